@@ -1,0 +1,125 @@
+"""What moves the base: sines whose amplitude and frequency change smoothly, and sampled records.
+
+Everything is packed into one table of segments that `sim.kernel` integrates without ever stepping across a
+segment's end. In a segment, with t counted from its start,
+
+    a_g(t) = P(t) sin(phi_0 + omega_0 t + kappa t^2 / 2) + p_0 + p_1 t,   P a cubic polynomial.
+
+A row is [duration, P_0, P_1, P_2, P_3, phi_0, omega_0, kappa, p_0, p_1].
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import tau
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.errors import InvalidInput
+
+ROW = 10
+"""Numbers in a row of a packed excitation."""
+
+
+class Excitation(Protocol):
+    """A base acceleration of finite duration."""
+
+    @property
+    def duration(self) -> float:
+        """Length [s]."""
+        ...
+
+    def packed(self) -> NDArray[np.float64]:
+        """The table of segments, shape (n, 10), as the module describes it."""
+        ...
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A sine whose amplitude [m/s2] goes along a cubic smoothstep and whose frequency [rad/s] goes linearly.
+
+    `amplitude` and `omega` are (start, end); equal ends make a dwell.
+    """
+
+    duration: float
+    amplitude: tuple[float, float]
+    omega: tuple[float, float]
+
+    @staticmethod
+    def dwell(duration: float, amplitude: float, omega: float) -> "Sweep":
+        """A steady sine."""
+        return Sweep(duration, (amplitude, amplitude), (omega, omega))
+
+    @property
+    def chirp_rate(self) -> float:
+        """kappa, change of the circular frequency per second [rad/s2]."""
+        return (self.omega[1] - self.omega[0]) / self.duration
+
+    def amplitude_at(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Amplitude at times since the sweep's start [m/s2]; held at the ends outside it."""
+        x = np.clip(t / self.duration, 0.0, 1.0)
+        return self.amplitude[0] + (self.amplitude[1] - self.amplitude[0]) * x * x * (3.0 - 2.0 * x)
+
+    def omega_at(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Circular frequency at times since the sweep's start [rad/s]; held at the ends outside it."""
+        x = np.clip(t / self.duration, 0.0, 1.0)
+        return self.omega[0] + (self.omega[1] - self.omega[0]) * x
+
+    def phase_at(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Phase gained since the sweep's start [rad], for times within it."""
+        return self.omega[0] * t + 0.5 * self.chirp_rate * t * t
+
+    def row(self, phase: float) -> list[float]:
+        """This sweep as a packed row, starting at `phase` [rad]."""
+        rise, length = self.amplitude[1] - self.amplitude[0], self.duration
+        polynomial = [self.amplitude[0], 0.0, 3.0 * rise / length**2, -2.0 * rise / length**3]
+        return [length, *polynomial, phase, self.omega[0], self.chirp_rate, 0.0, 0.0]
+
+
+class SineProgram:
+    """Sweeps one after the other with a continuous phase, starting at `phase` [rad]."""
+
+    def __init__(self, sweeps: Sequence[Sweep], phase: float = 0.0) -> None:
+        for sweep in sweeps:
+            if not sweep.duration > 0.0:
+                raise InvalidInput("duration of a sweep", sweep.duration, "it must be positive seconds")
+            if min(sweep.omega) <= 0.0:
+                raise InvalidInput("omega of a sweep", sweep.omega, "it must be positive rad/s")
+        self.sweeps = tuple(sweeps)
+        self.phase = phase
+
+    @property
+    def duration(self) -> float:
+        return sum(sweep.duration for sweep in self.sweeps)
+
+    def packed(self) -> NDArray[np.float64]:
+        rows: list[list[float]] = []
+        phase = self.phase
+        for sweep in self.sweeps:
+            rows.append(sweep.row(phase))
+            phase = (phase + float(sweep.phase_at(np.array(sweep.duration)))) % tau
+        return np.array(rows, dtype=np.float64).reshape(-1, ROW)
+
+
+class SampledRecord:
+    """Accelerations [m/s2] at a constant step [s], joined by straight lines: every sample is a breakpoint."""
+
+    def __init__(self, acceleration: NDArray[np.float64], dt: float) -> None:
+        if not dt > 0.0:
+            raise InvalidInput("dt of a record", dt, "it must be positive seconds")
+        if acceleration.ndim != 1 or acceleration.size < 2 or not np.isfinite(acceleration).all():
+            raise InvalidInput("record", acceleration.shape, "it must be at least two finite samples in one row")
+        self.acceleration = acceleration
+        self.dt = dt
+
+    @property
+    def duration(self) -> float:
+        return (self.acceleration.size - 1) * self.dt
+
+    def packed(self) -> NDArray[np.float64]:
+        rows = np.zeros((self.acceleration.size - 1, ROW))
+        rows[:, 0] = self.dt
+        rows[:, 8] = self.acceleration[:-1]
+        rows[:, 9] = np.diff(self.acceleration) / self.dt
+        return rows

@@ -1,0 +1,27 @@
+"""How a parameter is declared: once, with its unit, its limits and its meaning.
+
+From one declaration come the validation, the configuration file, the command-line flags,
+the documentation table and the metadata of the data file.
+"""
+
+from typing import Any, cast
+
+from pydantic import BaseModel, ConfigDict, Field
+from pydantic.fields import FieldInfo
+
+
+class Parameters(BaseModel):
+    """A frozen group of validated parameters in SI units; unknown names and non-finite numbers are refused."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+def quantity(default: Any, unit: str, description: str, **limits: Any) -> Any:
+    """Declare a field of `Parameters` with its SI `unit` ("1" for a pure number) and its `limits` (gt, ge, lt, le)."""
+    return Field(default, description=description, json_schema_extra={"unit": unit}, **limits)
+
+
+def unit_of(field: FieldInfo) -> str:
+    """The SI unit that `quantity` stored on a field; empty for texts, switches and nested groups."""
+    extra = cast(object, field.json_schema_extra)
+    return str(cast(dict[str, object], extra).get("unit", "")) if isinstance(extra, dict) else ""

@@ -1,0 +1,117 @@
+"""The specimen: a two-storey shear frame, a rocking block, and the spring between them.
+
+Symbols are those of the paper (Tables 1 to 3); its values are the defaults.
+"""
+
+from functools import cached_property
+from math import hypot, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.parameters import Parameters, quantity
+
+
+class Frame(Parameters):
+    """The two-storey shear frame (Tables 1 and 3)."""
+
+    h1: float = quantity(0.200, "m", "height of the first storey, where the spring acts", gt=0)
+    h2: float = quantity(0.496, "m", "height of the second storey", gt=0)
+    m1: float = quantity(1.062, "kg", "mass of the first storey", gt=0)
+    m2: float = quantity(1.062, "kg", "mass of the second storey", gt=0)
+    k1: float = quantity(213.44, "N/m", "stiffness of the first storey", gt=0)
+    k2: float = quantity(56.45, "N/m", "stiffness of the second storey", gt=0)
+    xi1: float = quantity(0.010, "1", "damping ratio of the first mode of the bare frame", ge=0, lt=1)
+    xi2: float = quantity(0.035, "1", "damping ratio of the second mode of the bare frame", ge=0, lt=1)
+
+    @cached_property
+    def natural_frequencies(self) -> tuple[float, float]:
+        """Undamped circular frequencies of the bare frame [rad/s], ascending (closed form of the 2x2 problem)."""
+        trace = (self.k1 + self.k2) / self.m1 + self.k2 / self.m2
+        product = self.k1 * self.k2 / (self.m1 * self.m2)
+        upper = 0.5 * (trace + sqrt(trace * trace - 4.0 * product))
+        return sqrt(product / upper), sqrt(upper)
+
+    @cached_property
+    def dashpots(self) -> tuple[float, float]:
+        """Dashpots (c1, c2) [N s/m] that give the modal damping ratios: phi_i' C phi_i = 2 xi_i omega_i.
+
+        The modes are mass-normalised; C = [[c1 + c2, -c2], [-c2, c2]], so each mode gives one linear equation
+        phi_1i^2 c1 + (phi_2i - phi_1i)^2 c2 = 2 xi_i omega_i.
+        """
+        rows: list[tuple[float, float]] = []
+        right: list[float] = []
+        for omega, xi in zip(self.natural_frequencies, (self.xi1, self.xi2), strict=True):
+            top = self.k2 / (self.k2 - omega * omega * self.m2)
+            norm = self.m1 + self.m2 * top * top
+            rows.append((1.0 / norm, (top - 1.0) ** 2 / norm))
+            right.append(2.0 * xi * omega)
+        c1, c2 = np.linalg.solve(np.array(rows), np.array(right))
+        return float(c1), float(c2)
+
+
+class Block(Parameters):
+    """The rigid rocking block (Table 2). It neither slides nor flies free."""
+
+    b: float = quantity(0.025, "m", "half width of the block", gt=0)
+    h_b: float = quantity(0.200, "m", "half height of the block", gt=0)
+    s: float = quantity(0.10, "m", "depth of the block, across the plane of motion", gt=0)
+    rho: float = quantity(2450.0, "kg/m3", "density of the block", gt=0)
+    restitution_factor: float = quantity(
+        1.0, "1", "measured over theoretical restitution r_exp/r_th (the paper measured 0.992)", ge=0
+    )
+
+    @property
+    def mass(self) -> float:
+        """M = rho 2b 2h_b s [kg]."""
+        return self.rho * 4.0 * self.b * self.h_b * self.s
+
+    @property
+    def slenderness(self) -> float:
+        """lambda = h_b / b."""
+        return self.h_b / self.b
+
+    @property
+    def inertia(self) -> float:
+        """J_A = J_B = 4/3 M (b^2 + h_b^2) about a base corner [kg m2]."""
+        return 4.0 / 3.0 * self.mass * hypot(self.b, self.h_b) ** 2
+
+    @property
+    def restitution(self) -> float:
+        """r = factor (J - 2b S_y) / J with S_y = M b: angular velocity after over before an impact (Housner)."""
+        return self.restitution_factor * (1.0 - 2.0 * self.b * self.mass * self.b / self.inertia)
+
+
+class Specimen(Parameters):
+    """Frame, block and spring. `beta = None` is the bare frame: no block, no spring."""
+
+    frame: Frame = Frame()
+    block: Block = Block()
+    beta: float | None = quantity(None, "1", "stiffness ratio k_C/k1 of the spring; absent for the bare frame", ge=0)
+    d: float = quantity(0.10, "m", "free length of the spring (not given in the paper)", gt=0)
+    g: float = quantity(9.81, "m/s2", "acceleration of gravity", gt=0)
+
+    @property
+    def k_c(self) -> float:
+        """Stiffness of the spring [N/m]; 0 for the bare frame."""
+        return (self.beta or 0.0) * self.frame.k1
+
+    @property
+    def uplift_acceleration(self) -> float:
+        """g / lambda [m/s2]: base acceleration that lifts the stand-alone block (Eq. 9)."""
+        return self.g / self.block.slenderness
+
+    def coupled(self, beta: float) -> "Specimen":
+        """The same specimen with a spring of stiffness ratio `beta`."""
+        return Specimen(frame=self.frame, block=self.block, beta=beta, d=self.d, g=self.g)
+
+    def bare(self) -> "Specimen":
+        """The same frame without block and spring."""
+        return Specimen(frame=self.frame, block=self.block, beta=None, d=self.d, g=self.g)
+
+    def packed(self) -> NDArray[np.float64]:
+        """The parameters as `sim.kernel` takes them, shape (16,): see `sim.kernel.equations` for the order."""
+        f, k, (c1, c2) = self.frame, self.block, self.frame.dashpots
+        frame = (f.m1, f.m2, f.k1, f.k2, c1, c2, f.h1, self.k_c, self.d)
+        block = (k.b, k.h_b, k.mass, k.inertia, k.restitution, self.g, 0.0 if self.beta is None else 1.0)
+        return np.array((*frame, *block))
