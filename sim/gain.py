@@ -1,0 +1,115 @@
+"""The gain coefficients alpha_1 and alpha_2 that the model predicts for a steady sine.
+
+alpha is a peak of the coupled frame over the same peak of the bare one (Eq. 10). Two steady motions can coexist, so a
+prediction has up to two layers; which one a test lands on is decided by its start.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.linear import steady_peaks
+from sim.rocking import Peaks
+from sim.specimen import Specimen
+from sim.steady import NoOrbit, Orbit, resting_state, rocking_branch, rocking_orbit
+
+
+@dataclass(frozen=True, eq=False)
+class Layer:
+    """One steady motion and its gain coefficients."""
+
+    orbit: Orbit
+    alpha_1: float
+    alpha_2: float
+
+    @property
+    def stable(self) -> bool:
+        """Whether a test can stay on it."""
+        return self.orbit.stable
+
+    @property
+    def multiplier(self) -> float:
+        """Greatest |Floquet multiplier|, per period of the drive."""
+        return self.orbit.multiplier
+
+
+@dataclass(frozen=True, eq=False)
+class GainPrediction:
+    """Gain coefficients at one frequency. A layer is None where its motion does not exist or was not found.
+
+    `omega` [rad/s]; `bare`: peaks of the frame without block, exact.
+    """
+
+    omega: float
+    beta: float
+    amplitude: float
+    bare: Peaks
+    rocking: Layer | None
+    resting: Layer | None
+
+    @property
+    def layers(self) -> dict[str, Layer]:
+        """The layers that exist, by name: "rocking", "resting"."""
+        named = {"rocking": self.rocking, "resting": self.resting}
+        return {name: layer for name, layer in named.items() if layer is not None}
+
+
+def predict_gain(
+    specimen: Specimen, omega: float, amplitude: float, bare_amplitude: float | None = None
+) -> GainPrediction:
+    """Gain coefficients under `amplitude` [m/s2] sin(`omega` [rad/s] t).
+
+    `bare_amplitude` [m/s2] is that of the test without block, when it was not the same.
+    Raises InvalidInput for a bare specimen or meaningless numbers. Source: Eq. (10).
+    """
+    resting = resting_state(specimen, omega, amplitude)
+    try:
+        rocking = rocking_orbit(specimen, omega, amplitude)
+    except NoOrbit:
+        rocking = None
+    return _prediction(specimen, omega, amplitude, bare_amplitude, rocking, resting)
+
+
+def gain_spectrum(
+    specimen: Specimen,
+    omegas: Sequence[float] | NDArray[np.float64],
+    amplitude: float,
+    bare_amplitude: float | None = None,
+) -> list[GainPrediction]:
+    """`predict_gain` at each of `omegas` [rad/s], cheaper: each orbit is predicted from its neighbours."""
+    places = [float(omega) for omega in omegas]
+    try:
+        branch = rocking_branch(specimen, places, amplitude)
+    except NoOrbit:
+        return [predict_gain(specimen, omega, amplitude, bare_amplitude) for omega in places]
+    return [
+        _prediction(specimen, omega, amplitude, bare_amplitude, orbit, resting_state(specimen, omega, amplitude))
+        for omega, orbit in zip(places, branch, strict=True)
+    ]
+
+
+def _prediction(
+    specimen: Specimen,
+    omega: float,
+    amplitude: float,
+    bare_amplitude: float | None,
+    rocking: Orbit | None,
+    resting: Orbit | None,
+) -> GainPrediction:
+    bare = steady_peaks(specimen, omega, amplitude if bare_amplitude is None else bare_amplitude)
+
+    def layer(orbit: Orbit | None) -> Layer | None:
+        if orbit is None:
+            return None
+        return Layer(orbit, alpha_1=orbit.peaks.u1 / bare.u1, alpha_2=orbit.peaks.drift / bare.drift)
+
+    return GainPrediction(
+        omega=omega,
+        beta=specimen.beta or 0.0,
+        amplitude=amplitude,
+        bare=bare,
+        rocking=layer(rocking),
+        resting=layer(resting),
+    )

@@ -1,0 +1,38 @@
+"""The one decorator that compiles the kernel, so that its rules are the same everywhere.
+
+Signatures are explicit: a function is compiled once, when its module is imported, and kept in numba's cache.
+`nogil` lets a thread pool run many simulations; division by zero gives inf, as in numpy, and is caught by the
+integrator's check of its state. There is no fastmath: it would make results depend on the processor and break
+the test for non-finite numbers.
+"""
+# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
+# numba publishes no types; `cast` below gives the decorated function its own type back.
+
+import hashlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+import numba
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def _cache_directory() -> str:
+    """A cache directory that changes with any source of the kernel.
+
+    numba looks only at the file of the function itself: a caller in another file would go on with the old callee.
+    """
+    here = Path(__file__).parent
+    sources = b"".join(path.read_bytes() for path in sorted(here.glob("*.py")))
+    return str(here / "__pycache__" / hashlib.sha256(sources).hexdigest()[:12])
+
+
+if not numba.config.CACHE_DIR:
+    numba.config.CACHE_DIR = _cache_directory()
+
+
+def compiled(signature: str) -> Callable[[F], F]:
+    """Compile a function for one numba `signature`, for example ``"float64(float64[::1])"``."""
+    decorator = numba.njit(signature, cache=True, nogil=True, error_model="numpy")
+    return cast(Callable[[F], F], decorator)

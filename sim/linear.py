@@ -1,0 +1,105 @@
+"""What is linear: modes of the bare frame and of the coupled system, and the exact steady response to a sine.
+
+Complex amplitudes: a base acceleration a_g = A sin(omega t) = Im(A exp(i omega t)) gives u = Im(U exp(i omega t)).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.errors import InvalidInput
+from sim.rocking import Peaks
+from sim.specimen import Frame, Specimen
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """Undamped modes of a linear system, ascending.
+
+    `omega`, shape (n,) [rad/s]: sign(lambda) sqrt|lambda| for the eigenvalues lambda of M^-1 K. A negative entry is not
+    a frequency but the rate of growth of a *divergent* mode: its stiffness is negative.
+    `shapes`, shape (n, n): column i is mode i, scaled to a unit u1 (or to a unit largest entry where u1 vanishes).
+    """
+
+    omega: NDArray[np.float64]
+    shapes: NDArray[np.float64]
+
+    @property
+    def divergent(self) -> NDArray[np.bool_]:
+        """Which modes grow instead of oscillating, shape (n,)."""
+        return self.omega < 0.0
+
+    @property
+    def hertz(self) -> NDArray[np.float64]:
+        """`omega` / (2 pi), shape (n,); negative where divergent."""
+        return self.omega / (2.0 * np.pi)
+
+
+def frame_matrices(frame: Frame) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Mass, damping and stiffness matrices of the bare frame over (u1, u2), each shape (2, 2)."""
+    c1, c2 = frame.dashpots
+    mass = np.diag([frame.m1, frame.m2])
+    damping = np.array([[c1 + c2, -c2], [-c2, c2]])
+    stiffness = np.array([[frame.k1 + frame.k2, -frame.k2], [-frame.k2, frame.k2]])
+    return mass, damping, stiffness
+
+
+def bare_modes(frame: Frame) -> Modes:
+    """The two modes of the frame without block; shapes over (u1, u2)."""
+    mass, _, stiffness = frame_matrices(frame)
+    return _modes(mass, stiffness)
+
+
+def coupled_modes(specimen: Specimen) -> Modes:
+    """The three modes of the linearised coupled system; shapes over (u1, u2, theta). Source: Eq. (12) to (14).
+
+    The first is divergent while h1^2 k_C k1 / (k1 + k_C) < h_b M g: gravity pushes the block over more than spring and
+    frame, one behind the other, hold it. With the paper's frame h1^2 k1 < h_b M g, so it is so for every k_C.
+    """
+    frame, block = specimen.frame, specimen.block
+    frame_mass, _, frame_stiffness = frame_matrices(frame)
+    mass, stiffness = np.zeros((3, 3)), np.zeros((3, 3))
+    mass[:2, :2], mass[2, 2] = frame_mass, block.inertia
+    stiffness[:2, :2] = frame_stiffness
+    spring = np.array([1.0, 0.0, frame.h1])
+    stiffness += specimen.k_c * np.outer(spring, spring)
+    stiffness[2, 2] -= block.h_b * block.mass * specimen.g
+    return _modes(mass, stiffness)
+
+
+def steady_response(
+    specimen: Specimen, omega: float, amplitude: float, *, resting: bool = False
+) -> tuple[complex, complex]:
+    """Complex amplitudes (U1, U2) [m] in the steady state under `amplitude` [m/s2] sin(`omega` [rad/s] t).
+
+    By default of the bare frame; with `resting`, of the frame whose spring is grounded on a block that never lifts.
+    Raises InvalidInput unless omega > 0 and the amplitude is finite.
+    """
+    if not (0.0 < omega < np.inf):
+        raise InvalidInput("omega", omega, "it must be positive rad/s")
+    if not np.isfinite(amplitude):
+        raise InvalidInput("amplitude", amplitude, "it must be a finite acceleration in m/s2")
+    mass, damping, stiffness = frame_matrices(specimen.frame)
+    dynamic = stiffness - omega * omega * mass + 1j * omega * damping
+    if resting:
+        dynamic[0, 0] += specimen.k_c
+    u1, u2 = np.linalg.solve(dynamic, -amplitude * np.diag(mass))
+    return complex(u1), complex(u2)
+
+
+def steady_peaks(specimen: Specimen, omega: float, amplitude: float, *, resting: bool = False) -> Peaks:
+    """Greatest |u1| and |u2 - u1| [m] of `steady_response`; theta is 0."""
+    u1, u2 = steady_response(specimen, omega, amplitude, resting=resting)
+    return Peaks(u1=abs(u1), drift=abs(u2 - u1), theta=0.0)
+
+
+def _modes(mass: NDArray[np.float64], stiffness: NDArray[np.float64]) -> Modes:
+    """Modes of a symmetric pair with diagonal mass, through the symmetric M^-1/2 K M^-1/2."""
+    root = np.sqrt(np.diag(mass))
+    values, vectors = np.linalg.eigh(stiffness / np.outer(root, root))
+    shapes = vectors / root[:, None]
+    largest = shapes[np.abs(shapes).argmax(axis=0), np.arange(values.size)]
+    first = shapes[0]
+    shapes = shapes / np.where(np.abs(first) > 1e-9 * np.abs(largest), first, largest)
+    return Modes(omega=np.sign(values) * np.sqrt(np.abs(values)), shapes=shapes)

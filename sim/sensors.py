@@ -1,0 +1,211 @@
+"""From motion to counts: lasers, accelerometer, displacement sensor, filter unit, converter.
+
+Each instrument is a group of parameters; `stream` starts it, and a stream is fed ticks in blocks of any size with
+the same samples as a result. Every stream draws from its own random generator, in order.
+"""
+
+from functools import lru_cache
+from math import floor
+from typing import Any, Literal
+
+import numpy as np
+from numpy.random import Generator, SeedSequence
+from numpy.typing import NDArray
+
+from sim.parameters import Parameters, quantity
+
+Array = NDArray[np.float64]
+
+
+class Laser(Parameters):
+    """A triangulation laser in the manner of the optoNCDT 1420, on its analogue output, at rest in mid range.
+
+    The current goes from 4 mA at the start to 20 mA at the end of the measuring range with 1 % of reserve on either
+    side (manual of the optoNCDT 1420 and of its family); the number of bits of the output and the error current
+    are not documented for certain and are therefore parameters.
+    """
+
+    measuring_range: float = quantity(0.200, "m", "measuring range; the storey rests in its middle", gt=0)
+    rate: float = quantity(4000.0, "1/s", "measurements per second of the laser's own clock", gt=0)
+    clock_error: float = quantity(20e-6, "1", "relative error of the laser's clock", gt=-0.01, lt=0.01)
+    latency: int = quantity(2, "1", "measurements between exposure and output", ge=0, le=100)
+    output_bits: int = quantity(12, "1", "bits of the analogue output over the measuring range", ge=8, le=24)
+    noise: float = quantity(5e-6, "m", "standard deviation of a measurement", ge=0)
+    linearity: float = quantity(
+        0.0008, "1", "amplitude of the smooth linearity error over the measuring range", ge=0, lt=0.1
+    )
+    linearity_waves: float = quantity(1.5, "1", "waves of the linearity error within the measuring range", ge=0)
+    scale_error: float = quantity(0.0, "1", "relative error of the sensitivity", gt=-0.5, lt=0.5)
+    load: float = quantity(500.0, "ohm", "resistor that turns the current into a voltage", gt=0)
+    error_current: float = quantity(0.0030, "A", "current when there is no valid measurement", ge=0)
+    reference: Literal["ground", "table"] = quantity(
+        "ground", "", "where the laser stands: on the ground it sees x + u, on the table it sees u"
+    )
+
+    @property
+    def nominal(self) -> tuple[float, float]:
+        """(m/V, m): displacement = volts * first + second, as the data sheet has it."""
+        slope = self.measuring_range / (0.016 * self.load)
+        return slope, -slope * 0.004 * self.load - 0.5 * self.measuring_range
+
+    @property
+    def valid_volts(self) -> tuple[float, float]:
+        """Voltages between which the output is a measurement: 3.8 to 20.2 mA, the reserve included."""
+        return 0.0038 * self.load, 0.0202 * self.load
+
+    def stream(self, sample_rate: float, seed: SeedSequence) -> "LaserStream":
+        """Start measuring, ticks coming at `sample_rate` [1/s]."""
+        return LaserStream(self, sample_rate, seed)
+
+
+class LaserStream:
+    """A laser at work: fed with what it sees at the ticks, it gives its output at the ticks."""
+
+    def __init__(self, laser: Laser, sample_rate: float, seed: SeedSequence) -> None:
+        from sim.kernel.laser import measure
+
+        self._measure = measure
+        self._noise = laser.noise
+        self._random = np.random.default_rng(seed)
+        self._phase = float(self._random.uniform())
+        wave_phase = float(self._random.uniform(0.0, 2.0 * np.pi))
+        self._constants = np.array(
+            [
+                laser.measuring_range,
+                1.0 + laser.scale_error,
+                laser.linearity,
+                laser.linearity_waves,
+                wave_phase,
+                2.0**laser.output_bits,
+                laser.load,
+                laser.error_current,
+            ]
+        )
+        self._per_tick = laser.rate * (1.0 + laser.clock_error) / sample_rate
+        self._tick_length = 1.0 / sample_rate
+        self._tick = 0
+        self._following = floor(-self._phase) - laser.latency
+        self._last = np.zeros(2)
+        self._shown = np.empty(laser.latency + 1)
+
+    def read(self, displacement: Array, velocity: Array) -> Array:
+        """Output [V] at each tick, shape (n,), for what is seen there: shape (n,) [m] and [m/s]."""
+        if self._tick == 0:
+            # what was shown before the first tick was measured on the same standing storey
+            self._last[0] = displacement[0]
+        newest = floor((self._tick + displacement.size - 1) * self._per_tick - self._phase)
+        noise = self._noise * self._random.standard_normal(newest + 1 - self._following)
+        volts = np.empty(displacement.size)
+        self._following = self._measure(
+            self._tick,
+            self._following,
+            self._per_tick,
+            self._phase,
+            self._tick_length,
+            self._constants,
+            noise,
+            displacement,
+            velocity,
+            self._last,
+            self._shown,
+            volts,
+        )
+        self._tick += displacement.size
+        return volts
+
+
+class LinearSensor(Parameters):
+    """A sensor with a proportional voltage output."""
+
+    sensitivity: float
+    noise_density: float
+    scale_error: float = quantity(0.0, "1", "relative error of the sensitivity", gt=-0.5, lt=0.5)
+
+    @property
+    def nominal(self) -> tuple[float, float]:
+        """(unit/V, unit): value = volts * first + second, as the calibration has it."""
+        return 1.0 / self.sensitivity, 0.0
+
+    def volts(self, value: Array, sample_rate: float, random: Generator) -> Array:
+        """Output [V] for values in the sensor's unit, same shape; the noise is white up to half the sample rate."""
+        noise = self.noise_density * (0.5 * sample_rate) ** 0.5 * random.standard_normal(value.size)
+        return self.sensitivity * (1.0 + self.scale_error) * (value + noise)
+
+
+class Accelerometer(LinearSensor):
+    """A servo or MEMS accelerometer on the table, good down to zero frequency."""
+
+    sensitivity: float = quantity(1.0, "V s2/m", "volts per m/s2 as calibrated", gt=0)
+    noise_density: float = quantity(2e-4, "m/s2/Hz^0.5", "spectral density of the white noise", ge=0)
+
+
+class DisplacementSensor(LinearSensor):
+    """A displacement transducer between the table and the ground."""
+
+    sensitivity: float = quantity(100.0, "V/m", "volts per metre as calibrated", gt=0)
+    noise_density: float = quantity(5e-7, "m/Hz^0.5", "spectral density of the white noise", ge=0)
+
+
+@lru_cache
+def _sections(order: int, share: float) -> tuple[Array, Array]:
+    """Second-order sections of the low-pass with cutoff `share` of the sample rate, and their settled state."""
+    from scipy import signal
+
+    sections: Any = signal.butter(order, share, fs=1.0, output="sos")
+    settled: Any = signal.sosfilt_zi(sections)
+    return sections, settled
+
+
+class FilterUnit(Parameters):
+    """The analogue low-pass before the converter: the same Butterworth card in every channel.
+
+    Simulated by the bilinear transform at the sample rate with the cutoff kept in place.
+    """
+
+    order: int = quantity(4, "1", "order of the Butterworth low-pass", ge=1, le=10)
+    cutoff: float = quantity(100.0, "Hz", "frequency at which the gain is -3 dB", gt=0)
+
+    def stream(self, sample_rate: float) -> "FilterStream":
+        """Start filtering channels sampled at `sample_rate` [1/s]."""
+        return FilterStream(*_sections(self.order, self.cutoff / sample_rate))
+
+
+class FilterStream:
+    """The filter cards at work; they have been on long before the first sample."""
+
+    def __init__(self, sections: Array, settled: Array) -> None:
+        self._sections = sections
+        self._settled = settled
+        self._state: Array | None = None
+
+    def read(self, volts: Array) -> Array:
+        """Filtered voltages, shape (n_channels, n) as given."""
+        from scipy import signal
+
+        if self._state is None:
+            self._state = self._settled[:, None, :] * volts[None, :, :1]
+        filtered, self._state = signal.sosfilt(self._sections, volts, axis=1, zi=self._state)
+        return np.asarray(filtered)
+
+
+class Converter(Parameters):
+    """The analogue-to-digital converter; beyond its range it stays at its last code."""
+
+    bits: int = quantity(14, "1", "resolution", ge=8, le=16)
+    range: float = quantity(10.0, "V", "largest magnitude of the input", gt=0)
+    noise: float = quantity(0.0004, "V", "standard deviation of the input noise of a sample", ge=0)
+
+    @property
+    def lsb(self) -> float:
+        """Volts per count."""
+        return 2.0 * self.range / 2**self.bits
+
+    @property
+    def codes(self) -> tuple[int, int]:
+        """Lowest and highest count."""
+        return -(2 ** (self.bits - 1)), 2 ** (self.bits - 1) - 1
+
+    def counts(self, volts: Array, random: Generator) -> NDArray[np.int16]:
+        """Counts of the voltages of all channels, shape (n, n_channels) as given."""
+        noisy = volts + self.noise * random.standard_normal(volts.shape)
+        return np.clip(np.rint(noisy / self.lsb), *self.codes).astype(np.int16)

@@ -1,0 +1,87 @@
+"""The long-stroke electrodynamic shaker: moving mass on a soft suspension, moving coil, power amplifier.
+
+    m x'' = Bl i - k_s x - c_s v - F_c tanh(v / v_c) - end stops + force noise - reaction of the specimen
+
+The amplifier either holds the coil voltage e, so that i = (e - Bl v) / R and the back-EMF makes the table nearly a
+velocity source, or it holds the current i, which makes it a force source. The coil's inductance is neglected: it
+matters above some hundred hertz only. Orders of magnitude follow the data sheets of long-stroke shakers such as
+the APS 400 and 420 (445 to 900 N, 0.15 m stroke, 1 m/s).
+"""
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.parameters import Parameters, quantity
+
+
+class Shaker(Parameters):
+    """An electrodynamic shaker with its table and its power amplifier."""
+
+    moving_mass: float = quantity(50.0, "kg", "moving mass: armature, table and fixtures, without the specimen", gt=0)
+    k_s: float = quantity(500.0, "N/m", "stiffness of the suspension", ge=0)
+    c_s: float = quantity(30.0, "N s/m", "viscous damping of the suspension and guides", ge=0)
+    bl: float = quantity(50.0, "N/A", "force constant Bl of the moving coil", gt=0)
+    resistance: float = quantity(0.8, "ohm", "resistance of the coil", gt=0)
+    amplifier: Literal["voltage", "current"] = quantity(
+        "voltage", "", "what the amplifier holds: coil voltage or current"
+    )
+    gain: float = quantity(
+        3.0, "1", "coil volts (voltage amplifier) or coil amperes (current amplifier) per volt of drive", gt=0
+    )
+    amplifier_lag: float = quantity(0.0, "s", "time constant of a first-order lag of the amplifier; 0 for none", ge=0)
+    voltage_limit: float = quantity(30.0, "V", "largest coil voltage the amplifier can give", gt=0)
+    current_limit: float = quantity(18.0, "A", "largest coil current the amplifier can give", gt=0)
+    drive_range: float = quantity(10.0, "V", "largest magnitude of the drive at the amplifier's input", gt=0)
+    friction: float = quantity(1.5, "N", "Coulomb friction F_c of the guides", ge=0)
+    friction_velocity: float = quantity(0.004, "m/s", "velocity v_c over which the friction turns round", gt=0)
+    half_stroke: float = quantity(0.075, "m", "displacement from mid stroke at which the end stops touch", gt=0)
+    stop_stiffness: float = quantity(4.0e5, "N/m", "stiffness of an end stop", gt=0)
+    stop_damping: float = quantity(
+        2.0, "s/m", "Hunt-Crossley damping of an end stop: its force grows by this share per m/s of approach", ge=0
+    )
+    force_noise: float = quantity(0.005, "N/Hz^0.5", "spectral density of the white force noise on the table", ge=0)
+    band_low: float = quantity(1.0, "Hz", "lower end of the usable band", gt=0)
+    band_high: float = quantity(100.0, "Hz", "upper end of the usable band", gt=0)
+
+    @property
+    def electric_damping(self) -> float:
+        """Damping by the back-EMF [N s/m]: Bl^2/R under a voltage amplifier, none under a current amplifier."""
+        return self.bl**2 / self.resistance if self.amplifier == "voltage" else 0.0
+
+    @property
+    def force_per_volt(self) -> float:
+        """Force on the blocked table per volt of drive [N/V]."""
+        return self.gain * self.bl / (self.resistance if self.amplifier == "voltage" else 1.0)
+
+    @property
+    def shortest_time(self) -> float:
+        """Shortest time constant of the shaker itself [s]: amplifier lag, damped motion, or swing on an end stop."""
+        motion = self.moving_mass / max(self.c_s + self.electric_damping, 1e-9)
+        swing = (self.moving_mass / self.stop_stiffness) ** 0.5
+        return min(motion, swing, self.amplifier_lag or motion)
+
+    def frequency_response(self, omega: NDArray[np.float64] | float, payload: float = 0.0) -> NDArray[np.complex128]:
+        """Table acceleration per drive [m/s2/V] at `omega` [rad/s], with a rigid `payload` [kg] bolted on.
+
+        Linear: no friction, no saturation, no end stops. Convention exp(+i omega t).
+        """
+        s = 1j * np.asarray(omega, dtype=np.float64)
+        impedance = (self.moving_mass + payload) * s * s + (self.c_s + self.electric_damping) * s + self.k_s
+        return np.asarray(self.force_per_volt * s * s / (impedance * (1.0 + self.amplifier_lag * s)), np.complex128)
+
+    def maximum_acceleration(self, omega: float, payload: float = 0.0) -> float:
+        """Largest sine acceleration [m/s2] at `omega` [rad/s] that stroke, velocity and force allow.
+
+        The least of omega^2 X, omega V and F/m with the no-load velocity V = voltage_limit / Bl and the peak force
+        F = Bl current_limit; friction and suspension are not counted.
+        """
+        by_stroke = omega**2 * self.half_stroke
+        by_velocity = omega * self.voltage_limit / self.bl
+        by_force = self.bl * self.current_limit / (self.moving_mass + payload)
+        return min(by_stroke, by_velocity, by_force)
+
+    def drive_for(self, acceleration: float, omega: float, payload: float = 0.0) -> float:
+        """Drive amplitude [V] of a sine of `acceleration` [m/s2] at `omega` [rad/s] by the linear response."""
+        return acceleration / float(np.abs(self.frequency_response(omega, payload)))

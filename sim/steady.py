@@ -1,0 +1,210 @@
+"""The steady response to a sine, solved for instead of waited for.
+
+Two periodic motions exist: the block rocks with two impacts per period of the drive, or it never lifts. They can
+coexist. The rocking one is a fixed point of the return map of the section "just after the impact into theta > 0";
+the full period is taken, because the spring sits on one side and the model is not symmetric in theta.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from math import isfinite, tau
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.errors import InvalidInput, RockbenchError
+from sim.excitation import SineProgram, Sweep
+from sim.linear import frame_matrices, steady_peaks, steady_response
+from sim.return_map import Solution, follow, newton
+from sim.rocking import Peaks, State, simulate
+from sim.specimen import Specimen
+
+SEED_SPECIMEN, SEED_OMEGA, SEED_AMPLITUDE = Specimen(beta=0.4), 16.0, 1.238512
+"""Where an orbit is known; from here it is followed to wherever it is asked for."""
+
+SEED_SECTION = (3.11068, -0.0010828, 0.00037455, 0.049398, -0.11073, 0.67994)
+"""The orbit there, to five digits, as a start for Newton: [phase, u1, u2, v1, v2, omega] on the section."""
+
+
+class NoOrbit(RockbenchError):
+    """No periodic rocking motion was found."""
+
+
+@dataclass(frozen=True, eq=False)
+class Orbit:
+    """One steady motion with the period of the drive.
+
+    `phase` [rad] of the base's sine and `start`: a point of the orbit. `peaks` over the period; `impacts` in it.
+    `multipliers`: Floquet multipliers, complex, shape (6,) when rocking, (4,) when the block rests.
+    """
+
+    specimen: Specimen
+    omega: float
+    amplitude: float
+    layer: Literal["rocking", "resting"]
+    phase: float
+    start: State
+    peaks: Peaks
+    impacts: int
+    multipliers: NDArray[np.complex128]
+
+    @property
+    def period(self) -> float:
+        """2 pi / omega [s]."""
+        return tau / self.omega
+
+    @cached_property
+    def multiplier(self) -> float:
+        """Greatest |Floquet multiplier|: what is left of a disturbance after one period."""
+        return float(np.abs(self.multipliers).max())
+
+    @property
+    def stable(self) -> bool:
+        """Whether small disturbances die out."""
+        return self.multiplier < 1.0
+
+    def samples(self, n: int) -> NDArray[np.float64]:
+        """One period at `n` equal steps, shape (n, 4): phase of the base's sine [rad] from 0, u1, u2 [m], theta [rad].
+
+        Raises InvalidInput for n < 1.
+        """
+        if n < 1:
+            raise InvalidInput("n", n, "at least one sample of the period")
+        phases = np.arange(n) * (tau / n)
+        # start at the known point and wait for the base's sine to begin anew
+        wait = -self.phase % tau
+        drive = SineProgram([Sweep.dwell(2.0 * self.period, self.amplitude, self.omega)], phase=self.phase)
+        motion = simulate(self.specimen, drive, state=self.start, sample_times=(wait + phases) / self.omega)
+        if motion.samples is None or len(motion.samples) < n:
+            raise NoOrbit(f"the orbit at omega = {self.omega:g} rad/s is too unstable to be drawn over one period")
+        table = np.empty((n, 4))
+        table[:, 0], table[:, 1:] = phases, motion.samples[:, [0, 1, 4]]
+        return table
+
+
+def rocking_orbit(specimen: Specimen, omega: float, amplitude: float, guess: Orbit | None = None) -> Orbit:
+    """The rocking motion of period 2 pi / `omega` [rad/s] under `amplitude` [m/s2] sin(omega t).
+
+    It is followed from `guess`, or from a known orbit, through every parameter at once in steps that adapt.
+    Raises InvalidInput for a bare frame or meaningless numbers, NoOrbit when it cannot be followed to the end.
+    """
+    _check(specimen, omega, amplitude)
+    if guess is not None and guess.layer == "rocking":
+        origin = _parameters(guess.specimen, guess.omega, guess.amplitude)
+        x = guess.start.as_array()
+        section = np.array([guess.phase, *x[:4], x[5]])
+    else:
+        origin = _parameters(SEED_SPECIMEN, SEED_OMEGA, SEED_AMPLITUDE)
+        section = np.array(SEED_SECTION)
+    target = _parameters(specimen, omega, amplitude)
+    solution = follow(origin, section, target)
+    if solution is None:
+        raise NoOrbit(
+            f"no rocking orbit found at omega = {omega:g} rad/s, beta = {specimen.beta:g}, amplitude = "
+            f"{amplitude:g} m/s2: give a closer guess, or values nearer to ones that have an orbit"
+        )
+    return _orbit(specimen, omega, amplitude, solution)
+
+
+def rocking_branch(specimen: Specimen, omegas: Sequence[float] | NDArray[np.float64], amplitude: float) -> list[Orbit]:
+    """`rocking_orbit` at each of `omegas`, in their order: each is predicted from up to three before it.
+
+    Raises as `rocking_orbit` does.
+    """
+    orbits: list[Orbit] = []
+    known: list[tuple[float, NDArray[np.float64]]] = []
+    for omega in (float(value) for value in omegas):
+        solution = None
+        if len(known) > 1 and all(omega != place for place, _ in known):
+            _check(specimen, omega, amplitude)
+            solution = newton(_parameters(specimen, omega, amplitude), _extrapolated(known, omega))
+        if solution is None:
+            orbit = rocking_orbit(specimen, omega, amplitude, orbits[-1] if orbits else None)
+        else:
+            orbit = _orbit(specimen, omega, amplitude, solution)
+        orbits.append(orbit)
+        x = orbit.start.as_array()
+        if all(omega != place for place, _ in known):
+            known = [*known[-2:], (omega, np.array([orbit.phase, *x[:4], x[5]]))]
+    return orbits
+
+
+def resting_state(specimen: Specimen, omega: float, amplitude: float) -> Orbit | None:
+    """The steady motion in which the block never lifts, in closed form; None where it does not exist.
+
+    It exists if and only if |h_b M A - k_C h1 U1| < b g M with U1 the complex amplitude of the frame with the spring
+    grounded (Eq. 9 and A.3 over a whole period). Always stable. Raises InvalidInput as `rocking_orbit` does.
+    """
+    _check(specimen, omega, amplitude)
+    frame = specimen.frame
+    if not amplitude < resting_level(specimen, omega):
+        return None
+    u1, u2 = steady_response(specimen, omega, amplitude, resting=True)
+    mass, damping, stiffness = frame_matrices(frame)
+    stiffness[0, 0] += specimen.k_c
+    first_order = np.zeros((4, 4))
+    first_order[:2, 2:] = np.eye(2)
+    first_order[2:, :2] = -np.linalg.solve(mass, stiffness)
+    first_order[2:, 2:] = -np.linalg.solve(mass, damping)
+    return Orbit(
+        specimen=specimen,
+        omega=omega,
+        amplitude=amplitude,
+        layer="resting",
+        phase=0.0,
+        start=State(u1=u1.imag, u2=u2.imag, v1=omega * u1.real, v2=omega * u2.real),
+        peaks=steady_peaks(specimen, omega, amplitude, resting=True),
+        impacts=0,
+        multipliers=np.exp(np.linalg.eigvals(first_order) * (tau / omega)).astype(np.complex128),
+    )
+
+
+def resting_level(specimen: Specimen, omega: float) -> float:
+    """Amplitude of the base's sine [m/s2] at which a block that rests in the steady state would begin to lift.
+
+    The moment about a corner, h_b M A - k_C h1 U1, is linear in the amplitude A (Eq. 9 and A.3).
+    """
+    _check(specimen, omega, 1.0)
+    frame, block = specimen.frame, specimen.block
+    u1, _ = steady_response(specimen, omega, 1.0, resting=True)
+    moment = abs(block.h_b * block.mass - specimen.k_c * frame.h1 * u1)
+    return block.b * specimen.g * block.mass / moment
+
+
+def _check(specimen: Specimen, omega: float, amplitude: float) -> None:
+    if specimen.beta is None:
+        raise InvalidInput("specimen", "bare frame", "a rocking or resting block needs beta, 0 or more")
+    if not (isfinite(omega) and omega > 0.0):
+        raise InvalidInput("omega", omega, "it must be positive rad/s")
+    if not (isfinite(amplitude) and amplitude > 0.0):
+        raise InvalidInput("amplitude", amplitude, "it must be a positive acceleration in m/s2")
+
+
+def _parameters(specimen: Specimen, omega: float, amplitude: float) -> NDArray[np.float64]:
+    return np.append(specimen.packed(), [omega, amplitude])
+
+
+def _extrapolated(known: list[tuple[float, NDArray[np.float64]]], omega: float) -> NDArray[np.float64]:
+    """The polynomial through the known sections (Lagrange), at `omega`."""
+    total = np.zeros(6)
+    for i, (place, section) in enumerate(known):
+        others = [other for j, (other, _) in enumerate(known) if j != i]
+        total += section * np.prod([(omega - other) / (place - other) for other in others])
+    return total
+
+
+def _orbit(specimen: Specimen, omega: float, amplitude: float, solution: Solution) -> Orbit:
+    phase, u1, u2, v1, v2, velocity = (float(value) for value in solution.section)
+    return Orbit(
+        specimen=specimen,
+        omega=omega,
+        amplitude=amplitude,
+        layer="rocking",
+        phase=phase,
+        start=State(u1=u1, u2=u2, v1=v1, v2=v2, theta=0.0, omega=velocity),
+        peaks=Peaks(*solution.peaks),
+        impacts=2,
+        multipliers=np.linalg.eigvals(solution.jacobian).astype(np.complex128),
+    )
