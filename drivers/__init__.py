@@ -1,0 +1,1 @@
+"""The instruments: one interface (`drivers.rig`) and every backend behind it."""

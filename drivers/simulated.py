@@ -1,0 +1,207 @@
+"""The simulated rig: the virtual bench behind the interface of the hardware."""
+
+from collections import deque
+from enum import Enum
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.clock import Clock, VirtualClock
+from drivers.rig import Block, Channel, DriveUnderflow, Handwork, RigError
+from sim.errors import InvalidInput
+from sim.specimen import Specimen
+from sim.virtual_bench import VirtualBench, VirtualBenchParameters
+
+_STILL_VELOCITY = 2.0e-4
+"""Velocity of table and storeys [m/s] below which the bench counts as at rest."""
+_STILL_DISPLACEMENT = 2.0e-4
+"""Displacement of the table from mid stroke [m] below which it counts as at rest."""
+_LONGEST_WAIT = 300.0
+"""Longest wait for that [s]; a block that hangs in its catch or a tilted table is not waited for."""
+_WARM_UP = 0.5
+"""How long filters and lasers have watched the bench at rest before the sample clock starts [s]."""
+
+
+class _State(Enum):
+    STOPPED = "not armed"
+    ARMED = "armed"
+    CLOSED = "closed"
+
+
+class SimulatedRig:
+    """A rig whose bench is computed. Under a `VirtualClock` it is as fast as the machine allows; under a
+    `WallClock` a block is handed out when it would have been measured.
+
+    `lead` is the number of drive samples that must be waiting, 50 ms unless told. Between two arms as much time
+    passes as a person waits: the bench coasts at zero drive until it is at rest.
+    """
+
+    def __init__(
+        self,
+        parameters: VirtualBenchParameters,
+        specimen: Specimen,
+        *,
+        seed: int,
+        clock: Clock | None = None,
+        lead: int | None = None,
+    ) -> None:
+        if lead is not None and lead < 0:
+            raise InvalidInput("lead", lead, "it must be a number of samples, 0 or more")
+        self.bench = VirtualBench(parameters, specimen, seed)
+        self._clock = clock if clock is not None else VirtualClock()
+        self._lead = round(0.05 * parameters.sample_rate) if lead is None else lead
+        self._seed = seed
+        self._state = _State.STOPPED
+        self._moved = False
+        self._queue: deque[NDArray[np.float64]] = deque()
+        self._waiting = 0
+        self._index = 0
+        self._started = 0.0
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        return tuple(
+            Channel(c.name, c.quantity, c.unit, c.scale, c.offset, c.valid, c.device) for c in self.bench.channels
+        )
+
+    @property
+    def sample_rate(self) -> float:
+        return self.bench.parameters.sample_rate
+
+    @property
+    def drive_range(self) -> float:
+        return self.bench.parameters.shaker.drive_range
+
+    @property
+    def lead(self) -> int:
+        return self._lead
+
+    @property
+    def clock(self) -> Clock:
+        return self._clock
+
+    @property
+    def description(self) -> dict[str, str]:
+        p = self.bench.parameters
+        return {
+            "backend": "simulated",
+            "seed": str(self._seed),
+            "shaker": f"simulated, {p.shaker.moving_mass:g} kg, {p.shaker.amplifier} amplifier",
+            "converter": f"simulated, {p.converter.bits} bit, +-{p.converter.range:g} V",
+            "filter_unit": f"simulated, Butterworth order {p.filter_unit.order}, {p.filter_unit.cutoff:g} Hz",
+            **{channel.name: channel.device for channel in self.bench.channels},
+        }
+
+    def arm(self) -> None:
+        if self._state is not _State.STOPPED:
+            raise RigError(f"arm is refused: the rig is {self._state.value}; stop it first, or open a new one")
+        self._come_to_rest()
+        self.bench.run(np.zeros(round(_WARM_UP * self.sample_rate)))
+        self._drop_queue()
+        self._index = 0
+        self._started = self._clock.now()
+        self._moved = True
+        self._state = _State.ARMED
+
+    def write(self, volts: NDArray[np.float64]) -> None:
+        self._require_armed("write")
+        samples = np.array(volts, dtype=np.float64)
+        if samples.ndim != 1:
+            self._refuse(f"a drive of shape {samples.shape} is refused: it must be one row of samples")
+        if samples.size == 0:
+            return
+        if not np.isfinite(samples).all():
+            self._refuse("a drive with samples that are not finite is refused: the output is at zero")
+        if (peak := float(np.abs(samples).max())) > self.drive_range:
+            self._refuse(f"a drive of {peak:.6g} V is refused: the range is +-{self.drive_range:g} V")
+        self._queue.append(samples)
+        self._waiting += samples.size
+
+    def read(self, n: int) -> Block:
+        self._require_armed("read")
+        if n < 1:
+            raise InvalidInput("samples to read", n, "it must be at least 1")
+        if self._waiting < n + self._lead:
+            waiting, needed = self._waiting, n + self._lead
+            self.stop()
+            raise DriveUnderflow(
+                f"the drive ran out at sample {self._index}: {waiting} samples were waiting and {needed} are needed;"
+                " the output is at zero, write earlier or read less at once"
+            )
+        first = self._index
+        counts = self.bench.run(self._next_samples(n))
+        self._index += n
+        self._clock.wait_until(self._started + self._index / self.sample_rate)
+        return Block(first, counts)
+
+    def stop(self) -> None:
+        if self._state is _State.ARMED:
+            self._state = _State.STOPPED
+        self._drop_queue()
+
+    def halt(self) -> None:
+        # the enable line and the output are one thing here: what follows is zero drive
+        self.stop()
+
+    def close(self) -> None:
+        self.stop()
+        self._state = _State.CLOSED
+
+    def handwork(self, work: Handwork, beta: float | None = None) -> None:
+        if self._state is not _State.STOPPED:
+            raise RigError(f"{work.value} is refused: the rig is {self._state.value}; hands belong on a stopped rig")
+        specimen = self.bench.specimen
+        if work is Handwork.MOUNT_SPRING:
+            if beta is None:
+                raise InvalidInput("beta", beta, "mounting a spring needs its stiffness ratio")
+            specimen = specimen.coupled(beta)
+        elif work is Handwork.REMOVE_BLOCK:
+            specimen = specimen.bare()
+        elif specimen.beta is None:
+            raise RigError("stand block up is refused: there is no block on the table; mount a spring and block first")
+        self._come_to_rest()
+        self.bench.mount(specimen)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _require_armed(self, what: str) -> None:
+        if self._state is not _State.ARMED:
+            raise RigError(f"{what} is refused: the rig is {self._state.value}; arm it first")
+
+    def _refuse(self, why: str) -> None:
+        self.stop()
+        raise RigError(why)
+
+    def _next_samples(self, n: int) -> NDArray[np.float64]:
+        """Take `n` samples from the queue."""
+        taken: list[NDArray[np.float64]] = []
+        missing = n
+        while missing:
+            head = self._queue.popleft()
+            if head.size > missing:
+                self._queue.appendleft(head[missing:])
+                head = head[:missing]
+            taken.append(head)
+            missing -= head.size
+        self._waiting -= n
+        return np.concatenate(taken)
+
+    def _drop_queue(self) -> None:
+        self._queue.clear()
+        self._waiting = 0
+
+    def _come_to_rest(self) -> None:
+        """Let time pass at zero drive until nothing moves to speak of."""
+        waited = 0.0
+        while self._moved and waited < _LONGEST_WAIT:
+            self.bench.coast(1.0)
+            waited += 1.0
+            truth = self.bench.truth
+            velocity = max(float(np.abs(v).max()) for v in (truth.v, truth.v1, truth.v2))
+            self._moved = velocity > _STILL_VELOCITY or abs(float(truth.x[-1])) > _STILL_DISPLACEMENT
+        self._moved = False

@@ -1,0 +1,184 @@
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from drivers.clock import VirtualClock, WallClock
+from drivers.rig import DriveUnderflow, Handwork, Rig, RigError
+from drivers.simulated import SimulatedRig
+from sim.errors import InvalidInput
+from sim.sensors import Laser
+from sim.specimen import Specimen
+from sim.virtual_bench import VirtualBenchParameters
+from tests.drivers.conformance import RigConformance, RigFactory, play, started
+
+COUPLED = Specimen(beta=0.64)
+
+
+def simulated(specimen: Specimen | None = None, seed: int = 1, **parts: object) -> SimulatedRig:
+    return SimulatedRig(VirtualBenchParameters.model_validate(parts), specimen or Specimen(), seed=seed)
+
+
+class TestSimulated(RigConformance):
+    @pytest.fixture
+    def make_rig(self) -> Iterator[RigFactory]:
+        rigs: list[Rig] = []
+
+        def make() -> Rig:
+            rigs.append(simulated(sample_rate=1000.0))
+            return rigs[-1]
+
+        yield make
+        for rig in rigs:
+            rig.close()
+
+
+def measured(rig: SimulatedRig, volts: NDArray[np.float64], name: str) -> NDArray[np.float64]:
+    """A channel in its unit while `volts` are written; the lead was written before."""
+    column = [channel.name for channel in rig.channels].index(name)
+    counts = np.concatenate([block.counts for block in play(rig, volts)])
+    return rig.channels[column].to_unit(counts[:, column])
+
+
+def toppled(rig: SimulatedRig) -> SimulatedRig:
+    """The rig stopped, its block in the catch."""
+    started(rig)
+    play(rig, 8.0 * np.sin(9.0 * np.arange(8000) / rig.sample_rate))
+    rig.stop()
+    return rig
+
+
+def test_drive_sample_i_acts_after_input_sample_i() -> None:
+    """Truth, no filter between: the table is at rest up to and with the sample of the step."""
+    rig = SimulatedRig(VirtualBenchParameters(), Specimen(), seed=1, lead=0)
+    rig.arm()
+    volts = np.zeros(300)
+    volts[200:] = 1.0
+    rig.write(volts)
+    rig.read(300)
+    velocity = rig.bench.truth.v
+    # 3 V on 0.8 ohm and 50 N/A push 50 kg: 3.75 m/s2 for the first half millisecond
+    assert abs(velocity[200]) < 1e-4
+    assert velocity[201] == pytest.approx(3.75 / 2000.0, rel=0.1)
+
+
+def test_both_ends_of_the_drive_range_are_allowed() -> None:
+    rig = started(simulated())
+    rig.write(np.array([10.0, -10.0]))
+    assert len(rig.read(2)) == 2
+
+
+def test_the_lead_is_fifty_milliseconds_unless_told() -> None:
+    assert simulated().lead == 100
+    assert SimulatedRig(VirtualBenchParameters(), Specimen(), seed=1, lead=7).lead == 7
+    with pytest.raises(InvalidInput, match="lead"):
+        SimulatedRig(VirtualBenchParameters(), Specimen(), seed=1, lead=-1)
+
+
+def test_a_refused_drive_ends_the_run() -> None:
+    rig = started(simulated(), 500)
+    with pytest.raises(RigError, match="11"):
+        rig.write(np.full(3, 11.0))
+    with pytest.raises(RigError, match="not armed"):
+        rig.read(1)
+
+
+def test_underflow_says_what_was_missing() -> None:
+    rig = started(simulated(), 20)
+    rig.read(20)
+    with pytest.raises(DriveUnderflow, match="sample 20: 100 samples were waiting and 105 are needed"):
+        rig.read(5)
+
+
+def test_reading_nothing_is_refused() -> None:
+    with pytest.raises(InvalidInput, match="samples to read"):
+        started(simulated(), 20).read(0)
+
+
+def test_the_bench_is_at_rest_when_it_is_armed_again() -> None:
+    rig = started(simulated())
+    swinging = measured(rig, 0.6 * np.sin(6.3 * np.arange(6000) / 2000.0), "laser_2")
+    rig.stop()
+    still = measured(started(rig), np.zeros(4000), "laser_2")
+    assert np.ptp(swinging) > 0.02
+    # a storey still to 0.2 mm/s moves less than 0.05 mm; the laser steps by 0.05 mm
+    assert np.ptp(still) < 4e-4
+    assert abs(still.mean()) < 1e-3
+
+
+@pytest.mark.parametrize("end", ["stop", "halt"])
+def test_the_output_is_at_zero_at_once_after_an_end(end: str) -> None:
+    """The coil brakes the table: its velocity dies away with the time constant m R / Bl^2 = 16 ms."""
+    rig = started(simulated())
+    play(rig, np.full(400, 1.0))
+    rig.write(np.full(1000, 1.0))
+    getattr(rig, end)()
+    before = rig.bench.truth.v[-1]
+    rig.bench.coast(0.1)
+    assert before > 0.05
+    assert abs(rig.bench.truth.v[-1]) < 0.06 * before
+
+
+def test_a_toppled_block_shows_in_laser_1_until_it_is_stood_up() -> None:
+    rig = toppled(simulated(COUPLED, laser_1=Laser(reference="table")))
+    fallen = measured(started(rig), np.zeros(400), "laser_1").mean()
+    rig.stop()
+    rig.handwork(Handwork.STAND_BLOCK_UP)
+    upright = measured(started(rig), np.zeros(400), "laser_1").mean()
+    assert abs(fallen) > 0.01
+    assert abs(upright) < 1e-3
+
+
+def test_removing_the_block_leaves_the_bare_frame_and_mounting_a_spring_couples_it() -> None:
+    rig = simulated(COUPLED)
+    rig.handwork(Handwork.REMOVE_BLOCK)
+    assert rig.bench.specimen == Specimen()
+    with pytest.raises(RigError, match="no block"):
+        rig.handwork(Handwork.STAND_BLOCK_UP)
+    rig.handwork(Handwork.MOUNT_SPRING, 0.25)
+    assert rig.bench.specimen == Specimen(beta=0.25)
+
+
+def test_mounting_a_spring_needs_its_stiffness() -> None:
+    with pytest.raises(InvalidInput, match="beta"):
+        simulated().handwork(Handwork.MOUNT_SPRING)
+
+
+def test_the_same_seed_gives_the_same_session_however_it_is_read() -> None:
+    volts = 2.0 * np.sin(16.0 * np.arange(3000) / 2000.0)
+    sessions: list[NDArray[np.int16]] = []
+    for block, seed in ((100, 3), (37, 3), (100, 4)):
+        rig = simulated(COUPLED, seed)
+        runs: list[NDArray[np.int16]] = []
+        for _ in range(2):
+            started(rig)
+            runs += [b.counts for b in play(rig, volts, block)]
+            rig.stop()
+        sessions.append(np.concatenate(runs))
+    np.testing.assert_array_equal(sessions[0], sessions[1])
+    assert (sessions[0] != sessions[2]).any()
+
+
+def test_virtual_time_is_the_time_of_the_samples() -> None:
+    clock = VirtualClock()
+    clock.wait_until(5.0)
+    rig = SimulatedRig(VirtualBenchParameters(), Specimen(), seed=1, clock=clock)
+    play(started(rig), np.zeros(3000))
+    assert clock.now() == pytest.approx(5.0 + 1.5)
+
+
+def test_under_a_wall_clock_reading_paces_the_reader() -> None:
+    clock = WallClock()
+    rig = SimulatedRig(VirtualBenchParameters(), Specimen(), seed=1, clock=clock)
+    started(rig)
+    begin = clock.now()
+    play(rig, np.zeros(400), 100)
+    assert 0.19 <= clock.now() - begin < 1.0
+
+
+def test_the_rig_closes_itself_as_a_context() -> None:
+    with simulated() as rig:
+        started(rig)
+    with pytest.raises(RigError, match="closed"):
+        rig.arm()
