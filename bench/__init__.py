@@ -1,0 +1,1 @@
+"""The application: engine, guard, control, analysis, record, report, command line."""

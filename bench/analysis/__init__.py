@@ -1,0 +1,1 @@
+"""Analysis: what the signals say, while they come in and afterwards."""

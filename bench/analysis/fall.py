@@ -1,0 +1,48 @@
+"""Notices from the first storey alone that the block has fallen."""
+
+from collections import deque
+from math import pi, sin
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.analysis.signals import U1
+from sim.specimen import Specimen
+
+FALLEN_TILT = 0.25
+"""Tilt [rad] that no rocking motion holds: about twice the block's critical angle."""
+
+
+class FallWatch:
+    """A fallen block pulls the frame aside for good: u1 keeps a mean of k_C h1 sin(theta) / (k1 + k_C).
+
+    The mean is taken over the blocks that fill a period of the frame's first mode, so that neither the forced motion
+    nor that mode is mistaken for it; half the offset at `FALLEN_TILT` is the threshold.
+    """
+
+    def __init__(self, specimen: Specimen, sample_rate: float) -> None:
+        frame, k_c = specimen.frame, specimen.k_c
+        self._threshold = 0.5 * k_c * frame.h1 * sin(FALLEN_TILT) / (frame.k1 + k_c)
+        self._span = 2.0 * pi / frame.natural_frequencies[0] * sample_rate
+        self._sums: deque[tuple[int, int, float]] = deque()
+
+    @property
+    def threshold(self) -> float:
+        """Mean of u1 [m] beyond which the block counts as fallen."""
+        return self._threshold
+
+    def fallen(self, signals: NDArray[np.float64]) -> bool:
+        """Whether the next block of signals, shape (n, 4), shows a fallen block."""
+        if self._threshold == 0.0:
+            return False
+        u1 = signals[:, U1]
+        valid = np.isfinite(u1)
+        seen = int(np.count_nonzero(valid))
+        self._sums.append((u1.size, seen, float(u1.sum() if seen == u1.size else u1[valid].sum())))
+        total, seen, summed = (sum(column) for column in zip(*self._sums, strict=True))
+        if total < self._span:
+            return False
+        while total - self._sums[0][0] >= self._span:
+            size, *_ = self._sums.popleft()
+            total -= size
+        return seen < 0.5 * total or abs(summed / seen) > self._threshold

@@ -1,0 +1,106 @@
+"""The gain coefficient from measured cycles, with its uncertainty (GUM, first order)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import hypot, sqrt
+
+import numpy as np
+
+from bench.analysis.cycles import Cycle
+from bench.analysis.signals import ACCELERATION, DISPLACEMENT, DRIFT, U1
+from sim.parameters import Parameters, quantity
+
+COVERAGE = 2.0
+"""Coverage factor k of every stated uncertainty."""
+
+
+class SensorAccuracy(Parameters):
+    """What the sensors' data sheets and calibrations leave open: standard uncertainties."""
+
+    laser_slope: float = quantity(
+        0.003, "1", "relative error of a laser's slope that differs between amplitudes (linearity)", ge=0, le=0.1
+    )
+    laser_mismatch: float = quantity(
+        0.001, "1", "relative difference between the scales of the two lasers", ge=0, le=0.1
+    )
+    accelerometer: float = quantity(0.003, "1", "relative error of the table accelerometer's scale", ge=0, le=0.1)
+
+
+@dataclass(frozen=True)
+class SteadyPeak:
+    """The drift over measured cycles.
+
+    `drift` [m] is its peak and `scatter` [m] the standard uncertainty of that peak from the cycles themselves;
+    `u1` [m] the first storey's peak, `amplitude` [m/s2] and `stroke` [m] the table's, `cycles` how many were used.
+    """
+
+    drift: float
+    scatter: float
+    u1: float
+    amplitude: float
+    stroke: float
+    cycles: int
+
+
+@dataclass(frozen=True)
+class Gain:
+    """alpha_2 with its expanded uncertainty (k = 2)."""
+
+    alpha_2: float
+    uncertainty: float
+
+
+def steady_peak(cycles: Sequence[Cycle]) -> SteadyPeak:
+    """Mean of the cycles' peaks; the scatter counts correlated neighbours, M_eff = M (1 - r1) / (1 + r1)."""
+    peaks = np.array([cycle.peak[DRIFT] for cycle in cycles])
+    return _peak(cycles, float(peaks.mean()), _standard_error(peaks))
+
+
+def modulated_peak(cycles: Sequence[Cycle]) -> SteadyPeak:
+    """Largest peak met; the scatter is the spread of the largest peaks of four quarters of the cycles."""
+    peaks = np.array([cycle.peak[DRIFT] for cycle in cycles])
+    quarters = [quarter.max() for quarter in np.array_split(peaks, 4) if quarter.size]
+    scatter = float(np.std(quarters, ddof=1)) if len(quarters) > 1 else float(peaks.max())
+    return _peak(cycles, float(peaks.max()), scatter)
+
+
+def _peak(cycles: Sequence[Cycle], drift: float, scatter: float) -> SteadyPeak:
+    amplitudes = np.abs(np.array([cycle.fundamental for cycle in cycles])).mean(axis=0)
+    return SteadyPeak(
+        drift=drift,
+        scatter=scatter,
+        u1=float(np.mean([cycle.peak[U1] for cycle in cycles])),
+        amplitude=float(amplitudes[ACCELERATION]),
+        stroke=float(amplitudes[DISPLACEMENT]),
+        cycles=len(cycles),
+    )
+
+
+def _standard_error(series: np.ndarray[tuple[int], np.dtype[np.float64]]) -> float:
+    if series.size < 3:
+        return float(np.ptp(series))
+    deviation = series - series.mean()
+    variance = float(deviation @ deviation) / (series.size - 1)
+    if variance == 0.0:
+        return 0.0
+    r1 = float(deviation[1:] @ deviation[:-1]) / ((series.size - 1) * variance)
+    r1 = min(max(r1, 0.0), 0.95)
+    effective = max(series.size * (1.0 - r1) / (1.0 + r1), 1.0)
+    return sqrt(variance / effective)
+
+
+def gain(coupled: SteadyPeak, bare: SteadyPeak, accuracy: SensorAccuracy) -> Gain:
+    """alpha_2 = peak drift coupled / peak drift bare (Eq. 10) at one frequency.
+
+    A common scale of the lasers cancels; what is left of each drift is its scatter, the lasers' linearity, and the
+    table's motion that a difference between the lasers' scales lets through. The table's scale error is common to
+    both tests and moves alpha_2 only as far as the two amplitudes differ: it is in the prediction's amplitude instead.
+    """
+    alpha = coupled.drift / bare.drift
+    relative = hypot(_relative(coupled, accuracy), _relative(bare, accuracy))
+    return Gain(alpha, COVERAGE * alpha * relative)
+
+
+def _relative(peak: SteadyPeak, accuracy: SensorAccuracy) -> float:
+    leak = accuracy.laser_mismatch * peak.stroke
+    return hypot(peak.scatter / peak.drift, accuracy.laser_slope, leak / peak.drift)

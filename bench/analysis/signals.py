@@ -1,0 +1,49 @@
+"""From the channels of a rig to the signals of the experiment."""
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.rig import Channel
+from sim.errors import InvalidInput
+
+SIGNALS = ("acceleration", "displacement", "u1", "drift")
+"""Columns of a signal array: table acceleration [m/s2], table displacement [m], first storey relative to the table
+[m] and drift u2 - u1 [m]."""
+
+ACCELERATION, DISPLACEMENT, U1, DRIFT = range(4)
+
+
+class SignalMap:
+    """Turns channel values into signals, counted from the zero taken at rest.
+
+    Lasers beside the table see x_g + u; lasers on it see u. The drift is free of x_g either way.
+    """
+
+    def __init__(self, channels: tuple[Channel, ...], reference: Literal["ground", "table"]) -> None:
+        names = [channel.name for channel in channels]
+        needed = ("table_acceleration", "table_displacement", "laser_1", "laser_2")
+        for name in needed:
+            if name not in names:
+                raise InvalidInput("channels", ", ".join(names), f"the harmonic analysis needs a channel {name}")
+        self._columns = [names.index(name) for name in needed]
+        self._ground = reference == "ground"
+        self._zero = np.zeros(len(SIGNALS))
+
+    def tare(self, values: NDArray[np.float64]) -> None:
+        """Take the mean of channel values at rest, shape (n, n_channels), as the zero of every signal."""
+        self._zero = np.nan_to_num(np.nanmean(self._raw(values), axis=0))
+
+    def of(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Signals, shape (n, 4), of channel values, shape (n, n_channels); NaN where a sensor gave none."""
+        return self._raw(values) - self._zero
+
+    def _raw(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        acceleration, displacement, first, second = (values[:, column] for column in self._columns)
+        signals = np.empty((values.shape[0], len(SIGNALS)), order="F")
+        signals[:, ACCELERATION] = acceleration
+        signals[:, DISPLACEMENT] = displacement
+        signals[:, U1] = first - displacement if self._ground else first
+        signals[:, DRIFT] = second - first
+        return signals

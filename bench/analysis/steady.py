@@ -1,0 +1,93 @@
+"""When a dwell has become steady, judged cycle by cycle on every signal."""
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.analysis.cycles import Cycle
+
+WINDOW = 12
+"""Cycles in one window; two of them are compared."""
+
+LONGEST_SUBHARMONIC = 6
+
+KIN_SHARE = 0.25
+"""A storey that happens to stand almost still is judged on a quarter of the other's motion, not on its own."""
+
+
+@dataclass(frozen=True)
+class Steadiness:
+    """The state of a dwell. `spread` and `drift` are relative to each signal's mean amplitude, largest first met.
+
+    `repeats` is the number of cycles after which the motion repeats: 1 when it is steady, 2..6 for a
+    subharmonic, 0 when it does not repeat.
+    """
+
+    steady: bool
+    spread: float
+    drift: float
+    repeats: int
+
+
+class SteadyDetector:
+    """Compares the complex amplitudes of every signal over the last two windows of cycles.
+
+    Steady means: within a window no cycle is farther from the mean than the tolerance, and the means of the two
+    windows differ by less than a third of it, which bounds what a transient that decays by 2 % a cycle still has to go
+    (0.98^12 / (1 - 0.98^12) / 3 = 1.2 tolerances). A noise floor of four standard deviations of a fitted
+    amplitude, sigma sqrt(2 / N), is granted to every signal.
+    """
+
+    def __init__(self, tolerance: float, kin: Sequence[int] = ()) -> None:
+        """`kin` are the columns of signals of one kind: none is held to less than `KIN_SHARE` of the largest."""
+        self._tolerance = tolerance
+        self._kin = list(kin)
+        self._cycles: deque[Cycle] = deque(maxlen=2 * WINDOW)
+
+    def push(self, cycle: Cycle) -> None:
+        """Take the next cycle."""
+        self._cycles.append(cycle)
+
+    def restart(self) -> None:
+        """Forget everything: the drive was changed."""
+        self._cycles.clear()
+
+    def judge(self) -> Steadiness:
+        """Where the dwell stands; never steady before two windows are full."""
+        if len(self._cycles) < 2 * WINDOW:
+            return Steadiness(False, float("nan"), float("nan"), 0)
+        cycles = list(self._cycles)
+        amplitudes = np.array([cycle.fundamental for cycle in cycles])
+        peaks = np.array([cycle.peak for cycle in cycles])
+        sigma = np.array([cycle.noise * np.sqrt(2.0 / cycle.samples) for cycle in cycles]).mean(axis=0)
+        spreads, drifts = zip(self._compare(amplitudes, sigma), self._compare(peaks, 2.0 * sigma), strict=True)
+        spread, drift = float(np.max(spreads)), float(np.max(drifts))
+        steady = spread <= self._tolerance and drift <= self._tolerance / 3.0
+        return Steadiness(steady, spread, drift, 1 if steady else self._repeats(amplitudes, sigma))
+
+    def _compare(
+        self, series: NDArray[np.complex128] | NDArray[np.float64], sigma: NDArray[np.float64]
+    ) -> tuple[float, float]:
+        """Largest relative spread within the last window and drift between the windows, above the noise."""
+        before, last = series[:WINDOW].mean(axis=0), series[WINDOW:].mean(axis=0)
+        size = self._size(last)
+        spread = np.max(np.abs(series[WINDOW:] - last), axis=0) - 4.0 * sigma
+        drift = np.abs(last - before) - 4.0 * sigma * np.sqrt(2.0 / WINDOW)
+        return float(np.max(spread / size)), float(np.max(drift / size))
+
+    def _size(self, mean: NDArray[np.complex128] | NDArray[np.float64]) -> NDArray[np.float64]:
+        size = np.maximum(np.abs(mean), 1e-12)
+        if self._kin:
+            size[self._kin] = np.maximum(size[self._kin], KIN_SHARE * size[self._kin].max())
+        return size
+
+    def _repeats(self, amplitudes: NDArray[np.complex128], sigma: NDArray[np.float64]) -> int:
+        size = self._size(amplitudes.mean(axis=0))
+        for period in range(2, LONGEST_SUBHARMONIC + 1):
+            change = np.max(np.abs(amplitudes[period:] - amplitudes[:-period]), axis=0) - 6.0 * sigma
+            if float(np.max(change / size)) <= self._tolerance:
+                return period
+        return 0

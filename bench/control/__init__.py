@@ -1,0 +1,1 @@
+"""Control: the table does what the protocol asks."""

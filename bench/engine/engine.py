@@ -1,0 +1,228 @@
+"""Runs a plan on a rig, through the guard, block by block."""
+
+from dataclasses import dataclass
+from typing import Never
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.analysis.cycles import Cycle, CycleAnalyser
+from bench.analysis.fall import FallWatch
+from bench.analysis.signals import SignalMap
+from bench.control.legs import sweeps
+from bench.control.oscillator import Oscillator
+from bench.engine.machine import Machine
+from bench.engine.operator import Operator
+from bench.engine.requests import Requests
+from bench.engine.steps import (
+    Arm,
+    Calibrate,
+    Done,
+    Dwell,
+    Fallen,
+    Follow,
+    Handle,
+    Measured,
+    Outcome,
+    Plan,
+    RampOut,
+    Say,
+    Step,
+    Trim,
+)
+from bench.engine.stream import Stream
+from bench.events import Acquired, LimitExceeded, OperatorAnswered, OperatorAsked, State, StateChanged
+from bench.guard.guard import Guard
+from drivers.rig import Rig
+from sim.errors import RockbenchError
+from sim.specimen import Specimen
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How a session ended: `status` is completed, stopped, aborted, halted or failed, with the reason."""
+
+    status: str
+    reason: str
+
+
+class _Ended(Exception):
+    """The plan is over before its end."""
+
+    def __init__(self, ending: Ending) -> None:
+        super().__init__(ending.reason)
+        self.ending = ending
+
+
+class Engine:
+    """Owns the loop: drive from the oscillator, through the guard, signals back to the plan.
+
+    `block` is the number of samples of one turn. Whatever happens, `run` leaves the output at zero.
+    """
+
+    def __init__(
+        self,
+        rig: Rig,
+        guard: Guard,
+        signals: SignalMap,
+        stream: Stream,
+        requests: Requests,
+        operator: Operator,
+        block: int,
+    ) -> None:
+        self._rig, self._guard, self._signals, self._stream = rig, guard, signals, stream
+        self._requests, self._operator, self._block = requests, operator, block
+        self._machine = Machine(self._announce)
+        self._oscillator = Oscillator(rig.sample_rate)
+        self._specimen: Specimen | None = None
+        self._fall: FallWatch | None = None
+        self._cycles: CycleAnalyser | None = None
+        self._drive = np.zeros(0)
+        self._read = 0
+        self._run = 0
+
+    @property
+    def state(self) -> State:
+        """What the bench is doing."""
+        return self._machine.state
+
+    def run(self, plan: Plan) -> Ending:
+        """Carry out `plan` to its end, or to the first reason to end it."""
+        try:
+            ending = self._carry_out(plan)
+        except _Ended as ended:
+            ending = ended.ending
+        except RockbenchError as error:
+            self._cut(str(error))
+            ending = Ending("failed", str(error))
+        except BaseException as error:
+            self._cut(f"{type(error).__name__} in the plan or a subscriber")
+            raise
+        finally:
+            self._rig.stop()
+            plan.close()
+        self._machine.go(State.CLOSED, ending.reason)
+        return ending
+
+    def _carry_out(self, plan: Plan) -> Ending:
+        try:
+            step = next(plan)
+            while True:
+                step = plan.send(self._do(step))
+        except StopIteration:
+            return Ending("completed", "the plan was carried out")
+
+    def _do(self, step: Step) -> Outcome:
+        match step:
+            case Follow():
+                return self._follow(step)
+            case Dwell():
+                return self._dwell(step)
+            case Say():
+                self._stream.say(step.event)
+            case Trim():
+                self._oscillator.trim(step.factor)
+            case Calibrate():
+                self._oscillator.use(step.calibration)
+            case Arm():
+                self._arm(step)
+            case RampOut():
+                self._ramp_out(State.ABORTING if step.fast else State.STOPPING, "the test is over")
+            case Handle():
+                self._handle(step)
+        return Done()
+
+    def _arm(self, step: Arm) -> None:
+        self._oscillator.reset()
+        self._read, self._cycles = 0, None
+        self._run += 1
+        self._machine.go(State.ARMED, "the operator's work is done")
+        self._guard.arm()
+        turns = max(round(step.rest * self._rig.sample_rate / self._block), 1)
+        self._signals.tare(np.concatenate([self._turn() for _ in range(turns)]))
+        self._fall = FallWatch(self._specimen, self._rig.sample_rate) if self._specimen else None
+        self._machine.go(State.RUNNING, "at rest, zero taken")
+
+    def _follow(self, step: Follow) -> Outcome:
+        self._cycles = None
+        for sweep in sweeps(step.legs, self._oscillator.amplitude, self._oscillator.omega):
+            self._oscillator.follow(sweep)
+        # what is asked now is played after the samples that already wait in the rig
+        end = self._read + self._rig.lead + self._oscillator.remaining
+        while self._read < end:
+            if self._fell(self._signals.of(self._turn())):
+                return Fallen()
+        return Done()
+
+    def _dwell(self, step: Dwell) -> Outcome:
+        if self._cycles is None:
+            self._cycles = CycleAnalyser(self._oscillator.omega, self._rig.sample_rate, self._read)
+        done: list[Cycle] = []
+        end = self._cycles.completed + step.cycles
+        while self._cycles.completed < end:
+            values = self._turn()
+            signals = self._signals.of(values)
+            if self._fell(signals):
+                return Fallen()
+            done += self._cycles.push(np.column_stack((signals, self._drive)))
+        return Measured(tuple(done))
+
+    def _handle(self, step: Handle) -> None:
+        self._machine.go(State.WAITING, step.request)
+        self._stream.say(OperatorAsked(0.0, step.request))
+        agreed = self._operator.confirm(step.request)
+        self._machine.go(State.IDLE, "the operator answered")
+        if not agreed:
+            raise _Ended(Ending("aborted", f"the operator declined: {step.request}"))
+        self._heed_requests()
+        self._rig.handwork(step.work, step.specimen.beta)
+        self._specimen = step.specimen
+        self._stream.say(OperatorAnswered(0.0, step.request, self._operator.name))
+
+    def _turn(self) -> NDArray[np.float64]:
+        """One turn of the loop: the channels' values, shape (block, n_channels)."""
+        exchange = self._guard.exchange(self._oscillator.next(self._block))
+        self._read = exchange.block.first + len(exchange.block)
+        self._drive = exchange.drive
+        self._stream.publish(Acquired(self._stream.now(), self._run, exchange.block, exchange.drive))
+        if exchange.violation is not None and self.state is not State.ABORTING:
+            over = exchange.violation
+            self._stream.say(LimitExceeded(0.0, over.quantity, over.value, over.limit, over.unit))
+            self._end(State.ABORTING, Ending("aborted", str(over)))
+        self._heed_requests()
+        return exchange.values
+
+    def _heed_requests(self) -> None:
+        asked = self._requests.strongest
+        if asked == "halt":
+            self._cut("halt was asked for")
+            raise _Ended(Ending("halted", "halt was asked for"))
+        if asked == "abort" and self.state is not State.ABORTING:
+            self._end(State.ABORTING, Ending("aborted", "abort was asked for"))
+        if asked == "stop" and self.state not in (State.ABORTING, State.STOPPING):
+            self._end(State.STOPPING, Ending("stopped", "stop was asked for"))
+
+    def _end(self, way: State, ending: Ending) -> Never:
+        if self.state is not State.IDLE:
+            self._ramp_out(way, ending.reason)
+        raise _Ended(ending)
+
+    def _ramp_out(self, way: State, reason: str) -> None:
+        self._machine.go(way, reason)
+        begin = self._guard.abort if way is State.ABORTING else self._guard.stop
+        begin()
+        while not self._guard.at_zero:
+            self._turn()
+        self._guard.disarm()
+        self._machine.go(State.IDLE, "the output is at zero")
+
+    def _cut(self, reason: str) -> None:
+        self._guard.halt()
+        if self.state not in (State.HALTED, State.CLOSED):
+            self._machine.go(State.HALTED, reason)
+
+    def _fell(self, signals: NDArray[np.float64]) -> bool:
+        return self._fall is not None and self._fall.fallen(signals)
+
+    def _announce(self, before: State, after: State, reason: str) -> None:
+        self._stream.publish(StateChanged(self._stream.now(), before, after, reason))

@@ -1,0 +1,96 @@
+"""The steps a plan is made of. A plan is a generator: it yields steps and is sent what came of them.
+
+A step says what the bench does, not how; the same plan can be run, summarised or timed without a device.
+"""
+
+from collections.abc import Generator
+from dataclasses import dataclass
+
+from bench.analysis.cycles import Cycle
+from bench.control.calibration import DriveCalibration
+from bench.control.legs import Leg
+from bench.events import Event
+from drivers.rig import Handwork
+from sim.specimen import Specimen
+
+
+@dataclass(frozen=True)
+class Handle:
+    """A person does something at the resting bench; `request` says what and why. Comes to nothing."""
+
+    work: Handwork
+    specimen: Specimen
+    request: str
+
+
+@dataclass(frozen=True)
+class Arm:
+    """Arm the rig at rest, with the output at zero, and take the zero of every signal over `rest` seconds."""
+
+    rest: float
+
+
+@dataclass(frozen=True)
+class Calibrate:
+    """From now on the drive is divided by this gain."""
+
+    calibration: DriveCalibration
+
+
+@dataclass(frozen=True)
+class Follow:
+    """Drive along legs, from where the drive is. Comes to `Fallen` as soon as the block has fallen, else to `Done`."""
+
+    legs: tuple[Leg, ...]
+
+
+@dataclass(frozen=True)
+class Dwell:
+    """Hold amplitude and frequency for `cycles` whole cycles. Comes to `Measured`, or to `Fallen`."""
+
+    cycles: int
+
+
+@dataclass(frozen=True)
+class Trim:
+    """Multiply the drive by `factor`, over one cycle."""
+
+    factor: float
+
+
+@dataclass(frozen=True)
+class RampOut:
+    """End the test: smooth ramp to zero, or the fast one; the rig is stopped afterwards."""
+
+    fast: bool = False
+
+
+@dataclass(frozen=True)
+class Say:
+    """Publish an event; its time is set by the engine."""
+
+    event: Event
+
+
+Step = Handle | Arm | Calibrate | Follow | Dwell | Trim | RampOut | Say
+
+
+@dataclass(frozen=True)
+class Done:
+    """The step was carried out."""
+
+
+@dataclass(frozen=True)
+class Fallen:
+    """The block has fallen; the drive still runs until the plan ramps it out."""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """The cycles of a dwell, in order; fewer than asked where samples were missing."""
+
+    cycles: tuple[Cycle, ...]
+
+
+Outcome = Done | Fallen | Measured
+Plan = Generator[Step, Outcome, None]

@@ -1,0 +1,29 @@
+"""The only way out of the engine: events, to whoever subscribed."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from bench.events import Event, Subscriber
+from drivers.clock import Clock
+
+
+class Stream:
+    """Stamps events with the bench's time since the session began and hands them to the subscribers in order."""
+
+    def __init__(self, clock: Clock, subscribers: Sequence[Subscriber]) -> None:
+        self._clock = clock
+        self._origin = clock.now()
+        self._subscribers = tuple(subscribers)
+
+    def now(self) -> float:
+        """Seconds of the bench's clock since the session began."""
+        return self._clock.now() - self._origin
+
+    def publish(self, event: Event) -> None:
+        """Hand `event` to every subscriber."""
+        for subscriber in self._subscribers:
+            subscriber(event)
+
+    def say(self, event: Event) -> None:
+        """Publish `event` with the present time."""
+        self.publish(replace(event, time=self.now()))

@@ -1,0 +1,1 @@
+"""The guard: nothing reaches the shaker except through it."""

@@ -1,0 +1,147 @@
+"""The one way to the shaker.
+
+The guard owns the rig's output. It refuses commands beyond the limits, watches the measured motion in the
+acquisition loop itself, and knows the three ways to end: *stop* (smooth ramp), *abort* (fast ramp), *halt* (enable
+line cut now). Once a ramp has begun nothing can raise the output again until the guard is armed anew.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.guard.limits import Limits, Ramps
+from bench.guard.watch import MotionWatch, Violation
+from drivers.rig import Block, Rig
+
+
+@dataclass(frozen=True)
+class Exchange:
+    """One turn of the acquisition loop.
+
+    `values` are the block's counts in units, shape (n, n_channels); `drive` [V], shape (n,), is what was played
+    while they were taken; `violation` is the limit that was exceeded, if one was.
+    """
+
+    block: Block
+    values: NDArray[np.float64]
+    drive: NDArray[np.float64]
+    violation: Violation | None
+
+
+class Guard:
+    """Stands between the engine and the rig."""
+
+    def __init__(self, rig: Rig, limits: Limits, ramps: Ramps) -> None:
+        self._rig = rig
+        self._limits = limits
+        self._ramps = ramps
+        self._channels = rig.channels
+        self._waiting = np.zeros(0)
+        self._command = 0.0
+        self._held: float | None = None
+        self._watch = MotionWatch(self._channels, rig.sample_rate, limits)
+        self._ramp_samples: int | None = None
+        self._ramp_done = 0
+        self._ramp_from = 1.0
+        self._slew = limits.drive_slew / rig.sample_rate
+
+    @property
+    def ramping(self) -> bool:
+        """Whether the output is being brought to zero."""
+        return self._ramp_samples is not None
+
+    @property
+    def at_zero(self) -> bool:
+        """Whether a ramp has ended and every sample that still waits in the rig is zero."""
+        return self.ramping and self._gain(0) == 0.0 and not self._waiting.any()
+
+    def arm(self) -> None:
+        """Arm the rig with zeros waiting ahead of the first sample."""
+        self._ramp_samples, self._ramp_done, self._ramp_from = None, 0, 1.0
+        self._command, self._held = 0.0, None
+        self._watch = MotionWatch(self._channels, self._rig.sample_rate, self._limits)
+        self._waiting = np.zeros(self._rig.lead)
+        self._rig.arm()
+        self._rig.write(self._waiting)
+
+    def exchange(self, volts: NDArray[np.float64]) -> Exchange:
+        """Send a block of commands [V] and read as many samples.
+
+        A command beyond the limits is not sent, nor any after it: the last good value is held and brought to zero
+        along the fast ramp.
+        """
+        refused = self._refusal(volts) if self._held is None else None
+        if refused is not None:
+            self._held = self._command
+            self.abort()
+        if self._held is not None:
+            volts = np.full(volts.shape, self._held)
+        self._command = float(volts[-1])
+        sent = self._ramped(volts)
+        self._rig.write(sent)
+        queue = np.concatenate((self._waiting, sent))
+        block = self._rig.read(volts.size)
+        played, self._waiting = queue[: volts.size], queue[volts.size :]
+        values = self._values(block)
+        seen = self._watch.check(block.first, values)
+        if seen is not None:
+            self.abort()
+        return Exchange(block, values, played, refused or seen)
+
+    def stop(self) -> None:
+        """Begin the smooth ramp to zero; a ramp that has begun goes on."""
+        if not self.ramping:
+            self._begin(self._ramps.stop)
+
+    def abort(self) -> None:
+        """Begin the fast ramp to zero; a slower ramp that has begun goes on from its value as a fast one."""
+        fast = max(round(self._ramps.abort * self._rig.sample_rate), 1)
+        if self._ramp_samples is None or self._ramp_samples - self._ramp_done > fast:
+            self._begin(self._ramps.abort)
+
+    def halt(self) -> None:
+        """Cut the enable line now."""
+        self._rig.halt()
+
+    def disarm(self) -> None:
+        """Stop the rig; its output is at zero afterwards."""
+        self._rig.stop()
+
+    def _begin(self, duration: float) -> None:
+        self._ramp_from = 1.0 if self._ramp_samples is None else float(self._gain(0))
+        self._ramp_samples = max(round(duration * self._rig.sample_rate), 1)
+        self._ramp_done = 0
+
+    def _gain(self, ahead: int | NDArray[np.int64]) -> float | NDArray[np.float64]:
+        """Factor on the command, `ahead` samples from now: half a cosine from its start value to zero."""
+        if self._ramp_samples is None:
+            return 1.0
+        x = np.minimum((self._ramp_done + ahead) / self._ramp_samples, 1.0)
+        return np.where(x < 1.0, self._ramp_from * 0.5 * (1.0 + np.cos(np.pi * x)), 0.0)
+
+    def _ramped(self, volts: NDArray[np.float64]) -> NDArray[np.float64]:
+        if self._ramp_samples is None:
+            return volts
+        sent = volts * self._gain(np.arange(1, volts.size + 1))
+        self._ramp_done += volts.size
+        return sent
+
+    def _refusal(self, volts: NDArray[np.float64]) -> Violation | None:
+        if not np.isfinite(volts).all():
+            return Violation("drive command", float("nan"), self._limits.drive_voltage, "V", 0)
+        peak = float(np.max(np.abs(volts)))
+        if peak > self._limits.drive_voltage:
+            return Violation("drive command", peak, self._limits.drive_voltage, "V", int(np.argmax(np.abs(volts))))
+        change = np.abs(np.diff(volts, prepend=self._command))
+        if float(change.max()) > self._slew:
+            rate = self._rig.sample_rate
+            at = int(np.argmax(change))
+            return Violation("drive slew", float(change[at]) * rate, self._limits.drive_slew, "V/s", at)
+        return None
+
+    def _values(self, block: Block) -> NDArray[np.float64]:
+        values = np.empty(block.counts.shape, order="F")
+        for column, channel in enumerate(self._channels):
+            values[:, column] = channel.to_unit(block.counts[:, column])
+        return values

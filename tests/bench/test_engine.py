@@ -1,0 +1,313 @@
+"""The engine: steps in, events out, and the output at zero whatever happens."""
+
+import itertools
+from collections.abc import Callable, Generator
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bench.analysis.signals import SignalMap
+from bench.control.calibration import DriveCalibration
+from bench.control.legs import Leg
+from bench.engine.engine import Ending, Engine
+from bench.engine.machine import LEGAL, Machine
+from bench.engine.operator import Unattended
+from bench.engine.requests import Requests
+from bench.engine.steps import (
+    Arm,
+    Calibrate,
+    Dwell,
+    Fallen,
+    Follow,
+    Handle,
+    Measured,
+    Outcome,
+    Plan,
+    RampOut,
+    Say,
+    Step,
+    Trim,
+)
+from bench.engine.stream import Stream
+from bench.events import Acquired, Event, LimitExceeded, OperatorAsked, State, StateChanged, StepStarted
+from bench.guard.guard import Guard
+from bench.guard.limits import Limits, Ramps
+from drivers.rig import Block, Handwork, RigError
+from sim.specimen import Specimen
+from tests.loopback import LoopbackRig
+
+COUPLED = Specimen().coupled(0.4)
+MOUNT = Handle(Handwork.MOUNT_SPRING, COUPLED, "mount the spring")
+OMEGA = 16.0
+
+
+class Bench:
+    """An engine on a loopback rig, with what it published."""
+
+    def __init__(self, rig: LoopbackRig | None = None, listener: Callable[[Event], None] | None = None) -> None:
+        self.rig = rig or LoopbackRig()
+        self.events: list[Event] = []
+        self.requests = Requests()
+        self.operator = Unattended()
+        subscribers = [self.events.append, *([listener] if listener else [])]
+        self.engine = Engine(
+            self.rig,
+            Guard(self.rig, Limits(), Ramps(stop=1.0, abort=0.2)),
+            SignalMap(self.rig.channels, "table"),
+            Stream(self.rig.clock, subscribers),
+            self.requests,
+            self.operator,
+            block=100,
+        )
+
+    def run(self, plan: Plan) -> Ending:
+        ending = self.engine.run(plan)
+        assert not self.rig.armed
+        return ending
+
+    def states(self) -> list[State]:
+        return [event.after for event in self.events if isinstance(event, StateChanged)]
+
+    def ends_at_zero(self) -> bool:
+        return self.rig.played.size == 0 or self.rig.played[-1] == 0.0
+
+
+def _plan(*steps: Step, outcomes: list[Outcome] | None = None) -> Plan:
+    for step in steps:
+        outcome = yield step
+        if outcomes is not None:
+            outcomes.append(outcome)
+
+
+RUN: tuple[Step, ...] = (
+    MOUNT,
+    Arm(0.5),
+    Calibrate(DriveCalibration.flat(1.0)),
+    Follow((Leg(2.0, 1.0, OMEGA),)),
+    Dwell(6),
+    RampOut(),
+)
+
+
+def test_a_whole_test_goes_through_its_states_and_ends_at_zero() -> None:
+    bench = Bench()
+    assert bench.run(_plan(*RUN)).status == "completed"
+    assert bench.states() == [
+        State.WAITING,
+        State.IDLE,
+        State.ARMED,
+        State.RUNNING,
+        State.STOPPING,
+        State.IDLE,
+        State.CLOSED,
+    ]
+    assert bench.rig.done == [Handwork.MOUNT_SPRING]
+    assert bench.ends_at_zero()
+
+
+def test_a_dwell_measures_the_cycles_of_the_motion_that_was_asked_for() -> None:
+    bench, outcomes = Bench(), list[Outcome]()
+    bench.run(_plan(*RUN, outcomes=outcomes))
+    measured = outcomes[4]
+    assert isinstance(measured, Measured)
+    assert len(measured.cycles) == 6
+    for cycle in measured.cycles:
+        assert np.abs(cycle.fundamental[0]) == pytest.approx(1.0, rel=1e-3)
+        assert np.abs(cycle.fundamental[4]) == pytest.approx(1.0, rel=1e-9)
+
+
+def test_dwells_follow_each_other_without_a_gap() -> None:
+    bench, outcomes = Bench(), list[Outcome]()
+    bench.run(_plan(*RUN[:5], Dwell(3), Trim(1.1), Dwell(4), RampOut(), outcomes=outcomes))
+    indices = [cycle.index for outcome in outcomes if isinstance(outcome, Measured) for cycle in outcome.cycles]
+    assert indices == list(range(len(indices)))
+    assert np.abs(outcomes[-2].cycles[-1].fundamental[0]) == pytest.approx(1.1, rel=1e-3)  # type: ignore[union-attr]
+
+
+def test_blocks_are_contiguous_within_a_run_and_counted_anew_in_the_next() -> None:
+    bench = Bench()
+    bench.run(_plan(*RUN, Arm(0.3), RampOut()))
+    acquired = [event for event in bench.events if isinstance(event, Acquired)]
+    for run, blocks in itertools.groupby(acquired, key=lambda event: event.run):
+        ends = 0
+        for event in blocks:
+            assert event.block.first == ends
+            ends += len(event.block)
+            assert event.drive.size == len(event.block)
+        assert run in (1, 2)
+
+
+def test_a_fallen_block_ends_the_step_and_leaves_the_rest_to_the_plan() -> None:
+    offset = np.zeros(1)
+
+    def laser(volts: np.ndarray) -> np.ndarray:
+        return 0.001 * volts + offset[0]
+
+    rig = LoopbackRig(
+        {
+            "table_displacement": lambda v: 0.01 * v,
+            "table_acceleration": lambda v: v,
+            "laser_1": laser,
+            "laser_2": laser,
+        }
+    )
+
+    def plan() -> Plan:
+        yield from _plan(*RUN[:4])
+        offset[0] = 0.03
+        assert isinstance((yield Dwell(40)), Fallen)
+        yield RampOut(fast=True)
+        yield Handle(Handwork.STAND_BLOCK_UP, COUPLED, "stand it up")
+
+    bench = Bench(rig)
+    assert bench.run(plan()).status == "completed"
+    assert State.ABORTING in bench.states()
+    assert bench.rig.done[-1] is Handwork.STAND_BLOCK_UP
+    assert bench.ends_at_zero()
+
+
+@pytest.mark.parametrize(("way", "status"), [("stop", "stopped"), ("abort", "aborted"), ("halt", "halted")])
+@pytest.mark.parametrize("after", [0, 3, 20, 45])
+def test_a_person_ends_the_run_in_any_state(way: str, status: str, after: int) -> None:
+    bench = Bench()
+    seen = 0
+
+    def listener(event: Event) -> None:
+        nonlocal seen
+        seen += isinstance(event, Acquired)
+        if seen == after and isinstance(event, Acquired | OperatorAsked):
+            getattr(bench.requests, way)()
+
+    bench = Bench(listener=listener)
+    assert bench.run(_plan(*RUN, *RUN)).status == status
+    if way == "halt":
+        assert bench.rig.halted
+    else:
+        assert bench.ends_at_zero()
+
+
+def test_a_limit_is_published_and_the_run_aborted() -> None:
+    bench = Bench(LoopbackRig({"table_displacement": lambda v: 0.1 * v, **_others()}))
+    ending = bench.run(_plan(*RUN))
+    assert ending.status == "aborted"
+    assert "table velocity" in ending.reason  # 0.1 m at 16 rad/s: 1.6 m/s passes 0.6 m/s first
+    assert sum(isinstance(event, LimitExceeded) for event in bench.events) == 1
+    assert bench.ends_at_zero()
+
+
+def _others() -> dict[str, Callable[[np.ndarray], np.ndarray]]:
+    return {
+        "table_acceleration": lambda v: v,
+        "laser_1": lambda v: 0.001 * v,
+        "laser_2": lambda v: 0.002 * v,
+    }
+
+
+class _Failing(LoopbackRig):
+    """Fails at its 30th block."""
+
+    def read(self, n: int) -> Block:
+        if self.played.size >= 3000:
+            raise RigError("the device is gone: check its power and its cable")
+        return super().read(n)
+
+
+def test_a_lost_device_is_a_failed_run_with_the_enable_line_cut() -> None:
+    bench = Bench(_Failing())
+    ending = bench.run(_plan(*RUN))
+    assert ending == Ending("failed", "the device is gone: check its power and its cable")
+    assert bench.rig.halted
+    assert bench.states()[-2:] == [State.HALTED, State.CLOSED]
+
+
+def test_an_exception_in_the_plan_cuts_the_output_and_is_not_swallowed() -> None:
+    def plan() -> Plan:
+        yield from _plan(*RUN[:4])
+        raise ZeroDivisionError("a mistake in the lab sheet")
+
+    bench = Bench()
+    with pytest.raises(ZeroDivisionError):
+        bench.engine.run(plan())
+    assert bench.rig.halted
+    assert not bench.rig.armed
+
+
+def test_an_exception_in_a_subscriber_cuts_the_output() -> None:
+    def listener(event: Event) -> None:
+        if isinstance(event, Acquired) and event.block.first > 2000:
+            raise OSError("disk full")
+
+    bench = Bench(listener=listener)
+    with pytest.raises(OSError, match="disk full"):
+        bench.engine.run(_plan(*RUN))
+    assert bench.rig.halted
+
+
+def test_the_plan_is_told_that_it_is_over() -> None:
+    closed = []
+
+    def plan() -> Generator[Step, Outcome, None]:
+        try:
+            yield from _plan(*RUN)
+        finally:
+            closed.append(True)
+
+    bench = Bench()
+    bench.requests.abort()
+    bench.run(plan())
+    assert closed == [True]
+
+
+def test_an_operator_who_declines_aborts_the_campaign() -> None:
+    class Declines:
+        name = "somebody"
+
+        def confirm(self, request: str) -> bool:
+            return "spring" not in request
+
+    bench = Bench()
+    bench.engine._operator = Declines()  # pyright: ignore[reportPrivateUsage]
+    assert bench.run(_plan(*RUN)).status == "aborted"
+    assert bench.rig.done == []
+
+
+def test_what_a_plan_says_is_stamped_with_the_time_of_the_bench() -> None:
+    bench = Bench()
+    bench.run(_plan(MOUNT, Arm(1.0), Say(StepStarted(-1.0, "now")), RampOut()))
+    said = next(event for event in bench.events if isinstance(event, StepStarted))
+    assert said.time == pytest.approx(1.0)
+
+
+def test_illegal_transitions_are_refused() -> None:
+    for before, after in itertools.product(State, State):
+        machine = Machine(lambda *_: None)
+        machine._state = before  # pyright: ignore[reportPrivateUsage]
+        if after in LEGAL[before]:
+            machine.go(after, "")
+            assert machine.state is after
+        else:
+            with pytest.raises(RuntimeError, match="cannot go"):
+                machine.go(after, "")
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    st.lists(st.sampled_from([Dwell(2), Trim(1.2), Trim(0.5), Follow((Leg(0.5, 2.0, 20.0),))]), max_size=6),
+    st.integers(0, 60),
+    st.sampled_from(["stop", "abort", "halt"]),
+)
+def test_any_plan_cut_anywhere_leaves_the_rig_stopped_and_within_limits(
+    middle: list[Step], after: int, way: str
+) -> None:
+    count = itertools.count()
+
+    def listener(event: Event) -> None:
+        if isinstance(event, Acquired) and next(count) == after:
+            getattr(bench.requests, way)()
+
+    bench = Bench(listener=listener)
+    bench.run(_plan(*RUN[:4], *middle, RampOut()))
+    assert np.abs(bench.rig.played).max(initial=0.0) <= Limits().drive_voltage
+    assert way == "halt" or bench.ends_at_zero()

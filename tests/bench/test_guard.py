@@ -1,0 +1,170 @@
+"""The guard: what it lets through, what it refuses, and how the output ends."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bench.guard.guard import Guard
+from bench.guard.limits import Limits, Ramps
+from tests.loopback import LoopbackRig
+
+N = 100
+LIMITS = Limits(drive_voltage=5.0, drive_slew=200.0, displacement=0.04, velocity=3.0, acceleration=4.5, debounce=0.002)
+RAMPS = Ramps(stop=1.0, abort=0.2)
+
+
+def _armed(rig: LoopbackRig | None = None) -> tuple[Guard, LoopbackRig]:
+    rig = rig or LoopbackRig()
+    guard = Guard(rig, LIMITS, RAMPS)
+    guard.arm()
+    return guard, rig
+
+
+def _sine(amplitude: float, first: int = 0, n: int = N) -> np.ndarray:
+    return amplitude * np.sin(2.0 * np.pi * 2.0 * np.arange(first, first + n) / 1000.0)
+
+
+def _run_out(guard: Guard, volts: np.ndarray) -> int:
+    blocks = 0
+    while not guard.at_zero:
+        guard.exchange(volts)
+        blocks += 1
+        assert blocks < 100
+    return blocks
+
+
+def test_a_good_command_passes_unchanged_after_the_lead() -> None:
+    guard, rig = _armed()
+    sent = np.concatenate([_sine(2.0, N * k) for k in range(5)])
+    played = np.concatenate([guard.exchange(block).drive for block in np.split(sent, 5)])
+    np.testing.assert_array_equal(played, np.concatenate((np.zeros(rig.lead), sent))[: sent.size])
+    np.testing.assert_array_equal(rig.played, played)
+
+
+@pytest.mark.parametrize(
+    ("bad", "named"),
+    [
+        (np.full(N, 6.0), "drive command"),
+        (np.full(N, np.nan), "drive command"),
+        (np.full(N, np.inf), "drive command"),
+        (np.where(np.arange(N) < 50, 0.0, 4.0), "drive slew"),
+    ],
+)
+def test_a_bad_command_is_named_and_never_sent(bad: np.ndarray, named: str) -> None:
+    guard, rig = _armed()
+    guard.exchange(_sine(2.0))
+    before = guard.exchange(_sine(2.0, N))
+    found = guard.exchange(bad)
+    assert before.violation is None
+    assert found.violation is not None
+    assert found.violation.quantity == named
+    _run_out(guard, bad)
+    assert np.abs(rig.played).max() <= 2.0
+    assert rig.played[-1] == 0.0
+    assert np.abs(np.diff(rig.played)).max() <= LIMITS.drive_slew / rig.sample_rate
+
+
+@pytest.mark.parametrize(("way", "length"), [("stop", 1.0), ("abort", 0.2)])
+def test_a_ramp_is_smooth_and_as_long_as_configured(way: str, length: float) -> None:
+    guard, rig = _armed()
+    guard.exchange(np.full(N, 0.0))
+    for level in np.linspace(0.1, 2.0, 20):
+        guard.exchange(np.full(N, level))
+    getattr(guard, way)()
+    begin = rig.played.size
+    _run_out(guard, np.full(N, 2.0))
+    ramp = rig.played[begin + rig.lead :]
+    assert ramp[0] == pytest.approx(2.0, rel=0.01)
+    assert np.all(np.diff(ramp) <= 0.0)
+    assert np.flatnonzero(ramp)[-1] + 1 == pytest.approx(length * rig.sample_rate, abs=2)
+    assert np.abs(np.diff(ramp)).max() <= 2.0 * np.pi / 2.0 / (length * rig.sample_rate) * 1.01
+
+
+def test_abort_overtakes_a_stop_from_where_it_is_and_stop_never_slows_an_abort() -> None:
+    guard, rig = _armed()
+    for level in np.linspace(0.0, 2.0, 20):
+        guard.exchange(np.full(N, level))
+    guard.stop()
+    guard.exchange(np.full(N, 2.0))
+    begin = rig.played.size
+    guard.abort()
+    guard.abort()
+    guard.stop()
+    _run_out(guard, np.full(N, 2.0))
+    tail = rig.played[begin:]
+    assert np.abs(np.diff(tail)).max() < 0.02
+    assert np.flatnonzero(tail)[-1] <= rig.lead + 0.2 * rig.sample_rate
+
+
+@pytest.mark.parametrize(("volts", "quantity"), [(4.2, "table displacement"), (4.8, "table acceleration")])
+def test_measured_motion_beyond_a_limit_aborts(volts: float, quantity: str) -> None:
+    factor = 0.01 if quantity == "table displacement" else 0.001
+    rig = LoopbackRig({"table_displacement": lambda v: factor * v, "table_acceleration": lambda v: v})
+    guard, _ = _armed(rig)
+    levels = np.linspace(0.0, volts, 30)
+    seen = [guard.exchange(np.full(N, level)).violation for level in levels] + [
+        guard.exchange(np.full(N, volts)).violation for _ in range(3)
+    ]
+    found = [violation for violation in seen if violation is not None]
+    assert found[0].quantity == quantity
+    assert guard.ramping
+    _run_out(guard, np.full(N, volts))
+    assert rig.played[-1] == 0.0
+
+
+def test_velocity_is_differenced_over_block_seams() -> None:
+    rig = LoopbackRig({"table_displacement": lambda v: 0.035 * v})
+    guard, _ = _armed(rig)
+    step = np.clip(np.arange(N) * 0.1, 0.0, 1.0)  # 35 mm in 10 ms: 1.75 m/s over the window of 20 ms
+    limits = LIMITS.model_copy(update={"velocity": 1.5})
+    guard = Guard(rig, limits, RAMPS)
+    guard.arm()
+    violations = [guard.exchange(block).violation for block in (np.zeros(N), step, np.ones(N), np.ones(N))]
+    found = next(violation for violation in violations if violation is not None)
+    assert found.quantity == "table velocity"
+    assert found.value == pytest.approx(1.75, rel=0.02)
+
+
+def test_a_single_spike_is_debounced() -> None:
+    def spike(volts: np.ndarray) -> np.ndarray:
+        values = np.zeros(volts.size)
+        values[10] = 20.0
+        return values
+
+    guard, _ = _armed(LoopbackRig({"table_acceleration": spike}))
+    assert all(guard.exchange(np.zeros(N)).violation is None for _ in range(5))
+
+
+def test_a_sensor_that_is_silent_for_too_long_aborts_although_each_block_is_short() -> None:
+    guard, rig = _armed(LoopbackRig({"laser_1": lambda volts: np.full(volts.size, np.nan)}))
+    seen = [guard.exchange(np.zeros(N)).violation for _ in range(6)]
+    assert [violation is None for violation in seen] == [True] * 4 + [False] * 2
+    assert seen[4] is not None
+    assert "laser_1" in seen[4].quantity
+    assert seen[4].sample == round(LIMITS.sensor_loss * rig.sample_rate) - 1
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.lists(
+        st.one_of(
+            st.sampled_from(["stop", "abort"]),
+            st.floats(-8.0, 8.0),
+            st.sampled_from([float("nan"), float("inf"), 1e300]),
+        ),
+        max_size=12,
+    )
+)
+def test_whatever_is_asked_the_output_stays_within_limits_and_ends_at_zero(acts: list[float | str]) -> None:
+    guard, rig = _armed()
+    for act in acts:
+        if isinstance(act, str):
+            getattr(guard, act)()
+        else:
+            guard.exchange(np.full(N, act))
+    guard.abort()
+    _run_out(guard, np.full(N, 8.0))
+    assert np.abs(rig.played).max() <= LIMITS.drive_voltage
+    assert np.abs(np.diff(rig.played, prepend=0.0)).max() <= LIMITS.drive_slew / rig.sample_rate + 1e-12
+    assert rig.played[-1] == 0.0
