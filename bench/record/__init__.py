@@ -1,0 +1,1 @@
+"""The record: one HDF5 file per campaign."""

@@ -1,0 +1,198 @@
+# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false
+"""The part of h5py that is used here, with types: h5py has none of its own.
+
+Every numeric dataset is made by `write_numbers` or `grow_numbers`, which ask for its unit, so none can lack it.
+"""
+
+import os
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Protocol, cast
+
+import h5py
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+# The oldest format that can be read while it is written; it is also fixed, so older tools keep up with newer writers.
+VERSIONS = ("v110", "v110")
+# Shares in a laboratory may not offer locks; mode "x" and the single-writer mode protect the file without them.
+LOCKING = "best-effort"
+
+
+class Attributes(Protocol):
+    """The attributes of a group or dataset."""
+
+    def __getitem__(self, name: str) -> Any: ...
+    def __setitem__(self, name: str, value: object) -> None: ...
+    def __contains__(self, name: object) -> bool: ...
+    def get(self, name: str, default: object = None) -> Any: ...
+
+
+class Dataset(Protocol):
+    """An array in the file, or a scalar (shape ())."""
+
+    @property
+    def attrs(self) -> Attributes: ...
+    @property
+    def shape(self) -> tuple[int, ...]: ...
+    def __getitem__(self, key: object) -> Any: ...
+    def __setitem__(self, key: object, value: object) -> None: ...
+    def resize(self, size: tuple[int, ...]) -> None: ...
+    def refresh(self) -> None: ...
+
+
+class Group(Protocol):
+    """A folder in the file."""
+
+    @property
+    def attrs(self) -> Attributes: ...
+    def create_group(self, name: str, track_order: bool) -> "Group": ...
+    def create_dataset(self, name: str, **options: Any) -> Dataset: ...
+    def __getitem__(self, name: str) -> object: ...
+    def __setitem__(self, name: str, value: object) -> None: ...
+    def __contains__(self, name: object) -> bool: ...
+    def __iter__(self) -> Iterator[str]: ...
+
+
+class File(Group, Protocol):
+    """An open file."""
+
+    swmr_mode: bool
+
+    def flush(self) -> None: ...
+    def close(self) -> None: ...
+
+
+def create(path: Path) -> File:
+    """A new file; FileExistsError if there is one."""
+    return cast(File, h5py.File(path, "x", libver=VERSIONS, locking=LOCKING))
+
+
+def let_go(file: File) -> None:
+    """Close a file that can no longer be written, leaving on the disk what was flushed.
+
+    HDF5 insists on writing what it still holds. When that fails it frees half of its state, and crashes the process
+    when it comes back to it, at the latest on exit; a crash is nothing for a program that drives a shaker. So the
+    rest of the writing goes to the null device.
+    """
+    with suppress(OSError, RuntimeError, ValueError):
+        nowhere = os.open(os.devnull, os.O_RDWR)
+        os.dup2(nowhere, cast(int, cast(h5py.File, file).id.get_vfd_handle()), inheritable=False)
+        os.close(nowhere)
+    with suppress(OSError, RuntimeError, ValueError):
+        file.close()
+
+
+def open_to_read(path: Path) -> File:
+    """A finished file, one that is being written, or one that a killed writer left."""
+    return cast(File, h5py.File(path, "r", libver=VERSIONS, locking=LOCKING, swmr=True))
+
+
+def is_hdf5(path: Path) -> bool:
+    """Whether the file begins like an HDF5 file."""
+    return cast(bool, h5py.is_hdf5(path))
+
+
+def dataset(parent: Group, path: str) -> Dataset:
+    """The dataset at `path` below `parent`."""
+    return cast(Dataset, parent[path])
+
+
+def group(parent: Group, path: str) -> Group:
+    """The group at `path` below `parent`."""
+    return cast(Group, parent[path])
+
+
+def create_group(parent: Group, name: str, nx_class: str) -> Group:
+    """A new group of a NeXus class; what is in it keeps the order in which it was made."""
+    made = parent.create_group(name, track_order=True)
+    made.attrs["NX_class"] = nx_class
+    return made
+
+
+def link(parent: Group, name: str, target: str) -> None:
+    """A soft link to an absolute path: the data stay where they are."""
+    parent[name] = h5py.SoftLink(target)
+
+
+def write_numbers(parent: Group, name: str, values: object, *, unit: str, description: str) -> Dataset:
+    """A dataset of numbers that are all known now; a scalar when `values` is one."""
+    made = parent.create_dataset(name, data=np.asarray(values))
+    made.attrs["units"], made.attrs["description"] = unit, description
+    return made
+
+
+def grow_numbers(
+    parent: Group, name: str, dtype: DTypeLike, *, unit: str, description: str, chunk: int, compress: bool
+) -> Dataset:
+    """An empty dataset of numbers that rows are appended to."""
+    filters = {"shuffle": True, "compression": "lzf"} if compress else {}
+    made = parent.create_dataset(name, shape=(0,), maxshape=(None,), dtype=dtype, chunks=(chunk,), **filters)
+    made.attrs["units"], made.attrs["description"] = unit, description
+    return made
+
+
+def text_type(width: int) -> np.dtype[Any]:
+    """Texts of `width` bytes of UTF-8, in memory and in the file: HDF5 does not convert from plain bytes."""
+    return cast("np.dtype[Any]", h5py.string_dtype("utf-8", width))
+
+
+def grow_texts(parent: Group, name: str, width: int, *, description: str, chunk: int) -> Dataset:
+    """An empty dataset of texts of at most `width` bytes of UTF-8.
+
+    Texts of variable length are kept apart from their dataset, and a reader of a live file may see one without
+    the other; so all texts are of fixed length.
+    """
+    made = parent.create_dataset(name, shape=(0,), maxshape=(None,), dtype=text_type(width), chunks=(chunk,))
+    made.attrs["description"] = description
+    return made
+
+
+def write_text(parent: Group, name: str, text: str, *, width: int = 0, description: str = "") -> Dataset:
+    """A scalar text that occupies its own length, or `width` bytes when it is to be replaced later."""
+    stored = text.encode()
+    kind = text_type(max(width, len(stored), 1))
+    made = parent.create_dataset(name, data=np.array(stored, dtype=kind), dtype=kind)
+    if description:
+        made.attrs["description"] = description
+    return made
+
+
+def write_texts(parent: Group, name: str, texts: Iterable[str], *, description: str) -> Dataset:
+    """A dataset of texts that are all known now."""
+    stored = [text.encode() for text in texts]
+    kind = text_type(max([1, *map(len, stored)]))
+    made = parent.create_dataset(name, data=np.array(stored, dtype=kind), dtype=kind)
+    made.attrs["description"] = description
+    return made
+
+
+def read_text(parent: Group, path: str) -> str:
+    """A scalar text."""
+    return bytes(dataset(parent, path)[()]).decode()
+
+
+def read_texts(stored: NDArray[Any]) -> list[str]:
+    """Texts of fixed length as read from a dataset."""
+    return [bytes(text).decode() for text in stored]
+
+
+def clip_text(text: str, width: int) -> bytes:
+    """UTF-8 of at most `width` bytes; a longer text ends with an ellipsis, and no character is cut in two."""
+    stored = text.encode()
+    if len(stored) <= width:
+        return stored
+    return stored[: width - 3].decode(errors="ignore").encode() + "…".encode()
+
+
+def replace_text(target: Dataset, text: str, width: int) -> None:
+    """Put another text, cut to `width` bytes if it must be, into a scalar that was made `width` bytes wide."""
+    target[()] = np.array(clip_text(text, width), dtype=text_type(width))
+
+
+def append(target: Dataset, values: NDArray[Any]) -> None:
+    """Add rows at the end."""
+    start = target.shape[0]
+    target.resize((start + len(values),))
+    target[start:] = values

@@ -1,0 +1,192 @@
+"""The subscriber that writes a campaign to its file, in its own thread so that a slow disk never delays the drive."""
+
+import queue
+import threading
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.events import Acquired, Estimate, Event, PointFinished, StateChanged
+from bench.record.errors import RecordError, reason
+from bench.record.journal import NOT_JOURNALLED
+from bench.record.layout import Skeleton, Status
+from bench.record.tables import Table
+from bench.record.writer import RecordWriter
+from drivers.rig import Channel
+from sim.errors import InvalidInput
+from sim.parameters import Parameters
+
+PERIOD = 0.5
+"""Seconds of wall time between two writes while samples come in."""
+
+BATCH = 20
+"""Chunks that are written at once when samples come faster than real time."""
+
+BACKLOG = 4096
+"""Events that may wait for the disk: minutes at real time; then the caller waits too, rather than lose one."""
+
+
+@dataclass(frozen=True)
+class _Block:
+    time: float
+    run: int
+    first: int
+    counts: NDArray[np.int16]
+    drive: NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class _Sync:
+    done: threading.Event
+
+
+@dataclass(frozen=True)
+class _End:
+    status: Status
+    summary: str
+
+
+class Recorder:
+    """Writes one new HDF5 file; call it with each event of the engine, and `close` it at the end.
+
+    Samples reach the file within a second, journalled events at once. An error of the disk is raised as RecordError
+    by the next call, once; what comes after it is not recorded, and what was written before stays readable.
+
+    `metadata` is stored as texts under /entry/metadata, `tables` (such as {"prediction": ...}) under /entry.
+    Raises InvalidInput, and creates nothing, when `path` exists or cannot be created, or a name or table is unfit.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        *,
+        channels: Sequence[Channel],
+        sample_rate: float,
+        point_type: type[Parameters],
+        metadata: Mapping[str, str],
+        tables: Mapping[str, Table] | None = None,
+        title: str = "rocking-bench campaign",
+    ) -> None:
+        self.path = path
+        self._point_type = point_type
+        self._n_channels = len(channels)
+        self._writer = RecordWriter(
+            path, Skeleton(title, tuple(channels), sample_rate, point_type, metadata, tables or {})
+        )
+        self._queue: queue.Queue[_Block | Event | _Sync | _End] = queue.Queue(BACKLOG)
+        self._failure: RecordError | None = None
+        self._told = False
+        self._closed = False
+        self._committed = time.monotonic()
+        # a daemon: a program that dies of an error does not wait for its recorder, and the file is readable anyway
+        self._thread = threading.Thread(target=self._work, name="recorder", daemon=True)
+        self._thread.start()
+
+    def __call__(self, event: Event) -> None:
+        """Take an event. Raises RecordError when it cannot be recorded or an earlier one could not be written."""
+        if self._closed:
+            raise RecordError(f"{self.path} is closed: {type(event).__name__} at {event.time:.3f} s was not recorded")
+        self._raise_failure()
+        if self._failure is not None:
+            return
+        if isinstance(event, Acquired):
+            self._queue.put(self._checked(event))
+        elif isinstance(event, PointFinished) and not isinstance(event.point, self._point_type):
+            raise RecordError(
+                f"point of type {type(event.point).__name__} was not recorded: {self.path} is for"
+                f" {self._point_type.__name__}"
+            )
+        elif isinstance(event, Estimate) or not isinstance(event, NOT_JOURNALLED):
+            self._queue.put(event)
+
+    def sync(self) -> None:
+        """Return when everything so far is in the file. Raises RecordError, once, when it could not be written."""
+        if not self._closed:
+            marker = _Sync(threading.Event())
+            self._queue.put(marker)
+            marker.done.wait()
+        self._raise_failure()
+
+    def close(self, status: Status | str, summary: str = "") -> None:
+        """Write what waits, how it ended and when, and close the file; closing again does nothing.
+
+        Raises InvalidInput for an unknown status, RecordError when the end of the record could not be written.
+        """
+        ends = [str(end) for end in Status if end is not Status.RUNNING]
+        if status not in ends:
+            raise InvalidInput("status of the record", str(status), "one of " + ", ".join(ends))
+        if self._closed:
+            return
+        self._closed = True
+        self._queue.put(_End(Status(status), summary))
+        self._thread.join()
+        self._raise_failure()
+
+    def _checked(self, event: Acquired) -> _Block:
+        """The block's own copy of the arrays, transposed: a driver may use its buffer again."""
+        counts, n = event.block.counts, len(event.block)
+        if counts.shape != (n, self._n_channels) or event.drive.shape != (n,):
+            raise RecordError(
+                f"block at sample {event.block.first} has inputs {counts.shape} and drive {event.drive.shape};"
+                f" expected ({n}, {self._n_channels}) and ({n},)"
+            )
+        copy = np.array(counts.T, dtype=np.int16, order="C")
+        return _Block(event.time, event.run, event.block.first, copy, event.drive.astype(np.float32))
+
+    def _raise_failure(self) -> None:
+        """Tell of a failure once: the steps that bring the bench down are events too, and must not be stopped by it."""
+        if self._failure is not None and not self._told:
+            self._told = True
+            raise self._failure
+
+    def _work(self) -> None:
+        """The thread: take what comes until the end; after a failure, only drain."""
+        while True:
+            try:
+                item = self._queue.get(timeout=PERIOD)
+            except queue.Empty:
+                item = None
+            if self._failure is None:
+                try:
+                    self._take(item)
+                except Exception as error:
+                    # whatever it was, the run must hear of it: an unrecorded campaign is worth nothing
+                    self._writer.abandon()
+                    failure = RecordError(
+                        f"{self.path} cannot be written further ({reason(error)}): see to the disk, start a new record"
+                    )
+                    failure.__cause__ = error
+                    self._failure = failure
+            if isinstance(item, _Sync):
+                item.done.set()
+            if isinstance(item, _End):
+                return
+
+    def _take(self, item: _Block | Event | _Sync | _End | None) -> None:
+        match item:
+            case _End():
+                self._writer.finish(item.status, item.summary)
+            case _Block():
+                self._writer.add_block(item.time, item.run, item.first, item.counts, item.drive)
+                self._commit_if_due()
+            case Estimate():
+                self._writer.add_event(item)
+                self._commit_if_due()
+            case Event():
+                self._writer.add_event(item)
+                self._commit(partial=isinstance(item, StateChanged))
+            case _:
+                self._commit(partial=True)
+
+    def _commit_if_due(self) -> None:
+        waited, chunks = time.monotonic() - self._committed, self._writer.full_chunks
+        if chunks >= BATCH or (chunks and waited >= PERIOD) or waited >= 2.0 * PERIOD:
+            self._commit(partial=not chunks)
+
+    def _commit(self, *, partial: bool) -> None:
+        self._writer.commit(partial=partial)
+        self._committed = time.monotonic()

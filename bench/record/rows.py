@@ -1,0 +1,42 @@
+"""A table that grows during the run: rows wait in memory until they are written together."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from bench.record import hdf5
+from bench.record.fields import Field
+
+
+class Rows:
+    """A group with one dataset per field."""
+
+    def __init__(self, parent: hdf5.Group, name: str, fields: Sequence[Field]) -> None:
+        group = hdf5.create_group(parent, name, "NXcollection")
+        self._columns = [(field, field.create(group)) for field in fields]
+        self._pending: list[tuple[Any, ...]] = []
+        self._written = 0
+
+    def __len__(self) -> int:
+        return self._written + len(self._pending)
+
+    @property
+    def written(self) -> int:
+        """Rows that have been given to the file."""
+        return self._written
+
+    def add(self, *values: Any) -> None:
+        """Append one row, a value per field in their order; None where a value is absent."""
+        self._pending.append(
+            tuple(field.encode(value) for (field, _), value in zip(self._columns, values, strict=True))
+        )
+
+    def write(self) -> None:
+        """Put the waiting rows into the file."""
+        if not self._pending:
+            return
+        for (field, stored), values in zip(self._columns, zip(*self._pending, strict=True), strict=True):
+            hdf5.append(stored, np.array(values, dtype=field.dtype))
+        self._written += len(self._pending)
+        self._pending.clear()

@@ -1,0 +1,86 @@
+"""The samples of all channels and of the drive, appended in whole chunks.
+
+A compressed chunk that is written twice leaves its first copy behind as dead space, so rows wait until a chunk is
+full unless they must reach the file now.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.record import hdf5
+from drivers.rig import Channel
+
+CHUNK_TIME = 0.5
+"""Seconds of samples in a chunk: what is at risk in a run at real time."""
+
+
+class Samples:
+    """One int16 dataset of counts per channel and one float32 dataset of the drive, always of one length."""
+
+    def __init__(self, instrument: hdf5.Group, channels: Sequence[Channel], sample_rate: float) -> None:
+        self.chunk = max(1, round(CHUNK_TIME * sample_rate))
+        self._stored = [_create_channel(instrument, channel, self.chunk) for channel in channels]
+        self._stored.append(_create_drive(instrument, self.chunk))
+        self._pending: list[tuple[NDArray[np.int16], NDArray[np.float32]]] = []
+        self._waiting = 0
+        self._written = 0
+
+    def __len__(self) -> int:
+        return self._written + self._waiting
+
+    @property
+    def written(self) -> int:
+        """Rows that have been given to the file."""
+        return self._written
+
+    @property
+    def full_chunks(self) -> int:
+        """How many chunks could be completed with the rows that wait."""
+        return len(self) // self.chunk - self._written // self.chunk
+
+    def add(self, counts: NDArray[np.int16], drive: NDArray[np.float32]) -> None:
+        """Append rows: counts of shape (n_channels, n) and drive of shape (n,) [V]."""
+        self._pending.append((counts, drive))
+        self._waiting += len(drive)
+
+    def write(self, *, partial: bool) -> None:
+        """Put the waiting rows into the file: all of them, or as many as complete a chunk."""
+        end = len(self) if partial else len(self) // self.chunk * self.chunk
+        count = end - self._written
+        if count <= 0:
+            return
+        counts = np.concatenate([block for block, _ in self._pending], axis=1)
+        drive = np.concatenate([block for _, block in self._pending])
+        for stored, values in zip(self._stored, (*counts, drive), strict=True):
+            hdf5.append(stored, values[:count])
+        self._written = end
+        self._waiting -= count
+        self._pending = [(counts[:, count:], drive[count:])] if self._waiting else []
+
+
+def _create_channel(instrument: hdf5.Group, channel: Channel, chunk: int) -> hdf5.Dataset:
+    sensor = hdf5.create_group(instrument, channel.name, "NXsensor")
+    hdf5.write_text(sensor, "measurement", channel.quantity)
+    hdf5.write_text(sensor, "model", channel.device)
+    description = f"{channel.quantity} as converted: counts * scale + offset is in {channel.unit}"
+    counts = hdf5.grow_numbers(
+        sensor, "counts", np.int16, unit="counts", description=description, chunk=chunk, compress=True
+    )
+    counts.attrs["long_name"] = f"{channel.name} [counts]"
+    counts.attrs["scale"], counts.attrs["offset"] = channel.scale, channel.offset
+    counts.attrs["value_units"] = channel.unit
+    counts.attrs["valid"] = np.array(channel.valid, dtype=np.int64)
+    counts.attrs["quantity"], counts.attrs["device"] = channel.quantity, channel.device
+    return counts
+
+
+def _create_drive(instrument: hdf5.Group, chunk: int) -> hdf5.Dataset:
+    # a 24 bit mantissa resolves full scale 256 times finer than a 16 bit converter: nothing that was played is lost
+    drive = hdf5.create_group(instrument, "drive", "NXcollection")
+    voltage = hdf5.grow_numbers(
+        drive, "voltage", np.float32, unit="V", description="drive as sent to the amplifier", chunk=chunk, compress=True
+    )
+    voltage.attrs["long_name"] = "drive [V]"
+    return voltage

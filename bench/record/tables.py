@@ -1,0 +1,66 @@
+"""A table that is known before the run, such as the prediction: named columns, each with its unit."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.record import hdf5
+from sim.errors import InvalidInput
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column: `values` of shape (n,) are numbers, truth values or texts; `unit` is "1" for a pure number."""
+
+    values: NDArray[Any]
+    unit: str
+    description: str
+
+
+Table = Mapping[str, Column]
+"""Columns of one length by name."""
+
+
+def check(name: str, table: Table) -> None:
+    """Raise InvalidInput unless the columns are one row of values each, of one length, and numbers have a unit."""
+    lengths: set[int] = set()
+    for key, column in table.items():
+        item, values = f"column {key} of table {name}", column.values
+        if values.ndim != 1 or values.dtype.kind not in "fiubU":
+            raise InvalidInput(item, (values.shape, str(values.dtype)), "it must be one row of numbers or texts")
+        if values.dtype.kind in "fiu" and not column.unit:
+            raise InvalidInput(item, column.unit, 'numbers need a unit; "1" for pure numbers')
+        lengths.add(len(values))
+    if len(lengths) > 1:
+        raise InvalidInput(f"table {name}", sorted(lengths), "its columns must have one length")
+
+
+def write(parent: hdf5.Group, name: str, table: Table) -> None:
+    """Store a table as a group with one dataset per column; truth values become int8."""
+    group = hdf5.create_group(parent, name, "NXcollection")
+    for key, column in table.items():
+        kind = column.values.dtype.kind
+        if kind == "U":
+            hdf5.write_texts(group, key, column.values.tolist(), description=column.description)
+            continue
+        values = column.values.astype(np.int8) if kind == "b" else column.values
+        stored = hdf5.write_numbers(group, key, values, unit=column.unit or "1", description=column.description)
+        if kind == "b":
+            stored.attrs["kind"] = "switch"
+
+
+def read(group: hdf5.Group) -> dict[str, Column]:
+    """The table as it was given to `write`."""
+    table: dict[str, Column] = {}
+    for key in group:
+        stored = hdf5.dataset(group, key)
+        values: NDArray[Any] = stored[:]
+        if values.dtype.kind == "S":
+            values = np.array(hdf5.read_texts(values), dtype=np.str_)
+        elif stored.attrs.get("kind") == "switch":
+            values = values.astype(np.bool_)
+        table[key] = Column(values, str(stored.attrs.get("units", "")), str(stored.attrs["description"]))
+    return table

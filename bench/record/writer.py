@@ -1,0 +1,118 @@
+"""The file of one campaign while it is written: it can be read at any moment and survives the death of the writer."""
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.events import Estimate, Event, PointFinished
+from bench.record import hdf5
+from bench.record.errors import RecordError, reason
+from bench.record.journal import text_of
+from bench.record.layout import STATUS_WIDTH, SUMMARY_WIDTH, TIME_WIDTH, Skeleton, Status, build, now
+from sim.errors import InvalidInput
+
+_EXISTS = "the file exists and is never overwritten; name another"
+
+ROOM = 1_000_000
+"""Bytes that must be free before a file is begun: many times an empty record."""
+
+
+def _try_folder(folder: Path) -> None:
+    """Raise OSError unless a file of some size can be made in `folder`.
+
+    HDF5 tells poorly why a file cannot be begun, and crashes the process when the disk fills up at that moment.
+    """
+    with tempfile.TemporaryFile(dir=folder, prefix=".room-") as room:
+        room.write(bytes(ROOM))
+
+
+class RecordWriter:
+    """Creates the file and appends to it. Methods raise what h5py raises when the disk fails, mostly OSError.
+
+    Raises InvalidInput when the file exists, cannot be created, or would hold something that cannot be stored, and
+    RecordError when the disk fails while it is begun.
+    """
+
+    def __init__(self, path: Path, skeleton: Skeleton) -> None:
+        skeleton.check()
+        if path.exists():
+            raise InvalidInput("record", str(path), _EXISTS)
+        try:
+            _try_folder(path.parent)
+            self._file = hdf5.create(path)
+        except FileExistsError:
+            raise InvalidInput("record", str(path), _EXISTS) from None
+        except OSError as error:
+            raise InvalidInput(
+                "record",
+                str(path),
+                f"the file cannot be created ({error.strerror or reason(error)}); name another folder",
+            ) from error
+        try:
+            self._parts = build(self._file, skeleton)
+            self._file.swmr_mode = True
+            self._file.flush()
+        except (OSError, RuntimeError) as error:
+            self.abandon()
+            path.unlink(missing_ok=True)
+            raise RecordError(f"{path} could not be begun ({reason(error)}): see to the disk") from error
+        parts = self._parts
+        self._tables = (parts.blocks, parts.events, parts.estimates, parts.points)
+        self._complete: list[int] = []
+        self._point_fields = tuple(skeleton.point_type.model_fields)
+
+    @property
+    def full_chunks(self) -> int:
+        """How many chunks of samples wait."""
+        return self._parts.samples.full_chunks
+
+    def add_block(
+        self, time: float, run: int, first: int, counts: NDArray[np.int16], drive: NDArray[np.float32]
+    ) -> None:
+        """Append a block: counts of shape (n_channels, n), drive of shape (n,) [V]."""
+        self._parts.blocks.add(len(self._parts.samples), run, first, time)
+        self._parts.samples.add(counts, drive)
+
+    def add_event(self, event: Event) -> None:
+        """Append an event that is no block."""
+        parts = self._parts
+        if isinstance(event, Estimate):
+            values = (event.beta, event.cycles, event.drift_peak, event.alpha_2, event.uncertainty, event.predicted)
+            parts.estimates.add(event.time, event.omega, *values)
+            return
+        if isinstance(event, PointFinished):
+            text = f"row {len(parts.points)} of points"
+            parts.points.add(*(getattr(event.point, name) for name in self._point_fields))
+        else:
+            text = text_of(event)
+        parts.events.add(event.time, type(event).__name__, text)
+
+    def commit(self, *, partial: bool) -> None:
+        """Bring what waits into the file, within reach of readers; samples that fill no chunk only if `partial`."""
+        samples, tables = self._parts.samples, self._tables
+        samples.write(partial=partial)
+        for rows in tables:
+            rows.write()
+        self._file.flush()
+        # a failing disk may keep the new length of a dataset without its rows, so what is whole is counted afterwards,
+        # in a place that exists already
+        complete = [samples.written, *(rows.written for rows in tables)]
+        if complete != self._complete:
+            self._parts.complete[...] = complete
+            self._file.flush()
+            self._complete = complete
+
+    def finish(self, status: Status, summary: str) -> None:
+        """Write everything that waits and the status, and close the file."""
+        self.commit(partial=True)
+        hdf5.replace_text(self._parts.summary, summary, SUMMARY_WIDTH)
+        hdf5.replace_text(self._parts.end_time, now(), TIME_WIDTH)
+        hdf5.replace_text(self._parts.status, status, STATUS_WIDTH)
+        self._file.flush()
+        self._file.close()
+
+    def abandon(self) -> None:
+        """Let go of the file after an error; what was committed stays readable."""
+        hdf5.let_go(self._file)

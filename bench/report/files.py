@@ -1,0 +1,27 @@
+"""Writes a result under its final name only when it is whole, and never over another."""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+from sim.errors import InvalidInput, RockbenchError
+
+
+def write_new(path: Path, write: Callable[[Path], None]) -> None:
+    """Let `write` fill a temporary file beside `path`, then give it that name.
+
+    Raises InvalidInput when `path` exists or its folder does not, RockbenchError when the disk fails.
+    """
+    if path.exists():
+        raise InvalidInput("file", str(path), "it exists and is never overwritten; name another")
+    if not path.parent.is_dir():
+        raise InvalidInput("file", str(path), "its folder does not exist; create it first")
+    # the temporary name keeps the suffix, from which a writer may choose the format
+    unfinished = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+    try:
+        write(unfinished)
+        os.replace(unfinished, path)
+    except OSError as error:
+        raise RockbenchError(f"{path} could not be written ({error.strerror or error}): see to the disk") from error
+    finally:
+        unfinished.unlink(missing_ok=True)
