@@ -1,0 +1,1 @@
+"""The command line: an equal client of the engine."""

@@ -1,0 +1,74 @@
+"""Command-line flags from declared parameters: declared once, offered as `--name VALUE`, checked by the model."""
+
+from collections.abc import Mapping
+from inspect import Parameter as Argument
+from typing import Annotated, Any
+
+from cyclopts import Group, Parameter
+
+from bench.config.declared import Declared, declared
+from sim.parameters import Parameters
+
+_METAVAR: dict[Any, str] = {int: "INT", float: "NUMBER", str: "TEXT"}
+
+
+def flag(name: str) -> str:
+    """The flag of a parameter."""
+    return "--" + name.replace("_", "-")
+
+
+def arguments_of(model: type[Parameters], group: Group) -> list[Argument]:
+    """One keyword-only argument for each field of `model`; None, the default, stands for "not given".
+
+    Values arrive as text: the model, not the command-line parser, decides what they may be, and says so.
+    """
+    return [_argument(entry, group) for entry in declared(model)]
+
+
+def given(model: type[Parameters], arguments: Mapping[str, Any]) -> dict[str, Any]:
+    """The fields of `model` that were given as flags, as plain data for its validation.
+
+    Text that is not what the field holds is left as it is, for the validation to refuse.
+    """
+    values: dict[str, Any] = {}
+    for entry in declared(model):
+        value = arguments.get(entry.name)
+        if value is not None:
+            values[entry.name] = [_read(item, entry.kind) for item in value] if entry.many else _read(value, entry.kind)
+    return values
+
+
+def in_words(value: object) -> str:
+    """A default as one would type it."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _argument(entry: Declared, group: Group) -> Argument:
+    unit = "" if entry.unit in ("", "1") else f" {entry.unit}"
+    defaults: list[object] = [] if entry.default is None else [*entry.default] if entry.many else [entry.default]
+    default = f"{' '.join(in_words(value) for value in defaults)}{unit}" if defaults else ""
+    allowed = ", ".join(entry.choices) or (f"each {entry.limits}" if entry.many and entry.limits else entry.limits)
+    text = f"{entry.description[:1].upper()}{entry.description[1:]}"
+    details = [f"[{entry.unit}]" if unit else "", f"({allowed})" if allowed else ""]
+    parameter = Parameter(
+        name=flag(entry.name),
+        help=" ".join([text, *(detail for detail in details if detail)]),
+        show_default=default or False,
+        metavar=None if entry.kind is bool else _METAVAR.get(entry.kind, "WORD") + ("..." if entry.many else ""),
+        negative=None if entry.kind is bool else (),
+        consume_multiple=entry.many,
+        group=group,
+    )
+    kind = bool if entry.kind is bool else tuple[str, ...] if entry.many else str
+    return Argument(entry.name, Argument.KEYWORD_ONLY, default=None, annotation=Annotated[kind | None, parameter])
+
+
+def _read(value: Any, kind: Any) -> Any:
+    if kind not in (int, float):
+        return value
+    try:
+        return kind(value)
+    except ValueError:
+        return value

@@ -1,0 +1,54 @@
+"""The command `rockbench`."""
+
+import sys
+from collections.abc import Sequence
+from importlib.metadata import version
+from io import TextIOWrapper
+
+from cyclopts import App, CycloptsError, UnusedCliTokensError
+
+from bench.cli.configure import config_app
+from bench.cli.refusal import tell
+from bench.cli.run import Start, run_app
+from sim.errors import RockbenchError
+
+
+def run() -> None:
+    """Entry point of the console script."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            # a console that cannot show a character shows another, and the run goes on
+            stream.reconfigure(errors="replace")
+    sys.exit(main())
+
+
+def main(argv: Sequence[str] | None = None, start: Start | None = None) -> int:
+    """Carry out a command line and return its exit code; `start` stands in for `bench.session.run_session`.
+
+    0: done. 1: a run failed or was aborted. 2: refused before anything started. 130: ended by Ctrl-C.
+    What went wrong is one line on standard error.
+    """
+    app = App(
+        name="rockbench",
+        help="Runs a shake-table bench for a frame coupled to a rocking block, and compares its gain with prediction.",
+        help_format="plaintext",
+        version=lambda: f"rockbench {version('rocking-bench')}",
+        exit_on_error=False,
+        print_error=False,
+        result_action="return_value",
+        suppress_keyboard_interrupt=False,
+    )
+    app.command(run_app(start))
+    app.command(config_app())
+    try:
+        code = app(sys.argv[1:] if argv is None else list(argv))
+    except UnusedCliTokensError as error:
+        tell(f"unexpected argument: {' '.join(error.unused_tokens or [])} (see --help)")
+        return 2
+    except (CycloptsError, RockbenchError) as error:
+        tell(error)
+        return 2
+    except KeyboardInterrupt:
+        tell("interrupted before the run began")
+        return 130
+    return code if isinstance(code, int) else 0

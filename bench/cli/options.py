@@ -1,0 +1,97 @@
+"""The options that every protocol has on the command line."""
+
+from dataclasses import dataclass
+from inspect import Parameter as Argument
+from inspect import signature
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Group, Parameter
+
+_RUN = Group("Run", sort_key=2)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """How a protocol is run, as opposed to what it asks for."""
+
+    config: Annotated[
+        Path | None,
+        Parameter(
+            name="--config",
+            metavar="FILE",
+            group=_RUN,
+            help="Configuration of the bench (TOML).",
+            show_default="the paper's specimen on the simulated bench",
+        ),
+    ] = None
+    protocol_file: Annotated[
+        Path | None,
+        Parameter(
+            name="--protocol-file",
+            metavar="FILE",
+            group=_RUN,
+            help="Parameters of the protocol (TOML, keys as the flags above with _ for -); flags win over the file.",
+        ),
+    ] = None
+    out: Annotated[
+        Path | None,
+        Parameter(
+            name="--out",
+            metavar="DIR",
+            group=_RUN,
+            help="Folder for the results; made if missing. Results that are there already are never overwritten.",
+            show_default="runs/<protocol>-<local date and time>",
+        ),
+    ] = None
+    seed: Annotated[
+        str | None,
+        Parameter(
+            name="--seed", metavar="INT", group=_RUN, help="Seed of the simulation, in place of the configuration's."
+        ),
+    ] = None
+    yes: Annotated[
+        bool,
+        Parameter(
+            name="--yes",
+            group=_RUN,
+            negative=(),
+            show_default=False,
+            help="Answer yes to the operator's questions: an unattended run.",
+        ),
+    ] = False
+    ask: Annotated[
+        bool,
+        Parameter(
+            name="--ask",
+            group=_RUN,
+            negative=(),
+            show_default=False,
+            help="Ask the operator even on the simulated bench, which else does the hand work by itself.",
+        ),
+    ] = False
+    realtime: Annotated[
+        bool,
+        Parameter(
+            name="--realtime",
+            group=_RUN,
+            negative=(),
+            show_default=False,
+            help="Let the simulated bench run at the pace of the wall clock, not as fast as it can.",
+        ),
+    ] = False
+    json: Annotated[
+        bool,
+        Parameter(
+            name="--json",
+            group=_RUN,
+            negative=(),
+            show_default=False,
+            help="Print one JSON object, the summary of the run, on standard output and nothing else there.",
+        ),
+    ] = False
+
+
+def arguments_of_options() -> list[Argument]:
+    """One keyword-only argument for each option."""
+    return list(signature(Options).parameters.values())

@@ -1,0 +1,37 @@
+"""Checks, before anything starts, that the results of a run can be written and overwrite nothing."""
+
+import tempfile
+from collections.abc import Iterable
+from datetime import datetime
+from pathlib import Path
+
+from sim.errors import InvalidInput
+
+RESULTS = ("campaign.h5", "gain_spectra.png", "summary.json")
+"""The files that a run writes into its folder."""
+
+
+def default_folder(protocol: str, now: datetime) -> Path:
+    """`runs/<protocol>-<date>T<time>`; hyphens in the time, because a colon is not allowed on every system."""
+    return Path("runs", f"{protocol}-{now:%Y-%m-%dT%H-%M-%S}")
+
+
+def check_folder(folder: Path, results: Iterable[str] = RESULTS) -> None:
+    """Refuse a folder that cannot take the `results` of a run. Leaves nothing behind, and creates no folder.
+
+    Raises InvalidInput naming what stands in the way.
+    """
+    for name in results:
+        if (folder / name).exists():
+            raise InvalidInput("--out", str(folder), f"it holds {name} already; results are never overwritten")
+    existing = folder
+    try:
+        while not existing.exists() and existing != existing.parent:
+            existing = existing.parent
+        if not existing.is_dir():
+            raise InvalidInput("--out", str(folder), f"{existing} is a file; give a folder")
+        # permission bits do not tell the truth on every file system: try it
+        with tempfile.TemporaryFile(dir=existing):
+            pass
+    except OSError as error:
+        raise InvalidInput("--out", str(folder), f"{existing} cannot be written: {error.strerror}") from None

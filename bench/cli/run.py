@@ -1,0 +1,132 @@
+"""`rockbench run <protocol>`: checks everything, runs the session, tells how it ended."""
+
+import json
+import sys
+from collections.abc import Callable, Sequence
+from contextlib import redirect_stdout
+from dataclasses import fields
+from datetime import datetime
+from inspect import Signature
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+from cyclopts import App, Group
+
+from bench.cli.catalogue import CATALOGUE, Entry
+from bench.cli.flags import arguments_of
+from bench.cli.options import Options, arguments_of_options
+from bench.cli.refusal import tell
+from sim.errors import InvalidInput, RockbenchError
+
+if TYPE_CHECKING:
+    from bench.config.model import BenchConfiguration
+    from bench.engine.operator import Operator
+    from bench.engine.requests import Requests
+    from bench.events import Subscriber
+    from bench.session import Experiment, SessionResult
+
+GOOD = ("completed", "stopped")
+"""How a session ends whose results are good."""
+
+_EXIT_CODES = (
+    "The exit code is 0 when the campaign was carried out (also when a point was not reached: its status says so), "
+    "1 when it failed or was aborted, 2 when something was refused before it began, 130 after Ctrl-C."
+)
+
+
+class Start(Protocol):
+    """What runs a session: `bench.session.run_session`, or its stand-in in a test."""
+
+    def __call__(
+        self,
+        protocol: "Experiment",
+        configuration: "BenchConfiguration",
+        *,
+        out: Path,
+        operator: "Operator",
+        subscribers: "Sequence[Subscriber]",
+        requests: "Requests",
+        realtime: bool,
+    ) -> "SessionResult":
+        """Run `protocol` and leave its results in the folder `out`."""
+        ...
+
+
+def run_app(start: Start | None = None) -> App:
+    """`rockbench run`, with one command for each protocol. Without `start`, sessions are the real ones."""
+    app = App(name="run", help="Run a protocol on the bench.", version_flags=())
+    for entry in CATALOGUE:
+        app.command(_command(entry, start), name=entry.name)
+    return app
+
+
+def _command(entry: Entry, start: Start | None) -> Callable[..., int]:
+    """The function behind a protocol's command; its signature is the protocol's flags and the common options."""
+
+    def execute(**arguments: Any) -> int:
+        common = {field.name for field in fields(Options)} & arguments.keys()
+        options = Options(**{name: arguments.pop(name) for name in common})
+        return _perform(entry, arguments, options, start)
+
+    group = Group(f"Parameters of the {entry.name} protocol", sort_key=1)
+    execute.__doc__ = f"{entry.summary}\n\n{entry.details}\n\n{_EXIT_CODES}"
+    execute.__dict__["__signature__"] = Signature([*arguments_of(entry.parameters, group), *arguments_of_options()])
+    return execute
+
+
+def _perform(entry: Entry, arguments: dict[str, Any], options: Options, start: Start | None) -> int:
+    from bench.cli.console import progress_on
+    from bench.cli.inputs import configuration_from, parameters_from
+    from bench.cli.interrupt import interruptible
+    from bench.cli.operator import AtTheConsole, choose
+    from bench.cli.output import check_folder, default_folder
+    from bench.engine.requests import Requests
+
+    experiment = entry.campaign(parameters_from(entry.parameters, arguments, options.protocol_file))
+    configuration = configuration_from(options.config, options.seed)
+    out = options.out or default_folder(entry.name, datetime.now())
+    check_folder(out)
+    operator = choose(configuration.backend, yes=options.yes, ask=options.ask, terminal=sys.stdin.isatty())
+    person = operator if isinstance(operator, AtTheConsole) else None
+    if start is None:
+        from bench.session import run_session
+
+        start = run_session
+    requests = Requests()
+    with (
+        interruptible(requests, asking=lambda: person is not None and person.asking) as interrupts,
+        progress_on(sys.stderr, person_answers=person is not None) as progress,
+        # standard output belongs to the result
+        redirect_stdout(sys.stderr),
+    ):
+        try:
+            ended = start(
+                experiment,
+                configuration,
+                out=out,
+                operator=operator,
+                subscribers=[progress],
+                requests=requests,
+                realtime=options.realtime,
+            )
+        except InvalidInput:
+            raise
+        except (RockbenchError, OSError) as error:
+            ended = error
+    if isinstance(ended, Exception):
+        tell(ended)
+        return interrupts.exit_code or 1
+    return _report(ended, out, options.json, interrupts.exit_code)
+
+
+def _report(result: "SessionResult", out: Path, as_json: bool, interrupted: int | None) -> int:
+    """Print the result, and turn the way it ended into an exit code."""
+    if as_json:
+        print(json.dumps({"status": result.status, "reason": result.reason, **result.summary}, allow_nan=False))
+    else:
+        print(f"{result.table.rstrip()}\nResults are in {out}")
+    if result.status not in GOOD:
+        tell(f"the run was {result.status}: {result.reason}")
+    if interrupted is None and result.interrupted and result.status not in GOOD:
+        return 130
+    return interrupted or (0 if result.status in GOOD else 1)

@@ -1,0 +1,152 @@
+"""What the operator sees, gathered from the stream of events. Knows nothing of how it is shown."""
+
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from bench.cli.words import ABSENT, difference, gain, number, one_line, setting
+from bench.events import (
+    Estimate,
+    Event,
+    LimitExceeded,
+    OperatorAnswered,
+    OperatorAsked,
+    PointFinished,
+    Progress,
+    State,
+    StateChanged,
+    StepStarted,
+    Warned,
+)
+
+NOTICES = 5
+"""How many of the last events are shown."""
+
+
+@dataclass(frozen=True)
+class Notice:
+    """One line of the log: `kind` is a word, `grave` says that the operator should look."""
+
+    time: float
+    kind: str
+    text: str
+    grave: bool = False
+
+
+@dataclass(frozen=True)
+class Row:
+    """A point of the campaign, finished or in progress, in words."""
+
+    omega: str
+    beta: str
+    status: str
+    alpha_2: str
+    predicted: str
+    difference: str
+    agrees: str
+    effort: str
+
+    @staticmethod
+    def finished(point: Mapping[str, Any]) -> "Row":
+        """From the values of a protocol's point; what the point does not have is absent."""
+        value, predicted = point.get("alpha_2"), point.get("alpha_2_predicted")
+        agrees, starts = point.get("agrees"), point.get("starts_tried")
+        unstable = point.get("predicted_stable") is False
+        effort = f"{point.get('cycles_measured', 0)} cycles"
+        return Row(
+            omega=setting(point.get("omega_rad_s")),
+            beta=setting(point.get("beta")),
+            status=str(point.get("status", ABSENT)),
+            alpha_2=gain(value, point.get("alpha_2_uncertainty")),
+            predicted=number(predicted) + (" unstable" if unstable else ""),
+            difference=difference(value, predicted),
+            agrees=ABSENT if agrees is None else "yes" if agrees else "NO",
+            effort=f"{effort}, {starts} starts" if starts and starts > 1 else effort,
+        )
+
+    @staticmethod
+    def running(estimate: Estimate) -> "Row":
+        """From the running estimate of the point that is being tested."""
+        return Row(
+            omega=setting(estimate.omega),
+            beta="bare" if estimate.beta is None else setting(estimate.beta),
+            status="measuring",
+            alpha_2=gain(estimate.alpha_2, estimate.uncertainty),
+            predicted=number(estimate.predicted),
+            difference=difference(estimate.alpha_2, estimate.predicted),
+            agrees=ABSENT,
+            effort=f"{estimate.cycles} cycles",
+        )
+
+    @property
+    def sentence(self) -> str:
+        """The row as one line of a log."""
+        return (
+            f"omega {self.omega} rad/s, beta {self.beta}: {self.status}, alpha_2 {self.alpha_2}, "
+            f"predicted {self.predicted}, difference {self.difference}, agrees: {self.agrees}, {self.effort}"
+        )
+
+
+def notice_of(event: Event) -> Notice | None:
+    """The event as a line of the log, or None when it is not worth one."""
+    match event:
+        case StepStarted():
+            return Notice(event.time, "step", one_line(event.text))
+        case PointFinished():
+            point = event.point.model_dump()
+            reason = one_line(str(point.get("reason") or ""))
+            text = Row.finished(point).sentence + (f" ({reason})" if reason else "")
+            return Notice(event.time, "point", text, grave=point.get("status") == "overturned")
+        case Warned():
+            return Notice(event.time, "warning", one_line(event.text), grave=True)
+        case LimitExceeded():
+            reached, allowed = (f"{value:.4g} {event.unit}" for value in (event.value, event.limit))
+            return Notice(event.time, "LIMIT", f"{event.quantity} reached {reached}, allowed {allowed}", grave=True)
+        case OperatorAsked():
+            return Notice(event.time, "asked", one_line(event.request))
+        case OperatorAnswered():
+            return Notice(event.time, "done", one_line(f"{event.request} (by {event.by})"))
+        case StateChanged(after=State.ABORTING | State.HALTED):
+            return Notice(event.time, str(event.after), one_line(event.reason), grave=True)
+        case _:
+            return None
+
+
+@dataclass
+class Scene:
+    """The present picture: `rows` of finished points, the last `notices` that are no points, and the rest as it is."""
+
+    time: float = 0.0
+    state: State = State.IDLE
+    reason: str = ""
+    step: str = ""
+    activity: str = ""
+    fraction: float = 0.0
+    remaining: float = float("nan")
+    rows: list[Row] = field(default_factory=list[Row])
+    running: Row | None = None
+    notices: deque[Notice] = field(default_factory=lambda: deque[Notice](maxlen=NOTICES))
+
+    def update(self, event: Event) -> Notice | None:
+        """Take in an event that is not a block of samples; returns its line of the log, if it has one."""
+        self.time = max(self.time, event.time)
+        match event:
+            case StateChanged():
+                self.state, self.reason = event.after, one_line(event.reason)
+            case StepStarted():
+                self.step, self.running = one_line(event.text), None
+            case Progress():
+                self.fraction = min(max(event.fraction, 0.0), 1.0)
+                self.remaining, self.activity = event.remaining, one_line(event.activity)
+            case Estimate():
+                self.running = Row.running(event)
+            case PointFinished():
+                self.rows.append(Row.finished(event.point.model_dump()))
+                self.running = None
+            case _:
+                pass
+        notice = notice_of(event)
+        if notice is not None and not isinstance(event, PointFinished):
+            self.notices.append(notice)
+        return notice

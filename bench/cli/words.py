@@ -1,0 +1,45 @@
+"""Numbers as the operator reads them."""
+
+from math import floor, isfinite, log10
+
+ABSENT = "-"
+"""What stands where there is no value."""
+
+
+def clock(seconds: float) -> str:
+    """Minutes and seconds, with hours when there are any: `4:07`, `1:02:30`; absent when not finite."""
+    if not isfinite(seconds):
+        return ABSENT
+    minutes, rest = divmod(round(max(seconds, 0.0)), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
+
+
+def number(value: float | None) -> str:
+    """Four significant digits, or absent for None and NaN."""
+    return ABSENT if value is None or not isfinite(value) else f"{value:#.4g}".rstrip(".")
+
+
+def setting(value: float | None) -> str:
+    """A value that was asked for, as it was typed: `12.5`."""
+    return ABSENT if value is None or not isfinite(value) else f"{value:g}"
+
+
+def gain(value: float | None, uncertainty: float | None) -> str:
+    """A value and its uncertainty, both to the place of the uncertainty's second digit: `0.8263 ± 0.0041`."""
+    if value is None or not isfinite(value) or uncertainty is None or not isfinite(uncertainty) or uncertainty <= 0:
+        return number(value)
+    places = min(max(1 - floor(log10(uncertainty)), 0), 6)
+    return f"{value:.{places}f} ± {uncertainty:.{places}f}"
+
+
+def difference(value: float | None, reference: float | None) -> str:
+    """How far `value` is from `reference`, in per cent of the reference: `+0.4 %`."""
+    if value is None or not reference or not (isfinite(value) and isfinite(reference)):
+        return ABSENT
+    return f"{100.0 * (value / reference - 1.0):+.1f} %"
+
+
+def one_line(text: str) -> str:
+    """The text without line breaks and control characters, which would disturb a terminal or a log."""
+    return "".join(character for character in " ".join(text.split()) if character.isprintable())

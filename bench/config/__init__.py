@@ -1,0 +1,1 @@
+"""The bench's configuration: one TOML file, validated, every key with its unit."""

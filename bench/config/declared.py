@@ -1,0 +1,154 @@
+"""A declared parameter in words: what it is, in which unit, between which limits.
+
+File, command line and error messages all describe a parameter through this module, so they cannot disagree.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from enum import Enum
+from inspect import getdoc
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+from annotated_types import Ge, Gt, Le, Lt, MaxLen, MinLen
+from pydantic.fields import FieldInfo
+
+from sim.parameters import Parameters, unit_of
+
+_BOUNDS: dict[type, tuple[str, str]] = {
+    Gt: ("gt", "above"),
+    Ge: ("ge", "at least"),
+    Lt: ("lt", "below"),
+    Le: ("le", "at most"),
+}
+_SINGULAR: dict[Any, str] = {int: "a whole number", float: "a number", bool: "true or false", str: "a text"}
+_PLURAL: dict[Any, str] = {int: "whole numbers", float: "numbers", bool: "switches (true or false)", str: "texts"}
+_COUNT = {0: "any number of", 1: "one or more", 2: "two or more", 3: "three or more"}
+
+
+@dataclass(frozen=True)
+class Declared:
+    """One field of a group of parameters.
+
+    `kind` is the type of a value, or of each of `many` values; `constraints` are the limits of each value and
+    `lengths` those of their number; `optional` says whether the value may be absent.
+    """
+
+    name: str
+    kind: Any
+    many: bool
+    optional: bool
+    default: Any
+    unit: str
+    description: str
+    constraints: tuple[object, ...]
+    lengths: tuple[object, ...]
+
+    @property
+    def group(self) -> type[Parameters] | None:
+        """The nested group that this field holds, or None for a value."""
+        return self.kind if isinstance(self.kind, type) and issubclass(self.kind, Parameters) else None
+
+    @property
+    def choices(self) -> tuple[str, ...]:
+        """The words that are allowed, or () when the value is not a choice."""
+        if get_origin(self.kind) is Literal:
+            return tuple(str(choice) for choice in get_args(self.kind))
+        if isinstance(self.kind, type) and issubclass(self.kind, Enum):
+            return tuple(str(member.value) for member in self.kind)
+        return ()
+
+    @property
+    def limits(self) -> str:
+        """The limits of a value, such as "above 0 and at most 60"; empty without limits."""
+        return " and ".join(
+            f"{word} {_exactly(getattr(constraint, attribute))}"
+            for constraint in self.constraints
+            for attribute, word in [_BOUNDS[type(constraint)]]
+        )
+
+    @property
+    def allowed(self) -> str:
+        """What the value may be, such as "one or more numbers, each above 0 and at most 60"."""
+        if self.group is not None:
+            return "a table of keys"
+        if self.choices:
+            return " or ".join(f'"{choice}"' for choice in self.choices)
+        if not self.many:
+            return f"{_SINGULAR.get(self.kind, 'a value')} {self.limits}".rstrip()
+        least = next((limit.min_length for limit in self.lengths if isinstance(limit, MinLen)), 0)
+        most = next((limit.max_length for limit in self.lengths if isinstance(limit, MaxLen)), None)
+        count = _COUNT.get(least, f"{least} or more") if most is None else f"{least} to {most}"
+        what = f"{count} {_PLURAL.get(self.kind, 'values')}"
+        return f"{what}, each {self.limits}" if self.limits else what
+
+    @property
+    def allowed_in_unit(self) -> str:
+        """`allowed` with its unit, for a sentence: "a number above 0 kg"."""
+        if self.unit in ("", "1"):
+            return self.allowed
+        return f"{self.allowed} {self.unit}" if self.limits else f"{self.allowed} [{self.unit}]"
+
+
+def declared(model: type[Parameters]) -> Iterator[Declared]:
+    """The fields of a group of parameters, in their order."""
+    for name, field in model.model_fields.items():
+        yield _declared(name, field)
+
+
+def at(model: type[Parameters], path: Sequence[str | int]) -> Declared | None:
+    """The field that `path` leads to, one of its values where the path ends with an index; None if there is none."""
+    found: Declared | None = None
+    group: type[Parameters] | None = model
+    for key in path:
+        if isinstance(key, int):
+            continue
+        if group is None or key not in group.model_fields:
+            return None
+        found = _declared(key, group.model_fields[key])
+        group = found.group
+    return replace(found, many=False) if found is not None and isinstance(path[-1], int) else found
+
+
+def keys(model: type[Parameters], prefix: str = "") -> Iterator[str]:
+    """The dotted keys of all values, nested groups included."""
+    for entry in declared(model):
+        if entry.group is not None:
+            yield from keys(entry.group, f"{prefix}{entry.name}.")
+        else:
+            yield prefix + entry.name
+
+
+def summary(model: type[Parameters]) -> str:
+    """The first sentence of a group's documentation."""
+    return (getdoc(model) or "").split("\n", 1)[0]
+
+
+def _exactly(limit: float) -> str:
+    return str(limit) if isinstance(limit, int) else f"{limit:g}"
+
+
+def _declared(name: str, field: FieldInfo) -> Declared:
+    kind, inner = field.annotation, tuple[object, ...]()
+    optional = get_origin(kind) in (Union, UnionType) and NoneType in get_args(kind)
+    if optional:
+        kind = next(option for option in get_args(kind) if option is not NoneType)
+    many = get_origin(kind) in (tuple, list)
+    if many:
+        kind = get_args(kind)[0]
+    if get_origin(kind) is Annotated:
+        kind, *extras = get_args(kind)
+        nested = (extra.metadata if isinstance(extra, FieldInfo) else [extra] for extra in extras)
+        inner = tuple(item for items in nested for item in items)
+    metadata = (*field.metadata, *inner)
+    return Declared(
+        name=name,
+        kind=kind,
+        many=many,
+        optional=optional,
+        default=field.get_default(call_default_factory=True, validated_data={}),
+        unit=unit_of(field),
+        description=field.description or "",
+        constraints=tuple(item for item in metadata if type(item) in _BOUNDS),
+        lengths=tuple(item for item in metadata if isinstance(item, MinLen | MaxLen)),
+    )

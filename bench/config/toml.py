@@ -1,0 +1,91 @@
+"""Configuration files: TOML in SI units, checked completely before anything starts."""
+
+import tomllib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import tomlkit
+
+from bench.config.declared import Declared, declared, summary
+from bench.config.model import BenchConfiguration
+from bench.config.validation import dotted, problems, validated
+from sim.errors import InvalidInput
+from sim.parameters import Parameters
+
+_HEADING = """\
+# Configuration of a shake-table bench for rockbench. SI units throughout.
+# Every key is optional and stands here with its default; above it: what it is [unit], and what it may be.
+# A key or table that begins with #, without a space, is absent by default: take the # away to give it."""
+
+
+def read_table(path: Path, item: str) -> dict[str, Any]:
+    """The keys of a TOML file, unchecked. `item` names the file in an error: InvalidInput, one line."""
+    try:
+        # Windows editors put a byte-order mark in front, which TOML does not allow
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except FileNotFoundError:
+        raise InvalidInput(item, str(path), "there is no such file") from None
+    except OSError as error:
+        raise InvalidInput(item, str(path), f"it cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError as error:
+        raise InvalidInput(item, str(path), f"it is not UTF-8 text (byte {error.start})") from None
+    except tomllib.TOMLDecodeError as error:
+        raise InvalidInput(item, str(path), f"it is not TOML: {error}") from None
+
+
+def read_configuration(path: Path) -> BenchConfiguration:
+    """The configuration in a file. Raises InvalidInput naming file and key."""
+    return validated(BenchConfiguration, read_table(path, "configuration file"), _within(path))
+
+
+def problems_of(path: Path) -> list[InvalidInput]:
+    """Every key of a configuration file that is refused; empty when the file is good.
+
+    Raises InvalidInput when it is not TOML at all.
+    """
+    return problems(BenchConfiguration, read_table(path, "configuration file"), _within(path))
+
+
+def write_commented(path: Path) -> None:
+    """Write every key with its default, commented. Raises InvalidInput when `path` exists or cannot be written."""
+    text = "\n".join([_HEADING, "", *_lines(BenchConfiguration, ())]) + "\n"
+    try:
+        with path.open("x", encoding="utf-8", newline="\n") as file:
+            file.write(text)
+    except FileExistsError:
+        raise InvalidInput("configuration file", str(path), "it exists already; it is never overwritten") from None
+    except OSError as error:
+        raise InvalidInput("configuration file", str(path), f"it cannot be written: {error.strerror}") from None
+
+
+def _within(path: Path) -> Callable[[tuple[str | int, ...]], str]:
+    return lambda where: f"{path.name}: {dotted(where)}"
+
+
+def _lines(model: type[Parameters], path: tuple[str, ...], mark: str = "") -> Iterator[str]:
+    """The lines of a group: its values first, as TOML requires, then its nested groups; `mark` comments them out."""
+    entries = list(declared(model))
+    for entry in entries:
+        if entry.group is None:
+            yield from _value_lines(entry, mark)
+    for entry in entries:
+        if entry.group is not None:
+            inner = "#" if entry.optional else mark
+            here = (*path, entry.name)
+            yield ""
+            if entry.description:
+                yield f"# {entry.description}"
+            yield f"# {summary(entry.group)}"
+            yield f"{inner}[{'.'.join(here)}]"
+            yield from _lines(entry.group, here, inner)
+
+
+def _value_lines(entry: Declared, mark: str) -> Iterator[str]:
+    unit = f" [{entry.unit}]" if entry.unit else ""
+    yield f"# {entry.description}{unit}; {entry.allowed}"
+    if entry.default is None:
+        yield f"#{entry.name} = <{entry.allowed}>"
+    else:
+        value = list(entry.default) if entry.many else entry.default
+        yield f"{mark}{entry.name} = {tomlkit.item(value).as_string()}"

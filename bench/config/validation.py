@@ -1,0 +1,97 @@
+"""Validates values from outside; what is refused is said in one plain line per value."""
+
+from collections.abc import Callable, Mapping
+from difflib import get_close_matches
+from json import dumps
+from typing import Any, TypeVar
+
+from pydantic import ValidationError
+
+from bench.config.declared import at, declared, keys
+from sim.errors import InvalidInput
+from sim.parameters import Parameters
+
+Path = tuple[str | int, ...]
+"""Where a value is: keys, and indices into lists."""
+
+P = TypeVar("P", bound=Parameters)
+
+
+def dotted(path: Path) -> str:
+    """A path as a person writes it: `specimen.frame.k1`, `omega[2]`."""
+    text = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in path)
+    return text.removeprefix(".")
+
+
+def validated(model: type[P], data: Mapping[str, Any], named: Callable[[Path], str] = dotted) -> P:
+    """An instance of `model` from plain data as a file holds it; `named` tells a person where a value is.
+
+    Raises InvalidInput for the first value that is refused, saying how many more there are.
+    """
+    try:
+        return _parsed(model, data)
+    except ValidationError as error:
+        first, *more = _refusals(model, error, named)
+    also = ", ".join(dict.fromkeys(refusal.item for refusal in more if refusal.item != first.item))
+    if also:
+        raise InvalidInput(first.item, first.value, f"{first.allowed} (refused too: {also})")
+    raise first
+
+
+def problems(
+    model: type[Parameters], data: Mapping[str, Any], named: Callable[[Path], str] = dotted
+) -> list[InvalidInput]:
+    """Every value of `data` that is refused, in the order of the declaration; empty when all is well."""
+    try:
+        _parsed(model, data)
+    except ValidationError as error:
+        return _refusals(model, error, named)
+    return []
+
+
+def _parsed(model: type[P], data: Mapping[str, Any]) -> P:
+    # By way of JSON, strictly: a list may stand for a tuple, a word for a choice, but "12" or true is no number.
+    return model.model_validate_json(dumps(data, default=str), strict=True)
+
+
+def _refusals(model: type[Parameters], error: ValidationError, named: Callable[[Path], str]) -> list[InvalidInput]:
+    details = error.errors(include_url=False)
+    paths = [detail["loc"] for detail in details]
+    # a list with a bad value is also reported as too short by that value: one of the two is enough
+    inner = [not any(other[: len(path)] == path and other != path for other in paths) for path in paths]
+    return [_refusal(model, detail, named) for detail, most in zip(details, inner, strict=True) if most]
+
+
+def _refusal(model: type[Parameters], detail: Any, named: Callable[[Path], str]) -> InvalidInput:
+    path: Path = detail["loc"]
+    value = "a table" if isinstance(detail["input"], dict) else detail["input"]
+    raised = detail.get("ctx", {}).get("error")
+    if isinstance(raised, InvalidInput):
+        return InvalidInput(named((*path, raised.item)), raised.value, raised.allowed)
+    if raised is not None:
+        return InvalidInput(named(path) or "the whole", value, str(raised))
+    if detail["type"] == "extra_forbidden":
+        return InvalidInput(named(path), value, f"there is no such key{_suggestion(model, path)}")
+    if detail["type"] == "missing":
+        return InvalidInput(named(path), None, "it is required")
+    entry = at(model, path)
+    allowed = f"it must be {entry.allowed_in_unit}" if entry is not None else str(detail["msg"])
+    return InvalidInput(named(path), value, allowed)
+
+
+def _suggestion(model: type[Parameters], path: Path) -> str:
+    """The known key that was probably meant: beside the unknown one first, then anywhere."""
+    parent, name = path[:-1], str(path[-1])
+    entry = at(model, parent)
+    group = model if not parent else entry.group if entry is not None else None
+    siblings = [field.name for field in declared(group)] if group is not None else []
+    close = get_close_matches(name, siblings, n=1)
+    if close:
+        return f"; the nearest is {dotted((*parent, close[0]))}"
+    everywhere = list(keys(model))
+    elsewhere = [key for key in everywhere if key.rpartition(".")[2] == name] or get_close_matches(
+        dotted(path), everywhere, n=1
+    )
+    if elsewhere:
+        return f"; the nearest is {elsewhere[0]}"
+    return f"; the keys here are {', '.join(siblings)}" if siblings else ""

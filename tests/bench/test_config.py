@@ -1,0 +1,145 @@
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from bench.config.declared import at, keys
+from bench.config.model import BenchConfiguration
+from bench.config.toml import problems_of, read_configuration, write_commented
+from bench.config.validation import problems, validated
+from protocols.harmonic.parameters import HarmonicParameters
+from sim.errors import InvalidInput
+from sim.specimen import Frame, Specimen
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Callable[[str], Path]:
+    """Writes a configuration file and returns its path."""
+
+    def write(text: str) -> Path:
+        path = tmp_path / "bench.toml"
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return write
+
+
+def refusal(path: Path) -> str:
+    with pytest.raises(InvalidInput) as caught:
+        read_configuration(path)
+    text = str(caught.value)
+    assert "\n" not in text
+    return text
+
+
+def test_a_written_file_reads_back_as_the_defaults(tmp_path: Path):
+    path = tmp_path / "rockbench.toml"
+    write_commented(path)
+    assert read_configuration(path) == BenchConfiguration()
+
+
+def test_a_written_file_holds_every_key_with_unit_and_limits_above_it(tmp_path: Path):
+    path = tmp_path / "rockbench.toml"
+    write_commented(path)
+    lines = path.read_text(encoding="utf-8").splitlines()
+    names = [match[1] for line in lines if (match := re.match(r"#?(\w+) = ", line))]
+    assert sorted(names) == sorted(key.rpartition(".")[2] for key in keys(BenchConfiguration))
+    above = lines[lines.index("k1 = 213.44") - 1]
+    assert above == "# stiffness of the first storey [N/m]; a number above 0"
+
+
+def test_the_optional_table_can_be_uncommented(tmp_path: Path):
+    path = tmp_path / "rockbench.toml"
+    write_commented(path)
+    text = re.sub(r"(?m)^#(?=[\w\[])(?!.*<)", "", path.read_text(encoding="utf-8"))
+    path.write_text(text, encoding="utf-8")
+    assert read_configuration(path).simulation.specimen == Specimen()
+
+
+def test_a_file_is_never_overwritten(file: Callable[[str], Path]):
+    path = file("# mine\n")
+    with pytest.raises(InvalidInput, match="exists already"):
+        write_commented(path)
+    assert path.read_text(encoding="utf-8") == "# mine\n"
+
+
+def test_writing_below_a_file_is_refused_in_words(file: Callable[[str], Path]):
+    with pytest.raises(InvalidInput, match="cannot be written"):
+        write_commented(file("") / "rockbench.toml")
+
+
+def test_values_in_a_file_replace_the_defaults(file: Callable[[str], Path]):
+    configuration = read_configuration(file("[specimen.frame]\nk1 = 200\n[simulation]\nseed = 7\n"))
+    assert configuration.specimen == Specimen(frame=Frame(k1=200.0))
+    assert configuration.simulation.seed == 7
+
+
+def test_a_byte_order_mark_is_no_error(tmp_path: Path):
+    path = tmp_path / "bench.toml"
+    path.write_bytes(b"\xef\xbb\xbf[simulation]\r\nseed = 3\r\n")
+    assert read_configuration(path).simulation.seed == 3
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[specimen.frame]\nk1 = -213.44", "bench.toml: specimen.frame.k1 = -213.44 is refused: .* above 0 N/m"),
+        ("[specimen.frame]\nk1 = nan", "specimen.frame.k1 = nan is refused: it must be a number above 0 N/m"),
+        ("[specimen.frame]\nk1 = '200'", "specimen.frame.k1 = '200' is refused: it must be a number"),
+        ("[specimen.frame]\nk1 = true", "specimen.frame.k1 = True is refused: it must be a number"),
+        ("[specimen.frame]\nk1 = 2024-05-01", "specimen.frame.k1 = '2024-05-01' is refused: it must be a number"),
+        ("[specimen.frame]\nxi1 = 1.0", "xi1 = 1.0 is refused: it must be a number at least 0 and below 1$"),
+        ("[simulation]\nseed = 1.5", "simulation.seed = 1.5 is refused: it must be a whole number"),
+        ("[specimen.frame]\nk3 = 1.0", "specimen.frame.k3 = 1.0 is refused: .* nearest is specimen.frame.k[12]"),
+        ("[frame]\nk1 = 1.0", "frame = 'a table' is refused: there is no such key"),
+        ("k_c = 3.0", "k_c = 3.0 is refused: there is no such key"),
+        ("[limits]\nzzz = 0.1", "limits.zzz = 0.1 .* the keys here are drive_voltage, drive_slew"),
+        ("[specimen]\nhalf_stroke = 0.1", "the nearest is simulation.bench.shaker.half_stroke"),
+        ("limits = 3", "limits = 3 is refused: it must be a table of keys"),
+        ("backend = 'cdaq'", "backend = 'cdaq' is refused: it must be \"simulated\""),
+        (
+            "[simulation.bench.filter_unit]\ncutoff = 4e3",
+            "simulation.bench.filter_unit.cutoff = 4000.0 .* sample_rate / 2",
+        ),
+        (
+            "[limits]\nvelocity = 0\n[ramps]\nstop = 0",
+            r"limits.velocity = 0 .* \(refused too: bench.toml: ramps.stop\)",
+        ),
+        ("backend = 'simulated'\n[specimen\n", "it is not TOML: .*line 2"),
+    ],
+)
+def test_what_is_wrong_is_said_in_one_line_with_key_value_and_what_is_allowed(
+    file: Callable[[str], Path], text: str, said: str
+):
+    assert re.search(said, refusal(file(text)))
+
+
+def test_all_problems_of_a_file_are_listed(file: Callable[[str], Path]):
+    found = problems_of(file("[limits]\nvelocity = 0\ndisplacement = -1.0\nspeed = 3\n"))
+    assert [problem.item.rpartition(".")[2] for problem in found] == ["displacement", "velocity", "speed"]
+    assert problems_of(file("")) == []
+
+
+def test_files_that_cannot_be_read_are_refused_in_words(tmp_path: Path):
+    assert "there is no such file" in refusal(tmp_path / "absent.toml")
+    assert "cannot be read" in refusal(tmp_path)
+    (tmp_path / "latin.toml").write_bytes(b"# \xe9\n")
+    assert "not UTF-8" in refusal(tmp_path / "latin.toml")
+
+
+def test_an_element_of_a_list_is_judged_by_itself():
+    found = problems(HarmonicParameters, {"omega": [12.5, 99.0]})
+    assert [str(problem) for problem in found] == [
+        "omega[1] = 99.0 is refused: it must be a number above 0 and at most 60 rad/s"
+    ]
+    assert validated(HarmonicParameters, {"omega": [12, 15.5]}).omega == (12.0, 15.5)
+
+
+def test_the_words_for_what_a_value_may_be_come_from_its_declaration():
+    omega, starts = at(HarmonicParameters, ("omega",)), at(HarmonicParameters, ("starts",))
+    assert omega is not None
+    assert omega.allowed_in_unit == "one or more numbers, each above 0 and at most 60 rad/s"
+    assert starts is not None
+    assert starts.allowed == "a whole number at least 1 and at most 50"
+    assert at(HarmonicParameters, ("omega", "x")) is None
