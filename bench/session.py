@@ -1,0 +1,169 @@
+"""One campaign from configuration to files: rig, guard, engine, recorder, report."""
+
+import json
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from bench.analysis.signals import SignalMap
+from bench.config.model import BenchConfiguration
+from bench.engine.engine import Engine
+from bench.engine.operator import Operator
+from bench.engine.requests import Requests
+from bench.engine.steps import Plan
+from bench.engine.stream import Stream
+from bench.events import Event, PointFinished, Subscriber
+from bench.guard.guard import Guard
+from bench.provenance import software
+from bench.record.recorder import Recorder
+from bench.record.tables import Table
+from bench.report.summary import Summary, write_summary
+from bench.rigs import block_samples, open_rig
+from sim.parameters import Parameters
+
+FILE, FIGURE, SUMMARY = "campaign.h5", "gain_spectra.png", "summary.json"
+
+
+class Experiment(Protocol):
+    """What a protocol offers to a session."""
+
+    @property
+    def name(self) -> str:
+        """The protocol's name."""
+        ...
+
+    @property
+    def parameters(self) -> Parameters:
+        """What was asked for."""
+        ...
+
+    @property
+    def point_type(self) -> type[Parameters]:
+        """The type of one result."""
+        ...
+
+    def check(self, configuration: BenchConfiguration) -> None:
+        """Raise InvalidInput when this bench cannot do what is asked."""
+        ...
+
+    def predict(self, configuration: BenchConfiguration) -> Table:
+        """What the model expects, stored before the first sample moves."""
+        ...
+
+    def plan(self, configuration: BenchConfiguration) -> Plan:
+        """The steps."""
+        ...
+
+    def table(self, points: Sequence[Parameters]) -> str:
+        """The results as plain text."""
+        ...
+
+    def figure(self, points: Sequence[Parameters], prediction: Table, path: Path) -> None:
+        """Draw the results beside the prediction."""
+        ...
+
+
+@dataclass(frozen=True)
+class SessionResult:
+    """How a campaign ended. `summary` is ready for JSON, `table` for the terminal."""
+
+    status: str
+    reason: str
+    summary: dict[str, object]
+    table: str
+    interrupted: bool
+
+
+class _Points:
+    """Gathers the points as they are finished."""
+
+    def __init__(self) -> None:
+        self.all: list[Parameters] = []
+
+    def __call__(self, event: Event) -> None:
+        if isinstance(event, PointFinished):
+            self.all.append(event.point)
+
+
+def run_session(
+    protocol: Experiment,
+    configuration: BenchConfiguration,
+    *,
+    out: Path,
+    operator: Operator,
+    subscribers: Sequence[Subscriber],
+    requests: Requests,
+    realtime: bool,
+) -> SessionResult:
+    """Run `protocol` on the configured bench and leave data file, figure and summary in the folder `out`.
+
+    Raises InvalidInput before anything moves. Once the rig is armed every ending is a result, with its status.
+    """
+    started = time.monotonic()
+    protocol.check(configuration)
+    prediction = protocol.predict(configuration)
+    out.mkdir(parents=True, exist_ok=True)
+    rig = open_rig(configuration, realtime=realtime)
+    try:
+        recorder = Recorder(
+            out / FILE,
+            channels=rig.channels,
+            sample_rate=rig.sample_rate,
+            point_type=protocol.point_type,
+            metadata=_metadata(protocol, configuration, rig.description),
+            tables={"prediction": prediction},
+        )
+        points = _Points()
+        stream = Stream(rig.clock, [recorder, points, *subscribers])
+        status = "failed"
+        try:
+            engine = Engine(
+                rig,
+                Guard(rig, configuration.limits, configuration.ramps),
+                SignalMap(rig.channels, configuration.simulation.bench.laser_1.reference),
+                stream,
+                requests,
+                operator,
+                block_samples(configuration),
+            )
+            ending = engine.run(protocol.plan(configuration))
+            status = ending.status
+        finally:
+            recorder.close(status)
+    finally:
+        rig.close()
+    protocol.figure(points.all, prediction, out / FIGURE)
+    summary = Summary(
+        protocol=protocol.name,
+        status=ending.status,
+        points=points.all,
+        file=out / FILE,
+        figure=out / FIGURE,
+        summary=ending.reason,
+        software=f"rocking-bench {software()['rocking-bench']}",
+        seed=configuration.simulation.seed,
+        elapsed=time.monotonic() - started,
+        bench_time=stream.now(),
+    )
+    write_summary(out / SUMMARY, summary)
+    return SessionResult(
+        status=ending.status,
+        reason=ending.reason,
+        summary=summary.as_dict(),
+        table=protocol.table(points.all),
+        interrupted=requests.strongest is not None,
+    )
+
+
+def _metadata(protocol: Experiment, configuration: BenchConfiguration, devices: dict[str, str]) -> dict[str, str]:
+    return {
+        "protocol": protocol.name,
+        "parameters": protocol.parameters.model_dump_json(),
+        "configuration": configuration.model_dump_json(),
+        "specimen": configuration.specimen.model_dump_json(),
+        "seed": str(configuration.simulation.seed),
+        "devices": json.dumps(devices),
+        **software(),
+    }

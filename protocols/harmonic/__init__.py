@@ -1,0 +1,1 @@
+"""The harmonic campaign of the paper, section 4.3."""

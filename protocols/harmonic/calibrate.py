@@ -1,0 +1,67 @@
+"""How much drive makes how much acceleration: measured at each frequency, at a level that leaves the block at rest."""
+
+from collections.abc import Generator, Sequence
+
+import numpy as np
+
+from bench.analysis.cycles import Cycle
+from bench.analysis.signals import ACCELERATION, SIGNALS
+from bench.control.calibration import DriveCalibration
+from bench.control.legs import Leg
+from bench.engine.steps import Calibrate, Dwell, Fallen, Follow, Measured, Outcome, Step
+
+PROBE = 0.02
+"""First, careful amplitude [V] when nothing is known of the drive yet."""
+
+CHANGE_TIME = 1.0
+"""Time in which frequency and level go from one calibration point to the next [s]."""
+
+SETTLING, MEASURED = 2, 4
+"""Cycles that are left out and used at each point."""
+
+_DRIVE = len(SIGNALS)
+"""Column of the drive in a cycle's arrays."""
+
+
+def calibrate_drive(
+    omegas: Sequence[float], level: float, start: DriveCalibration | None
+) -> Generator[Step, Outcome, DriveCalibration | Fallen]:
+    """Measure the gain of the drive at `omegas` [rad/s] with table accelerations of `level` [m/s2].
+
+    Without a `start` the gain is first probed in two steps, from a command too small to do harm.
+    """
+    if start is None:
+        start = DriveCalibration.flat(1.0)
+        for volts in (PROBE, 10.0 * PROBE):
+            yield Calibrate(start)
+            gain = yield from _measure(omegas[0], volts * start.gain[0])
+            if isinstance(gain, Fallen):
+                return gain
+            yield Follow((Leg(CHANGE_TIME, 0.0, omegas[0]),))
+            start = DriveCalibration.flat(gain)
+    yield Calibrate(start)
+    points: dict[float, float] = {}
+    for omega in sorted(omegas):
+        gain = yield from _measure(omega, level)
+        if isinstance(gain, Fallen):
+            return gain
+        points[omega] = gain
+    yield Follow((Leg(CHANGE_TIME, 0.0, max(omegas)),))
+    return DriveCalibration(tuple(points), tuple(points.values()))
+
+
+def _measure(omega: float, amplitude: float) -> Generator[Step, Outcome, float | Fallen]:
+    """Gain [m/s2 per V] at one frequency."""
+    outcome = yield Follow((Leg(CHANGE_TIME, amplitude, omega),))
+    if isinstance(outcome, Fallen):
+        return outcome
+    outcome = yield Dwell(SETTLING + MEASURED)
+    if not isinstance(outcome, Measured):
+        return Fallen()
+    return drive_gain(outcome.cycles[SETTLING:])
+
+
+def drive_gain(cycles: Sequence[Cycle]) -> float:
+    """Amplitude of the table's acceleration over that of the drive, over cycles [m/s2 per V]."""
+    amplitudes = np.abs(np.array([cycle.fundamental for cycle in cycles])).mean(axis=0)
+    return float(amplitudes[ACCELERATION] / amplitudes[_DRIVE])

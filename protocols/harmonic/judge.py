@@ -1,0 +1,73 @@
+"""What a measured dwell means: on which layer it lies, and whether it agrees with the prediction for that layer."""
+
+from math import hypot, log
+
+from bench.analysis.gain import SensorAccuracy, SteadyPeak, gain
+from protocols.harmonic.point import HarmonicPoint, PointStatus
+from protocols.harmonic.settle import Settled
+from sim.gain import Layer, predict_gain
+from sim.specimen import Specimen
+
+_ROCKING = "rocking"
+
+AGREEMENT = 0.02
+"""Relative difference between measured and predicted that is allowed where the uncertainty is smaller."""
+
+
+def judge(
+    settled: Settled, bare: SteadyPeak, omega: float, specimen: Specimen, accuracy: SensorAccuracy, starts: int
+) -> HarmonicPoint:
+    """The point that a dwell makes, compared with the layer whose drift and u1 are nearest to the measured ones."""
+    peak = settled.peak
+    layers = predict_gain(specimen, omega, peak.amplitude, bare.amplitude).layers
+    steady = settled.steadiness.steady
+    name = _nearest(layers, peak) if steady else _ROCKING
+    layer = layers.get(name)
+    measured = gain(peak, bare, accuracy)
+    predicted = layer.alpha_2 if layer else None
+    agrees = None
+    if steady and predicted is not None:
+        agrees = abs(measured.alpha_2 - predicted) <= max(AGREEMENT * predicted, measured.uncertainty)
+    return HarmonicPoint(
+        omega_rad_s=omega,
+        beta=specimen.beta or 0.0,
+        status=_status(settled, name),
+        layer=name if layer else "none",
+        alpha_2=measured.alpha_2,
+        alpha_2_uncertainty=measured.uncertainty,
+        alpha_2_predicted=predicted,
+        predicted_stable=layer.stable if layer else None,
+        agrees=agrees,
+        drift_peak_m=peak.drift,
+        bare_drift_peak_m=bare.drift,
+        amplitude_m_s2=peak.amplitude,
+        bare_amplitude_m_s2=bare.amplitude,
+        starts_tried=starts,
+        cycles_measured=peak.cycles,
+        settle_time_s=settled.time,
+        reason=_reason(settled, agrees),
+    )
+
+
+def _nearest(layers: dict[str, Layer], peak: SteadyPeak) -> str:
+    """The layer whose peaks of drift and u1 are nearest in ratio to the measured ones."""
+
+    def distance(name: str) -> float:
+        expected = layers[name].orbit.peaks
+        return hypot(log(peak.drift / expected.drift), log(peak.u1 / expected.u1))
+
+    return min(layers, key=distance, default=_ROCKING)
+
+
+def _status(settled: Settled, layer: str) -> PointStatus:
+    if not settled.steadiness.steady:
+        return PointStatus.MODULATED
+    return PointStatus.STEADY if layer == _ROCKING else PointStatus.RESTING
+
+
+def _reason(settled: Settled, agrees: bool | None) -> str:
+    state = settled.steadiness
+    if not state.steady:
+        how = f"repeats every {state.repeats} cycles" if state.repeats else "does not repeat"
+        return f"not steady after {settled.time:.0f} s: the motion {how}, spread {100.0 * state.spread:.1f} %"
+    return "differs from the prediction by more than 2 % and the uncertainty" if agrees is False else ""

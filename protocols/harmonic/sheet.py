@@ -1,0 +1,170 @@
+"""The lab sheet of the harmonic campaign (section 4.3 of the paper).
+
+1. The bare frame: calibrate the drive, then at each frequency hold the amplitude, wait for the steady state, measure.
+2. For each spring: mount it, calibrate the drive anew at a level that leaves the block at rest, and at each frequency
+   try the planned starts until one is steady. A start that topples the block is ended, the block is stood up, and the
+   next one is tried; a point that no start reaches is reported as what it did.
+"""
+
+from collections.abc import Generator
+
+import numpy as np
+
+from bench.analysis.cycles import Cycle
+from bench.analysis.gain import SteadyPeak, gain, steady_peak
+from bench.config.model import BenchConfiguration
+from bench.control.calibration import DriveCalibration
+from bench.control.legs import Leg
+from bench.control.starts import Start, plan_starts
+from bench.engine.steps import Arm, Calibrate, Fallen, Follow, Handle, Outcome, Plan, RampOut, Say, Step
+from bench.events import Estimate, PointFinished, StepStarted
+from drivers.rig import Handwork
+from protocols.harmonic.calibrate import calibrate_drive
+from protocols.harmonic.judge import judge
+from protocols.harmonic.pace import Pace
+from protocols.harmonic.parameters import HarmonicParameters
+from protocols.harmonic.point import HarmonicPoint, PointStatus
+from protocols.harmonic.settle import Look, Settled, settle_and_measure
+from sim.gain import predict_gain
+from sim.specimen import Specimen
+from sim.steady import resting_level
+
+REST = 2.0
+"""Time at rest before a test, over which the zero of the signals is taken [s]."""
+
+CHANGE_TIME = 4.0
+"""Time in which the bare frame goes from one frequency to the next [s]."""
+
+
+class HarmonicSheet:
+    """One campaign on one bench: what the plan knows and gathers while it runs."""
+
+    def __init__(self, parameters: HarmonicParameters, configuration: BenchConfiguration) -> None:
+        self._parameters = parameters
+        self._configuration = configuration
+        self._specimen = configuration.specimen
+        self._amplitude = parameters.amplitude_factor * self._specimen.uplift_acceleration
+        self._pace = Pace(parameters.omega, 1 + len(parameters.beta))
+        self._bare: dict[float, SteadyPeak] = {}
+
+    def plan(self) -> Plan:
+        """The whole campaign as steps."""
+        calibration = yield from self._bare_frame()
+        for beta in self._parameters.beta:
+            yield from self._spring(self._specimen.coupled(beta), calibration)
+
+    def _bare_frame(self) -> Generator[Step, Outcome, DriveCalibration]:
+        yield Handle(Handwork.REMOVE_BLOCK, self._specimen.bare(), "Take the spring and the block off the table.")
+        yield Arm(REST)
+        yield Say(StepStarted(0.0, "calibrate the drive, bare frame"))
+        level = self._parameters.calibration_level * self._amplitude
+        calibration = yield from calibrate_drive(self._parameters.omega, level, None)
+        assert not isinstance(calibration, Fallen), "there is no block that could fall"
+        yield Calibrate(calibration)
+        duration = self._parameters.ramp_time
+        for omega in self._parameters.omega:
+            yield Say(StepStarted(0.0, f"bare frame at {omega:g} rad/s"))
+            yield Follow((Leg(duration, self._amplitude, omega),))
+            settled = yield from settle_and_measure(omega, self._amplitude, self._parameters, self._look(omega, None))
+            assert not isinstance(settled, Fallen), "there is no block that could fall"
+            self._bare[omega] = settled.peak
+            self._pace.finished(omega)
+            duration = CHANGE_TIME
+        yield RampOut()
+        return calibration
+
+    def _spring(self, specimen: Specimen, calibration: DriveCalibration) -> Generator[Step, Outcome, None]:
+        request = f"Stand the block on its base and mount the spring of beta = {specimen.beta:g}."
+        yield Handle(Handwork.MOUNT_SPRING, specimen, request)
+        plans = {omega: self._starts(specimen, omega) for omega in self._parameters.omega}
+        yield Arm(REST)
+        yield Say(StepStarted(0.0, f"calibrate the drive, beta = {specimen.beta:g}"))
+        omegas = sorted({leg.omega for starts in plans.values() for start in starts for leg in start.legs})
+        grid = np.linspace(omegas[0], omegas[-1], max(round((omegas[-1] - omegas[0]) / 1.5) + 1, 2))
+        wanted = sorted({*(round(float(omega), 2) for omega in grid), *self._parameters.omega})
+        allowed = 0.6 * min(resting_level(specimen, omega) for omega in wanted)
+        level = min(self._parameters.calibration_level * self._amplitude, allowed)
+        measured = yield from calibrate_drive(wanted, level, calibration)
+        yield RampOut()
+        if not isinstance(measured, Fallen):
+            calibration = measured
+        for omega in self._parameters.omega:
+            point = yield from self._point(specimen, omega, calibration, plans[omega])
+            self._pace.finished(omega)
+            yield Say(self._pace.progress(f"finished beta = {specimen.beta:g} at {omega:g} rad/s"))
+            yield Say(PointFinished(0.0, point))
+
+    def _point(
+        self, specimen: Specimen, omega: float, calibration: DriveCalibration, starts: list[Start]
+    ) -> Generator[Step, Outcome, HarmonicPoint]:
+        """Try the planned starts; the first steady rocking motion is the point, else the best that was met."""
+        found: HarmonicPoint | None = None
+        falls = 0
+        look = self._look(omega, specimen)
+        for tried, start in enumerate(starts, 1):
+            where = f"beta = {specimen.beta:g} at {omega:g} rad/s, start {tried} of {len(starts)}: {start.name}"
+            yield Say(StepStarted(0.0, where))
+            yield Arm(REST)
+            yield Calibrate(calibration)
+            settled: Settled | Fallen | None = None
+            if not isinstance((yield Follow(start.legs)), Fallen):
+                settled = yield from settle_and_measure(omega, self._amplitude, self._parameters, look)
+            if not isinstance(settled, Settled):
+                falls += 1
+                yield RampOut(fast=True)
+                yield Handle(Handwork.STAND_BLOCK_UP, specimen, "The block has fallen: stand it up again.")
+                continue
+            yield RampOut()
+            accuracy = self._configuration.analysis
+            point = judge(settled, self._bare[omega], omega, specimen, accuracy, tried)
+            if point.status is PointStatus.STEADY or not point.predicted_stable:
+                return point
+            found = found or point
+        if found is not None:
+            return found.model_copy(update={"starts_tried": len(starts)})
+        return self._overturned(specimen, omega, falls)
+
+    def _overturned(self, specimen: Specimen, omega: float, falls: int) -> HarmonicPoint:
+        bare = self._bare[omega]
+        layer = predict_gain(specimen, omega, self._amplitude, bare.amplitude).rocking
+        kind = "stable" if layer and layer.stable else "unstable"
+        return HarmonicPoint(
+            omega_rad_s=omega,
+            beta=specimen.beta or 0.0,
+            status=PointStatus.OVERTURNED,
+            layer="rocking" if layer else "none",
+            alpha_2_predicted=layer.alpha_2 if layer else None,
+            predicted_stable=layer.stable if layer else None,
+            bare_drift_peak_m=bare.drift,
+            bare_amplitude_m_s2=bare.amplitude,
+            starts_tried=falls,
+            reason=f"the block fell in each of {falls} starts; the predicted orbit is {kind}",
+        )
+
+    def _starts(self, specimen: Specimen, omega: float) -> list[Start]:
+        layer = predict_gain(specimen, omega, self._amplitude).rocking
+        orbit = layer.orbit if layer else None
+        return plan_starts(specimen, omega, self._amplitude, orbit, self._parameters.starts)
+
+    def _look(self, omega: float, specimen: Specimen | None) -> Look:
+        """What the operator is told while a test settles: running alpha_2 beside the predicted one."""
+        cycles_seen = 0
+        bare = self._bare.get(omega)
+        predicted = float("nan")
+        if specimen is not None and bare is not None:
+            layer = predict_gain(specimen, omega, self._amplitude, bare.amplitude).rocking
+            predicted = layer.alpha_2 if layer else predicted
+
+        def look(cycles: list[Cycle]) -> Generator[Step, Outcome, None]:
+            nonlocal cycles_seen
+            cycles_seen += len(cycles)
+            peak = steady_peak(cycles)
+            alpha_2 = uncertainty = float("nan")
+            if bare is not None and specimen is not None:
+                running = gain(peak, bare, self._configuration.analysis)
+                alpha_2, uncertainty = running.alpha_2, running.uncertainty
+            beta = specimen.beta if specimen else None
+            yield Say(Estimate(0.0, omega, beta, cycles_seen, peak.drift, alpha_2, uncertainty, predicted))
+            yield Say(self._pace.progress(f"settling at {omega:g} rad/s", omega, cycles_seen))
+
+        return look
