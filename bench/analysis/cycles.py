@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 HARMONICS = 9
 """Harmonics fitted jointly: the drift of a rocking frame has less than 1e-5 of its peak above them."""
 
+COMPLETE = 0.98
+"""Share of a cycle's samples that must be there: a laser that leaves its range at every peak would bias the fit."""
+
 _GRID = 256
 _ANGLES: NDArray[np.float64] = np.arange(_GRID, dtype=np.float64) * (tau / _GRID)
 
@@ -51,7 +54,7 @@ def fit_cycle(index: int, phase: NDArray[np.float64], values: NDArray[np.float64
     if not valid.all():
         phase, values = phase[valid], values[valid]
     harmonics = min(HARMONICS, (phase.size - 1) // 4)
-    if valid.mean() < 0.8 or harmonics < 1:
+    if valid.mean() < COMPLETE or harmonics < 1:
         return None
     basis = _basis(phase, harmonics)
     coefficients = np.linalg.solve(basis.T @ basis, basis.T @ values)

@@ -32,7 +32,7 @@ class FallWatch:
         return self._threshold
 
     def fallen(self, signals: NDArray[np.float64]) -> bool:
-        """Whether the next block of signals, shape (n, 4), shows a fallen block."""
+        """Whether the next block of signals, shape (n, 5), shows a fallen block."""
         if self._threshold == 0.0:
             return False
         u1 = signals[:, U1]

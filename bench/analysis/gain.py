@@ -7,7 +7,7 @@ from math import hypot, sqrt
 import numpy as np
 
 from bench.analysis.cycles import Cycle
-from bench.analysis.signals import ACCELERATION, DISPLACEMENT, DRIFT, U1
+from bench.analysis.signals import ACCELERATION, DRIFT, LASER_1, U1
 from sim.parameters import Parameters, quantity
 
 COVERAGE = 2.0
@@ -18,12 +18,11 @@ class SensorAccuracy(Parameters):
     """What the sensors' data sheets and calibrations leave open: standard uncertainties."""
 
     laser_slope: float = quantity(
-        0.003, "1", "relative error of a laser's slope that differs between amplitudes (linearity)", ge=0, le=0.1
+        0.003, "1", "relative error of one laser's slope over the motion it sees (linearity)", ge=0, le=0.1
     )
     laser_mismatch: float = quantity(
         0.001, "1", "relative difference between the scales of the two lasers", ge=0, le=0.1
     )
-    accelerometer: float = quantity(0.003, "1", "relative error of the table accelerometer's scale", ge=0, le=0.1)
 
 
 @dataclass(frozen=True)
@@ -31,14 +30,16 @@ class SteadyPeak:
     """The drift over measured cycles.
 
     `drift` [m] is its peak and `scatter` [m] the standard uncertainty of that peak from the cycles themselves;
-    `u1` [m] the first storey's peak, `amplitude` [m/s2] and `stroke` [m] the table's, `cycles` how many were used.
+    `u1` [m] is the first storey's peak, `amplitude` [m/s2] the table's; `laser_1` and `laser_2` [m] are the complex
+    amplitudes of what the lasers see, `cycles` how many cycles were used.
     """
 
     drift: float
     scatter: float
     u1: float
     amplitude: float
-    stroke: float
+    laser_1: complex
+    laser_2: complex
     cycles: int
 
 
@@ -65,13 +66,15 @@ def modulated_peak(cycles: Sequence[Cycle]) -> SteadyPeak:
 
 
 def _peak(cycles: Sequence[Cycle], drift: float, scatter: float) -> SteadyPeak:
-    amplitudes = np.abs(np.array([cycle.fundamental for cycle in cycles])).mean(axis=0)
+    fundamentals = np.array([cycle.fundamental for cycle in cycles])
+    mean = fundamentals.mean(axis=0)
     return SteadyPeak(
         drift=drift,
         scatter=scatter,
         u1=float(np.mean([cycle.peak[U1] for cycle in cycles])),
-        amplitude=float(amplitudes[ACCELERATION]),
-        stroke=float(amplitudes[DISPLACEMENT]),
+        amplitude=float(np.abs(fundamentals[:, ACCELERATION]).mean()),
+        laser_1=complex(mean[LASER_1]),
+        laser_2=complex(mean[LASER_1] + mean[DRIFT]),
         cycles=len(cycles),
     )
 
@@ -92,9 +95,10 @@ def _standard_error(series: np.ndarray[tuple[int], np.dtype[np.float64]]) -> flo
 def gain(coupled: SteadyPeak, bare: SteadyPeak, accuracy: SensorAccuracy) -> Gain:
     """alpha_2 = peak drift coupled / peak drift bare (Eq. 10) at one frequency.
 
-    A common scale of the lasers cancels; what is left of each drift is its scatter, the lasers' linearity, and the
-    table's motion that a difference between the lasers' scales lets through. The table's scale error is common to
-    both tests and moves alpha_2 only as far as the two amplitudes differ: it is in the prediction's amplitude instead.
+    A common scale of the lasers cancels. What is left of each drift is its scatter, the slope error of each laser over
+    all that it sees, and a difference d between the lasers' scales, which lets d (laser_1 + laser_2) / 2 through: each
+    laser sees much more than the drift, the table's motion included. The accelerometer's scale error is common to
+    both tests and cancels as far as the response is proportional to the amplitude.
     """
     alpha = coupled.drift / bare.drift
     relative = hypot(_relative(coupled, accuracy), _relative(bare, accuracy))
@@ -102,5 +106,6 @@ def gain(coupled: SteadyPeak, bare: SteadyPeak, accuracy: SensorAccuracy) -> Gai
 
 
 def _relative(peak: SteadyPeak, accuracy: SensorAccuracy) -> float:
-    leak = accuracy.laser_mismatch * peak.stroke
-    return hypot(peak.scatter / peak.drift, accuracy.laser_slope, leak / peak.drift)
+    slope = accuracy.laser_slope * hypot(abs(peak.laser_1), abs(peak.laser_2))
+    mismatch = accuracy.laser_mismatch * abs(peak.laser_1 + peak.laser_2) / 2.0
+    return hypot(peak.scatter, slope, mismatch) / peak.drift

@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 from drivers.rig import Channel
 from sim.errors import InvalidInput
 
-SIGNALS = ("acceleration", "displacement", "u1", "drift")
+SIGNALS = ("acceleration", "displacement", "u1", "drift", "laser_1")
 """Columns of a signal array: table acceleration [m/s2], table displacement [m], first storey relative to the table
-[m] and drift u2 - u1 [m]."""
+[m], drift u2 - u1 [m], and what the first laser sees [m]."""
 
-ACCELERATION, DISPLACEMENT, U1, DRIFT = range(4)
+ACCELERATION, DISPLACEMENT, U1, DRIFT, LASER_1 = range(5)
 
 
 class SignalMap:
@@ -35,8 +35,13 @@ class SignalMap:
         """Take the mean of channel values at rest, shape (n, n_channels), as the zero of every signal."""
         self._zero = np.nan_to_num(np.nanmean(self._raw(values), axis=0))
 
+    def scatter(self, values: NDArray[np.float64]) -> float:
+        """Larger standard deviation of u1 and drift [m] in channel values; infinite where samples are missing."""
+        deviation = np.std(self._raw(values)[:, [U1, DRIFT]], axis=0)
+        return float(np.nan_to_num(deviation, nan=np.inf).max())
+
     def of(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Signals, shape (n, 4), of channel values, shape (n, n_channels); NaN where a sensor gave none."""
+        """Signals, shape (n, 5), of channel values, shape (n, n_channels); NaN where a sensor gave none."""
         return self._raw(values) - self._zero
 
     def _raw(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -46,4 +51,5 @@ class SignalMap:
         signals[:, DISPLACEMENT] = displacement
         signals[:, U1] = first - displacement if self._ground else first
         signals[:, DRIFT] = second - first
+        signals[:, LASER_1] = first
         return signals

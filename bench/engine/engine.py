@@ -31,7 +31,7 @@ from bench.engine.steps import (
     Trim,
 )
 from bench.engine.stream import Stream
-from bench.events import Acquired, LimitExceeded, OperatorAnswered, OperatorAsked, State, StateChanged
+from bench.events import Acquired, LimitExceeded, OperatorAnswered, OperatorAsked, State, StateChanged, Warned
 from bench.guard.guard import Guard
 from drivers.rig import Rig
 from sim.errors import RockbenchError
@@ -139,7 +139,13 @@ class Engine:
         self._machine.go(State.ARMED, "the operator's work is done")
         self._guard.arm()
         turns = max(round(step.rest * self._rig.sample_rate / self._block), 1)
-        self._signals.tare(np.concatenate([self._turn() for _ in range(turns)]))
+        for _ in range(max(round(step.patience / step.rest), 1)):
+            values = np.concatenate([self._turn() for _ in range(turns)])
+            if self._signals.scatter(values) <= step.still:
+                break
+        else:
+            self._stream.say(Warned(0.0, f"the storeys are not still after {step.patience:g} s; zero taken anyway"))
+        self._signals.tare(values)
         self._fall = FallWatch(self._specimen, self._rig.sample_rate) if self._specimen else None
         self._machine.go(State.RUNNING, "at rest, zero taken")
 

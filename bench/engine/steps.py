@@ -25,9 +25,15 @@ class Handle:
 
 @dataclass(frozen=True)
 class Arm:
-    """Arm the rig at rest, with the output at zero, and take the zero of every signal over `rest` seconds."""
+    """Arm the rig with the output at zero, wait until the storeys are still, and take the zero of every signal.
+
+    Still: over `rest` seconds neither u1 nor the drift scatters by more than `still` [m]. After `patience` seconds the
+    zero is taken all the same, with a warning.
+    """
 
     rest: float
+    still: float = 1e-4
+    patience: float = 240.0
 
 
 @dataclass(frozen=True)

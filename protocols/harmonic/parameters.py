@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from sim.parameters import Parameters, quantity
 
@@ -19,6 +19,13 @@ class HarmonicParameters(Parameters):
     beta: tuple[Stiffness, ...] = quantity(
         (0.25, 0.64, 0.97), "1", "stiffness ratios k_C/k1 of the coupling springs", min_length=1
     )
+    @field_validator("omega", "beta")
+    @classmethod
+    def _each_once(cls, values: tuple[float, ...]) -> tuple[float, ...]:
+        if len(set(values)) < len(values):
+            raise ValueError("each value may be asked for once")
+        return values
+
     amplitude_factor: float = quantity(
         1.01, "1", "amplitude of the table acceleration over the uplift acceleration g/lambda", gt=0, le=5
     )

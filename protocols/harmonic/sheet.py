@@ -32,6 +32,8 @@ from sim.steady import resting_level
 REST = 2.0
 """Time at rest before a test, over which the zero of the signals is taken [s]."""
 
+FALLEN_REQUEST = "The block has fallen: stand it up again."
+
 CHANGE_TIME = 4.0
 """Time in which the bare frame goes from one frequency to the next [s]."""
 
@@ -86,7 +88,9 @@ class HarmonicSheet:
         level = min(self._parameters.calibration_level * self._amplitude, allowed)
         measured = yield from calibrate_drive(wanted, level, calibration)
         yield RampOut()
-        if not isinstance(measured, Fallen):
+        if isinstance(measured, Fallen):
+            yield Handle(Handwork.STAND_BLOCK_UP, specimen, FALLEN_REQUEST)
+        else:
             calibration = measured
         for omega in self._parameters.omega:
             point = yield from self._point(specimen, omega, calibration, plans[omega])
@@ -100,7 +104,6 @@ class HarmonicSheet:
         """Try the planned starts; the first steady rocking motion is the point, else the best that was met."""
         found: HarmonicPoint | None = None
         falls = 0
-        look = self._look(omega, specimen)
         for tried, start in enumerate(starts, 1):
             where = f"beta = {specimen.beta:g} at {omega:g} rad/s, start {tried} of {len(starts)}: {start.name}"
             yield Say(StepStarted(0.0, where))
@@ -108,11 +111,12 @@ class HarmonicSheet:
             yield Calibrate(calibration)
             settled: Settled | Fallen | None = None
             if not isinstance((yield Follow(start.legs)), Fallen):
+                look = self._look(omega, specimen)
                 settled = yield from settle_and_measure(omega, self._amplitude, self._parameters, look)
             if not isinstance(settled, Settled):
                 falls += 1
                 yield RampOut(fast=True)
-                yield Handle(Handwork.STAND_BLOCK_UP, specimen, "The block has fallen: stand it up again.")
+                yield Handle(Handwork.STAND_BLOCK_UP, specimen, FALLEN_REQUEST)
                 continue
             yield RampOut()
             accuracy = self._configuration.analysis

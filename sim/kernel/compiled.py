@@ -6,6 +6,7 @@ integrator's check of its state. There is no fastmath: it would make results dep
 the test for non-finite numbers.
 """
 # pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
+# pyright: reportPrivateImportUsage=false, reportAttributeAccessIssue=false
 # numba publishes no types; `cast` below gives the decorated function its own type back.
 
 import hashlib

@@ -37,7 +37,8 @@ def first_root(p: NDArray[np.float64], n: int, h: float) -> float:
         steepest = steepest * h + k * abs(p[k])
         if k > 1:
             sharpest = sharpest * h + k * (k - 1) * abs(p[k])
-    left, width, floor = 0.0, h, SMALLEST_PART * h
+    left, right, t = 0.0, h, h
+    width, floor = h, SMALLEST_PART * h
     while left < h:
         right = min(left + width, h)
         half = 0.5 * (right - left)

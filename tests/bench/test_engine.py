@@ -115,7 +115,7 @@ def test_a_dwell_measures_the_cycles_of_the_motion_that_was_asked_for() -> None:
     assert len(measured.cycles) == 6
     for cycle in measured.cycles:
         assert np.abs(cycle.fundamental[0]) == pytest.approx(1.0, rel=1e-3)
-        assert np.abs(cycle.fundamental[4]) == pytest.approx(1.0, rel=1e-9)
+        assert np.abs(cycle.fundamental[5]) == pytest.approx(1.0, rel=1e-9)
 
 
 def test_dwells_follow_each_other_without_a_gap() -> None:

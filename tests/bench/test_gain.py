@@ -13,16 +13,16 @@ EXACT = SensorAccuracy(laser_slope=0.0, laser_mismatch=0.0)
 def _cycles(drifts: np.ndarray) -> list[Cycle]:
     made = []
     for k, drift in enumerate(drifts):
-        fundamental = np.zeros(5, dtype=complex)
+        fundamental = np.zeros(6, dtype=complex)
         fundamental[ACCELERATION] = 1.2j
-        peak = np.zeros(5)
+        peak = np.zeros(6)
         peak[DRIFT] = drift
-        made.append(Cycle(k, 600, fundamental, peak, np.zeros(5), np.zeros(5), np.zeros(5)))
+        made.append(Cycle(k, 600, fundamental, peak, np.zeros(6), np.zeros(6), np.zeros(6)))
     return made
 
 
-def _peak(drift: float, scatter: float = 0.0, stroke: float = 0.0) -> SteadyPeak:
-    return SteadyPeak(drift, scatter, 0.001, 1.2, stroke, 24)
+def _peak(drift: float, scatter: float = 0.0, seen: complex = 0.0) -> SteadyPeak:
+    return SteadyPeak(drift, scatter, 0.001, 1.2, seen, seen + drift, 24)
 
 
 def test_the_gain_is_the_ratio_of_the_drifts() -> None:
@@ -33,9 +33,10 @@ def test_the_gain_is_the_ratio_of_the_drifts() -> None:
 
 def test_independent_contributions_add_in_squares_and_are_doubled() -> None:
     accuracy = SensorAccuracy(laser_slope=0.003, laser_mismatch=0.001)
-    found = gain(_peak(0.010, 1e-5, 0.008), _peak(0.050, 1e-4, 0.004), accuracy)
-    coupled = 1e-5**2 / 0.010**2 + 0.003**2 + (0.001 * 0.008 / 0.010) ** 2
-    bare = 1e-4**2 / 0.050**2 + 0.003**2 + (0.001 * 0.004 / 0.050) ** 2
+    found = gain(_peak(0.010, 1e-5, 0.008j), _peak(0.050, 1e-4, -0.020), accuracy)
+    sees = 0.008**2 + (0.008**2 + 0.010**2)  # |0.008i|^2 + |0.010 + 0.008i|^2
+    coupled = (1e-5**2 + 0.003**2 * sees + 0.001**2 * (0.008**2 + 0.005**2)) / 0.010**2
+    bare = (1e-4**2 + 0.003**2 * (0.020**2 + 0.030**2) + 0.001**2 * 0.005**2) / 0.050**2
     assert found.uncertainty == pytest.approx(2.0 * 0.2 * np.sqrt(coupled + bare))
 
 

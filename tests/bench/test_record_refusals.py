@@ -78,7 +78,7 @@ def test_a_block_of_the_wrong_shape_is_refused(path: Path) -> None:
     recorder.close("failed")
     with pytest.raises(RecordError, match="closed"):
         recorder(good)
-    with pytest.raises(InvalidInput, match="completed, aborted, halted, failed"):
+    with pytest.raises(InvalidInput, match="completed, stopped, aborted, halted, failed"):
         recorder.close("running")
 
 

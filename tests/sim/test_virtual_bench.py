@@ -1,0 +1,145 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from pydantic import ValidationError
+from scipy.optimize import minimize
+
+from sim.sensors import Accelerometer, FilterUnit, Laser
+from sim.shaker import Shaker
+from sim.specimen import Specimen
+from sim.virtual_bench import VirtualBench, VirtualBenchParameters
+
+Array = NDArray[np.float64]
+
+RATE = 2000.0
+
+
+def kick(n: int) -> Array:
+    """A drive that makes the block rock at once."""
+    return 4.5 * np.sin(16.0 * np.arange(n) / RATE)
+
+
+def values(bench: VirtualBench, counts: NDArray[np.int16]) -> dict[str, Array]:
+    """The channels as their calibrations have them."""
+    return {c.name: counts[:, i].astype(np.float64) * c.scale + c.offset for i, c in enumerate(bench.channels)}
+
+
+def bench_with(specimen: Specimen, seed: int = 1, **parts: object) -> VirtualBench:
+    return VirtualBench(VirtualBenchParameters.model_validate(parts), specimen, seed)
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.lists(st.integers(1, 120), min_size=2, max_size=12), st.sampled_from([2000.0, 20_000.0]))
+def test_counts_do_not_depend_on_how_the_drive_is_cut(blocks: list[int], rate: float) -> None:
+    whole, cut = (bench_with(Specimen(beta=0.4), 7, sample_rate=rate) for _ in range(2))
+    rocking = kick(int(0.4 * rate))
+    volts = kick(sum(blocks))
+    for bench in (whole, cut):
+        bench.run(rocking)
+        assert np.abs(bench.truth.theta).max() > 1e-3
+    expected, start = whole.run(volts), 0
+    for n in blocks:
+        np.testing.assert_array_equal(cut.run(volts[start : start + n]), expected[start : start + n])
+        start += n
+
+
+def test_single_samples_are_the_block() -> None:
+    whole, cut = (bench_with(Specimen(beta=0.4), 3) for _ in range(2))
+    volts = kick(600)
+    expected = whole.run(volts)
+    np.testing.assert_array_equal(np.concatenate([cut.run(volts[i : i + 1]) for i in range(600)]), expected)
+
+
+def test_a_seed_is_a_bench() -> None:
+    one, same, other = (bench_with(Specimen(beta=0.4), seed).run(kick(400)) for seed in (1, 1, 2))
+    np.testing.assert_array_equal(one, same)
+    assert all((one[:, i] != other[:, i]).any() for i in range(4))
+
+
+def test_an_empty_block_is_empty() -> None:
+    assert bench_with(Specimen()).run(np.empty(0)).shape == (0, 4)
+
+
+def test_channels_report_the_motion_through_their_calibrations() -> None:
+    """Slow motion, so that filter and latency hardly matter: tolerances are delay times rate of change."""
+    bench = bench_with(Specimen(), filter_unit=FilterUnit(order=2, cutoff=500.0))
+    t = np.arange(12_000) / RATE
+    seen = values(bench, bench.run(1.5 * np.sin(2.0 * np.pi * 0.4 * t)))
+    truth = bench.truth
+    delay = 0.003
+    assert np.abs(seen["table_displacement"] - truth.x).max() < delay * np.abs(truth.v).max() + 1e-4
+    assert np.abs(seen["table_acceleration"] - truth.a)[20:].max() < 0.08
+    for name, u, v in (("laser_1", truth.u1, truth.v1), ("laser_2", truth.u2, truth.v2)):
+        assert np.abs(u).max() > 1e-3
+        assert np.abs(seen[name] - truth.x - u).max() < delay * np.abs(truth.v + v).max() + 4e-4
+
+
+def test_a_laser_on_the_table_does_not_see_the_table() -> None:
+    bench = bench_with(Specimen(), laser_1=Laser(reference="table"))
+    seen = values(bench, bench.run(0.5 * np.sin(6.0 * np.arange(4000) / RATE)))
+    ground = np.abs(seen["laser_1"] - bench.truth.u1 - bench.truth.x).max()
+    assert np.abs(seen["laser_1"] - bench.truth.u1).max() < 0.2 * ground
+
+
+def test_a_scale_error_is_not_known_to_the_calibration() -> None:
+    volts = 1.5 * np.sin(16.0 * np.arange(6000) / RATE)
+    honest, wrong = bench_with(Specimen()), bench_with(Specimen(), accelerometer=Accelerometer(scale_error=0.05))
+    ratio = values(wrong, wrong.run(volts))["table_acceleration"].std()
+    ratio /= values(honest, honest.run(volts))["table_acceleration"].std()
+    assert wrong.channels == honest.channels
+    assert ratio == pytest.approx(1.05, rel=2e-3)
+
+
+def test_a_laser_out_of_range_and_a_saturated_input_are_not_measurements() -> None:
+    bench = bench_with(Specimen(), laser_1=Laser(measuring_range=0.010))
+    counts = bench.run(np.concatenate([np.zeros(200), np.full(1200, 10.0)]))
+    limits = dict(zip((c.name for c in bench.channels), (c.valid for c in bench.channels), strict=True))
+    low, high = limits["laser_1"]
+    assert ((low <= counts[:200, 2]) & (counts[:200, 2] <= high)).all()
+    assert counts[-1, 2] < low
+    assert limits["table_acceleration"] == (-8191, 8190)
+
+
+def test_a_toppled_block_is_caught_and_pulls_the_frame_where_the_springs_balance() -> None:
+    """The storeys rest where the potential energy of Eq. (5) is least with the block at the catch angle."""
+    specimen = Specimen(beta=0.64)
+    bench = bench_with(specimen, laser_1=Laser(reference="table", linearity=0.0), shaker=Shaker(force_noise=0.0))
+    bench.run(8.0 * np.sin(9.0 * np.arange(8000) / RATE))
+    assert bench.fallen
+    bench.coast(120.0)
+    seen = values(bench, bench.run(np.zeros(400)))["laser_1"][-100:].mean()
+    side = float(np.sign(bench.truth.theta[-1]))
+    assert np.abs(bench.truth.theta[-1]) == 0.35
+    f, corner = specimen.frame, 0.0 if side > 0 else 2.0 * specimen.block.b
+
+    def energy(u: Array) -> float:
+        theta = 0.35 * side
+        dx = specimen.d + corner * (1.0 - np.cos(theta)) - f.h1 * np.sin(theta) - u[0]
+        dy = -f.h1 * (1.0 - np.cos(theta)) - corner * np.sin(theta)
+        spring = 0.5 * specimen.k_c * (np.hypot(dx, dy) - specimen.d) ** 2
+        return 0.5 * f.k1 * u[0] ** 2 + 0.5 * f.k2 * (u[1] - u[0]) ** 2 + spring
+
+    expected = minimize(energy, np.zeros(2), method="Nelder-Mead", options={"xatol": 1e-8, "fatol": 1e-14}).x[0]
+    assert abs(expected) > 0.01
+    assert seen == pytest.approx(expected, abs=5e-4)
+    bench.stand_up()
+    bench.run(np.zeros(400))
+    assert not bench.fallen
+    assert np.abs(bench.truth.u1).max() < 1e-4
+
+
+def test_mounting_another_specimen_stands_it_still() -> None:
+    bench = bench_with(Specimen(beta=0.4))
+    bench.run(kick(2000))
+    bench.mount(Specimen())
+    bench.coast(0.001)
+    truth = bench.truth
+    assert truth.u1[0] == truth.u2[0] == truth.theta[0] == truth.v[0] == 0.0
+    assert bench.specimen.beta is None
+
+
+def test_a_filter_that_the_sample_rate_cannot_carry_is_refused() -> None:
+    with pytest.raises(ValidationError, match=r"filter_unit\.cutoff"):
+        VirtualBenchParameters(sample_rate=150.0)
