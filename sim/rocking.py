@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
 from importlib import import_module
-from math import ceil, isfinite, log, log10, pi
+from math import ceil, log, log10, pi
 from typing import Literal
 
 import numpy as np
@@ -135,8 +135,8 @@ def simulate(
     _check_state(specimen, start, overturning_angle)
     if not 1e-15 <= tolerance <= 1e-3:
         raise InvalidInput("tolerance", tolerance, "it must be between 1e-15 and 1e-3")
-    if not (isfinite(peaks_from) and peaks_from >= 0.0):
-        raise InvalidInput("peaks_from", peaks_from, "it must be a time of the run in seconds, 0 or later")
+    if not 0.0 <= peaks_from < duration:
+        raise InvalidInput("peaks_from", peaks_from, f"it must lie within the {duration:g} s of the run")
 
     x, samples, report = start.as_array(), np.empty((times.size, 6)), np.empty(kernel.REPORT)
     kernel.run(

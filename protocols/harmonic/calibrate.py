@@ -9,6 +9,7 @@ from bench.analysis.signals import ACCELERATION, SIGNALS
 from bench.control.calibration import DriveCalibration
 from bench.control.legs import Leg
 from bench.engine.steps import Calibrate, Dwell, Fallen, Follow, Measured, Outcome, Step
+from protocols.harmonic.evidence import need_answer, need_cycles
 
 PROBE = 0.02
 """First, careful amplitude [V] when nothing is known of the drive yet."""
@@ -58,7 +59,10 @@ def _measure(omega: float, amplitude: float) -> Generator[Step, Outcome, float |
     outcome = yield Dwell(SETTLING + MEASURED)
     if not isinstance(outcome, Measured):
         return Fallen()
-    return drive_gain(outcome.cycles[SETTLING:])
+    used = outcome.cycles[SETTLING:]
+    need_cycles(used, MEASURED)
+    need_answer(used)
+    return drive_gain(used)
 
 
 def drive_gain(cycles: Sequence[Cycle]) -> float:

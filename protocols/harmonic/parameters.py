@@ -19,6 +19,7 @@ class HarmonicParameters(Parameters):
     beta: tuple[Stiffness, ...] = quantity(
         (0.25, 0.64, 0.97), "1", "stiffness ratios k_C/k1 of the coupling springs", min_length=1
     )
+
     @field_validator("omega", "beta")
     @classmethod
     def _each_once(cls, values: tuple[float, ...]) -> tuple[float, ...]:

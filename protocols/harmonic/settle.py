@@ -1,7 +1,7 @@
 """From a dwell that has just begun to a measured steady state: hold the amplitude, wait, measure."""
 
 from collections import deque
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from math import tau
 
@@ -12,7 +12,7 @@ from bench.analysis.gain import SteadyPeak, modulated_peak, steady_peak
 from bench.analysis.signals import ACCELERATION, DRIFT, U1
 from bench.analysis.steady import WINDOW, Steadiness, SteadyDetector
 from bench.engine.steps import Dwell, Fallen, Measured, Outcome, Step, Trim
-from drivers.rig import RigError
+from protocols.harmonic.evidence import need_cycles
 from protocols.harmonic.parameters import HarmonicParameters
 
 TURN = 6
@@ -54,7 +54,7 @@ def settle_and_measure(
         if not isinstance(outcome, Measured):
             return Fallen()
         waited += TURN * tau / omega
-        _check(outcome.cycles, TURN)
+        need_cycles(outcome.cycles, TURN)
         for cycle in outcome.cycles:
             detector.push(cycle)
         recent.extend(outcome.cycles)
@@ -69,16 +69,9 @@ def settle_and_measure(
     outcome = yield Dwell(parameters.measured_cycles)
     if not isinstance(outcome, Measured):
         return Fallen()
-    _check(outcome.cycles, parameters.measured_cycles)
+    need_cycles(outcome.cycles, parameters.measured_cycles)
     peak = (steady_peak if steadiness.steady else modulated_peak)(outcome.cycles)
     return Settled(peak, steadiness, waited)
-
-
-def _check(cycles: Sequence[Cycle], asked: int) -> None:
-    if len(cycles) < 0.75 * asked:
-        raise RigError(
-            f"{asked - len(cycles)} of {asked} cycles lack samples: a sensor leaves its range; move it or ask for less"
-        )
 
 
 def achieved(cycles: tuple[Cycle, ...]) -> float:

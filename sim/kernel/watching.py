@@ -21,11 +21,13 @@ UPLIFT_MARGIN = 1e-12
 @compiled("void(float64[:,::1], int64, float64, float64[::1])")
 def state_at(c: NDArray[np.float64], n: int, t: float, out: NDArray[np.float64]) -> None:
     """The six polynomials at time `t` of the step, written to `out`, shape (6,)."""
-    for j in range(6):
-        value = 0.0
-        for k in range(n, -1, -1):
-            value = value * t + c[j, k]
-        out[j] = value
+    # six sums side by side: each alone would wait for its own last product
+    u1 = u2 = v1 = v2 = theta = omega = 0.0
+    for k in range(n, -1, -1):
+        u1, u2 = u1 * t + c[0, k], u2 * t + c[1, k]
+        v1, v2 = v1 * t + c[2, k], v2 * t + c[3, k]
+        theta, omega = theta * t + c[4, k], omega * t + c[5, k]
+    out[0], out[1], out[2], out[3], out[4], out[5] = u1, u2, v1, v2, theta, omega
 
 
 @compiled("void(float64[:,::1], int64, float64, float64, boolean, float64[::1], float64[::1])")

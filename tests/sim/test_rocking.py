@@ -256,6 +256,14 @@ def test_samples_and_window_of_the_peaks() -> None:
     assert np.gradient(motion.samples[:, 0], times)[1:-1] == pytest.approx(motion.samples[1:-1, 2], abs=2e-4)
 
 
+@pytest.mark.parametrize("duration", [0.86, 0.92, 0.98, 1.04, 1.10])  # some while the motion falls
+def test_the_window_of_the_peaks_may_open_inside_a_step(duration: float) -> None:
+    drive = SineProgram([Sweep.dwell(duration, 1.2 * A_S, 17.0)])
+    motion = simulate(Specimen(beta=0.64), drive, state=State(theta=0.03), peaks_from=duration - 1e-9)
+    assert motion.peaks.u1 == pytest.approx(abs(motion.end.u1), abs=1e-8)
+    assert motion.peaks.theta == pytest.approx(abs(motion.end.theta), abs=1e-8)
+
+
 def test_an_inelastic_block_stops_at_its_first_impact() -> None:
     block = Specimen(beta=0.0, block=Block(restitution_factor=0.0))
     motion = simulate(block, steady(3.0, 0.0), state=State(theta=0.05))
@@ -315,6 +323,7 @@ GOOD = steady(1.0, 0.0)
         ("tolerance", FREE, GOOD, {"tolerance": 0.0}),
         ("tolerance", FREE, GOOD, {"tolerance": float("nan")}),
         ("peaks_from", FREE, GOOD, {"peaks_from": -1.0}),
+        ("peaks_from", FREE, GOOD, {"peaks_from": 1.0}),
         ("overturning_angle", FREE, GOOD, {"overturning_angle": 2.0}),
         ("sample_times", FREE, GOOD, {"sample_times": [0.0, 2.0]}),
         ("sample_times", FREE, GOOD, {"sample_times": [0.5, 0.2]}),

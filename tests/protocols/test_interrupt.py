@@ -1,0 +1,53 @@
+"""Ctrl-C on a real process: the table is ramped down, the file closed as aborted, and the exit code is 130."""
+
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from bench.record.reader import open_record
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="sends SIGINT to one process")
+def test_ctrl_c(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    command = [sys.executable, "-c", "from bench.cli.main import run; run()", "run", "harmonic", "--out", str(folder)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        _wait_until_running(folder / "campaign.h5", process)
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=60)
+    finally:
+        process.kill()
+    assert process.returncode == 130
+    assert "aborted" in errors
+    assert "Traceback" not in errors
+    with h5py.File(folder / "campaign.h5", "r") as file:
+        assert file["entry/status"][()] == b"aborted"
+        drive = file["entry/instrument/drive/voltage"][:]
+    assert np.abs(drive).max() > 0.0
+    assert drive[-1] == 0.0
+    with open_record(folder / "campaign.h5") as record:
+        reasons = [event.text for event in record.events if event.kind == "StateChanged"]
+    assert any("abort was asked for" in reason for reason in reasons)
+
+
+def _wait_until_running(path: Path, process: "subprocess.Popen[str]") -> None:
+    """Wait until the drive moves the table."""
+    deadline = time.monotonic() + 60.0
+    while time.monotonic() < deadline:
+        assert process.poll() is None, process.communicate()
+        if path.exists():
+            try:
+                with open_record(path) as record:
+                    if record.rows > 20_000:
+                        return
+            except Exception:  # the file is being laid out
+                pass
+        time.sleep(0.05)
+    raise AssertionError("the run did not start")
