@@ -138,16 +138,22 @@ class Engine:
         self._run += 1
         self._machine.go(State.ARMED, "the operator's work is done")
         self._guard.arm()
-        turns = max(round(step.rest * self._rig.sample_rate / self._block), 1)
-        for _ in range(max(round(step.patience / step.rest), 1)):
-            values = np.concatenate([self._turn() for _ in range(turns)])
-            if self._signals.scatter(values) <= step.still:
-                break
-        else:
-            self._stream.say(Warned(0.0, f"the storeys are not still after {step.patience:g} s; zero taken anyway"))
-        self._signals.tare(values)
+        self._signals.tare(self._stillness(step))
         self._fall = FallWatch(self._specimen, self._rig.sample_rate) if self._specimen else None
         self._machine.go(State.RUNNING, "at rest, zero taken")
+
+    def _stillness(self, step: Arm) -> NDArray[np.float64]:
+        """Channel values over a rest during which the storeys were still, shape (n, n_channels)."""
+        turns = max(round(step.rest * self._rig.sample_rate / self._block), 1)
+        waited = 0.0
+        while True:
+            values = np.concatenate([self._turn() for _ in range(turns)])
+            if self._signals.scatter(values) <= step.still:
+                return values
+            waited += step.rest
+            if waited >= step.patience:
+                self._stream.say(Warned(0.0, f"the storeys are not still after {waited:g} s; zero taken anyway"))
+                return values
 
     def _follow(self, step: Follow) -> Outcome:
         self._cycles = None

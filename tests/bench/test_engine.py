@@ -31,7 +31,7 @@ from bench.engine.steps import (
     Trim,
 )
 from bench.engine.stream import Stream
-from bench.events import Acquired, Event, LimitExceeded, OperatorAsked, State, StateChanged, StepStarted
+from bench.events import Acquired, Event, LimitExceeded, OperatorAsked, State, StateChanged, StepStarted, Warned
 from bench.guard.guard import Guard
 from bench.guard.limits import Limits, Ramps
 from drivers.rig import Block, Handwork, RigError
@@ -311,3 +311,24 @@ def test_any_plan_cut_anywhere_leaves_the_rig_stopped_and_within_limits(
     bench.run(_plan(*RUN[:4], *middle, RampOut()))
     assert np.abs(bench.rig.played).max(initial=0.0) <= Limits().drive_voltage
     assert way == "halt" or bench.ends_at_zero()
+
+
+def test_the_zero_is_taken_when_the_storeys_are_still_or_with_a_warning_when_they_never_are() -> None:
+    sway = iter(np.linspace(1.0, -1.0, 40))
+
+    def laser(volts: np.ndarray) -> np.ndarray:
+        return np.full(volts.size, max(next(sway, 0.0), 0.0) * 0.01) + 0.02
+
+    calm = LoopbackRig({"table_displacement": lambda v: 0.0 * v, **_others(), "laser_2": laser})
+    bench = Bench(calm)
+    bench.run(_plan(MOUNT, Arm(0.5), RampOut()))
+    assert bench.rig.clock.now() > 2.0
+    assert not any(isinstance(event, Warned) for event in bench.events)
+
+    shaking = LoopbackRig(
+        {"table_displacement": lambda v: 0.0 * v, **_others(), "laser_2": lambda v: 0.02 * np.sin(np.arange(v.size))}
+    )
+    bench = Bench(shaking)
+    bench.run(_plan(MOUNT, Arm(0.5, patience=2.0), RampOut()))
+    (warning,) = [event for event in bench.events if isinstance(event, Warned)]
+    assert "not still after 2 s" in warning.text
