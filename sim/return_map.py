@@ -4,133 +4,161 @@ Section: just after the impact into theta > 0. Unknowns x = [phase, u1, u2, v1, 
 [rad] of the base's sine at that impact. The map goes over the next two impacts and takes 2 pi off the phase. It is
 located on events, so its derivative needs no saltation matrices and its eigenvalues are the Floquet multipliers.
 
-Parameters are one vector q, shape (18,): `Specimen.packed()`, omega [rad/s], amplitude [m/s2].
+Parameters are one vector q, shape (18,): `Specimen.packed()`, omega [rad/s], amplitude [m/s2]. Everything is done for
+many points at once: q has shape (n, 18), x shape (n, 6).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import pi, tau
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.specimen import Specimen
+
+Floats = NDArray[np.float64]
+
 ORDER, TOLERANCE = 18, 1e-11
 """Of the Taylor steps: the map is then smooth to rounding, which differencing it needs."""
 
-DIFFERENCE = 1e-5
-"""Relative step of the central differences: the product of the multipliers then errs by about 1e-10."""
+Accuracy = Literal[2, 4]
+"""Order of the differences that make a Jacobian of 12 or of 24 maps."""
 
-CLOSURE = 1e-11
+DIFFERENCE: dict[Accuracy, float] = {2: 4e-6, 4: 1e-4}
+"""Relative steps: the multipliers then err by about 5e-10 and 3e-11, by truncation and rounding alike."""
+
+STENCIL: dict[Accuracy, tuple[Floats, Floats]] = {
+    2: (np.array([1.0, -1.0]), np.array([0.5, -0.5])),
+    4: (np.array([1.0, -1.0, 2.0, -2.0]), np.array([8.0, -8.0, -1.0, 1.0]) / 12.0),
+}
+"""Central differences: nodes in steps, and their weights."""
+
+CLOSURE = 1e-12
 """Scaled mismatch over one period at which an orbit counts as closed."""
 
-MOST_ITERATIONS = 8
+SLOW = 0.1
+"""A known Jacobian is kept while each step of Newton leaves less of the mismatch than this."""
+
+MOST_ITERATIONS = 10
 SMALLEST_ADVANCE = 1e-3
 """Limits of Newton's iterations and of the steps of `follow`, as a part of the way."""
+
+MOST_KNOWN = 5
+"""Points that an extrapolation goes through: more would magnify the rounding of the Jacobians."""
 
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """A fixed point: its section, shape (6,), the map's Jacobian there, shape (6, 6), peaks over the period."""
+    """A fixed point: its section, shape (6,), the map's Jacobian there, shape (6, 6), peaks over the period, (3,)."""
 
-    section: NDArray[np.float64]
-    jacobian: NDArray[np.float64]
-    peaks: tuple[float, float, float]
-
-
-class ReturnMap:
-    """The map for one parameter vector `q`; calling it costs about a hundredth of a millisecond."""
-
-    def __init__(self, q: NDArray[np.float64]) -> None:
-        from sim.kernel import rocking as kernel
-
-        self._kernel = kernel
-        self._p = np.ascontiguousarray(q[:16])
-        omega, amplitude = float(q[16]), float(q[17])
-        self._omega = omega
-        # three periods: an orbit that has not returned by then is not one of period 2 pi / omega
-        self._segments = np.array([[3.0 * tau / omega, amplitude, 0.0, 0.0, 0.0, 0.0, omega, 0.0, 0.0, 0.0]])
-        self._no_times, self._no_samples = np.empty(0), np.empty((0, 6))
-        self._report = np.empty(kernel.REPORT)
-        length, angle = float(np.hypot(q[9], q[10])), float(q[9] / q[10])
-        velocity = max(omega * angle, amplitude / omega)
-        self.scale = np.array([1.0, length * angle, length * angle, length * velocity, length * velocity, velocity])
-
-    def __call__(self, x: NDArray[np.float64], *, watch_peaks: bool = False) -> NDArray[np.float64] | None:
-        """The image of `x`, shape (6,); None when the block does not come back to the section."""
-        state = np.array([x[1], x[2], x[3], x[4], 0.0, x[5]])
-        if not x[5] > 0.0:
-            return None
-        self._segments[0, 5] = x[0]
-        self._kernel.run(
-            self._p,
-            self._segments,
-            state,
-            self._no_times,
-            self._no_samples,
-            ORDER,
-            TOLERANCE,
-            np.inf,
-            0.5 * pi,
-            0.0,
-            0.0 if watch_peaks else np.inf,
-            2,
-            self._report,
-        )
-        if self._report[self._kernel.STATUS] != self._kernel.IMPACT_LIMIT or not state[5] > 0.0:
-            return None
-        phase = x[0] + self._omega * self._report[self._kernel.END] - tau
-        return np.array([phase, state[0], state[1], state[2], state[3], state[5]])
-
-    @property
-    def peaks(self) -> tuple[float, float, float]:
-        """|u1|, |u2 - u1|, |theta| of the last call that watched them."""
-        u1, drift, theta = self._report[self._kernel.PEAKS :]
-        return float(u1), float(drift), float(theta)
-
-    def jacobian(self, x: NDArray[np.float64]) -> NDArray[np.float64] | None:
-        """The derivative of the map at `x` by central differences, shape (6, 6); None where it is not defined."""
-        columns: list[NDArray[np.float64]] = []
-        for j in range(6):
-            step = DIFFERENCE * self.scale[j]
-            ahead, behind = x.copy(), x.copy()
-            ahead[j] += step
-            behind[j] -= step
-            after, before = self(ahead), self(behind)
-            if after is None or before is None:
-                return None
-            columns.append((after - before) / (ahead[j] - behind[j]))
-        return np.column_stack(columns)
+    section: Floats
+    jacobian: Floats
+    peaks: Floats
 
 
-def newton(q: NDArray[np.float64], x: NDArray[np.float64]) -> Solution | None:
-    """The fixed point near `x`; None when Newton does not converge to one."""
-    return_map = ReturnMap(q)
-    previous = np.inf
+@dataclass(frozen=True, eq=False)
+class Solutions:
+    """Fixed points: sections, shape (n, 6), Jacobians, (n, 6, 6), peaks, (n, 3), and which were found, (n,).
+
+    The phase is not wrapped: it stays near the start's. Rows that were not found are NaN.
+    """
+
+    section: Floats
+    jacobian: Floats
+    peaks: Floats
+    found: NDArray[np.bool_]
+
+    def one(self, i: int) -> Solution | None:
+        """Row `i`, or None if it was not found."""
+        return Solution(self.section[i], self.jacobian[i], self.peaks[i]) if self.found[i] else None
+
+
+def parameters(specimen: Specimen, omega: float | Floats, amplitude: float) -> Floats:
+    """Parameter vectors of one specimen, shape (n, 18), for each of the `omega` [rad/s], shape (n,) or a number."""
+    omegas = np.atleast_1d(np.asarray(omega, dtype=np.float64))
+    q = np.empty((omegas.size, 18))
+    q[:, :16], q[:, 16], q[:, 17] = specimen.packed(), omegas, amplitude
+    return q
+
+
+def scales(q: Floats) -> Floats:
+    """Typical sizes of the unknowns, shape (n, 6): the angle b / h_b, the block's diagonal, the drive's frequency."""
+    length, angle = np.hypot(q[:, 9], q[:, 10]), q[:, 9] / q[:, 10]
+    velocity = np.maximum(q[:, 16] * angle, q[:, 17] / q[:, 16])
+    sizes = np.empty((len(q), 6))
+    sizes[:, 0], sizes[:, 5] = 1.0, velocity
+    sizes[:, 1:3], sizes[:, 3:5] = (length * angle)[:, None], (length * velocity)[:, None]
+    return sizes
+
+
+def images(q: Floats, x: Floats, *, watch_peaks: bool = False) -> tuple[Floats, Floats]:
+    """The map at x, shape (n * m, 6), m starts for each row of q: images and peaks, shape (n * m, 3).
+
+    An image is NaN when the block does not come back to the section.
+    """
+    from sim.kernel import period as kernel
+
+    out, peaks = np.empty((len(x), 6)), np.empty((len(x), 3))
+    contiguous = np.ascontiguousarray
+    kernel.images(contiguous(q), contiguous(x), ORDER, TOLERANCE, watch_peaks, out, peaks)
+    return out, peaks
+
+
+def jacobians(q: Floats, x: Floats, accuracy: Accuracy = 4) -> tuple[Floats, Floats]:
+    """Derivatives of the map at x, shape (n, 6, 6), and of its peaks, shape (n, 3, 6); NaN where not defined.
+
+    The peaks are watched, and so differentiated, only at the accuracy 4; else their derivatives are 0.
+    """
+    nodes, weights = STENCIL[accuracy]
+    # the steps as they are after rounding, exactly
+    steps = (x + DIFFERENCE[accuracy] * scales(q)) - x
+    starts = x[:, None, None, :] + (nodes[:, None, None] * np.eye(6)) * steps[:, None, None, :]
+    out, peaks = images(q, starts.reshape(-1, 6), watch_peaks=accuracy == 4)
+    shape = (len(x), nodes.size, 6)
+    slopes = np.einsum("s,nsji->nij", weights, out.reshape(*shape, 6)) / steps[:, None, :]
+    return slopes, np.einsum("s,nsji->nij", weights, peaks.reshape(*shape, 3)) / steps[:, None, :]
+
+
+def newton(q: Floats, x: Floats, known: Floats | None = None, accuracy: Accuracy = 4) -> Solutions:
+    """The fixed points near x, shape (n, 6); `known` are guesses of the Jacobians there, shape (n, 6, 6).
+
+    A Jacobian is used as long as it serves, since a chord step costs one map; at the end it is taken anew with
+    `accuracy`.
+    """
+    n = len(x)
+    place, peaks, sizes = x.copy(), np.full((n, 3), np.nan), scales(q)
+    jacobian = np.full((n, 6, 6), np.nan) if known is None else known.copy()
+    found, previous, active = np.zeros(n, dtype=np.bool_), np.full(n, np.inf), np.arange(n)
     for _ in range(MOST_ITERATIONS):
-        image = return_map(x, watch_peaks=True)
-        if image is None:
-            return None
-        peaks = return_map.peaks
-        mismatch = image - x
-        error = float(np.abs(mismatch / return_map.scale).max())
-        jacobian = return_map.jacobian(x)
-        if jacobian is None or not error < 10.0 * previous:
-            return None
-        if error < CLOSURE:
-            return Solution(np.array([x[0] % tau, *x[1:]]), jacobian, peaks)
-        previous = error
-        try:
-            x = x - np.linalg.solve(jacobian - np.eye(6), mismatch)
-        except np.linalg.LinAlgError:
-            return None
-    return None
+        image, seen = images(q[active], place[active], watch_peaks=True)
+        mismatch = image - place[active]
+        error = np.abs(mismatch / sizes[active]).max(axis=1)
+        closed, going = error < CLOSURE, error < 10.0 * previous[active]
+        found[active[closed]], peaks[active[closed]] = True, seen[closed]
+        keep = ~closed & going
+        active, mismatch, error = active[keep], mismatch[keep], error[keep]
+        stale = np.isnan(jacobian[active, 0, 0]) | ((previous[active] < np.inf) & (error > SLOW * previous[active]))
+        if stale.any():
+            jacobian[active[stale]] = jacobians(q[active[stale]], place[active[stale]], 2)[0]
+        previous[active] = error
+        place[active] -= _solved(jacobian[active] - np.eye(6), mismatch)
+        if not active.size:
+            break
+    place[~found], jacobian[~found] = np.nan, np.nan
+    if found.any():
+        jacobian[found] = jacobians(q[found], place[found], accuracy)[0]
+        found &= np.isfinite(jacobian).all(axis=(1, 2))
+    return Solutions(place, jacobian, peaks, found)
 
 
-def follow(origin: NDArray[np.float64], x: NDArray[np.float64], target: NDArray[np.float64]) -> Solution | None:
-    """The fixed point at parameters `target`, followed along the straight line from `x` near the one at `origin`.
+def follow(origin: Floats, x: Floats, target: Floats) -> Solution | None:
+    """The fixed point at `target`, shape (18,), followed along the straight line from `x` near the one at `origin`.
 
     Steps grow while Newton converges and are halved when it does not; None when they get too short.
     """
-    solution = newton(origin, x)
+    solution = newton(origin[None], x[None]).one(0)
     if solution is None:
         return None
     span = target - origin
@@ -140,7 +168,8 @@ def follow(origin: NDArray[np.float64], x: NDArray[np.float64], target: NDArray[
     section, tangent = solution.section, np.zeros(6)
     while done < 1.0:
         place = min(done + advance, 1.0)
-        found = newton(origin + place * span if place < 1.0 else target, section + (place - done) * tangent)
+        aim = origin + place * span if place < 1.0 else target
+        found = newton(aim[None], (section + (place - done) * tangent)[None]).one(0)
         if found is None:
             advance *= 0.5
             if advance < SMALLEST_ADVANCE:
@@ -151,4 +180,23 @@ def follow(origin: NDArray[np.float64], x: NDArray[np.float64], target: NDArray[
         tangent = change / (place - done)
         solution, section, done = found, found.section, place
         advance *= 2.0
+    return solution
+
+
+def extrapolated(places: Sequence[float], values: Sequence[Floats], place: float) -> Floats:
+    """The polynomial through the last of the known values, of any shape, at `place` (Lagrange)."""
+    near, last = np.array(places[-MOST_KNOWN:]), values[-MOST_KNOWN:]
+    total = np.zeros_like(last[0])
+    for i, value in enumerate(last):
+        others = np.delete(near, i)
+        total += value * np.prod((place - others) / (near[i] - others))
+    return total
+
+
+def _solved(matrices: Floats, right: Floats) -> Floats:
+    """Solutions of linear systems, shape (n, 6); NaN where a matrix is singular or not finite."""
+    solution = np.full(right.shape, np.nan)
+    usable = np.isfinite(matrices).all(axis=(1, 2)) & (np.abs(np.linalg.det(matrices)) > 0.0)
+    if usable.any():
+        solution[usable] = np.linalg.solve(matrices[usable], right[usable][..., None])[..., 0]
     return solution

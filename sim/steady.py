@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from sim.errors import InvalidInput, RockbenchError
 from sim.excitation import SineProgram, Sweep
 from sim.linear import frame_matrices, steady_peaks, steady_response
-from sim.return_map import Solution, follow, newton
+from sim.return_map import MOST_KNOWN, Solution, extrapolated, follow, newton, parameters
 from sim.rocking import Peaks, State, simulate
 from sim.specimen import Specimen
 
@@ -49,6 +49,12 @@ class Orbit:
     peaks: Peaks
     impacts: int
     multipliers: NDArray[np.complex128]
+
+    @property
+    def section(self) -> NDArray[np.float64]:
+        """[phase, u1, u2, v1, v2, omega] at `start`, shape (6,): where the return map takes the orbit up."""
+        x = self.start.as_array()
+        return np.array([self.phase, *x[:4], x[5]])
 
     @property
     def period(self) -> float:
@@ -90,45 +96,43 @@ def rocking_orbit(specimen: Specimen, omega: float, amplitude: float, guess: Orb
     It is followed from `guess`, or from a known orbit, through every parameter at once in steps that adapt.
     Raises InvalidInput for a bare frame or meaningless numbers, NoOrbit when it cannot be followed to the end.
     """
-    _check(specimen, omega, amplitude)
+    check_steady(specimen, omega, amplitude)
     if guess is not None and guess.layer == "rocking":
-        origin = _parameters(guess.specimen, guess.omega, guess.amplitude)
-        x = guess.start.as_array()
-        section = np.array([guess.phase, *x[:4], x[5]])
+        origin, section = parameters(guess.specimen, guess.omega, guess.amplitude)[0], guess.section
     else:
-        origin = _parameters(SEED_SPECIMEN, SEED_OMEGA, SEED_AMPLITUDE)
-        section = np.array(SEED_SECTION)
-    target = _parameters(specimen, omega, amplitude)
-    solution = follow(origin, section, target)
-    if solution is None:
-        raise NoOrbit(
-            f"no rocking orbit found at omega = {omega:g} rad/s, beta = {specimen.beta:g}, amplitude = "
-            f"{amplitude:g} m/s2: give a closer guess, or values nearer to ones that have an orbit"
-        )
-    return _orbit(specimen, omega, amplitude, solution)
+        origin, section = _seed()
+    return _orbit(specimen, omega, amplitude, _followed(origin, section, specimen, omega, amplitude))
 
 
 def rocking_branch(specimen: Specimen, omegas: Sequence[float] | NDArray[np.float64], amplitude: float) -> list[Orbit]:
-    """`rocking_orbit` at each of `omegas`, in their order: each is predicted from up to three before it.
+    """`rocking_orbit` at each of `omegas`, in their order: each is predicted from those before it.
 
     Raises as `rocking_orbit` does.
     """
-    orbits: list[Orbit] = []
-    known: list[tuple[float, NDArray[np.float64]]] = []
-    for omega in (float(value) for value in omegas):
-        solution = None
-        if len(known) > 1 and all(omega != place for place, _ in known):
-            _check(specimen, omega, amplitude)
-            solution = newton(_parameters(specimen, omega, amplitude), _extrapolated(known, omega))
+    places = [float(omega) for omega in omegas]
+    branch = branch_solutions(specimen, places, amplitude)
+    return [_orbit(specimen, omega, amplitude, branch[omega]) for omega in places]
+
+
+def branch_solutions(specimen: Specimen, omegas: Sequence[float], amplitude: float) -> dict[float, Solution]:
+    """The fixed points of `rocking_branch`, with phases that do not jump by 2 pi, by frequency in the order given."""
+    known: dict[float, Solution] = {}
+    origin, section = _seed()
+    for omega in omegas:
+        check_steady(specimen, omega, amplitude)
+        if omega in known:
+            continue
+        target, solution = parameters(specimen, omega, amplitude), None
+        if len(known) > 1:
+            near = list(known)[-MOST_KNOWN:]
+            guess = extrapolated(near, [known[place].section for place in near], omega)
+            slope = extrapolated(near, [known[place].jacobian for place in near], omega)
+            solution = newton(target, guess[None], slope[None]).one(0)
         if solution is None:
-            orbit = rocking_orbit(specimen, omega, amplitude, orbits[-1] if orbits else None)
-        else:
-            orbit = _orbit(specimen, omega, amplitude, solution)
-        orbits.append(orbit)
-        x = orbit.start.as_array()
-        if all(omega != place for place, _ in known):
-            known = [*known[-2:], (omega, np.array([orbit.phase, *x[:4], x[5]]))]
-    return orbits
+            solution = _followed(origin, section, specimen, omega, amplitude)
+        known[omega] = solution
+        origin, section = target[0], solution.section
+    return known
 
 
 def resting_state(specimen: Specimen, omega: float, amplitude: float) -> Orbit | None:
@@ -137,17 +141,10 @@ def resting_state(specimen: Specimen, omega: float, amplitude: float) -> Orbit |
     It exists if and only if |h_b M A - k_C h1 U1| < b g M with U1 the complex amplitude of the frame with the spring
     grounded (Eq. 9 and A.3 over a whole period). Always stable. Raises InvalidInput as `rocking_orbit` does.
     """
-    _check(specimen, omega, amplitude)
-    frame = specimen.frame
+    check_steady(specimen, omega, amplitude)
     if not amplitude < resting_level(specimen, omega):
         return None
     u1, u2 = steady_response(specimen, omega, amplitude, resting=True)
-    mass, damping, stiffness = frame_matrices(frame)
-    stiffness[0, 0] += specimen.k_c
-    first_order = np.zeros((4, 4))
-    first_order[:2, 2:] = np.eye(2)
-    first_order[2:, :2] = -np.linalg.solve(mass, stiffness)
-    first_order[2:, 2:] = -np.linalg.solve(mass, damping)
     return Orbit(
         specimen=specimen,
         omega=omega,
@@ -157,8 +154,19 @@ def resting_state(specimen: Specimen, omega: float, amplitude: float) -> Orbit |
         start=State(u1=u1.imag, u2=u2.imag, v1=omega * u1.real, v2=omega * u2.real),
         peaks=steady_peaks(specimen, omega, amplitude, resting=True),
         impacts=0,
-        multipliers=np.exp(np.linalg.eigvals(first_order) * (tau / omega)).astype(np.complex128),
+        multipliers=np.exp(resting_rates(specimen) * (tau / omega)),
     )
+
+
+def resting_rates(specimen: Specimen) -> NDArray[np.complex128]:
+    """Rates [1/s] at which disturbances of the frame with its spring grounded go, complex, shape (4,)."""
+    mass, damping, stiffness = frame_matrices(specimen.frame)
+    stiffness[0, 0] += specimen.k_c
+    first_order = np.zeros((4, 4))
+    first_order[:2, 2:] = np.eye(2)
+    first_order[2:, :2] = -np.linalg.solve(mass, stiffness)
+    first_order[2:, 2:] = -np.linalg.solve(mass, damping)
+    return np.linalg.eigvals(first_order).astype(np.complex128)
 
 
 def resting_level(specimen: Specimen, omega: float) -> float:
@@ -166,14 +174,15 @@ def resting_level(specimen: Specimen, omega: float) -> float:
 
     The moment about a corner, h_b M A - k_C h1 U1, is linear in the amplitude A (Eq. 9 and A.3).
     """
-    _check(specimen, omega, 1.0)
+    check_steady(specimen, omega, 1.0)
     frame, block = specimen.frame, specimen.block
     u1, _ = steady_response(specimen, omega, 1.0, resting=True)
     moment = abs(block.h_b * block.mass - specimen.k_c * frame.h1 * u1)
     return block.b * specimen.g * block.mass / moment
 
 
-def _check(specimen: Specimen, omega: float, amplitude: float) -> None:
+def check_steady(specimen: Specimen, omega: float, amplitude: float) -> None:
+    """Refuse (InvalidInput) a bare frame, and a frequency [rad/s] or an amplitude [m/s2] that is not positive."""
     if specimen.beta is None:
         raise InvalidInput("specimen", "bare frame", "a rocking or resting block needs beta, 0 or more")
     if not (isfinite(omega) and omega > 0.0):
@@ -182,17 +191,20 @@ def _check(specimen: Specimen, omega: float, amplitude: float) -> None:
         raise InvalidInput("amplitude", amplitude, "it must be a positive acceleration in m/s2")
 
 
-def _parameters(specimen: Specimen, omega: float, amplitude: float) -> NDArray[np.float64]:
-    return np.append(specimen.packed(), [omega, amplitude])
+def _seed() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    return parameters(SEED_SPECIMEN, SEED_OMEGA, SEED_AMPLITUDE)[0], np.array(SEED_SECTION)
 
 
-def _extrapolated(known: list[tuple[float, NDArray[np.float64]]], omega: float) -> NDArray[np.float64]:
-    """The polynomial through the known sections (Lagrange), at `omega`."""
-    total = np.zeros(6)
-    for i, (place, section) in enumerate(known):
-        others = [other for j, (other, _) in enumerate(known) if j != i]
-        total += section * np.prod([(omega - other) / (place - other) for other in others])
-    return total
+def _followed(
+    origin: NDArray[np.float64], section: NDArray[np.float64], specimen: Specimen, omega: float, amplitude: float
+) -> Solution:
+    solution = follow(origin, section, parameters(specimen, omega, amplitude)[0])
+    if solution is None:
+        raise NoOrbit(
+            f"no rocking orbit found at omega = {omega:g} rad/s, beta = {specimen.beta:g}, amplitude = "
+            f"{amplitude:g} m/s2: give a closer guess, or values nearer to ones that have an orbit"
+        )
+    return solution
 
 
 def _orbit(specimen: Specimen, omega: float, amplitude: float, solution: Solution) -> Orbit:
@@ -202,9 +214,9 @@ def _orbit(specimen: Specimen, omega: float, amplitude: float, solution: Solutio
         omega=omega,
         amplitude=amplitude,
         layer="rocking",
-        phase=phase,
+        phase=phase % tau,
         start=State(u1=u1, u2=u2, v1=v1, v2=v2, theta=0.0, omega=velocity),
-        peaks=Peaks(*solution.peaks),
+        peaks=Peaks(*(float(peak) for peak in solution.peaks)),
         impacts=2,
         multipliers=np.linalg.eigvals(solution.jacobian).astype(np.complex128),
     )

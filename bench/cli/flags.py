@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from inspect import Parameter as Argument
+from math import isclose
 from typing import Annotated, Any
 
 from cyclopts import Group, Parameter
@@ -45,10 +46,21 @@ def in_words(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
+def _several(values: list[object]) -> str:
+    """Values as one would type them; many that are equally spaced, as `start:stop:count`."""
+    numbers = [value for value in values if isinstance(value, float)]
+    if len(numbers) == len(values) > 8:
+        first, last, steps = numbers[0], numbers[-1], len(numbers) - 1
+        even = (first + (last - first) * k / steps for k in range(len(numbers)))
+        if all(isclose(value, place) for value, place in zip(numbers, even, strict=True)):
+            return f"{first:g}:{last:g}:{len(numbers)}"
+    return " ".join(in_words(value) for value in values)
+
+
 def _argument(entry: Declared, group: Group) -> Argument:
     unit = "" if entry.unit in ("", "1") else f" {entry.unit}"
     defaults: list[object] = [] if entry.default is None else [*entry.default] if entry.many else [entry.default]
-    default = f"{' '.join(in_words(value) for value in defaults)}{unit}" if defaults else ""
+    default = f"{_several(defaults)}{unit}" if defaults else ""
     allowed = ", ".join(entry.choices) or (f"each {entry.limits}" if entry.many and entry.limits else entry.limits)
     text = f"{entry.description[:1].upper()}{entry.description[1:]}"
     details = [f"[{entry.unit}]" if unit else "", f"({allowed})" if allowed else ""]

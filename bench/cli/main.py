@@ -8,6 +8,7 @@ from io import TextIOWrapper
 from cyclopts import App, CycloptsError, UnusedCliTokensError
 
 from bench.cli.configure import config_app
+from bench.cli.predict import predict_app
 from bench.cli.refusal import tell
 from bench.cli.run import Start, run_app
 from sim.errors import RockbenchError
@@ -39,6 +40,7 @@ def main(argv: Sequence[str] | None = None, start: Start | None = None) -> int:
         suppress_keyboard_interrupt=False,
     )
     app.command(run_app(start))
+    app.command(predict_app())
     app.command(config_app())
     try:
         code = app(sys.argv[1:] if argv is None else list(argv))

@@ -2,13 +2,15 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.record import hdf5
 from sim.errors import InvalidInput
+
+if TYPE_CHECKING:
+    from bench.record import hdf5
 
 
 @dataclass(frozen=True)
@@ -38,8 +40,10 @@ def check(name: str, table: Table) -> None:
         raise InvalidInput(f"table {name}", sorted(lengths), "its columns must have one length")
 
 
-def write(parent: hdf5.Group, name: str, table: Table) -> None:
+def write(parent: "hdf5.Group", name: str, table: Table) -> None:
     """Store a table as a group with one dataset per column; truth values become int8."""
+    from bench.record import hdf5  # a table that is not stored needs no HDF5
+
     group = hdf5.create_group(parent, name, "NXcollection")
     for key, column in table.items():
         kind = column.values.dtype.kind
@@ -52,8 +56,10 @@ def write(parent: hdf5.Group, name: str, table: Table) -> None:
             stored.attrs["kind"] = "switch"
 
 
-def read(group: hdf5.Group) -> dict[str, Column]:
+def read(group: "hdf5.Group") -> dict[str, Column]:
     """The table as it was given to `write`."""
+    from bench.record import hdf5
+
     table: dict[str, Column] = {}
     for key in group:
         stored = hdf5.dataset(group, key)
@@ -64,3 +70,8 @@ def read(group: hdf5.Group) -> dict[str, Column]:
             values = values.astype(np.bool_)
         table[key] = Column(values, str(stored.attrs.get("units", "")), str(stored.attrs["description"]))
     return table
+
+
+def arrays(table: Table) -> dict[str, NDArray[Any]]:
+    """The bare values of a table by name, for what draws them."""
+    return {name: column.values for name, column in table.items()}
