@@ -61,9 +61,7 @@ class SimulatedRig:
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        return tuple(
-            Channel(c.name, c.quantity, c.unit, c.scale, c.offset, c.valid, c.device) for c in self.bench.channels
-        )
+        return self.bench.channels
 
     @property
     def sample_rate(self) -> float:

@@ -9,6 +9,7 @@ from numpy.random import SeedSequence
 from numpy.typing import NDArray
 from pydantic import model_validator
 
+from sim.channel import Channel
 from sim.errors import InvalidInput
 from sim.parameters import Parameters, quantity
 from sim.sensors import Accelerometer, Converter, DisplacementSensor, FilterUnit, Laser
@@ -48,19 +49,6 @@ class VirtualBenchParameters(Parameters):
                 f"it must be below sample_rate / 2 = {self.sample_rate / 2}",
             )
         return self
-
-
-@dataclass(frozen=True)
-class BenchChannel:
-    """One input as its calibration has it: value [unit] = counts * scale + offset for counts within `valid`."""
-
-    name: str
-    quantity: str
-    unit: str
-    scale: float
-    offset: float
-    valid: tuple[int, int]
-    device: str
 
 
 @dataclass(frozen=True)
@@ -157,7 +145,7 @@ class VirtualBench:
         return self._mode == self._kernel.FALLEN
 
     @property
-    def channels(self) -> tuple[BenchChannel, ...]:
+    def channels(self) -> tuple[Channel, ...]:
         """The inputs in the order of the columns, with the nominal calibrations: scale errors are not known to it."""
         p, lsb = self.parameters, self.parameters.converter.lsb
         lowest, highest = (code + inward for code, inward in zip(p.converter.codes, (1, -1), strict=True))
@@ -166,16 +154,14 @@ class VirtualBench:
             ("table_acceleration", "acceleration", "m/s2", p.accelerometer, "simulated accelerometer"),
         )
         channels = [
-            BenchChannel(name, kind, unit, lsb * sensor.nominal[0], sensor.nominal[1], (lowest, highest), device)
+            Channel(name, kind, unit, lsb * sensor.nominal[0], sensor.nominal[1], (lowest, highest), device)
             for name, kind, unit, sensor, device in linear
         ]
         for name, laser in (("laser_1", p.laser_1), ("laser_2", p.laser_2)):
             slope, offset = laser.nominal
             low, high = (round(volts / lsb) for volts in laser.valid_volts)
             valid = max(low, lowest), min(high, highest)
-            channels.append(
-                BenchChannel(name, "displacement", "m", lsb * slope, offset, valid, "simulated optoNCDT 1420")
-            )
+            channels.append(Channel(name, "displacement", "m", lsb * slope, offset, valid, "simulated optoNCDT 1420"))
         return tuple(channels)
 
     @property
