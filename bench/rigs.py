@@ -14,6 +14,7 @@ def open_rig(configuration: BenchConfiguration, *, realtime: bool) -> Rig:
         simulation.bench,
         simulation.specimen or configuration.specimen,
         seed=simulation.seed,
+        spring_factor=simulation.spring_factor,
         clock=WallClock() if realtime else VirtualClock(),
         lead=block_samples(configuration),
     )

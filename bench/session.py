@@ -20,10 +20,9 @@ from bench.provenance import software
 from bench.record.recorder import Recorder
 from bench.record.tables import Table
 from bench.report.summary import Summary, write_summary
+from bench.results import FIGURE, FILE, SUMMARY
 from bench.rigs import block_samples, open_rig
 from sim.parameters import Parameters
-
-FILE, FIGURE, SUMMARY = "campaign.h5", "gain_spectra.png", "summary.json"
 
 
 class Experiment(Protocol):
@@ -99,11 +98,14 @@ def run_session(
 ) -> SessionResult:
     """Run `protocol` on the configured bench and leave data file, figure and summary in the folder `out`.
 
-    Raises InvalidInput before anything moves. Once the rig is armed every ending is a result, with its status.
+    Raises InvalidInput, or KeyboardInterrupt when an end was asked for, before anything moves. Once the rig is armed
+    every ending is a result, with its status.
     """
     started = time.monotonic()
     protocol.check(configuration)
     prediction = protocol.predict(configuration)
+    if requests.strongest is not None:
+        raise KeyboardInterrupt
     out.mkdir(parents=True, exist_ok=True)
     rig = open_rig(configuration, realtime=realtime)
     try:
@@ -117,7 +119,7 @@ def run_session(
         )
         points = _Points()
         stream = Stream(rig.clock, [recorder, points, *subscribers])
-        status = "failed"
+        status, reason = "failed", "the program failed"
         try:
             engine = Engine(
                 rig,
@@ -129,25 +131,25 @@ def run_session(
                 block_samples(configuration),
             )
             ending = engine.run(protocol.plan(configuration))
-            status = ending.status
+            status, reason = ending.status, ending.reason
         finally:
-            recorder.close(status)
+            recorder.close(status, reason)
     finally:
         rig.close()
-    protocol.figure(points.all, prediction, out / FIGURE)
     summary = Summary(
         protocol=protocol.name,
         status=ending.status,
         points=points.all,
         file=out / FILE,
         figure=out / FIGURE,
-        summary=ending.reason,
+        reason=ending.reason,
         software=f"rocking-bench {software()['rocking-bench']}",
         seed=configuration.simulation.seed,
         elapsed=time.monotonic() - started,
         bench_time=stream.now(),
     )
     write_summary(out / SUMMARY, summary)
+    protocol.figure(points.all, prediction, out / FIGURE)
     return SessionResult(
         status=ending.status,
         reason=ending.reason,

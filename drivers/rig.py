@@ -104,8 +104,8 @@ class Rig(Protocol):
         """Stop, and release every device. Allowed any number of times."""
         ...
 
-    def handwork(self, work: Handwork, beta: float | None = None) -> None:
-        """Told that a person has done `work` (with the spring `beta`) while the rig was stopped.
+    def handwork(self, work: Handwork, stiffness: float | None = None) -> None:
+        """Told that a person has done `work` (with a spring of `stiffness` [N/m]) while the rig was stopped.
 
         A simulated rig does it to its specimen; a real one has nothing to do. Raises RigError when armed.
         """

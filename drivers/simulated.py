@@ -34,7 +34,8 @@ class SimulatedRig:
     `WallClock` a block is handed out when it would have been measured.
 
     `lead` is the number of drive samples that must be waiting, 50 ms unless told. Between two arms as much time
-    passes as a person waits: the bench coasts at zero drive until it is at rest.
+    passes as a person waits: the bench coasts at zero drive until it is at rest. Every spring that is mounted is
+    `spring_factor` times as stiff as it is said to be.
     """
 
     def __init__(
@@ -45,6 +46,7 @@ class SimulatedRig:
         seed: int,
         clock: Clock | None = None,
         lead: int | None = None,
+        spring_factor: float = 1.0,
     ) -> None:
         if lead is not None and lead < 0:
             raise InvalidInput("lead", lead, "it must be a number of samples, 0 or more")
@@ -52,6 +54,7 @@ class SimulatedRig:
         self._clock = clock if clock is not None else VirtualClock()
         self._lead = round(0.05 * parameters.sample_rate) if lead is None else lead
         self._seed = seed
+        self._spring_factor = spring_factor
         self._state = _State.STOPPED
         self._moved = False
         self._queue: deque[NDArray[np.float64]] = deque()
@@ -146,14 +149,14 @@ class SimulatedRig:
         self.stop()
         self._state = _State.CLOSED
 
-    def handwork(self, work: Handwork, beta: float | None = None) -> None:
+    def handwork(self, work: Handwork, stiffness: float | None = None) -> None:
         if self._state is not _State.STOPPED:
             raise RigError(f"{work.value} is refused: the rig is {self._state.value}; hands belong on a stopped rig")
         specimen = self.bench.specimen
         if work is Handwork.MOUNT_SPRING:
-            if beta is None:
-                raise InvalidInput("beta", beta, "mounting a spring needs its stiffness ratio")
-            specimen = specimen.coupled(beta)
+            if stiffness is None:
+                raise InvalidInput("stiffness", stiffness, "mounting a spring needs its stiffness in N/m")
+            specimen = specimen.coupled(self._spring_factor * stiffness / specimen.frame.k1)
         elif work is Handwork.REMOVE_BLOCK:
             specimen = specimen.bare()
         elif specimen.beta is None:

@@ -1,7 +1,8 @@
-"""The gain coefficients alpha_1 and alpha_2 that the model predicts for a steady sine.
+"""The gain coefficients alpha_1 and alpha_2 that the model predicts for a steady sine and for a record.
 
-alpha is a peak of the coupled frame over the same peak of the bare one (Eq. 10). Two steady motions can coexist, so a
-prediction has up to two layers; which one a test lands on is decided by its start.
+alpha is a peak of the coupled frame over the same peak of the bare one (Eq. 10). Under a sine two steady motions can
+coexist, so a prediction has up to two layers; which one a test lands on is decided by its start. Under a record the
+peaks are those of the one motion that starts at rest, unless it ends with the block overturned.
 """
 
 from collections.abc import Sequence
@@ -10,8 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.errors import InvalidInput
+from sim.excitation import SampledRecord
 from sim.linear import steady_peaks
-from sim.rocking import Peaks
+from sim.rocking import Motion, Peaks, Status, simulate, simulate_many
 from sim.specimen import Specimen
 from sim.steady import NoOrbit, Orbit, resting_state, rocking_branch, rocking_orbit
 
@@ -56,6 +59,19 @@ class GainPrediction:
         return {name: layer for name, layer in named.items() if layer is not None}
 
 
+@dataclass(frozen=True, eq=False)
+class SeismicGain:
+    """Gain coefficients of one stiffness ratio under a record; both None unless the run was completed.
+
+    `motion` says whether and when the block overturned (`motion.overturned`, `motion.end_time`), and has the peaks.
+    """
+
+    beta: float
+    alpha_1: float | None
+    alpha_2: float | None
+    motion: Motion
+
+
 def predict_gain(
     specimen: Specimen, omega: float, amplitude: float, bare_amplitude: float | None = None
 ) -> GainPrediction:
@@ -88,6 +104,29 @@ def gain_spectrum(
         _prediction(specimen, omega, amplitude, bare_amplitude, orbit, resting_state(specimen, omega, amplitude))
         for omega, orbit in zip(places, branch, strict=True)
     ]
+
+
+def seismic_curve(
+    specimen: Specimen, record: SampledRecord, betas: Sequence[float] | NDArray[np.float64]
+) -> list[SeismicGain]:
+    """Gain coefficients under `record`, from rest, at each stiffness ratio of `betas`, on all processors.
+
+    Raises InvalidInput for a negative stiffness ratio, or a record under which the bare frame does not move.
+    Source: Eq. (10); peaks over the record's duration, without the free motion after it.
+    """
+    bare = simulate(specimen.bare(), record)
+    if bare.status is not Status.COMPLETED or not min(bare.peaks.u1, bare.peaks.drift) > 0.0:
+        raise InvalidInput(
+            "record", f"peaks of the bare frame {bare.peaks}", "the bare frame must move and stay finite"
+        )
+    coupled = [specimen.coupled(float(beta)) for beta in betas]
+    curve: list[SeismicGain] = []
+    for member, motion in zip(coupled, simulate_many(coupled, record), strict=True):
+        known = motion.status is Status.COMPLETED
+        alpha_1 = motion.peaks.u1 / bare.peaks.u1 if known else None
+        alpha_2 = motion.peaks.drift / bare.peaks.drift if known else None
+        curve.append(SeismicGain(member.beta or 0.0, alpha_1, alpha_2, motion))
+    return curve
 
 
 def _prediction(

@@ -10,7 +10,7 @@ many points at once: q has shape (n, 18), x shape (n, 6).
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import pi, tau
+from math import pi, prod, tau
 from typing import Literal
 
 import numpy as np
@@ -26,8 +26,8 @@ ORDER, TOLERANCE = 18, 1e-11
 Accuracy = Literal[2, 4]
 """Order of the differences that make a Jacobian of 12 or of 24 maps."""
 
-DIFFERENCE: dict[Accuracy, float] = {2: 4e-6, 4: 1e-4}
-"""Relative steps: the multipliers then err by about 5e-10 and 3e-11, by truncation and rounding alike."""
+DIFFERENCE: dict[Accuracy, float] = {2: 4e-6, 4: 5e-5}
+"""Relative steps: the multipliers then err by about 5e-10 and 5e-11, by truncation and rounding alike."""
 
 STENCIL: dict[Accuracy, tuple[Floats, Floats]] = {
     2: (np.array([1.0, -1.0]), np.array([0.5, -0.5])),
@@ -40,6 +40,9 @@ CLOSURE = 1e-12
 
 SLOW = 0.1
 """A known Jacobian is kept while each step of Newton leaves less of the mismatch than this."""
+
+NEAR = 0.3
+"""Scaled mismatch beyond which a start is refused: Newton might end on another orbit than the one that is followed."""
 
 MOST_ITERATIONS = 10
 SMALLEST_ADVANCE = 1e-3
@@ -74,6 +77,11 @@ class Solutions:
         """Row `i`, or None if it was not found."""
         return Solution(self.section[i], self.jacobian[i], self.peaks[i]) if self.found[i] else None
 
+    def put(self, i: int, solution: Solution) -> None:
+        """Let row `i` be a solution that was found in another way."""
+        self.section[i], self.jacobian[i], self.peaks[i] = solution.section, solution.jacobian, solution.peaks
+        self.found[i] = True
+
 
 def parameters(specimen: Specimen, omega: float | Floats, amplitude: float) -> Floats:
     """Parameter vectors of one specimen, shape (n, 18), for each of the `omega` [rad/s], shape (n,) or a number."""
@@ -106,19 +114,14 @@ def images(q: Floats, x: Floats, *, watch_peaks: bool = False) -> tuple[Floats, 
     return out, peaks
 
 
-def jacobians(q: Floats, x: Floats, accuracy: Accuracy = 4) -> tuple[Floats, Floats]:
-    """Derivatives of the map at x, shape (n, 6, 6), and of its peaks, shape (n, 3, 6); NaN where not defined.
-
-    The peaks are watched, and so differentiated, only at the accuracy 4; else their derivatives are 0.
-    """
+def jacobians(q: Floats, x: Floats, accuracy: Accuracy = 4) -> Floats:
+    """Derivatives of the map at x, shape (n, 6, 6); NaN where the map is not defined around x."""
     nodes, weights = STENCIL[accuracy]
     # the steps as they are after rounding, exactly
     steps = (x + DIFFERENCE[accuracy] * scales(q)) - x
     starts = x[:, None, None, :] + (nodes[:, None, None] * np.eye(6)) * steps[:, None, None, :]
-    out, peaks = images(q, starts.reshape(-1, 6), watch_peaks=accuracy == 4)
-    shape = (len(x), nodes.size, 6)
-    slopes = np.einsum("s,nsji->nij", weights, out.reshape(*shape, 6)) / steps[:, None, :]
-    return slopes, np.einsum("s,nsji->nij", weights, peaks.reshape(*shape, 3)) / steps[:, None, :]
+    out, _ = images(q, starts.reshape(-1, 6))
+    return np.einsum("s,nsji->nij", weights, out.reshape(len(x), nodes.size, 6, 6)) / steps[:, None, :]
 
 
 def newton(q: Floats, x: Floats, known: Floats | None = None, accuracy: Accuracy = 4) -> Solutions:
@@ -135,20 +138,20 @@ def newton(q: Floats, x: Floats, known: Floats | None = None, accuracy: Accuracy
         image, seen = images(q[active], place[active], watch_peaks=True)
         mismatch = image - place[active]
         error = np.abs(mismatch / sizes[active]).max(axis=1)
-        closed, going = error < CLOSURE, error < 10.0 * previous[active]
+        closed, going = error < CLOSURE, error < np.minimum(10.0 * previous[active], NEAR)
         found[active[closed]], peaks[active[closed]] = True, seen[closed]
         keep = ~closed & going
         active, mismatch, error = active[keep], mismatch[keep], error[keep]
         stale = np.isnan(jacobian[active, 0, 0]) | ((previous[active] < np.inf) & (error > SLOW * previous[active]))
         if stale.any():
-            jacobian[active[stale]] = jacobians(q[active[stale]], place[active[stale]], 2)[0]
+            jacobian[active[stale]] = jacobians(q[active[stale]], place[active[stale]], 2)
         previous[active] = error
         place[active] -= _solved(jacobian[active] - np.eye(6), mismatch)
         if not active.size:
             break
     place[~found], jacobian[~found] = np.nan, np.nan
     if found.any():
-        jacobian[found] = jacobians(q[found], place[found], accuracy)[0]
+        jacobian[found] = jacobians(q[found], place[found], accuracy)
         found &= np.isfinite(jacobian).all(axis=(1, 2))
     return Solutions(place, jacobian, peaks, found)
 
@@ -185,18 +188,18 @@ def follow(origin: Floats, x: Floats, target: Floats) -> Solution | None:
 
 def extrapolated(places: Sequence[float], values: Sequence[Floats], place: float) -> Floats:
     """The polynomial through the last of the known values, of any shape, at `place` (Lagrange)."""
-    near, last = np.array(places[-MOST_KNOWN:]), values[-MOST_KNOWN:]
+    near, last = places[-MOST_KNOWN:], values[-MOST_KNOWN:]
     total = np.zeros_like(last[0])
-    for i, value in enumerate(last):
-        others = np.delete(near, i)
-        total += value * np.prod((place - others) / (near[i] - others))
+    for at, value in zip(near, last, strict=True):
+        total += value * prod((place - other) / (at - other) for other in near if other != at)
     return total
 
 
 def _solved(matrices: Floats, right: Floats) -> Floats:
     """Solutions of linear systems, shape (n, 6); NaN where a matrix is singular or not finite."""
     solution = np.full(right.shape, np.nan)
-    usable = np.isfinite(matrices).all(axis=(1, 2)) & (np.abs(np.linalg.det(matrices)) > 0.0)
-    if usable.any():
+    finite = np.flatnonzero(np.isfinite(matrices).all(axis=(1, 2)))
+    usable = finite[np.linalg.det(matrices[finite]) != 0.0]
+    if usable.size:
         solution[usable] = np.linalg.solve(matrices[usable], right[usable][..., None])[..., 0]
     return solution

@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
 from importlib import import_module
-from math import ceil, log, log10, pi
+from math import ceil, log, log10, nan, pi
 from typing import Literal
 
 import numpy as np
@@ -77,7 +77,7 @@ class State:
 
 @dataclass(frozen=True)
 class Peaks:
-    """Greatest |u1| [m], |u2 - u1| [m] and |theta| [rad]."""
+    """Greatest |u1| [m], |u2 - u1| [m] and |theta| [rad]; not a number where they were not watched."""
 
     u1: float
     drift: float
@@ -114,60 +114,22 @@ def simulate(
     *,
     state: State | None = None,
     sample_times: ArrayLike | None = None,
-    peaks_from: float = 0.0,
+    peaks_from: float | None = 0.0,
     tolerance: float = TOLERANCE,
     overturning_angle: float = pi / 2,
 ) -> Motion:
     """Integrate the specimen from `state` (default: at rest) through the whole `excitation`.
 
-    `sample_times`, shape (n,), ascending [s]; `peaks_from` [s] starts the window of the peaks; `overturning_angle`
-    [rad] is the |theta| that ends the run. A run that overturns or fails is a result, not an error.
+    `sample_times`, shape (n,), ascending [s]; `peaks_from` [s] starts the window of the peaks, None watches none;
+    `overturning_angle` [rad] is the |theta| that ends the run. A run that overturns or fails is a result, not an error.
+    Neither samples nor peaks move the motion, and each costs only when asked for.
 
     Raises InvalidInput, before anything is integrated, for values outside their meaning.
     Source: Eq. (8), (9), (A.1) and (A.3) of the paper; coming to rest is described in `sim.kernel.rocking.run`.
     """
-    from sim.kernel import rocking as kernel
-
-    segments = excitation.packed()
-    duration = _checked_duration(segments)
-    times = _checked_times(sample_times, duration)
-    start = state or State()
-    _check_state(specimen, start, overturning_angle)
-    if not 1e-15 <= tolerance <= 1e-3:
-        raise InvalidInput("tolerance", tolerance, "it must be between 1e-15 and 1e-3")
-    if not 0.0 <= peaks_from < duration:
-        raise InvalidInput("peaks_from", peaks_from, f"it must lie within the {duration:g} s of the run")
-
-    x, samples, report = start.as_array(), np.empty((times.size, 6)), np.empty(kernel.REPORT)
-    kernel.run(
-        specimen.packed(),
-        segments,
-        x,
-        times,
-        samples,
-        series_order(tolerance, float(np.median(segments[:, 0]))),
-        tolerance,
-        np.inf,
-        overturning_angle,
-        REST_ANGLE,
-        peaks_from,
-        MOST_IMPACTS,
-        report,
-    )
-    names = {
-        kernel.COMPLETED: Status.COMPLETED,
-        kernel.OVERTURNED_A: Status.OVERTURNED_A,
-        kernel.OVERTURNED_B: Status.OVERTURNED_B,
-    }
-    return Motion(
-        status=names.get(int(report[kernel.STATUS]), Status.FAILED),
-        end_time=float(report[kernel.END]),
-        end=State.from_array(x),
-        peaks=Peaks(*(float(peak) for peak in report[kernel.PEAKS :])),
-        impacts=int(report[kernel.IMPACTS]),
-        steps=int(report[kernel.STEPS]),
-        samples=None if sample_times is None else samples[: int(report[kernel.SAMPLES])],
-    )
+    check_options(tolerance, overturning_angle)
+    run = _Run(specimen, _Drive(excitation), state or State(), sample_times, peaks_from, tolerance, overturning_angle)
+    return run.motion()
 
 
 def simulate_many(
@@ -175,13 +137,13 @@ def simulate_many(
     excitations: Excitation | Sequence[Excitation],
     *,
     states: State | Sequence[State] | None = None,
-    peaks_from: float | Sequence[float] = 0.0,
+    peaks_from: float | Sequence[float] | None = 0.0,
     tolerance: float = TOLERANCE,
     overturning_angle: float = pi / 2,
 ) -> list[Motion]:
     """`simulate` for many runs on all processors, in order.
 
-    A single specimen, excitation, state or window serves all runs.
+    A single specimen, excitation, state or window serves all runs. Everything is checked before the first run starts.
 
     Raises InvalidInput when the sequences differ in length or a run is refused.
     """
@@ -192,18 +154,24 @@ def simulate_many(
     if any(length != runs for length in several):
         raise InvalidInput("simulate_many", several, "its sequences must have the same length")
 
-    def one(i: int) -> Motion:
-        return simulate(
-            specimens[i] if isinstance(specimens, Sequence) else specimens,
-            excitations[i] if isinstance(excitations, Sequence) else excitations,
-            state=states[i] if isinstance(states, Sequence) else states,
-            peaks_from=peaks_from[i] if isinstance(peaks_from, Sequence) else peaks_from,
-            tolerance=tolerance,
-            overturning_angle=overturning_angle,
-        )
+    models = list(specimens) if isinstance(specimens, Sequence) else [specimens]
+    drives = [_Drive(item) for item in (excitations if isinstance(excitations, Sequence) else [excitations])]
+    check_options(tolerance, overturning_angle)
 
+    prepared = [
+        _Run(
+            models[i % len(models)],
+            drives[i % len(drives)],
+            (states[i] if isinstance(states, Sequence) else states) or State(),
+            None,
+            peaks_from[i] if isinstance(peaks_from, Sequence) else peaks_from,
+            tolerance,
+            overturning_angle,
+        )
+        for i in range(runs)
+    ]
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        return list(pool.map(one, range(runs)))
+        return list(pool.map(_Run.motion, prepared))
 
 
 def series_order(tolerance: float, segment: float) -> int:
@@ -218,28 +186,16 @@ def series_order(tolerance: float, segment: float) -> int:
     return max(6, min(longest, covering))
 
 
-def _checked_duration(segments: NDArray[np.float64]) -> float:
-    if segments.ndim != 2 or segments.shape[0] < 1 or segments.shape[1] != ROW:
-        raise InvalidInput("excitation", segments.shape, f"its table must have at least one row of {ROW} numbers")
-    if not np.isfinite(segments).all():
-        raise InvalidInput("excitation", "a number that is not finite", "all of its numbers must be finite")
-    if not (segments[:, 0] > 0.0).all():
-        raise InvalidInput("excitation", float(segments[:, 0].min()), "every segment must last a positive time")
-    return float(segments[:, 0].sum())
-
-
-def _checked_times(sample_times: ArrayLike | None, duration: float) -> NDArray[np.float64]:
-    times = np.ascontiguousarray([] if sample_times is None else sample_times, dtype=np.float64)
-    if times.ndim != 1 or not np.isfinite(times).all() or (np.diff(times) < 0.0).any():
-        raise InvalidInput("sample_times", times.shape, "they must be finite ascending seconds in one row")
-    if times.size and not (times[0] >= 0.0 and times[-1] <= duration * (1.0 + 1e-12)):
-        raise InvalidInput("sample_times", (times[0], times[-1]), f"they must lie within the {duration:g} s of the run")
-    return np.clip(times, 0.0, duration)
-
-
-def _check_state(specimen: Specimen, state: State, overturning_angle: float) -> None:
+def check_options(tolerance: float, overturning_angle: float) -> None:
+    """Refuse, as InvalidInput, options outside their meaning."""
+    if not 1e-15 <= tolerance <= 1e-3:
+        raise InvalidInput("tolerance", tolerance, "it must be between 1e-15 and 1e-3")
     if not 0.0 < overturning_angle <= pi / 2:
         raise InvalidInput("overturning_angle", overturning_angle, "it must be above 0 and at most pi/2 rad")
+
+
+def check_state(specimen: Specimen, state: State, overturning_angle: float) -> None:
+    """Refuse, as InvalidInput, a state in which a motion cannot start."""
     x = state.as_array()
     if not np.isfinite(x).all():
         raise InvalidInput("state", state, "all of its components must be finite")
@@ -249,3 +205,97 @@ def _check_state(specimen: Specimen, state: State, overturning_angle: float) -> 
         raise InvalidInput("theta", state.theta, f"the block must start below {overturning_angle:g} rad")
     if specimen.beta and abs(state.u1) >= specimen.d:
         raise InvalidInput("u1", state.u1, f"the spring must keep a length: |u1| below d = {specimen.d:g} m")
+
+
+def motion_of(
+    report: NDArray[np.float64], x: NDArray[np.float64], samples: NDArray[np.float64] | None, *, watched: bool
+) -> Motion:
+    """What the kernel's `report`, shape (8,), and end state `x`, shape (6,), say; `watched`: whether peaks were."""
+    from sim.kernel import rocking as kernel
+
+    names = {
+        kernel.COMPLETED: Status.COMPLETED,
+        kernel.OVERTURNED_A: Status.OVERTURNED_A,
+        kernel.OVERTURNED_B: Status.OVERTURNED_B,
+    }
+    return Motion(
+        status=names.get(int(report[kernel.STATUS]), Status.FAILED),
+        end_time=float(report[kernel.END]),
+        end=State.from_array(x),
+        peaks=Peaks(*(float(peak) for peak in report[kernel.PEAKS :])) if watched else Peaks(nan, nan, nan),
+        impacts=int(report[kernel.IMPACTS]),
+        steps=int(report[kernel.STEPS]),
+        samples=None if samples is None else samples[: int(report[kernel.SAMPLES])],
+    )
+
+
+class _Drive:
+    """An excitation's table, checked: its segments, its duration [s] and the typical length of a segment [s]."""
+
+    def __init__(self, excitation: Excitation) -> None:
+        segments = excitation.packed()
+        if segments.ndim != 2 or segments.shape[0] < 1 or segments.shape[1] != ROW:
+            raise InvalidInput("excitation", segments.shape, f"its table must have at least one row of {ROW} numbers")
+        # a finite sum has finite terms, and costs half of looking at each
+        if not np.isfinite(segments.sum()) and not np.isfinite(segments).all():
+            raise InvalidInput("excitation", "a number that is not finite", "all of its numbers must be finite")
+        lengths = segments[:, 0]
+        if not lengths.min() > 0.0:
+            raise InvalidInput("excitation", float(lengths.min()), "every segment must last a positive time")
+        self.segments = segments
+        self.duration = float(lengths.sum())
+        self.typical = float(np.median(lengths[:: 1 + lengths.size // 50]))
+
+
+@dataclass(frozen=True, eq=False)
+class _Run:
+    """One run, checked when it is made."""
+
+    specimen: Specimen
+    drive: _Drive
+    state: State
+    sample_times: ArrayLike | None
+    peaks_from: float | None
+    tolerance: float
+    overturning_angle: float
+
+    def __post_init__(self) -> None:
+        check_state(self.specimen, self.state, self.overturning_angle)
+        duration = self.drive.duration
+        if self.peaks_from is not None and not 0.0 <= self.peaks_from < duration:
+            raise InvalidInput("peaks_from", self.peaks_from, f"it must lie within the {duration:g} s of the run")
+
+    def motion(self) -> Motion:
+        from sim.kernel import rocking as kernel
+
+        times = _checked_times(self.sample_times, self.drive.duration)
+        x, samples = self.state.as_array(), np.empty((times.size, 6))
+        report, memory = np.zeros(kernel.REPORT), np.zeros((kernel.MEMORY_ROWS, 6))
+        memory[0, kernel.LENGTH] = self.drive.segments[0, 0]
+        kernel.advance(
+            self.specimen.packed(),
+            self.drive.segments,
+            x,
+            times,
+            0,
+            samples,
+            series_order(self.tolerance, self.drive.typical),
+            self.tolerance,
+            np.inf,
+            self.overturning_angle,
+            REST_ANGLE,
+            np.inf if self.peaks_from is None else self.peaks_from,
+            MOST_IMPACTS,
+            memory,
+            report,
+        )
+        return motion_of(report, x, None if self.sample_times is None else samples, watched=self.peaks_from is not None)
+
+
+def _checked_times(sample_times: ArrayLike | None, duration: float) -> NDArray[np.float64]:
+    times = np.ascontiguousarray([] if sample_times is None else sample_times, dtype=np.float64)
+    if times.ndim != 1 or not np.isfinite(times).all() or (np.diff(times) < 0.0).any():
+        raise InvalidInput("sample_times", times.shape, "they must be finite ascending seconds in one row")
+    if times.size and not (times[0] >= 0.0 and times[-1] <= duration * (1.0 + 1e-12)):
+        raise InvalidInput("sample_times", (times[0], times[-1]), f"they must lie within the {duration:g} s of the run")
+    return np.clip(times, 0.0, duration)

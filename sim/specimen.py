@@ -8,8 +8,13 @@ from math import hypot, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import model_validator
 
+from sim.errors import InvalidInput
 from sim.parameters import Parameters, quantity
+
+SLOWEST, FASTEST = 1e-3, 1e5
+"""Natural frequencies [rad/s] of any frame that stands on a table; beyond them a number was mistyped."""
 
 
 class Frame(Parameters):
@@ -23,6 +28,19 @@ class Frame(Parameters):
     k2: float = quantity(56.45, "N/m", "stiffness of the second storey", gt=0)
     xi1: float = quantity(0.010, "1", "damping ratio of the first mode of the bare frame", ge=0, lt=1)
     xi2: float = quantity(0.035, "1", "damping ratio of the second mode of the bare frame", ge=0, lt=1)
+
+    @model_validator(mode="after")
+    def _a_frame_that_can_stand(self) -> "Frame":
+        if self.h1 >= self.h2:
+            raise InvalidInput("h1", self.h1, f"the first storey must be below the second, h2 = {self.h2:g} m")
+        try:
+            lower, upper = self.natural_frequencies
+        except ArithmeticError:
+            lower, upper = 0.0, 0.0
+        if not (lower >= SLOWEST and upper <= FASTEST):
+            makes = f"with its masses and k2 it makes frequencies beyond {SLOWEST:g} to {FASTEST:g} rad/s"
+            raise InvalidInput("k1", self.k1, makes)
+        return self
 
     @cached_property
     def natural_frequencies(self) -> tuple[float, float]:
@@ -58,8 +76,18 @@ class Block(Parameters):
     s: float = quantity(0.10, "m", "depth of the block, across the plane of motion", gt=0)
     rho: float = quantity(2450.0, "kg/m3", "density of the block", gt=0)
     restitution_factor: float = quantity(
-        1.0, "1", "measured over theoretical restitution r_exp/r_th (the paper measured 0.992)", ge=0
+        1.0, "1", "measured over theoretical restitution r_exp/r_th (the paper measured 0.992)", ge=0, le=2
     )
+
+    @model_validator(mode="after")
+    def _an_impact_gives_no_energy(self) -> "Block":
+        # below 0, as for a slab 1.42 times as wide as it is high, the impact would turn it back on the corner it left
+        if not 0.0 <= self.restitution <= 1.0:
+            allowed = (
+                f"it gives r = {self.restitution:.4g}: an impact neither adds speed nor turns it back, r is 0 to 1"
+            )
+            raise InvalidInput("restitution_factor", self.restitution_factor, allowed)
+        return self
 
     @property
     def mass(self) -> float:
@@ -110,7 +138,7 @@ class Specimen(Parameters):
         return Specimen(frame=self.frame, block=self.block, beta=None, d=self.d, g=self.g)
 
     def packed(self) -> NDArray[np.float64]:
-        """The parameters as `sim.kernel` takes them, shape (16,): see `sim.kernel.equations` for the order."""
+        """The parameters as `sim.kernel` takes them, shape (16,): see `sim.kernel.packing` for the order."""
         f, k, (c1, c2) = self.frame, self.block, self.frame.dashpots
         frame = (f.m1, f.m2, f.k1, f.k2, c1, c2, f.h1, self.k_c, self.d)
         block = (k.b, k.h_b, k.mass, k.inertia, k.restitution, self.g, 0.0 if self.beta is None else 1.0)

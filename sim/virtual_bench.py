@@ -50,6 +50,13 @@ class VirtualBenchParameters(Parameters):
             )
         return self
 
+    @model_validator(mode="after")
+    def _lasers_stand_together(self) -> "VirtualBenchParameters":
+        if self.laser_1.reference != self.laser_2.reference:
+            allowed = f"the drift needs both lasers in one place, laser_1.reference = {self.laser_1.reference!r}"
+            raise InvalidInput("laser_2.reference", self.laser_2.reference, allowed)
+        return self
+
 
 @dataclass(frozen=True)
 class Truth:

@@ -24,13 +24,13 @@ class LoopbackRig:
         lead: int = 100,
         sample_rate: float = 1000.0,
     ) -> None:
-        self._response = response or {
+        self.response = response or {
             "table_displacement": lambda volts: 0.01 * volts,
             "table_acceleration": lambda volts: volts,
             "laser_1": lambda volts: 0.001 * volts,
             "laser_2": lambda volts: 0.002 * volts,
         }
-        self.channels = tuple(channel(name, "displacement", "m") for name in self._response)
+        self.channels = tuple(channel(name, "displacement", "m") for name in self.response)
         self.sample_rate, self.drive_range, self.lead = sample_rate, 10.0, lead
         self.clock = VirtualClock()
         self.description = {"rig": "loopback"}
@@ -57,7 +57,7 @@ class LoopbackRig:
         now, self._queue = self._queue[:n], self._queue[n:]
         self.played = np.concatenate((self.played, now))
         self.clock.wait_until(self.clock.now() + n / self.sample_rate)
-        values = np.stack([respond(now) for respond in self._response.values()], axis=1)
+        values = np.stack([respond(now) for respond in self.response.values()], axis=1)
         counts = np.where(np.isnan(values), -32768, np.round(np.nan_to_num(values) * COUNTS_PER_UNIT))
         first, self._index = self._index, self._index + n
         return Block(first, counts.astype(np.int16))
@@ -72,7 +72,7 @@ class LoopbackRig:
     def close(self) -> None:
         self.stop()
 
-    def handwork(self, work: Handwork, beta: float | None = None) -> None:  # noqa: ARG002
+    def handwork(self, work: Handwork, stiffness: float | None = None) -> None:  # noqa: ARG002
         if self.armed:
             raise RigError("hands off: the rig is armed")
         self.done.append(work)

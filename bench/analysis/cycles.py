@@ -4,6 +4,7 @@ A fit over one cycle needs no whole number of samples, averages the noise of hun
 of the motion without the upward bias of picking the largest noisy sample.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil, tau
 
@@ -34,18 +35,17 @@ def _basis(phase: NDArray[np.float64], harmonics: int) -> NDArray[np.float64]:
 class Cycle:
     """One cycle of the drive's period. The last column of every array is the drive [V], the others the signals.
 
-    `fundamental` are complex amplitudes c with signal = Re(c exp(-i phase)), phase = omega (sample index) / rate;
-    `peak` is the largest magnitude of the fitted motion, its mean included; `noise` the residual's rms.
-    All have shape (n_signals + 1,). `distortion` is the rms of harmonics 2.. over the fundamental.
+    `coefficients`, shape (1 + 2 H, m): mean, cosines and sines of the harmonics of phase = omega (sample index) / rate.
+    `fundamental` are complex amplitudes c with signal = Re(c exp(-i phase)); `peak` is the largest magnitude of the
+    fitted motion, its mean included; `noise` the residual's rms; shape (m,) each.
     """
 
     index: int
     samples: int
+    coefficients: NDArray[np.float64]
     fundamental: NDArray[np.complex128]
     peak: NDArray[np.float64]
-    mean: NDArray[np.float64]
     noise: NDArray[np.float64]
-    distortion: NDArray[np.float64]
 
 
 def fit_cycle(index: int, phase: NDArray[np.float64], values: NDArray[np.float64]) -> Cycle | None:
@@ -57,21 +57,36 @@ def fit_cycle(index: int, phase: NDArray[np.float64], values: NDArray[np.float64
     if valid.mean() < COMPLETE or harmonics < 1:
         return None
     basis = _basis(phase, harmonics)
-    coefficients = np.linalg.solve(basis.T @ basis, basis.T @ values)
+    coefficients: NDArray[np.float64] = np.linalg.solve(basis.T @ basis, basis.T @ values).astype(np.float64)
     residual = values - basis @ coefficients
     waveform = _basis(_ANGLES, harmonics) @ coefficients
-    cosines, sines = coefficients[1 : harmonics + 1], coefficients[harmonics + 1 :]
-    power = cosines**2 + sines**2
-    size = np.sqrt(power[0])
     return Cycle(
         index=index,
         samples=phase.size,
-        fundamental=cosines[0] + 1j * sines[0],
+        coefficients=coefficients,
+        fundamental=coefficients[1] + 1j * coefficients[harmonics + 1],
         peak=_peak(waveform),
-        mean=coefficients[0],
         noise=np.sqrt(np.mean(residual**2, axis=0)),
-        distortion=np.sqrt(power[1:].sum(axis=0)) / np.where(size > 0.0, size, np.inf),
     )
+
+
+def mean_cycle(cycles: Sequence[Cycle]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Peaks of the mean of many cycles, shape (m,), each cycle's magnitude there, (n, m), and harmonics, (m,).
+
+    The mean is taken of the coefficients, so that noise does not raise the peak as a mean of peaks would. The
+    harmonics are the rms of all above the fundamental over the fundamental.
+    """
+    all_coefficients = np.array([cycle.coefficients for cycle in cycles])
+    mean = all_coefficients.mean(axis=0)
+    harmonics = (mean.shape[0] - 1) // 2
+    basis = _basis(_ANGLES, harmonics)
+    waveform = basis @ mean
+    at = np.argmax(np.abs(waveform), axis=0)
+    sign = np.sign(np.take_along_axis(waveform, at[None, :], axis=0)[0])
+    there = sign * np.einsum("mk,nkm->nm", basis[at], all_coefficients)
+    power = mean[1 : harmonics + 1] ** 2 + mean[harmonics + 1 :] ** 2
+    fundamental = np.where(power[0] > 0.0, power[0], np.inf)
+    return _peak(waveform), there, np.sqrt(power[1:].sum(axis=0) / fundamental)
 
 
 def _peak(waveform: NDArray[np.float64]) -> NDArray[np.float64]:

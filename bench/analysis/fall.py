@@ -32,7 +32,7 @@ class FallWatch:
         return self._threshold
 
     def fallen(self, signals: NDArray[np.float64]) -> bool:
-        """Whether the next block of signals, shape (n, 5), shows a fallen block."""
+        """Whether the next block of signals, shape (n, 6), shows a fallen block."""
         if self._threshold == 0.0:
             return False
         u1 = signals[:, U1]
@@ -45,4 +45,5 @@ class FallWatch:
         while total - self._sums[0][0] >= self._span:
             size, *_ = self._sums.popleft()
             total -= size
-        return seen < 0.5 * total or abs(summed / seen) > self._threshold
+        # a laser that has lost the storey is the guard's business: it says nothing about the block
+        return 2 * seen > total and abs(summed / seen) > self._threshold

@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 from drivers.rig import Channel
 from sim.errors import InvalidInput
 
-SIGNALS = ("acceleration", "displacement", "u1", "drift", "laser_1")
+SIGNALS = ("acceleration", "displacement", "u1", "drift", "laser_1", "laser_2")
 """Columns of a signal array: table acceleration [m/s2], table displacement [m], first storey relative to the table
-[m], drift u2 - u1 [m], and what the first laser sees [m]."""
+[m], drift u2 - u1 [m], and what the two lasers see [m]."""
 
-ACCELERATION, DISPLACEMENT, U1, DRIFT, LASER_1 = range(5)
+ACCELERATION, DISPLACEMENT, U1, DRIFT, LASER_1, LASER_2 = range(6)
 
 
 class SignalMap:
@@ -41,7 +41,7 @@ class SignalMap:
         return float(np.nan_to_num(deviation, nan=np.inf).max())
 
     def of(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Signals, shape (n, 5), of channel values, shape (n, n_channels); NaN where a sensor gave none."""
+        """Signals, shape (n, 6), of channel values, shape (n, n_channels); NaN where a sensor gave none."""
         return self._raw(values) - self._zero
 
     def _raw(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -52,4 +52,5 @@ class SignalMap:
         signals[:, U1] = first - displacement if self._ground else first
         signals[:, DRIFT] = second - first
         signals[:, LASER_1] = first
+        signals[:, LASER_2] = second
         return signals

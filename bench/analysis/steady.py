@@ -38,13 +38,21 @@ class SteadyDetector:
     Steady means: within a window no cycle is farther from the mean than the tolerance, and the means of the two
     windows differ by less than a third of it, which bounds what a transient that decays by 2 % a cycle still has to go
     (0.98^12 / (1 - 0.98^12) / 3 = 1.2 tolerances). A noise floor of four standard deviations of a fitted
-    amplitude, sigma sqrt(2 / N), is granted to every signal.
+    amplitude, sigma sqrt(2 / N), is granted to every signal, and to every phase the jitter of a sensor that runs free.
     """
 
-    def __init__(self, tolerance: float, kin: Sequence[int] = ()) -> None:
-        """`kin` are the columns of signals of one kind: none is held to less than `KIN_SHARE` of the largest."""
+    def __init__(
+        self, tolerance: float, columns: Sequence[int] | None = None, kin: Sequence[int] = (), jitter: float = 0.0
+    ) -> None:
+        """`columns` are the signals that are judged, all of them when absent; `kin` the places, among them, of signals
+        of one kind: none is held to less than `KIN_SHARE` of the largest.
+
+        `jitter` [rad] is how far a phase may wander because a sensor runs on its own clock.
+        """
         self._tolerance = tolerance
+        self._columns = slice(None) if columns is None else list(columns)
         self._kin = list(kin)
+        self._jitter = jitter
         self._cycles: deque[Cycle] = deque(maxlen=2 * WINDOW)
 
     def push(self, cycle: Cycle) -> None:
@@ -52,20 +60,22 @@ class SteadyDetector:
         self._cycles.append(cycle)
 
     def restart(self) -> None:
-        """Forget everything: the drive was changed."""
+        """Forget everything: the drive was changed, and what came before says nothing about what follows."""
         self._cycles.clear()
 
-    def judge(self) -> Steadiness:
-        """Where the dwell stands; never steady before two windows are full."""
+    def judge(self, allowance: float = 1.0) -> Steadiness:
+        """Where the dwell stands, at `allowance` times the tolerance; never steady before two windows are full."""
         if len(self._cycles) < 2 * WINDOW:
             return Steadiness(False, float("nan"), float("nan"), 0)
         cycles = list(self._cycles)
-        amplitudes = np.array([cycle.fundamental for cycle in cycles])
-        peaks = np.array([cycle.peak for cycle in cycles])
-        sigma = np.array([cycle.noise * np.sqrt(2.0 / cycle.samples) for cycle in cycles]).mean(axis=0)
+        amplitudes = np.array([cycle.fundamental[self._columns] for cycle in cycles])
+        peaks = np.array([cycle.peak[self._columns] for cycle in cycles])
+        noise = [cycle.noise[self._columns] * np.sqrt(2.0 / cycle.samples) for cycle in cycles]
+        sigma = np.array(noise).mean(axis=0)
         spreads, drifts = zip(self._compare(amplitudes, sigma), self._compare(peaks, 2.0 * sigma), strict=True)
         spread, drift = float(np.max(spreads)), float(np.max(drifts))
-        steady = spread <= self._tolerance and drift <= self._tolerance / 3.0
+        tolerance = allowance * self._tolerance
+        steady = spread <= tolerance and drift <= tolerance / 3.0
         return Steadiness(steady, spread, drift, 1 if steady else self._repeats(amplitudes, sigma))
 
     def _compare(
@@ -74,9 +84,19 @@ class SteadyDetector:
         """Largest relative spread within the last window and drift between the windows, above the noise."""
         before, last = series[:WINDOW].mean(axis=0), series[WINDOW:].mean(axis=0)
         size = self._size(last)
-        spread = np.max(np.abs(series[WINDOW:] - last), axis=0) - 4.0 * sigma
-        drift = np.abs(last - before) - 4.0 * sigma * np.sqrt(2.0 / WINDOW)
+        spread = np.max(self._distance(series[WINDOW:], last), axis=0) - 4.0 * sigma
+        drift = self._distance(before, last) - 4.0 * sigma * np.sqrt(2.0 / WINDOW)
         return float(np.max(spread / size)), float(np.max(drift / size))
+
+    def _distance(
+        self,
+        these: NDArray[np.complex128] | NDArray[np.float64],
+        those: NDArray[np.complex128] | NDArray[np.float64],
+    ) -> NDArray[np.float64]:
+        """How far amplitudes are apart: in size, or in phase as far as that is beyond the jitter."""
+        size = np.abs(those)
+        turned = np.abs(np.angle(these * np.conj(those))) * size
+        return np.maximum(np.abs(np.abs(these) - size), turned - self._jitter * size)
 
     def _size(self, mean: NDArray[np.complex128] | NDArray[np.float64]) -> NDArray[np.float64]:
         size = np.maximum(np.abs(mean), 1e-12)
@@ -87,7 +107,7 @@ class SteadyDetector:
     def _repeats(self, amplitudes: NDArray[np.complex128], sigma: NDArray[np.float64]) -> int:
         size = self._size(amplitudes.mean(axis=0))
         for period in range(2, LONGEST_SUBHARMONIC + 1):
-            change = np.max(np.abs(amplitudes[period:] - amplitudes[:-period]), axis=0) - 6.0 * sigma
+            change = np.max(self._distance(amplitudes[period:], amplitudes[:-period]), axis=0) - 6.0 * sigma
             if float(np.max(change / size)) <= self._tolerance:
                 return period
         return 0

@@ -23,7 +23,7 @@ class Interrupts:
 
 @contextmanager
 def interruptible(requests: Requests, asking: Callable[[], bool]) -> Generator[Interrupts, None, None]:
-    """Turn SIGINT and SIGTERM into `requests` while the context lasts: abort at the first, halt at the next.
+    """Turn SIGINT, SIGTERM and a closed terminal into `requests`: abort at the first, halt at the next.
 
     When `asking` says that the operator is being asked, the handler also raises KeyboardInterrupt, because
     Python would resume the wait for the answer. Outside the main thread, where Python allows no handlers, nothing
@@ -43,7 +43,10 @@ def interruptible(requests: Requests, asking: Callable[[], bool]) -> Generator[I
         if asking():
             raise KeyboardInterrupt
 
-    before = {number: signal.signal(number, handle) for number in (signal.SIGINT, signal.SIGTERM)}
+    # a closed terminal ends a run as Ctrl-C does; which of these exist depends on the system
+    names = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
+    numbers = [signal.Signals[name] for name in names if name in signal.Signals.__members__]
+    before = {number: signal.signal(number, handle) for number in numbers}
     try:
         yield interrupts
     finally:

@@ -7,6 +7,7 @@ from io import TextIOWrapper
 
 from cyclopts import App, CycloptsError, UnusedCliTokensError
 
+from bench.cli.benchmark import benchmark_app
 from bench.cli.configure import config_app
 from bench.cli.predict import predict_app
 from bench.cli.refusal import tell
@@ -42,6 +43,7 @@ def main(argv: Sequence[str] | None = None, start: Start | None = None) -> int:
     app.command(run_app(start))
     app.command(predict_app())
     app.command(config_app())
+    app.command(benchmark_app())
     try:
         code = app(sys.argv[1:] if argv is None else list(argv))
     except UnusedCliTokensError as error:

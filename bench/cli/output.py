@@ -5,10 +5,8 @@ from collections.abc import Iterable
 from datetime import datetime
 from pathlib import Path
 
+from bench.results import FIGURE, FILE, SUMMARY
 from sim.errors import InvalidInput
-
-RESULTS = ("campaign.h5", "gain_spectra.png", "summary.json")
-"""The files that a run writes into its folder."""
 
 
 def default_folder(protocol: str, now: datetime) -> Path:
@@ -16,16 +14,16 @@ def default_folder(protocol: str, now: datetime) -> Path:
     return Path("runs", f"{protocol}-{now:%Y-%m-%dT%H-%M-%S}")
 
 
-def check_folder(folder: Path, results: Iterable[str] = RESULTS) -> None:
+def check_folder(folder: Path, results: Iterable[str] = (FILE, FIGURE, SUMMARY)) -> None:
     """Refuse a folder that cannot take the `results` of a run. Leaves nothing behind, and creates no folder.
 
     Raises InvalidInput naming what stands in the way.
     """
-    for name in results:
-        if (folder / name).exists():
-            raise InvalidInput("--out", str(folder), f"it holds {name} already; results are never overwritten")
     existing = folder
     try:
+        for name in results:
+            if (folder / name).exists():
+                raise InvalidInput("--out", str(folder), f"it holds {name} already; results are never overwritten")
         while not existing.exists() and existing != existing.parent:
             existing = existing.parent
         if not existing.is_dir():

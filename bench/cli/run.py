@@ -125,8 +125,8 @@ def _report(result: "SessionResult", out: Path, as_json: bool, interrupted: int 
         print(json.dumps({"status": result.status, "reason": result.reason, **result.summary}, allow_nan=False))
     else:
         print(f"{result.table.rstrip()}\nResults are in {out}")
-    if result.status not in GOOD:
-        tell(f"the run was {result.status}: {result.reason}")
-    if interrupted is None and result.interrupted and result.status not in GOOD:
-        return 130
-    return interrupted or (0 if result.status in GOOD else 1)
+    if result.status in GOOD:
+        # an end that was asked for when there was nothing left to end changes nothing
+        return 0
+    tell(f"the run was {result.status}: {result.reason}")
+    return interrupted or (130 if result.interrupted else 1)

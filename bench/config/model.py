@@ -2,8 +2,11 @@
 
 from typing import Literal
 
+from pydantic import model_validator
+
 from bench.analysis.gain import SensorAccuracy
 from bench.guard.limits import Limits, Ramps
+from sim.errors import InvalidInput
 from sim.parameters import Parameters, quantity
 from sim.specimen import Specimen
 from sim.virtual_bench import VirtualBenchParameters
@@ -23,6 +26,9 @@ class Simulation(Parameters):
     seed: int = quantity(1, "", "seed of every random number of the virtual bench", ge=0, lt=2**32)
     bench: VirtualBenchParameters = VirtualBenchParameters()
     specimen: Specimen | None = quantity(None, "", "the true specimen; absent when it is as assumed")
+    spring_factor: float = quantity(
+        1.0, "1", "true over nominal stiffness of every spring that is mounted", gt=0, le=10
+    )
 
 
 class BenchConfiguration(Parameters):
@@ -35,3 +41,11 @@ class BenchConfiguration(Parameters):
     acquisition: Acquisition = Acquisition()
     analysis: SensorAccuracy = SensorAccuracy()
     simulation: Simulation = Simulation()
+
+    @model_validator(mode="after")
+    def _springs_belong_to_the_protocol(self) -> "BenchConfiguration":
+        for name, specimen in (("specimen", self.specimen), ("simulation.specimen", self.simulation.specimen)):
+            if specimen is not None and specimen.beta is not None:
+                allowed = "the protocol says which springs are mounted; leave it out (see simulation.spring_factor)"
+                raise InvalidInput(f"{name}.beta", specimen.beta, allowed)
+        return self

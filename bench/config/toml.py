@@ -30,6 +30,8 @@ def read_table(path: Path, item: str) -> dict[str, Any]:
         raise InvalidInput(item, str(path), f"it cannot be read: {error.strerror}") from None
     except UnicodeDecodeError as error:
         raise InvalidInput(item, str(path), f"it is not UTF-8 text (byte {error.start})") from None
+    except RecursionError:
+        raise InvalidInput(item, str(path), "it is nested too deeply") from None
     except tomllib.TOMLDecodeError as error:
         raise InvalidInput(item, str(path), f"it is not TOML: {error}") from None
 

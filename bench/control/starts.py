@@ -105,7 +105,7 @@ def _candidates(omega: float, amplitude: float) -> list[Start]:
             legs.append(Leg(EASE, amplitude, omega))
             name += f", {overshoot:g} x amplitude"
         found.append(Start(name, tuple(legs), 0.0))
-    return found
+    return list({start.legs: start for start in found}.values())
 
 
 def _scaled(start: Start, factor: float) -> list[Leg]:

@@ -33,7 +33,7 @@ from bench.engine.steps import (
 from bench.engine.stream import Stream
 from bench.events import Acquired, LimitExceeded, OperatorAnswered, OperatorAsked, State, StateChanged, Warned
 from bench.guard.guard import Guard
-from drivers.rig import Rig
+from drivers.rig import Rig, RigError
 from sim.errors import RockbenchError
 from sim.specimen import Specimen
 
@@ -89,19 +89,34 @@ class Engine:
     def run(self, plan: Plan) -> Ending:
         """Carry out `plan` to its end, or to the first reason to end it."""
         try:
-            ending = self._carry_out(plan)
-        except _Ended as ended:
-            ending = ended.ending
-        except RockbenchError as error:
+            ending = self._until_ended(plan)
+        except RigError as error:
             self._cut(str(error))
             ending = Ending("failed", str(error))
         except BaseException as error:
             self._cut(f"{type(error).__name__} in the plan or a subscriber")
             raise
         finally:
-            self._rig.stop()
-            plan.close()
+            try:
+                self._rig.stop()
+            finally:
+                plan.close()
         self._machine.go(State.CLOSED, ending.reason)
+        return ending
+
+    def _until_ended(self, plan: Plan) -> Ending:
+        """The ending of a plan, with the output brought to zero along a ramp wherever the rig still works."""
+        try:
+            ending = self._carry_out(plan)
+        except _Ended as ended:
+            return ended.ending
+        except RigError:
+            raise
+        except RockbenchError as error:
+            # the record, the plan or an analysis gave up: no reason to jerk the table
+            ending = Ending("failed", str(error))
+        if self.state in (State.ARMED, State.RUNNING, State.STOPPING, State.ABORTING):
+            self._ramp_out(State.ABORTING, ending.reason)
         return ending
 
     def _carry_out(self, plan: Plan) -> Ending:
@@ -127,7 +142,7 @@ class Engine:
             case Arm():
                 self._arm(step)
             case RampOut():
-                self._ramp_out(State.ABORTING if step.fast else State.STOPPING, "the test is over")
+                return self._ramp_out(State.ABORTING if step.fast else State.STOPPING, "the test is over")
             case Handle():
                 self._handle(step)
         return Done()
@@ -136,6 +151,7 @@ class Engine:
         self._oscillator.reset()
         self._read, self._cycles = 0, None
         self._run += 1
+        self._heed_requests()
         self._machine.go(State.ARMED, "the operator's work is done")
         self._guard.arm()
         self._signals.tare(self._stillness(step))
@@ -180,6 +196,7 @@ class Engine:
         return Measured(tuple(done))
 
     def _handle(self, step: Handle) -> None:
+        self._heed_requests()
         self._machine.go(State.WAITING, step.request)
         self._stream.say(OperatorAsked(0.0, step.request))
         agreed = self._operator.confirm(step.request)
@@ -187,7 +204,7 @@ class Engine:
         if not agreed:
             raise _Ended(Ending("aborted", f"the operator declined: {step.request}"))
         self._heed_requests()
-        self._rig.handwork(step.work, step.specimen.beta)
+        self._rig.handwork(step.work, step.specimen.k_c or None)
         self._specimen = step.specimen
         self._stream.say(OperatorAnswered(0.0, step.request, self._operator.name))
 
@@ -219,14 +236,17 @@ class Engine:
             self._ramp_out(way, ending.reason)
         raise _Ended(ending)
 
-    def _ramp_out(self, way: State, reason: str) -> None:
-        self._machine.go(way, reason)
+    def _ramp_out(self, way: State, reason: str) -> Outcome:
+        if self.state is not way:
+            self._machine.go(way, reason)
         begin = self._guard.abort if way is State.ABORTING else self._guard.stop
         begin()
+        fell = False
         while not self._guard.at_zero:
-            self._turn()
+            fell |= self._fell(self._signals.of(self._turn()))
         self._guard.disarm()
         self._machine.go(State.IDLE, "the output is at zero")
+        return Fallen() if fell else Done()
 
     def _cut(self, reason: str) -> None:
         self._guard.halt()

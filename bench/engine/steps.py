@@ -66,7 +66,10 @@ class Trim:
 
 @dataclass(frozen=True)
 class RampOut:
-    """End the test: smooth ramp to zero, or the fast one; the rig is stopped afterwards."""
+    """End the test: smooth ramp to zero, or the fast one; the rig is stopped afterwards.
+
+    Comes to `Fallen` when the block fell on the way, else to `Done`.
+    """
 
     fast: bool = False
 

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from bench.guard.limits import Limits, Ramps
 from bench.guard.watch import MotionWatch, Violation
-from drivers.rig import Block, Rig
+from drivers.rig import Block, Rig, RigError
+from sim.errors import InvalidInput
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,11 @@ class Guard:
         self._ramp_done = 0
         self._ramp_from = 1.0
         self._slew = limits.drive_slew / rig.sample_rate
+        self._expected = 0
+        steepest = 0.5 * np.pi * limits.drive_voltage / min(ramps.stop, ramps.abort)
+        if steepest > limits.drive_slew:
+            needs = f"a ramp from {limits.drive_voltage:g} V needs {steepest:.0f} V/s, limits.drive_slew allows less"
+            raise InvalidInput("ramps.abort", min(ramps.stop, ramps.abort), needs)
 
     @property
     def ramping(self) -> bool:
@@ -59,7 +65,7 @@ class Guard:
     def arm(self) -> None:
         """Arm the rig with zeros waiting ahead of the first sample."""
         self._ramp_samples, self._ramp_done, self._ramp_from = None, 0, 1.0
-        self._command, self._held = 0.0, None
+        self._command, self._held, self._expected = 0.0, None, 0
         self._watch = MotionWatch(self._channels, self._rig.sample_rate, self._limits)
         self._waiting = np.zeros(self._rig.lead)
         self._rig.arm()
@@ -82,6 +88,9 @@ class Guard:
         self._rig.write(sent)
         queue = np.concatenate((self._waiting, sent))
         block = self._rig.read(volts.size)
+        if block.first != self._expected or len(block) != volts.size:
+            raise RigError(f"samples are missing: a block begins at {block.first} where {self._expected} was due")
+        self._expected += len(block)
         played, self._waiting = queue[: volts.size], queue[volts.size :]
         values = self._values(block)
         seen = self._watch.check(block.first, values)

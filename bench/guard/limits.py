@@ -1,5 +1,7 @@
 """What the table and the drive may do at most."""
 
+from pydantic import model_validator
+
 from sim.parameters import Parameters, quantity
 
 
@@ -18,5 +20,11 @@ class Limits(Parameters):
 class Ramps(Parameters):
     """How the output is brought to zero."""
 
-    stop: float = quantity(4.0, "s", "length of the smooth ramp that ends a good run", gt=0)
-    abort: float = quantity(0.5, "s", "length of the fast ramp that ends a bad run", gt=0)
+    stop: float = quantity(4.0, "s", "length of the smooth ramp that ends a good run", ge=0.05, le=60)
+    abort: float = quantity(0.5, "s", "length of the fast ramp that ends a bad run", ge=0.05, le=10)
+
+    @model_validator(mode="after")
+    def _abort_is_the_fast_one(self) -> "Ramps":
+        if self.abort > self.stop:
+            raise ValueError("abort must not be longer than stop")
+        return self

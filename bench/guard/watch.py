@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from bench.guard.limits import Limits
 from drivers.rig import Channel
+from sim.errors import InvalidInput
 
 VELOCITY_WINDOW = 0.02
 """Time over which the table's velocity is differenced [s]: long against the noise, short against the motion."""
@@ -27,54 +28,54 @@ class Violation:
 
 
 class _Persistence:
-    """How long a condition has held, carried from block to block."""
+    """A count that rises by one with each bad sample and falls by one with each good one, never below zero.
+
+    A condition that is interrupted now and then still reaches the limit; a single spike does not.
+    """
 
     def __init__(self, samples: int) -> None:
         self._needed = max(samples, 1)
-        self._held = 0
+        self._level = 0
 
-    def first(self, condition: NDArray[np.bool_]) -> int | None:
-        """Index of the sample at which the condition has held long enough, or None."""
-        if not condition.any():
-            self._held = 0
+    def first(self, bad: NDArray[np.bool_]) -> int | None:
+        """Index of the sample at which the count reaches the limit, or None."""
+        if self._level == 0 and not bad.any():
             return None
-        n = condition.size
-        last_false = np.maximum.accumulate(np.where(condition, -1 - self._held, np.arange(n)))
-        held = np.arange(n) - last_false
-        self._held = int(held[-1])
-        reached = np.flatnonzero(held >= self._needed)
+        walk = self._level + np.cumsum(np.where(bad, 1, -1))
+        level = walk - np.minimum(np.minimum.accumulate(walk), 0)
+        self._level = min(int(level[-1]), self._needed)
+        reached = np.flatnonzero(level >= self._needed)
         return int(reached[0]) if reached.size else None
 
 
 class MotionWatch:
-    """Checks blocks of values against the limits. Channels are found by name; absent ones are not watched."""
+    """Checks blocks of values against the limits. Channels are found by name; absent ones are not watched.
+
+    A table channel without a value counts as beyond its limit: a converter at its rail says nothing but "more".
+    Raises InvalidInput for a limit that its channel cannot measure.
+    """
 
     def __init__(self, channels: tuple[Channel, ...], sample_rate: float, limits: Limits) -> None:
-        names = [channel.name for channel in channels]
-        self._names = names
+        self._names = [channel.name for channel in channels]
         self._limits = limits
-        self._displacement = names.index("table_displacement") if "table_displacement" in names else None
-        self._acceleration = names.index("table_acceleration") if "table_acceleration" in names else None
+        self._displacement = _column(channels, "table_displacement", limits.displacement, "limits.displacement")
+        self._acceleration = _column(channels, "table_acceleration", limits.acceleration, "limits.acceleration")
         self._span = max(round(VELOCITY_WINDOW * sample_rate), 1)
         self._span_time = self._span / sample_rate
         self._tail = np.zeros(0)
         debounce = round(limits.debounce * sample_rate)
         self._over = {key: _Persistence(debounce) for key in ("displacement", "velocity", "acceleration")}
-        self._lost = [_Persistence(round(limits.sensor_loss * sample_rate)) for _ in names]
+        self._lost = [_Persistence(round(limits.sensor_loss * sample_rate)) for _ in channels]
 
     def check(self, first: int, values: NDArray[np.float64]) -> Violation | None:
         """The first violation in a block of values, shape (n, n_channels), or None."""
         found = self._motion(values)
         invalid = np.isnan(values)
-        if invalid.any():
-            for column, name in enumerate(self._names):
-                at = self._lost[column].first(invalid[:, column])
-                if at is not None:
-                    loss = self._limits.sensor_loss
-                    found.append(Violation(f"time without a valid sample of {name}", loss, loss, "s", at))
-        else:
-            for lost in self._lost:
-                lost.first(invalid[:, 0])
+        for column, name in enumerate(self._names):
+            at = self._lost[column].first(invalid[:, column])
+            if at is not None:
+                loss = self._limits.sensor_loss
+                found.append(Violation(f"time without a valid sample of {name}", loss, loss, "s", at))
         if not found:
             return None
         worst = min(found, key=lambda violation: violation.sample)
@@ -85,7 +86,7 @@ class MotionWatch:
         if self._displacement is not None:
             x = values[:, self._displacement]
             self._compare("displacement", x, self._limits.displacement, "m", found)
-            long = np.concatenate((self._tail, x))
+            long = _filled(np.concatenate((self._tail, x)))
             if long.size > self._span:
                 speed = (long[self._span :] - long[: -self._span]) / self._span_time
                 self._compare("velocity", speed[-x.size :], self._limits.velocity, "m/s", found)
@@ -95,6 +96,26 @@ class MotionWatch:
         return found
 
     def _compare(self, key: str, values: NDArray[np.float64], limit: float, unit: str, found: list[Violation]) -> None:
-        at = self._over[key].first(np.abs(values) > limit)
+        size = np.where(np.isnan(values), np.inf, np.abs(values))
+        at = self._over[key].first(size > limit)
         if at is not None:
-            found.append(Violation(f"table {key}", float(abs(values[at])), limit, unit, at))
+            found.append(Violation(f"table {key}", float(size[at]), limit, unit, at))
+
+
+def _column(channels: tuple[Channel, ...], name: str, limit: float, item: str) -> int | None:
+    for column, channel in enumerate(channels):
+        if channel.name == name:
+            reach = min(-channel.limits[0], channel.limits[1])
+            if limit > reach:
+                raise InvalidInput(item, limit, f"the channel {name} measures up to {reach:.4g} {channel.unit} only")
+            return column
+    return None
+
+
+def _filled(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Missing samples take the value of the last valid one."""
+    missing = np.isnan(x)
+    if not missing.any():
+        return x
+    last = np.maximum.accumulate(np.where(missing, 0, np.arange(x.size)))
+    return np.nan_to_num(x[last])

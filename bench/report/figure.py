@@ -1,32 +1,28 @@
 # pyright: reportUnknownMemberType=false
 """Gain spectra as in Fig. 6 of the paper: predicted and measured alpha_2 against frequency, a panel per stiffness.
 
-matplotlib is imported when a figure is drawn, and never through pyplot: no window, no global state. Its keyword
-arguments have no types, hence the first line.
+matplotlib's keyword arguments have no types, hence the first line.
 """
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.report.files import write_new
 from bench.report.rows import PointLike, plain
+from bench.report.style import BLACK, BLUE, GREEN, GREY, PURPLE, VERMILLION, new_figure, set_grid, ticks_1_2_5
+from bench.report.style import write_figure as write_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-DPI = 200
 COLUMNS = 3
 PANEL = (3.6, 3.3)
 MARGIN = 1.1
 """Inches: width and height of a panel, and the height that title and legend take."""
 
-# Okabe and Ito (2008): told apart by the colour blind; shapes and dashes say the same again for print in grey
-BLACK, BLUE, VERMILLION, GREEN, PURPLE, GREY = "#000000", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#666666"
 MARKERS = {"steady": ("o", VERMILLION), "modulated": ("D", PURPLE), "resting": ("s", GREEN), "overturned": ("X", BLACK)}
 
 LEGEND = (
@@ -54,15 +50,11 @@ def gain_spectra(points: Sequence[PointLike], prediction: Prediction, *, title: 
     `points` have the fields of a harmonic point. A point without a gain is a cross at the upper edge with its status.
     The gain axis is logarithmic, so that a reduction to 1/5 and a resonance of 5 are seen alike.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     rows = plain(points)
     betas = sorted({round(float(beta), 6) for beta in (*prediction["beta"], *(row["beta"] for row in rows))}) or [0.0]
     n_columns = min(COLUMNS, len(betas))
     n_rows = -(-len(betas) // n_columns)
-    figure = Figure(figsize=(max(2, n_columns) * PANEL[0], n_rows * PANEL[1] + MARGIN), dpi=DPI, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(max(2, n_columns) * PANEL[0], n_rows * PANEL[1] + MARGIN)
     axes: list[Axes] = [figure.add_subplot(n_rows, n_columns, k + 1) for k in range(len(betas))]
     limits = _ranges(rows, prediction)
     for panel, beta in zip(axes, betas, strict=True):
@@ -76,13 +68,8 @@ def gain_spectra(points: Sequence[PointLike], prediction: Prediction, *, title: 
             panel.tick_params(labelleft=False)
     if title:
         figure.suptitle(title)
-    _add_legend(figure, axes)
+    _add_legend(figure, axes, measured=bool(rows))
     return figure
-
-
-def write_figure(path: Path, figure: "Figure") -> None:
-    """Save as PNG at 200 dpi. Raises InvalidInput when `path` exists, RockbenchError when the disk fails."""
-    write_new(path, lambda unfinished: figure.savefig(unfinished, dpi=DPI, format="png"))
 
 
 def _of_beta(prediction: Prediction, beta: float) -> dict[str, NDArray[Any]]:
@@ -107,6 +94,7 @@ def _draw_prediction(panel: "Axes", prediction: Mapping[str, NDArray[Any]]) -> N
             color=colour,
             linestyle=dash,
             linewidth=width,
+            marker="." if omega.size == 1 else None,
             label=f"predicted, block {layer}",
         )
         if not stable.all():
@@ -189,8 +177,6 @@ def _draw_lost(panel: "Axes", rows: list[dict[str, Any]]) -> None:
 
 
 def _dress(panel: "Axes", beta: float, limits: tuple[tuple[float, float], tuple[float, float]]) -> None:
-    from matplotlib.ticker import FixedLocator, NullFormatter, StrMethodFormatter
-
     panel.axhline(
         1.0, color=GREY, linestyle="-.", linewidth=1.0, zorder=1, label=r"$\alpha_2$ = 1: the block has no effect"
     )
@@ -199,13 +185,8 @@ def _dress(panel: "Axes", beta: float, limits: tuple[tuple[float, float], tuple[
     panel.set_yscale("log")
     panel.set_xlim(*limits[0])
     panel.set_ylim(*limits[1])
-    decades = [10.0**power for power in range(-3, 4)]
-    panel.yaxis.set_major_locator(FixedLocator([digit * decade for decade in decades for digit in (1, 2, 5)]))
-    panel.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
-    panel.yaxis.set_minor_locator(FixedLocator([digit * decade for decade in decades for digit in (3, 4, 6, 7, 8, 9)]))
-    panel.yaxis.set_minor_formatter(NullFormatter())
-    panel.grid(which="major", color="#dddddd", linewidth=0.6)
-    panel.set_axisbelow(True)
+    ticks_1_2_5(panel.yaxis)
+    set_grid(panel)
 
 
 def _ranges(rows: list[dict[str, Any]], prediction: Prediction) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -220,7 +201,7 @@ def _ranges(rows: list[dict[str, Any]], prediction: Prediction) -> tuple[tuple[f
     return (first - margin, last + margin), (float(gain.min()) / HEADROOM, float(gain.max()) * HEADROOM)
 
 
-def _add_legend(figure: "Figure", axes: Sequence["Axes"]) -> None:
+def _add_legend(figure: "Figure", axes: Sequence["Axes"], *, measured: bool) -> None:
     """One legend for all panels, below them, with each kind of line and marker once."""
     entries: dict[str, Any] = {}
     for panel in axes:
@@ -235,6 +216,6 @@ def _add_legend(figure: "Figure", axes: Sequence["Axes"]) -> None:
         ncols=3 if len(axes) > 1 else 2,
         fontsize=8,
         frameon=False,
-        title="error bars: expanded uncertainty (k = 2)",
+        title="error bars: expanded uncertainty (k = 2)" if measured else None,
         title_fontsize=8,
     )

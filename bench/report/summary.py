@@ -21,7 +21,7 @@ class Summary:
     points: Sequence[PointLike]
     file: Path | None
     figure: Path | None
-    summary: str
+    reason: str
     software: str
     seed: int | None
     elapsed: float
@@ -32,7 +32,7 @@ class Summary:
         content = {
             "protocol": self.protocol,
             "status": self.status,
-            "summary": self.summary,
+            "reason": self.reason,
             "points": plain(self.points),
             "file": None if self.file is None else self.file.as_posix(),
             "figure": None if self.figure is None else self.figure.as_posix(),

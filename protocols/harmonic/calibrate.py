@@ -47,8 +47,8 @@ def calibrate_drive(
         if isinstance(gain, Fallen):
             return gain
         points[omega] = gain
-    yield Follow((Leg(CHANGE_TIME, 0.0, max(omegas)),))
-    return DriveCalibration(tuple(points), tuple(points.values()))
+    outcome = yield Follow((Leg(CHANGE_TIME, 0.0, max(omegas)),))
+    return outcome if isinstance(outcome, Fallen) else DriveCalibration(tuple(points), tuple(points.values()))
 
 
 def _measure(omega: float, amplitude: float) -> Generator[Step, Outcome, float | Fallen]:

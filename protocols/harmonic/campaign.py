@@ -8,7 +8,6 @@ from bench.engine.steps import Plan
 from bench.record.tables import Table
 from protocols.harmonic.parameters import HarmonicParameters
 from protocols.harmonic.point import HarmonicPoint
-from sim.errors import InvalidInput
 from sim.parameters import Parameters
 
 
@@ -22,21 +21,11 @@ class HarmonicCampaign:
         self.parameters = parameters
 
     def check(self, configuration: BenchConfiguration) -> None:
-        """Refuse motions beyond the guard's limits or the shaker's stroke: x = a / Omega^2, v = a / Omega."""
-        limits, stroke = configuration.limits, configuration.simulation.bench.shaker.half_stroke
-        amplitude = self.parameters.amplitude_factor * configuration.specimen.uplift_acceleration
-        if amplitude > limits.acceleration:
-            allowed = f"it asks for {amplitude:.3g} m/s2 where limits.acceleration = {limits.acceleration:g} m/s2"
-            raise InvalidInput("amplitude_factor", self.parameters.amplitude_factor, allowed)
-        reach, owner = min((stroke, "the shaker's stroke"), (limits.displacement, "limits.displacement"))
-        for omega in self.parameters.omega:
-            travel, speed = amplitude / omega**2, amplitude / omega
-            if travel > reach:
-                needs = f"{amplitude:.3g} m/s2 needs {1e3 * travel:.1f} mm there, {owner} allows {1e3 * reach:.1f} mm"
-                raise InvalidInput("omega", omega, needs)
-            if speed > limits.velocity:
-                needs = f"{amplitude:.3g} m/s2 needs {speed:.3g} m/s there, limits.velocity = {limits.velocity:g} m/s"
-                raise InvalidInput("omega", omega, needs)
+        """Raise InvalidInput for what the table, the lasers or the limits of this bench do not allow."""
+        from protocols.harmonic.reach import check_storeys, check_table
+
+        check_table(self.parameters, configuration)
+        check_storeys(self.parameters, configuration)
 
     def predict(self, configuration: BenchConfiguration) -> Table:
         """Gain spectra of every spring on both layers, wide enough to frame the measured points."""

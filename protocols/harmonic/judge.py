@@ -1,5 +1,6 @@
 """What a measured dwell means: on which layer it lies, and whether it agrees with the prediction for that layer."""
 
+from collections.abc import Iterator
 from math import hypot, log
 
 from bench.analysis.gain import SensorAccuracy, SteadyPeak, gain
@@ -10,15 +11,21 @@ from sim.specimen import Specimen
 
 _ROCKING = "rocking"
 
+AMPLITUDE_NOTE = 0.005
+"""Relative error of the table's amplitude that is worth a word; the prediction is for the achieved one all the same."""
+
 AGREEMENT = 0.02
 """Relative difference between measured and predicted that is allowed where the uncertainty is smaller."""
 
 
 def judge(
-    settled: Settled, bare: SteadyPeak, omega: float, specimen: Specimen, accuracy: SensorAccuracy, starts: int
+    settled: Settled, reference: Settled, omega: float, specimen: Specimen, accuracy: SensorAccuracy, starts: int
 ) -> HarmonicPoint:
-    """The point that a dwell makes, compared with the layer whose drift and u1 are nearest to the measured ones."""
-    peak = settled.peak
+    """The point that a dwell makes, compared with the layer whose drift and u1 are nearest to the measured ones.
+
+    `reference` is the bare frame's dwell at the same frequency.
+    """
+    peak, bare = settled.peak, reference.peak
     layers = predict_gain(specimen, omega, peak.amplitude, bare.amplitude).layers
     steady = settled.steadiness.steady
     name = _nearest(layers, peak) if steady else _ROCKING
@@ -26,7 +33,7 @@ def judge(
     measured = gain(peak, bare, accuracy)
     predicted = layer.alpha_2 if layer else None
     agrees = None
-    if steady and predicted is not None:
+    if steady and reference.steadiness.steady and predicted is not None:
         agrees = abs(measured.alpha_2 - predicted) <= max(AGREEMENT * predicted, measured.uncertainty)
     return HarmonicPoint(
         omega_rad_s=omega,
@@ -45,7 +52,8 @@ def judge(
         starts_tried=starts,
         cycles_measured=peak.cycles,
         settle_time_s=settled.time,
-        reason=_reason(settled, agrees),
+        table_harmonics=peak.harmonics,
+        reason="; ".join(_reasons(settled, reference, name, layers, agrees)),
     )
 
 
@@ -65,9 +73,19 @@ def _status(settled: Settled, layer: str) -> PointStatus:
     return PointStatus.STEADY if layer == _ROCKING else PointStatus.RESTING
 
 
-def _reason(settled: Settled, agrees: bool | None) -> str:
+def _reasons(
+    settled: Settled, reference: Settled, name: str, layers: dict[str, Layer], agrees: bool | None
+) -> Iterator[str]:
+    """Everything that a reader of the point should know."""
     state = settled.steadiness
     if not state.steady:
         how = f"repeats every {state.repeats} cycles" if state.repeats else "does not repeat"
-        return f"not steady after {settled.time:.0f} s: the motion {how}, spread {100.0 * state.spread:.1f} %"
-    return "differs from the prediction by more than 2 % and the uncertainty" if agrees is False else ""
+        yield f"not steady after {settled.time:.0f} s: the motion {how}, spread {100.0 * state.spread:.1f} %"
+    elif name != _ROCKING and _ROCKING in layers and layers[_ROCKING].stable:
+        yield "no start reached the stable rocking motion: the block rests"
+    if abs(settled.amplitude_error) > AMPLITUDE_NOTE:
+        yield f"the table's amplitude is {100.0 * settled.amplitude_error:+.2f} % off"
+    if not reference.steadiness.steady:
+        yield "the bare frame was not steady: its drift is no reference"
+    if agrees is False:
+        yield "differs from the prediction by more than 2 % and the uncertainty"

@@ -6,7 +6,7 @@ from pydantic import Field, field_validator
 
 from sim.parameters import Parameters, quantity
 
-Frequency = Annotated[float, Field(gt=0, le=60)]
+Frequency = Annotated[float, Field(gt=0, le=40)]
 Stiffness = Annotated[float, Field(gt=0, le=100)]
 
 
@@ -28,7 +28,7 @@ class HarmonicParameters(Parameters):
         return values
 
     amplitude_factor: float = quantity(
-        1.01, "1", "amplitude of the table acceleration over the uplift acceleration g/lambda", gt=0, le=5
+        1.01, "1", "amplitude of the table acceleration over the uplift acceleration g/lambda", ge=0.1, le=5
     )
     amplitude_tolerance: float = quantity(
         0.002, "1", "largest relative error of the measured table amplitude before a point is measured", gt=0, le=0.1
@@ -42,4 +42,4 @@ class HarmonicParameters(Parameters):
     )
     settle_limit: float = quantity(240.0, "s", "longest wait for the steady state", gt=0, le=3600)
     measured_cycles: int = quantity(24, "1", "cycles over which a steady point is measured", ge=4, le=1000)
-    starts: int = quantity(6, "1", "starts that are tried before a point is given up", ge=1, le=50)
+    starts: int = quantity(6, "1", "starts that are tried before a point is given up", ge=1, le=32)

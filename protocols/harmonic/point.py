@@ -34,6 +34,7 @@ class HarmonicPoint(Parameters):
     bare_drift_peak_m: float | None = quantity(None, "m", "peak drift of the bare frame")
     amplitude_m_s2: float | None = quantity(None, "m/s2", "achieved amplitude of the table, coupled")
     bare_amplitude_m_s2: float | None = quantity(None, "m/s2", "achieved amplitude of the table, bare")
+    table_harmonics: float | None = quantity(None, "1", "rms of the table's harmonics over its fundamental, coupled")
     starts_tried: int = quantity(0, "1", "starts tried")
     cycles_measured: int = quantity(0, "1", "cycles over which the peaks were measured")
     settle_time_s: float | None = quantity(None, "s", "time from the dwell's begin to the steady state")

@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from bench.record.tables import Column, Table
 from protocols.harmonic.parameters import HarmonicParameters
+from sim.errors import InvalidInput
 from sim.gain import gain_spectrum
 from sim.specimen import Specimen
 
@@ -25,6 +26,8 @@ def gain_spectra(parameters: HarmonicParameters, specimen: Specimen) -> Table:
         for prediction in gain_spectrum(specimen.coupled(beta), omegas, amplitude)
         for name, layer in prediction.layers.items()
     ]
+    if not rows:
+        raise InvalidInput("specimen", "as configured", "no steady motion of it is known at the asked frequencies")
     omega, beta, alpha_1, alpha_2, stable, layer = (list(column) for column in zip(*rows, strict=True))
     return {
         "omega": Column(np.array(omega), "rad/s", "circular frequency of the base motion"),

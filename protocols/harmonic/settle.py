@@ -8,8 +8,8 @@ from math import tau
 import numpy as np
 
 from bench.analysis.cycles import Cycle
-from bench.analysis.gain import SteadyPeak, modulated_peak, steady_peak
-from bench.analysis.signals import ACCELERATION, DRIFT, U1
+from bench.analysis.gain import SensorAccuracy, SteadyPeak, modulated_peak, steady_peak
+from bench.analysis.signals import ACCELERATION, DISPLACEMENT, LASER_1, LASER_2
 from bench.analysis.steady import WINDOW, Steadiness, SteadyDetector
 from bench.engine.steps import Dwell, Fallen, Measured, Outcome, Step, Trim
 from protocols.harmonic.evidence import need_cycles
@@ -27,51 +27,73 @@ TRIM_GAIN = 0.7
 
 @dataclass(frozen=True)
 class Settled:
-    """What a dwell came to: its peak, how steady it was, and how long it took to become so."""
+    """What a dwell came to: its peak, how steady it was, how long that took, and how far off the amplitude is."""
 
     peak: SteadyPeak
     steadiness: Steadiness
     time: float
+    amplitude_error: float
 
+
+JUDGED = (ACCELERATION, DISPLACEMENT, LASER_1, LASER_2)
+"""Signals on which the steady state is judged: as the sensors see them, since the jitter of a laser's delay moves only
+their phase, but moves u1 and drift, which are small differences, in size as well."""
+
+KIN = (2, 3)
+"""Places of the lasers among them."""
+
+SHORTEST = 10.0
+"""Shortest wait [s]: at high frequencies two windows of cycles are shorter than the frame's memory."""
+
+LEFT = 1.2
+"""Tolerances that a transient may still have to go when the detector is content (see `SteadyDetector`)."""
 
 Look = Callable[[list[Cycle]], Generator[Step, Outcome, None]]
 """What is told to the operator at each look: steps made from the cycles of the last window."""
 
 
 def settle_and_measure(
-    omega: float, amplitude: float, parameters: HarmonicParameters, look: Look
+    omega: float, amplitude: float, parameters: HarmonicParameters, accuracy: SensorAccuracy, look: Look
 ) -> Generator[Step, Outcome, Settled | Fallen]:
     """Hold `amplitude` [m/s2] at `omega` [rad/s] until every signal is steady, then measure.
 
     A motion that does not become steady within the settle limit is measured as it is: as a modulated one.
     """
-    detector = SteadyDetector(parameters.settle_tolerance, kin=(U1, DRIFT))
+    detector = SteadyDetector(parameters.settle_tolerance, JUDGED, KIN, omega * accuracy.laser_timing)
     recent: deque[Cycle] = deque(maxlen=WINDOW)
-    waited = 0.0
-    steadiness = detector.judge()
-    while waited < parameters.settle_limit:
-        outcome = yield Dwell(TURN)
+    measured = max(parameters.measured_cycles, 2 * WINDOW)
+    waited, over = 0.0, False
+    while True:
+        ready = over or (waited >= SHORTEST and detector.judge().steady)
+        asked = measured if ready else TURN
+        outcome = yield Dwell(asked)
         if not isinstance(outcome, Measured):
             return Fallen()
-        waited += TURN * tau / omega
-        need_cycles(outcome.cycles, TURN)
+        waited += asked * tau / omega
+        need_cycles(outcome.cycles, asked)
         for cycle in outcome.cycles:
             detector.push(cycle)
+        if ready:
+            # the verdict is on the cycles that are used; at the tolerance itself noise would decide, hence twice
+            steadiness = detector.judge(allowance=2.0)
+            if steadiness.steady or over:
+                used = outcome.cycles[-parameters.measured_cycles :]
+                return _settled(used, steadiness, waited, amplitude, parameters)
         recent.extend(outcome.cycles)
         yield from look(list(recent))
-        steadiness = detector.judge()
+        over = waited >= parameters.settle_limit
         error = achieved(outcome.cycles) / amplitude - 1.0
-        if abs(error) > parameters.amplitude_tolerance:
+        if abs(error) > parameters.amplitude_tolerance and not over:
             correction = float(np.clip(-TRIM_GAIN * error, -LARGEST_TRIM, LARGEST_TRIM))
             yield Trim(1.0 + correction)
-        elif steadiness.steady:
-            break
-    outcome = yield Dwell(parameters.measured_cycles)
-    if not isinstance(outcome, Measured):
-        return Fallen()
-    need_cycles(outcome.cycles, parameters.measured_cycles)
-    peak = (steady_peak if steadiness.steady else modulated_peak)(outcome.cycles)
-    return Settled(peak, steadiness, waited)
+            detector.restart()
+
+
+def _settled(
+    cycles: tuple[Cycle, ...], steadiness: Steadiness, waited: float, amplitude: float, parameters: HarmonicParameters
+) -> Settled:
+    peak = steady_peak(cycles, LEFT * parameters.settle_tolerance) if steadiness.steady else modulated_peak(cycles)
+    return Settled(peak, steadiness, waited, peak.amplitude / amplitude - 1.0)
 
 
 def achieved(cycles: tuple[Cycle, ...]) -> float:

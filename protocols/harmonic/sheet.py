@@ -11,14 +11,14 @@ from collections.abc import Generator
 import numpy as np
 
 from bench.analysis.cycles import Cycle
-from bench.analysis.gain import SteadyPeak, gain, steady_peak
+from bench.analysis.gain import gain, steady_peak
 from bench.config.model import BenchConfiguration
 from bench.control.calibration import DriveCalibration
 from bench.control.legs import Leg
 from bench.control.starts import Start, plan_starts
 from bench.engine.steps import Arm, Calibrate, Fallen, Follow, Handle, Outcome, Plan, RampOut, Say, Step
-from bench.events import Estimate, PointFinished, StepStarted
-from drivers.rig import Handwork
+from bench.events import Estimate, PointFinished, StepStarted, Warned
+from drivers.rig import Handwork, RigError
 from protocols.harmonic.calibrate import calibrate_drive
 from protocols.harmonic.judge import judge
 from protocols.harmonic.pace import Pace
@@ -31,6 +31,8 @@ from sim.steady import resting_level
 
 REST = 2.0
 """Time at rest before a test, over which the zero of the signals is taken [s]."""
+
+NO_BLOCK = "the first storey is pulled aside although the block was taken off: check lasers and specimen"
 
 FALLEN_REQUEST = "The block has fallen: stand it up again."
 
@@ -47,7 +49,7 @@ class HarmonicSheet:
         self._specimen = configuration.specimen
         self._amplitude = parameters.amplitude_factor * self._specimen.uplift_acceleration
         self._pace = Pace(parameters.omega, 1 + len(parameters.beta))
-        self._bare: dict[float, SteadyPeak] = {}
+        self._bare: dict[float, Settled] = {}
 
     def plan(self) -> Plan:
         """The whole campaign as steps."""
@@ -61,15 +63,19 @@ class HarmonicSheet:
         yield Say(StepStarted(0.0, "calibrate the drive, bare frame"))
         level = self._parameters.calibration_level * self._amplitude
         calibration = yield from calibrate_drive(self._parameters.omega, level, None)
-        assert not isinstance(calibration, Fallen), "there is no block that could fall"
+        if isinstance(calibration, Fallen):
+            raise RigError(NO_BLOCK)
         yield Calibrate(calibration)
         duration = self._parameters.ramp_time
         for omega in self._parameters.omega:
             yield Say(StepStarted(0.0, f"bare frame at {omega:g} rad/s"))
             yield Follow((Leg(duration, self._amplitude, omega),))
-            settled = yield from settle_and_measure(omega, self._amplitude, self._parameters, self._look(omega, None))
-            assert not isinstance(settled, Fallen), "there is no block that could fall"
-            self._bare[omega] = settled.peak
+            settled = yield from self._settle(omega, None)
+            if isinstance(settled, Fallen):
+                raise RigError(NO_BLOCK)
+            if not settled.steadiness.steady:
+                yield Say(Warned(0.0, f"the bare frame is not steady at {omega:g} rad/s: no gain can be stated there"))
+            self._bare[omega] = settled
             self._pace.finished(omega)
             duration = CHANGE_TIME
         yield RampOut()
@@ -87,10 +93,8 @@ class HarmonicSheet:
         allowed = 0.6 * min(resting_level(specimen, omega) for omega in wanted)
         level = min(self._parameters.calibration_level * self._amplitude, allowed)
         measured = yield from calibrate_drive(wanted, level, calibration)
-        yield RampOut()
-        if isinstance(measured, Fallen):
-            yield Handle(Handwork.STAND_BLOCK_UP, specimen, FALLEN_REQUEST)
-        else:
+        yield from self._end_test(specimen, fast=isinstance(measured, Fallen))
+        if isinstance(measured, DriveCalibration):
             calibration = measured
         for omega in self._parameters.omega:
             point = yield from self._point(specimen, omega, calibration, plans[omega])
@@ -101,7 +105,7 @@ class HarmonicSheet:
     def _point(
         self, specimen: Specimen, omega: float, calibration: DriveCalibration, starts: list[Start]
     ) -> Generator[Step, Outcome, HarmonicPoint]:
-        """Try the planned starts; the first steady rocking motion is the point, else the best that was met."""
+        """Try the planned starts; the first steady rocking motion is the point, else the first that stood."""
         found: HarmonicPoint | None = None
         falls = 0
         for tried, start in enumerate(starts, 1):
@@ -111,14 +115,12 @@ class HarmonicSheet:
             yield Calibrate(calibration)
             settled: Settled | Fallen | None = None
             if not isinstance((yield Follow(start.legs)), Fallen):
-                look = self._look(omega, specimen)
-                settled = yield from settle_and_measure(omega, self._amplitude, self._parameters, look)
+                settled = yield from self._settle(omega, specimen)
             if not isinstance(settled, Settled):
                 falls += 1
-                yield RampOut(fast=True)
-                yield Handle(Handwork.STAND_BLOCK_UP, specimen, FALLEN_REQUEST)
+                yield from self._end_test(specimen, fast=True)
                 continue
-            yield RampOut()
+            yield from self._end_test(specimen, fast=False)
             accuracy = self._configuration.analysis
             point = judge(settled, self._bare[omega], omega, specimen, accuracy, tried)
             if point.status is PointStatus.STEADY or not point.predicted_stable:
@@ -128,8 +130,14 @@ class HarmonicSheet:
             return found.model_copy(update={"starts_tried": len(starts)})
         return self._overturned(specimen, omega, falls)
 
+    def _end_test(self, specimen: Specimen, *, fast: bool) -> Generator[Step, Outcome, None]:
+        """Ramp out, fast when the block has fallen; a block that has fallen by then is stood up again."""
+        outcome = yield RampOut(fast=fast)
+        if fast or isinstance(outcome, Fallen):
+            yield Handle(Handwork.STAND_BLOCK_UP, specimen, FALLEN_REQUEST)
+
     def _overturned(self, specimen: Specimen, omega: float, falls: int) -> HarmonicPoint:
-        bare = self._bare[omega]
+        bare = self._bare[omega].peak
         layer = predict_gain(specimen, omega, self._amplitude, bare.amplitude).rocking
         kind = "stable" if layer and layer.stable else "unstable"
         return HarmonicPoint(
@@ -145,6 +153,10 @@ class HarmonicSheet:
             reason=f"the block fell in each of {falls} starts; the predicted orbit is {kind}",
         )
 
+    def _settle(self, omega: float, specimen: Specimen | None) -> Generator[Step, Outcome, Settled | Fallen]:
+        look = self._look(omega, specimen)
+        return settle_and_measure(omega, self._amplitude, self._parameters, self._configuration.analysis, look)
+
     def _starts(self, specimen: Specimen, omega: float) -> list[Start]:
         layer = predict_gain(specimen, omega, self._amplitude).rocking
         orbit = layer.orbit if layer else None
@@ -153,7 +165,8 @@ class HarmonicSheet:
     def _look(self, omega: float, specimen: Specimen | None) -> Look:
         """What the operator is told while a test settles: running alpha_2 beside the predicted one."""
         cycles_seen = 0
-        bare = self._bare.get(omega)
+        reference = self._bare.get(omega)
+        bare = reference.peak if reference else None
         predicted = float("nan")
         if specimen is not None and bare is not None:
             layer = predict_gain(specimen, omega, self._amplitude, bare.amplitude).rocking

@@ -3,7 +3,7 @@
 Signatures are explicit: a function is compiled once, when its module is imported, and kept in numba's cache.
 `nogil` lets a thread pool run many simulations; division by zero gives inf, as in numpy, and is caught by the
 integrator's check of its state. There is no fastmath: it would make results depend on the processor and break
-the test for non-finite numbers.
+the test for non-finite numbers. Nobody calls them as C functions: without that wrapper they compile faster.
 """
 # pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
 # pyright: reportPrivateImportUsage=false, reportAttributeAccessIssue=false
@@ -33,7 +33,15 @@ if not numba.config.CACHE_DIR:
     numba.config.CACHE_DIR = _cache_directory()
 
 
+def inlined(function: F) -> F:
+    """Write a thin function out in each compiled caller; on its own it is compiled only when Python calls it.
+
+    Every level of calls between compiled functions costs seconds of compilation, because each is optimised anew.
+    """
+    return cast(F, numba.njit(cache=True, nogil=True, error_model="numpy", inline="always")(function))
+
+
 def compiled(signature: str) -> Callable[[F], F]:
     """Compile a function for one numba `signature`, for example ``"float64(float64[::1])"``."""
-    decorator = numba.njit(signature, cache=True, nogil=True, error_model="numpy")
+    decorator = cast(Any, numba.njit)(signature, cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True)
     return cast(Callable[[F], F], decorator)

@@ -21,9 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.kernel.compiled import compiled
-
-M1, M2, K1, K2, C1, C2, H1, K_C, D, B, H_B, MASS, INERTIA, RESTITUTION, GRAVITY, COUPLED = range(16)
-"""Places in the packed parameters, the order of `Specimen.packed()`. COUPLED is 0 for the bare frame."""
+from sim.kernel.packing import C1, C2, GRAVITY, H1, H_B, INERTIA, K1, K2, K_C, M1, M2, MASS, B, D
+from sim.kernel.packing import COUPLED as COUPLED
+from sim.kernel.packing import RESTITUTION as RESTITUTION
 
 
 @compiled("void(float64[::1], float64, float64[::1], float64, float64[::1])")

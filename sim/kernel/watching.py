@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.kernel.compiled import compiled
-from sim.kernel.equations import COUPLED, GRAVITY, H1, H_B, K_C, MASS, B
+from sim.kernel.packing import COUPLED, GRAVITY, H1, H_B, K_C, MASS, B
 from sim.kernel.roots import first_root, greatest_magnitude
 
 NO_EVENT, IMPACT, OVERTURNING, UPLIFT = range(4)
@@ -41,12 +41,18 @@ def raise_peaks(
     peaks: NDArray[np.float64],
 ) -> None:
     """Raise `peaks` = [|u1|, |u2 - u1|, |theta|], shape (3,), to the greatest values in [start, h]."""
+    # most steps raise nothing: the three bounds together, and a polynomial on its own only where its bound says so
+    most_1 = most_2 = most_3 = 0.0
+    for k in range(n, -1, -1):
+        most_1 = most_1 * h + abs(c[0, k])
+        most_2 = most_2 * h + abs(c[1, k] - c[0, k])
+        most_3 = most_3 * h + abs(c[4, k])
+    if most_1 <= peaks[0] and most_2 <= peaks[1] and most_3 <= peaks[2]:
+        return
     for which in range(3 if rocking else 2):
-        bound = 0.0
-        for k in range(n, -1, -1):
-            e[k] = c[0, k] if which == 0 else (c[1, k] - c[0, k] if which == 1 else c[4, k])
-            bound = bound * h + abs(e[k])
-        if bound > peaks[which]:
+        if (most_1 if which == 0 else (most_2 if which == 1 else most_3)) > peaks[which]:
+            for k in range(n + 1):
+                e[k] = c[0, k] if which == 0 else (c[1, k] - c[0, k] if which == 1 else c[4, k])
             peaks[which] = greatest_magnitude(e, n, start, h, peaks[which])
 
 
@@ -73,6 +79,13 @@ def first_event(
     event, direction = NO_EVENT, 0.0
     if sg == 0.0 and p[COUPLED] == 0.0:
         return h, event, direction
+    if sg != 0.0:
+        # most steps hold no event: one bound for both, before anything is searched
+        first, spread = sg * c[4, known], 0.0
+        for k in range(n, known, -1):
+            spread = (spread + abs(c[4, k])) * h
+        if first > spread and (first + spread) * h**known < theta_limit:
+            return h, event, direction
     for candidate in range(2):
         degree = n
         if sg == 0.0:

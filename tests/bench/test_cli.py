@@ -2,7 +2,6 @@ import json
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from io import StringIO
@@ -119,7 +118,7 @@ def test_help_gives_units_limits_and_defaults(capsys: pytest.CaptureFixture[str]
     shown = capsys.readouterr().out
     for text in (
         "--omega NUMBER...",
-        "Circular frequencies of the base motion [rad/s] (each above 0 and at most 60)",
+        "Circular frequencies of the base motion [rad/s] (each above 0 and at most 40)",
         "[default: 12.5 15 17.5 20 rad/s]",
         "[default: 240 s]",
         "--starts INT",
@@ -139,7 +138,7 @@ def test_help_and_version_are_an_end_in_themselves(capsys: pytest.CaptureFixture
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        ("--omega 0", "--omega = 0.0 is refused: it must be a number above 0 and at most 60 rad/s"),
+        ("--omega 0", "--omega = 0.0 is refused: it must be a number above 0 and at most 40 rad/s"),
         ("--omega 12 x", "--omega = 'x' is refused"),
         ("--omega", "--omega = [] is refused: it must be one or more numbers"),
         ("--omega inf", "--omega = inf is refused"),
@@ -298,7 +297,7 @@ def test_config_init_and_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, 
     assert all(line.startswith("rockbench: error: rockbench.toml: specimen.frame.") for line in lines)
 
 
-def test_help_is_quick_and_imports_nothing_that_only_a_run_needs():
+def test_help_imports_nothing_that_only_a_run_needs():
     program = (
         "import sys; from bench.cli.main import main; main(['--help']); main(['run', 'harmonic', '--help']);"
         "heavy = {'numba', 'scipy', 'matplotlib', 'h5py', 'PySide6', 'pyqtgraph', 'nidaqmx', 'grpc', 'numpy'};"
@@ -306,10 +305,3 @@ def test_help_is_quick_and_imports_nothing_that_only_a_run_needs():
     )
     ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
     assert (ran.returncode, ran.stderr) == (0, "")
-    durations: list[float] = []
-    # the best of some: other work on the machine can only slow it down
-    while len(durations) < 6 and min(durations, default=1.0) >= 0.6:
-        begin = time.perf_counter()
-        subprocess.run([sys.executable, "-c", "from bench.cli.main import run; run()"], capture_output=True, check=True)
-        durations.append(time.perf_counter() - begin)
-    assert min(durations) < 0.6

@@ -131,7 +131,7 @@ def test_files_that_cannot_be_read_are_refused_in_words(tmp_path: Path):
 def test_an_element_of_a_list_is_judged_by_itself():
     found = problems(HarmonicParameters, {"omega": [12.5, 99.0]})
     assert [str(problem) for problem in found] == [
-        "omega[1] = 99.0 is refused: it must be a number above 0 and at most 60 rad/s"
+        "omega[1] = 99.0 is refused: it must be a number above 0 and at most 40 rad/s"
     ]
     assert validated(HarmonicParameters, {"omega": [12, 15.5]}).omega == (12.0, 15.5)
 
@@ -139,7 +139,7 @@ def test_an_element_of_a_list_is_judged_by_itself():
 def test_the_words_for_what_a_value_may_be_come_from_its_declaration():
     omega, starts = at(HarmonicParameters, ("omega",)), at(HarmonicParameters, ("starts",))
     assert omega is not None
-    assert omega.allowed_in_unit == "one or more numbers, each above 0 and at most 60 rad/s"
+    assert omega.allowed_in_unit == "one or more numbers, each above 0 and at most 40 rad/s"
     assert starts is not None
-    assert starts.allowed == "a whole number at least 1 and at most 50"
+    assert starts.allowed == "a whole number at least 1 and at most 32"
     assert at(HarmonicParameters, ("omega", "x")) is None

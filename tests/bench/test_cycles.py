@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bench.analysis.cycles import CycleAnalyser, fit_cycle
+from bench.analysis.cycles import CycleAnalyser, fit_cycle, mean_cycle
 
 
 def _signal(t: np.ndarray, omega: float) -> np.ndarray:
@@ -11,15 +11,15 @@ def _signal(t: np.ndarray, omega: float) -> np.ndarray:
     return 0.3 + 2.0 * np.cos(omega * t - 0.4) + 0.25 * np.sin(3.0 * omega * t)
 
 
-def test_a_fit_recovers_mean_fundamental_and_distortion() -> None:
+def test_a_fit_recovers_mean_fundamental_and_harmonics() -> None:
     rate, omega = 2000.0, 17.3
     n = int(2.0 * np.pi / omega * rate)
     t = np.arange(n) / rate
     cycle = fit_cycle(0, omega * t, _signal(t, omega)[:, None])
     assert cycle is not None
-    assert cycle.mean[0] == pytest.approx(0.3, abs=1e-12)
+    assert cycle.coefficients[0, 0] == pytest.approx(0.3, abs=1e-12)
     assert cycle.fundamental[0] == pytest.approx(2.0 * np.exp(0.4j), abs=1e-12)
-    assert cycle.distortion[0] == pytest.approx(0.125, abs=1e-12)
+    assert mean_cycle([cycle])[2][0] == pytest.approx(0.125, abs=1e-12)
     assert cycle.noise[0] < 1e-12
 
 
@@ -66,3 +66,19 @@ def test_a_cycle_with_few_missing_samples_is_fitted_and_one_with_many_is_left_ou
     assert cycle.fundamental[0] == pytest.approx(2.0 * np.exp(0.4j), abs=1e-10)
     values[100:130] = np.nan
     assert fit_cycle(0, omega * t, values) is None
+
+
+def test_the_mean_of_noisy_cycles_has_no_bias_where_the_mean_of_their_peaks_has_one() -> None:
+    rate, omega, sigma = 2000.0, 20.0, 0.2
+    noise = np.random.default_rng(8)
+    t = np.arange(628) / rate
+    cycles = []
+    for k in range(400):
+        cycle = fit_cycle(k, omega * t, (np.cos(omega * t) + sigma * noise.standard_normal(t.size))[:, None])
+        assert cycle is not None
+        cycles.append(cycle)
+    peaks, there, _ = mean_cycle(cycles)
+    error = there.std() / 20.0
+    assert peaks[0] == pytest.approx(1.0, abs=3.0 * error)
+    assert there.mean() == pytest.approx(peaks[0], rel=1e-4)
+    assert np.mean([cycle.peak[0] for cycle in cycles]) > 1.0 + 3.0 * error

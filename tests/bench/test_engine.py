@@ -35,6 +35,7 @@ from bench.events import Acquired, Event, LimitExceeded, OperatorAsked, State, S
 from bench.guard.guard import Guard
 from bench.guard.limits import Limits, Ramps
 from drivers.rig import Block, Handwork, RigError
+from sim.errors import RockbenchError
 from sim.specimen import Specimen
 from tests.loopback import LoopbackRig
 
@@ -115,7 +116,7 @@ def test_a_dwell_measures_the_cycles_of_the_motion_that_was_asked_for() -> None:
     assert len(measured.cycles) == 6
     for cycle in measured.cycles:
         assert np.abs(cycle.fundamental[0]) == pytest.approx(1.0, rel=1e-3)
-        assert np.abs(cycle.fundamental[5]) == pytest.approx(1.0, rel=1e-9)
+        assert np.abs(cycle.fundamental[6]) == pytest.approx(1.0, rel=1e-9)
 
 
 def test_dwells_follow_each_other_without_a_gap() -> None:
@@ -232,6 +233,52 @@ def test_an_exception_in_the_plan_cuts_the_output_and_is_not_swallowed() -> None
         bench.engine.run(plan())
     assert bench.rig.halted
     assert not bench.rig.armed
+
+
+def test_an_error_that_is_not_the_rigs_ends_with_the_fast_ramp() -> None:
+    def plan() -> Plan:
+        yield from _plan(*RUN[:4])
+        raise RockbenchError("the record gave up: the disk is full")
+
+    bench = Bench()
+    ending = bench.engine.run(plan())
+    assert ending == Ending("failed", "the record gave up: the disk is full")
+    assert State.ABORTING in bench.states()
+    assert not bench.rig.halted
+    assert bench.ends_at_zero()
+
+
+def test_a_plan_that_forgets_its_ramp_is_ramped_out() -> None:
+    bench = Bench()
+    assert bench.run(_plan(*RUN[:4])).status == "completed"
+    assert bench.ends_at_zero()
+    assert not bench.rig.halted
+
+
+def test_missing_samples_are_a_failed_run() -> None:
+    class Leaky(LoopbackRig):
+        def read(self, n: int) -> Block:
+            block = super().read(n)
+            return Block(block.first + (10 if block.first > 2000 else 0), block.counts)
+
+    bench = Bench(Leaky())
+    ending = bench.run(_plan(*RUN))
+    assert ending.status == "failed"
+    assert "samples are missing" in ending.reason
+
+
+def test_a_fall_while_the_test_is_ramped_out_is_told_to_the_plan() -> None:
+    offset = np.zeros(1)
+    rig = LoopbackRig({**LoopbackRig().response, "laser_1": lambda v: 0.001 * v + offset[0]})
+    seen: list[Outcome] = []
+
+    def plan() -> Plan:
+        yield from _plan(*RUN[:5])
+        offset[0] = 0.03
+        seen.append((yield RampOut()))
+
+    Bench(rig).run(plan())
+    assert seen == [Fallen()]
 
 
 def test_an_exception_in_a_subscriber_cuts_the_output() -> None:

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from bench.guard.guard import Guard
 from bench.guard.limits import Limits, Ramps
+from sim.errors import InvalidInput
 from tests.loopback import LoopbackRig
 
 N = 100
@@ -134,6 +135,51 @@ def test_a_single_spike_is_debounced() -> None:
 
     guard, _ = _armed(LoopbackRig({"table_acceleration": spike}))
     assert all(guard.exchange(np.zeros(N)).violation is None for _ in range(5))
+
+
+def test_a_sensor_at_its_rail_counts_as_beyond_the_limit() -> None:
+    def saturated(volts: np.ndarray) -> np.ndarray:
+        return np.where(np.arange(volts.size) > 50, np.nan, 0.0)
+
+    guard, _ = _armed(LoopbackRig({"table_acceleration": saturated}))
+    violation = guard.exchange(np.zeros(N)).violation
+    assert violation is not None
+    assert violation.quantity == "table acceleration"
+    assert violation.value == np.inf
+
+
+@pytest.mark.parametrize("every", [2, 5])
+def test_missing_samples_do_not_hide_a_motion_beyond_its_limit(every: int) -> None:
+    def intermittent(volts: np.ndarray) -> np.ndarray:
+        return np.where(np.arange(volts.size) % every == 0, np.nan, 0.05)
+
+    guard, _ = _armed(LoopbackRig({"table_displacement": intermittent}))
+    violation = guard.exchange(np.zeros(N)).violation
+    assert violation is not None
+    assert violation.quantity == "table displacement"
+
+
+def test_velocity_is_seen_through_missing_samples() -> None:
+    def moving(volts: np.ndarray) -> np.ndarray:
+        t = np.arange(volts.size) / 1000.0
+        return np.where(np.arange(volts.size) % 5 == 0, np.nan, 3.5 * t - 0.02)
+
+    limits = Limits(displacement=30.0, velocity=3.0, acceleration=4.5, debounce=0.01)
+    guard = Guard(LoopbackRig({"table_displacement": moving}), limits, RAMPS)
+    guard.arm()
+    violation = guard.exchange(np.zeros(N)).violation
+    assert violation is not None
+    assert violation.quantity == "table velocity"
+
+
+def test_a_limit_that_a_channel_cannot_measure_is_refused() -> None:
+    with pytest.raises(InvalidInput, match=r"limits\.acceleration = 40\.0 .* table_acceleration measures up to 32\.77"):
+        Guard(LoopbackRig(), Limits(acceleration=40.0), RAMPS)
+
+
+def test_a_ramp_steeper_than_the_slew_limit_is_refused() -> None:
+    with pytest.raises(InvalidInput, match=r"ramps\.abort"):
+        Guard(LoopbackRig(), Limits(drive_slew=100.0), Ramps(stop=1.0, abort=0.1))
 
 
 def test_a_sensor_that_is_silent_for_too_long_aborts_although_each_block_is_short() -> None:

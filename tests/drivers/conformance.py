@@ -246,7 +246,7 @@ class RigConformance:
     def test_handwork_is_told_to_a_stopped_rig(self, make_rig: RigFactory, state: Callable[[Rig], None]) -> None:
         rig = make_rig()
         state(rig)
-        rig.handwork(Handwork.MOUNT_SPRING, 0.4)
+        rig.handwork(Handwork.MOUNT_SPRING, 0.4 * 213.44)
         rig.handwork(Handwork.STAND_BLOCK_UP)
         rig.handwork(Handwork.REMOVE_BLOCK)
         assert play(started(rig), np.zeros(10))[0].first == 0

@@ -121,7 +121,7 @@ def test_the_output_is_at_zero_at_once_after_an_end(end: str) -> None:
 
 
 def test_a_toppled_block_shows_in_laser_1_until_it_is_stood_up() -> None:
-    rig = toppled(simulated(COUPLED, laser_1=Laser(reference="table")))
+    rig = toppled(simulated(COUPLED, laser_1=Laser(reference="table"), laser_2=Laser(reference="table")))
     fallen = measured(started(rig), np.zeros(400), "laser_1").mean()
     rig.stop()
     rig.handwork(Handwork.STAND_BLOCK_UP)
@@ -136,12 +136,12 @@ def test_removing_the_block_leaves_the_bare_frame_and_mounting_a_spring_couples_
     assert rig.bench.specimen == Specimen()
     with pytest.raises(RigError, match="no block"):
         rig.handwork(Handwork.STAND_BLOCK_UP)
-    rig.handwork(Handwork.MOUNT_SPRING, 0.25)
+    rig.handwork(Handwork.MOUNT_SPRING, 0.25 * 213.44)
     assert rig.bench.specimen == Specimen(beta=0.25)
 
 
 def test_mounting_a_spring_needs_its_stiffness() -> None:
-    with pytest.raises(InvalidInput, match="beta"):
+    with pytest.raises(InvalidInput, match="stiffness"):
         simulated().handwork(Handwork.MOUNT_SPRING)
 
 

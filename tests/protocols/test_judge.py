@@ -14,12 +14,14 @@ AMPLITUDE = 1.01 * 9.81 / 8.0
 OMEGA = 20.0
 SPECIMEN = Specimen().coupled(0.25)
 PREDICTED = predict_gain(SPECIMEN, OMEGA, AMPLITUDE)
-BARE = SteadyPeak(PREDICTED.bare.drift, 0.0, PREDICTED.bare.u1, AMPLITUDE, 0.007, 0.009, 24)
 STEADY = Steadiness(True, 0.0, 0.0, 1)
 
 
 def _settled(drift: float, u1: float, steadiness: Steadiness = STEADY) -> Settled:
-    return Settled(SteadyPeak(drift, 0.0, u1, AMPLITUDE, 0.007, 0.009, 24), steadiness, 60.0)
+    return Settled(SteadyPeak(drift, 0.0, u1, AMPLITUDE, 0.02, 0.007, 0.009, 24), steadiness, 60.0, 0.0)
+
+
+BARE = _settled(PREDICTED.bare.drift, PREDICTED.bare.u1)
 
 
 @pytest.mark.parametrize(("layer", "status"), [("rocking", PointStatus.STEADY), ("resting", PointStatus.RESTING)])
@@ -35,7 +37,7 @@ def test_each_layer_is_recognised(layer: str, status: PointStatus, error: float)
 
 def test_a_difference_beyond_two_per_cent_and_the_uncertainty_is_flagged() -> None:
     peaks = PREDICTED.layers["rocking"].orbit.peaks
-    exact = SensorAccuracy(laser_slope=0.0, laser_mismatch=0.0)
+    exact = SensorAccuracy(laser_slope=0.0, laser_mismatch=0.0, laser_resolution=0.0)
     point = judge(_settled(1.025 * peaks.drift, peaks.u1), BARE, OMEGA, SPECIMEN, exact, 1)
     assert point.agrees is False
     assert "differs" in point.reason
@@ -57,3 +59,17 @@ def test_what_is_not_steady_is_modulated_and_says_how(repeats: int, words: str) 
     assert point.status is PointStatus.MODULATED
     assert words in point.reason
     assert point.agrees is None
+
+
+def test_a_bare_frame_that_was_not_steady_is_no_reference() -> None:
+    peaks = PREDICTED.layers["rocking"].orbit.peaks
+    wandering = _settled(PREDICTED.bare.drift, PREDICTED.bare.u1, Steadiness(False, 0.1, 0.1, 0))
+    point = judge(_settled(peaks.drift, peaks.u1), wandering, OMEGA, SPECIMEN, SensorAccuracy(), 1)
+    assert point.agrees is None
+    assert "bare frame was not steady" in point.reason
+
+
+def test_a_resting_block_says_that_the_stable_rocking_motion_was_not_reached() -> None:
+    peaks = PREDICTED.layers["resting"].orbit.peaks
+    point = judge(_settled(peaks.drift, peaks.u1), BARE, OMEGA, SPECIMEN, SensorAccuracy(), 6)
+    assert "no start reached the stable rocking motion" in point.reason

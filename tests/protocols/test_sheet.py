@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bench.analysis.cycles import Cycle
-from bench.analysis.signals import ACCELERATION, DRIFT, LASER_1, U1
+from bench.analysis.signals import ACCELERATION, DRIFT, LASER_1, LASER_2, U1
 from bench.config.model import BenchConfiguration
 from bench.engine.steps import (
     Arm,
@@ -24,13 +24,15 @@ from bench.engine.steps import (
     Step,
 )
 from bench.events import Estimate, PointFinished, Progress
-from drivers.rig import Handwork, RigError
+from drivers.rig import Handwork
 from protocols.harmonic.calibrate import PROBE
 from protocols.harmonic.campaign import HarmonicCampaign
+from protocols.harmonic.evidence import Unmeasurable
 from protocols.harmonic.parameters import HarmonicParameters
 from protocols.harmonic.point import HarmonicPoint, PointStatus
 from sim.gain import predict_gain
 from sim.specimen import Specimen
+from tests.made_cycles import pure_cycle
 
 OMEGA, BETA = 16.0, 0.4
 PARAMETERS = HarmonicParameters(omega=(OMEGA,), beta=(BETA,), starts=3, settle_limit=30.0)
@@ -38,10 +40,11 @@ AMPLITUDE = PARAMETERS.amplitude_factor * Specimen().uplift_acceleration
 
 
 def _cycle(index: int, drift: float, u1: float = 0.001, turn: float = 0.0) -> Cycle:
-    fundamental = np.zeros(6, dtype=complex)
-    fundamental[ACCELERATION], fundamental[5] = AMPLITUDE, 1.0
+    fundamental = np.zeros(7, dtype=complex)
+    fundamental[ACCELERATION], fundamental[6] = AMPLITUDE, 1.0
     fundamental[U1], fundamental[DRIFT], fundamental[LASER_1] = u1, drift * np.exp(1j * turn), u1
-    return Cycle(index, 700, fundamental, np.abs(fundamental), np.zeros(6), np.zeros(6), np.zeros(6))
+    fundamental[LASER_2] = fundamental[U1] + fundamental[DRIFT]
+    return pure_cycle(index, fundamental, samples=700)
 
 
 class Script:
@@ -147,15 +150,15 @@ def test_a_motion_that_never_settles_is_modulated_after_all_starts(peaks: tuple[
 def test_a_sensor_that_loses_the_peaks_is_an_error_that_says_so(peaks: tuple[float, float, float]) -> None:
     script = Script(lambda *_: None, peaks[0])
     script._answer = lambda step: Measured(()) if isinstance(step, Dwell) else Done()
-    with pytest.raises(RigError, match="lack samples"):
+    with pytest.raises(Unmeasurable, match="lack samples"):
         script.run()
 
 
 def test_a_table_that_does_not_answer_is_an_error_before_the_drive_is_raised(peaks: tuple[float, float, float]) -> None:
-    silent = replace(_cycle(0, 0.0), fundamental=np.zeros(6, dtype=complex), noise=np.full(6, 0.01))
+    silent = replace(_cycle(0, 0.0), fundamental=np.zeros(7, dtype=complex), noise=np.full(7, 0.01))
     script = Script(lambda *_: None, peaks[0])
     script._answer = lambda step: Measured((silent,) * step.cycles) if isinstance(step, Dwell) else Done()
-    with pytest.raises(RigError, match="does not answer the drive"):
+    with pytest.raises(Unmeasurable, match="does not answer the drive"):
         script.run()
     followed = [leg.amplitude for step in script.steps if isinstance(step, Follow) for leg in step.legs]
     assert followed == [PROBE]

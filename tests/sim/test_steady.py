@@ -166,10 +166,46 @@ def test_spectrum_is_the_single_predictions() -> None:
 
 
 def test_where_there_is_no_rocking_orbit_it_is_said() -> None:
+    # a hundredth of the amplitude cannot make up for what two impacts take from any motion of this period
     specimen = Specimen(beta=0.64)
-    with pytest.raises(NoOrbit, match="omega = 6"):
-        rocking_orbit(specimen, 6.0, 0.9 * A_S)
-    assert predict_gain(specimen, 6.0, 0.9 * A_S).rocking is None
+    with pytest.raises(NoOrbit, match="omega = 16"):
+        rocking_orbit(specimen, 16.0, 0.01 * A_S)
+    assert predict_gain(specimen, 16.0, 0.01 * A_S).rocking is None
+
+
+def test_a_very_unstable_orbit_closes_in_an_independent_solver() -> None:
+    # near the resonance of the first mode
+    orbit = rocking_branch(Specimen(beta=0.64), np.arange(10.0, 6.89, -0.05), 0.9 * A_S)[-1]
+    assert orbit.multiplier > 10.0
+    _, impacts = reference_motion(
+        orbit.specimen,
+        lambda t: 0.9 * A_S * float(np.sin(orbit.phase + orbit.omega * t)),
+        [0.0, 1.02 * orbit.period],
+        orbit.start.as_array(),
+        1,
+    )
+    assert impacts[1] == pytest.approx(orbit.period, abs=1e-9)
+    # the spring is nearly squeezed flat here: the map is too steep for its differences to be exact
+    assert np.prod(orbit.multipliers).real == pytest.approx(product_of_multipliers(orbit), rel=1e-3)
+
+
+def test_leading_multipliers_are_the_fate_of_a_disturbance() -> None:
+    orbit = rocking_orbit(Specimen(beta=0.97), 14.8, A_S)
+    drive = SineProgram([Sweep.dwell(152.0 * orbit.period, A_S, orbit.omega)], phase=orbit.phase)
+    times = np.arange(100.25, 151.0) * orbit.period
+    runs: list[np.ndarray] = []
+    for moved in (0.0, 1e-9):
+        start = State.from_array(orbit.start.as_array() + np.array([0.0, 0.0, 0.0, 0.0, 0.0, moved]))
+        samples = simulate(orbit.specimen, drive, state=start, sample_times=times, tolerance=1e-14).samples
+        assert samples is not None
+        runs.append(samples)
+    # once the other pairs have died out, y(k + 2) = 2 Re(mu) y(k + 1) - |mu|^2 y(k) in every component
+    left = runs[1] - runs[0]
+    terms = np.stack([left[1:-1].ravel(), left[:-2].ravel()], axis=1)
+    sum_of_pair, minus_product = np.linalg.lstsq(terms, left[2:].ravel())[0]
+    leading = orbit.multipliers[np.abs(orbit.multipliers).argmax()]
+    assert np.sqrt(-minus_product) == pytest.approx(orbit.multiplier, rel=1e-4)
+    assert sum_of_pair == pytest.approx(2.0 * leading.real, rel=1e-4)
 
 
 @pytest.mark.parametrize(

@@ -77,7 +77,7 @@ def test_channels_report_the_motion_through_their_calibrations() -> None:
 
 
 def test_a_laser_on_the_table_does_not_see_the_table() -> None:
-    bench = bench_with(Specimen(), laser_1=Laser(reference="table"))
+    bench = bench_with(Specimen(), laser_1=Laser(reference="table"), laser_2=Laser(reference="table"))
     seen = values(bench, bench.run(0.5 * np.sin(6.0 * np.arange(4000) / RATE)))
     ground = np.abs(seen["laser_1"] - bench.truth.u1 - bench.truth.x).max()
     assert np.abs(seen["laser_1"] - bench.truth.u1).max() < 0.2 * ground
@@ -105,7 +105,12 @@ def test_a_laser_out_of_range_and_a_saturated_input_are_not_measurements() -> No
 def test_a_toppled_block_is_caught_and_pulls_the_frame_where_the_springs_balance() -> None:
     """The storeys rest where the potential energy of Eq. (5) is least with the block at the catch angle."""
     specimen = Specimen(beta=0.64)
-    bench = bench_with(specimen, laser_1=Laser(reference="table", linearity=0.0), shaker=Shaker(force_noise=0.0))
+    bench = bench_with(
+        specimen,
+        laser_1=Laser(reference="table", linearity=0.0),
+        laser_2=Laser(reference="table"),
+        shaker=Shaker(force_noise=0.0),
+    )
     bench.run(8.0 * np.sin(9.0 * np.arange(8000) / RATE))
     assert bench.fallen
     bench.coast(120.0)

@@ -1,0 +1,53 @@
+"""The standard case: 120 s of steady rocking with 649 impacts, and what is known about it from elsewhere.
+
+START and PHASE are the periodic orbit at beta 0.64, Omega 17 rad/s to ten digits: from there on they define the case
+and are exact. END and PEAKS are its solution by heyoka in 80-bit arithmetic at tolerance 1e-19, an integrator and
+equations that share nothing with ours; `tests/benchmarks/reference.py` computes them anew and checks their beginning
+with mpmath at 30 digits.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.excitation import SineProgram, Sweep
+from sim.rocking import Peaks, State
+from sim.specimen import Specimen
+
+SPECIMEN = Specimen(beta=0.64)
+OMEGA, AMPLITUDE, PHASE, DURATION = 17.0, 1.01 * 9.81 / 8.0, 3.106701049, 120.0
+"""[rad/s], [m/s2], [rad], [s] of the base's sine."""
+
+START = State(-0.0005206767388, 0.0002474257154, 0.01109507688, -0.09173639983, 0.0, 0.6525443109)
+
+IMPACTS = 649
+
+END: NDArray[np.float64] = np.array(
+    [
+        -0.00032004601938123983152,
+        0.0047147920591060567654,
+        -0.0124001013518200293964,
+        0.044827534742789846127,
+        -0.030219691126191776354,
+        -0.23633857278366831926,
+    ]
+)
+"""State after DURATION, as `State.as_array`."""
+
+PEAKS = (0.00082052486744979255383, 0.0060632412081126333043, 0.033611621224326909147)
+"""Greatest |u1|, |u2 - u1| [m] and |theta| [rad] of the whole run."""
+
+
+def drive(duration: float = DURATION) -> SineProgram:
+    """The sine of the base."""
+    return SineProgram([Sweep.dwell(duration, AMPLITUDE, OMEGA)], phase=PHASE)
+
+
+def error_of(end: NDArray[np.float64]) -> float:
+    """Greatest deviation of an end state, shape (6,), from END, in SI units; velocities are of the order of 1."""
+    return float(np.abs(end - END).max())
+
+
+def peak_error_of(peaks: Peaks) -> float:
+    """Greatest relative deviation of the peaks from PEAKS."""
+    found = (peaks.u1, peaks.drift, peaks.theta)
+    return max(abs(value / exact - 1.0) for value, exact in zip(found, PEAKS, strict=True))

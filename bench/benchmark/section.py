@@ -1,0 +1,115 @@
+"""What a part of the benchmark hands back, and how it is written: text, Markdown, plain data."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from math import isfinite
+
+Cell = float | int | str | bool | None
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a table: key of its rows, heading with the unit, format of its numbers."""
+
+    key: str
+    heading: str
+    form: str = "s"
+
+
+@dataclass(frozen=True)
+class Target:
+    """A number that was promised: met when `measured` is at most `limit`; None when it could not be measured."""
+
+    name: str
+    limit: float
+    measured: float | None
+    unit: str
+
+    @property
+    def met(self) -> bool | None:
+        """Whether it was kept; None when it could not be measured."""
+        return None if self.measured is None else self.measured <= self.limit
+
+    def row(self) -> dict[str, Cell]:
+        """The target as a row of a table."""
+        return {
+            "name": self.name,
+            "limit": self.limit,
+            "measured": self.measured,
+            "unit": self.unit,
+            "met": self.met,
+        }
+
+
+@dataclass(frozen=True)
+class Section:
+    """One table with what must be said beside it."""
+
+    key: str
+    title: str
+    columns: Sequence[Column]
+    rows: Sequence[dict[str, Cell]]
+    notes: Sequence[str] = ()
+    targets: Sequence[Target] = field(default=())
+
+    def text(self) -> str:
+        """The table in aligned columns."""
+        cells = self._cells()
+        widths = [max(len(line[k]) for line in cells) for k in range(len(self.columns))]
+        lines = ["  ".join(self._aligned(line, widths)).rstrip() for line in cells]
+        lines.insert(1, "-" * (sum(widths) + 2 * (len(widths) - 1)))
+        return "\n".join([self.title, "", *lines, *self.notes])
+
+    def markdown(self) -> str:
+        """The section as Markdown."""
+        head, *body = self._cells()
+        rule = ["---" if column.form == "s" else "--:" for column in self.columns]
+        lines = ["| " + " | ".join(line) + " |" for line in (head, rule, *body)]
+        return "\n".join([f"## {self.title}", "", *lines, *(f"\n{note}" for note in self.notes)])
+
+    def as_dict(self) -> dict[str, object]:
+        """Plain data for JSON; what is not finite is None."""
+        rows = [
+            {name: None if isinstance(cell, float) and not isfinite(cell) else cell for name, cell in row.items()}
+            for row in self.rows
+        ]
+        return {"title": self.title, "rows": rows, "notes": list(self.notes)}
+
+    def _cells(self) -> list[list[str]]:
+        return [
+            [column.heading for column in self.columns],
+            *([_shown(row.get(column.key), column.form) for column in self.columns] for row in self.rows),
+        ]
+
+    def _aligned(self, line: list[str], widths: list[int]) -> list[str]:
+        return [
+            text.ljust(width) if column.form == "s" else text.rjust(width)
+            for text, width, column in zip(line, widths, self.columns, strict=True)
+        ]
+
+
+TARGET_COLUMNS = (
+    Column("name", "target"),
+    Column("limit", "at most", "g"),
+    Column("measured", "measured", ".3g"),
+    Column("unit", "unit"),
+    Column("met", "met"),
+)
+
+
+def targets_section(sections: Sequence[Section]) -> Section:
+    """All targets in one table, the ones that were missed first."""
+    targets = [target for section in sections for target in section.targets]
+    order = {False: 0, None: 1, True: 2}
+    rows = [target.row() for target in sorted(targets, key=lambda target: order[target.met])]
+    return Section("targets", "Targets", TARGET_COLUMNS, rows)
+
+
+def _shown(value: Cell, form: str) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, bool):
+        return "yes" if value else "NO"
+    if isinstance(value, str) or form == "s":
+        return str(value)
+    return format(value, form) if isfinite(value) else "-"

@@ -1,0 +1,176 @@
+"""`rockbench predict`: what the model expects, without a bench."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from inspect import Signature
+from typing import TYPE_CHECKING, Any
+
+from cyclopts import App, Group
+
+from bench.cli import flags
+from bench.cli.predict_options import ResultOptions, SpecimenOptions, arguments_of
+from bench.cli.refusal import tell
+from bench.prediction.requests import (
+    HistoryRequest,
+    MapRequest,
+    ModesRequest,
+    SineRequest,
+    SpectrumRequest,
+    SteadyRequest,
+)
+from sim.errors import InvalidInput, RockbenchError
+
+if TYPE_CHECKING:
+    from bench.cli.predict_output import Result
+    from sim.specimen import Specimen
+
+_EXIT_CODES = (
+    "The exit code is 0 when the prediction was made, 1 when it failed, 2 when something was refused before it began. "
+    "Files that exist are never overwritten."
+)
+
+MOST_HISTORIES = 6
+"""Points that a figure of histories can show."""
+
+Make = Callable[[Any, "Specimen"], "Result"]
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """A prediction on the command line: its flags come from `request`, and `make` computes it."""
+
+    name: str
+    request: type[ModesRequest] | type[SineRequest]
+    make: Make
+    summary: str
+    details: str
+    drawable: int | None = None
+    """Points that its figure can show, if that has a limit."""
+
+
+def predict_app() -> App:
+    """`rockbench predict`, with one command for each kind of prediction."""
+    app = App(name="predict", help="Predict modes, motions and gain coefficients from the model.", version_flags=())
+    for prediction in PREDICTIONS:
+        app.command(_command(prediction), name=prediction.name)
+    return app
+
+
+def _command(prediction: Prediction) -> Callable[..., int]:
+    """The function behind a command; its signature is the flags of the request and the common options."""
+
+    def execute(**arguments: Any) -> int:
+        return _perform(prediction, arguments)
+
+    group = Group(f"Parameters of {prediction.name}", sort_key=1)
+    asked = flags.arguments_of(prediction.request, group)
+    execute.__doc__ = f"{prediction.summary}\n\n{prediction.details}\n\n{_EXIT_CODES}"
+    execute.__dict__["__signature__"] = Signature(
+        [*asked, *arguments_of(SpecimenOptions), *arguments_of(ResultOptions)]
+    )
+    return execute
+
+
+def _perform(prediction: Prediction, arguments: dict[str, Any]) -> int:
+    from bench.cli.predict_inputs import request_from, specimen_from
+    from bench.cli.predict_output import check_files, deliver
+
+    options = ResultOptions(**_taken(arguments, ResultOptions))
+    chosen = SpecimenOptions(**_taken(arguments, SpecimenOptions))
+    request = request_from(prediction.request, arguments)
+    specimen = specimen_from(chosen.specimen, chosen.distance, chosen.restitution_factor)
+    if specimen.beta is not None and arguments.get("beta") is None and not isinstance(request, MapRequest):
+        request = request.model_copy(update={"beta": (specimen.beta,)})
+    check_files(options)
+    if options.plot is not None and prediction.drawable is not None and isinstance(request, SineRequest):
+        points = len(request.omega) * len(request.beta)
+        if points > prediction.drawable:
+            allowed = f"at most {prediction.drawable} points fit in this figure; ask for fewer"
+            raise InvalidInput("--plot", f"{points} points", allowed)
+    try:
+        deliver(prediction.make(request, specimen), options)
+    except InvalidInput:
+        raise
+    except (RockbenchError, OSError) as error:
+        tell(error)
+        return 1
+    return 0
+
+
+def _taken(arguments: dict[str, Any], options: type[SpecimenOptions] | type[ResultOptions]) -> dict[str, Any]:
+    names = {field.name for field in fields(options)} & arguments.keys()
+    return {name: arguments.pop(name) for name in names}
+
+
+def _modes(request: ModesRequest, specimen: "Specimen") -> "Result":
+    from bench.cli.predict_modes import modes
+
+    return modes(request, specimen)
+
+
+def _history(request: HistoryRequest, specimen: "Specimen") -> "Result":
+    from bench.cli.predict_history import history
+
+    return history(request, specimen)
+
+
+def _steady(request: SteadyRequest, specimen: "Specimen") -> "Result":
+    from bench.cli.predict_gain import steady
+
+    return steady(request, specimen)
+
+
+def _spectrum(request: SpectrumRequest, specimen: "Specimen") -> "Result":
+    from bench.cli.predict_gain import spectrum
+
+    return spectrum(request, specimen)
+
+
+def _map(request: MapRequest, specimen: "Specimen") -> "Result":
+    from bench.cli.predict_gain import gain_map
+
+    return gain_map(request, specimen)
+
+
+PREDICTIONS = (
+    Prediction(
+        "modes",
+        ModesRequest,
+        _modes,
+        "Frequencies and shapes of the bare frame and of the linearised coupled system.",
+        "A mode with negative stiffness is divergent: it has a rate of growth and no frequency. The figure is like the "
+        "paper's Fig. 3; with more than five stiffnesses it shows curves over the stiffness.",
+    ),
+    Prediction(
+        "history",
+        HistoryRequest,
+        _history,
+        "Time histories of drift, u1 and theta, with the sine switched on at rest or in the steady state.",
+        "From rest the block may overturn, also where the steady motion is stable: the history then ends there, and "
+        "says so. With --steady: whole periods of each steady motion that exists. The figure is like the paper's "
+        "Fig. 5.",
+    ),
+    Prediction(
+        "steady",
+        SteadyRequest,
+        _steady,
+        "Steady motions at single points: gain coefficients, peaks, impacts, Floquet multipliers.",
+        "Motions of the drive's period are solved for, not waited for. Up to two exist at a point: the block rocks, or "
+        "it never lifts. Each is an entry. The figure shows two periods of each.",
+        drawable=MOST_HISTORIES,
+    ),
+    Prediction(
+        "spectrum",
+        SpectrumRequest,
+        _spectrum,
+        "Gain spectra: alpha_1 and alpha_2 against frequency for each stiffness, both layers.",
+        "The figure is like the paper's Fig. 6, without measurements.",
+    ),
+    Prediction(
+        "map",
+        MapRequest,
+        _map,
+        "Gain maps: alpha_1 and alpha_2 over frequency and stiffness, both layers, with stability.",
+        "The figure is like the paper's Fig. 4: surfaces and contour maps.",
+    ),
+)

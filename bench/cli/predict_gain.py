@@ -1,0 +1,123 @@
+"""`rockbench predict steady`, `spectrum` and `map`: the same table, each with its figure and its text."""
+
+import sys
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bench.cli.predict_output import Result
+from bench.cli.predict_text import extremes, text_table
+from bench.prediction.files import provenance, rows_of
+from bench.prediction.requests import HistoryRequest, MapRequest, SineRequest, SpectrumRequest, SteadyRequest
+from bench.prediction.steady import predict_points, predict_spectra, steady_table
+from bench.record.tables import Table, arrays
+from sim.errors import RockbenchError
+from sim.gain import GainPrediction
+from sim.specimen import Specimen
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from bench.report.map_figure import Layer
+
+_SHOWN = {
+    "omega_rad_s": "omega",
+    "beta": "beta",
+    "layer": "layer",
+    "alpha_1": "alpha_1",
+    "alpha_2": "alpha_2",
+    "theta_max_rad": "max theta",
+    "impacts_per_period": "impacts",
+    "floquet_modulus": "Floquet",
+    "stable": "stable",
+}
+
+
+def steady(request: SteadyRequest, specimen: Specimen) -> Result:
+    """Steady motions at single points."""
+    table = _table(request, specimen, predict_points(specimen, request))
+
+    def figure() -> "Figure":
+        from bench.cli.predict_history import figure_of
+        from bench.prediction.history import histories
+
+        shared = request.model_dump(include={"omega", "beta", "amplitude_factor"})
+        return figure_of(histories(specimen, HistoryRequest(**shared, steady=True, periods=2)))
+
+    shown = {**_SHOWN, "status": "status"} if "status" in table else _SHOWN
+    return _result("steady motions under a sine", request, specimen, table, text_table(table, shown), figure)
+
+
+def spectrum(request: SpectrumRequest, specimen: Specimen) -> Result:
+    """Gain spectra, one for each stiffness."""
+    table = _table(request, specimen, predict_spectra(specimen, request))
+
+    def figure() -> "Figure":
+        from bench.report.figure import gain_spectra
+
+        columns = arrays(table)
+        return gain_spectra([], {**columns, "omega": columns["omega_rad_s"]})
+
+    return _result("gain spectra", request, specimen, table, extremes(table), figure)
+
+
+def gain_map(request: MapRequest, specimen: Specimen) -> Result:
+    """Gain maps."""
+    from bench.prediction.gain_map import grids, map_table, resting_margin
+
+    if request.solver == "taylor":
+        table = map_table(specimen, request)
+        _tell_lost(len(request.omega) * len(request.beta) - int((table["layer"].values == "rocking").sum()))
+    else:
+        table = _table(request, specimen, predict_spectra(specimen, request), request.scheduler)
+
+    def figure() -> "Figure":
+        from bench.report.map_figure import Layer, map_figure
+
+        columns = arrays(table)
+
+        def layer(name: str) -> "Layer":
+            gains = {gain: grids(columns, request, name, gain) for gain in ("alpha_1", "alpha_2")}
+            return Layer(gains, grids(columns, request, name, "floquet_modulus"))
+
+        axes = np.sort(request.omega), np.sort(request.beta)
+        return map_figure(*axes, layer("rocking"), layer("resting"), resting_margin(specimen, request))
+
+    return _result("gain maps", request, specimen, table, extremes(table), figure)
+
+
+def _table(
+    request: SineRequest, specimen: Specimen, predictions: list[GainPrediction], scheduler: str | None = None
+) -> Table:
+    _tell_lost(sum(prediction.rocking is None for prediction in predictions))
+    if request.solver == "taylor":
+        return steady_table(predictions)
+    from bench.prediction.timed import timed_gains
+
+    return steady_table(predictions, timed_gains(specimen, request, predictions, scheduler))
+
+
+def _tell_lost(points: int) -> None:
+    if points:
+        print(f"rockbench: no rocking orbit was found at {points} point{'s' * (points > 1)}", file=sys.stderr)
+
+
+def _result(
+    title: str, request: SineRequest, specimen: Specimen, table: Table, text: str, figure: "Callable[[], Figure]"
+) -> Result:
+    exists = bool(table["layer"].values.size)
+
+    def drawn() -> "Figure":
+        if not exists:
+            raise RockbenchError("no steady motion was found, so there is nothing to draw: ask for other points")
+        return figure()
+
+    return Result(
+        title=title,
+        tables={"points": table},
+        content={"points": rows_of(table)},
+        text=text if exists else "no steady motion was found",
+        metadata=provenance(request, specimen),
+        figure=drawn,
+    )

@@ -1,0 +1,91 @@
+"""What a prediction is asked for, from flags and a file of the specimen: refused in one line, or complete and valid."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from bench.cli.flags import flag, given
+from bench.config.validation import dotted, validated
+from sim.errors import InvalidInput
+from sim.parameters import Parameters
+
+if TYPE_CHECKING:
+    from sim.specimen import Specimen
+
+P = TypeVar("P", bound=Parameters)
+
+MOST_VALUES, MOST_POINTS = 10_000, 1_000_000
+"""Of a range, and of all ranges together: more is a slip of the finger."""
+
+_OF_SPECIMEN: dict[tuple[str | int, ...], str] = {
+    ("d",): "--distance",
+    ("block", "restitution_factor"): "--restitution-factor",
+}
+
+
+def request_from(model: type[P], arguments: Mapping[str, Any]) -> P:
+    """The request that the flags make. Raises InvalidInput."""
+    flags = dict(arguments)
+    points = 1
+    for name in ("omega", "beta"):
+        if flags.get(name) is not None:
+            flags[name] = expanded(flag(name), flags[name])
+            points *= len(flags[name])
+    if points > MOST_POINTS:
+        raise InvalidInput("--omega times --beta", points, f"at most {MOST_POINTS} points")
+    wanted = given(model, flags)
+
+    def named(path: tuple[str | int, ...]) -> str:
+        return flag(str(path[0])) if path else dotted(path)
+
+    return validated(model, wanted, named)
+
+
+def expanded(item: str, tokens: Sequence[str]) -> list[str | float]:
+    """Numbers as they were typed, and in place of each `start:stop:count` its numbers. Raises InvalidInput."""
+    values: list[str | float] = []
+    for token in tokens:
+        if ":" in token:
+            values += _range(item, token)
+        else:
+            values.append(token)
+    return values
+
+
+def specimen_from(file: Path | None, distance: str | None, restitution_factor: str | None) -> "Specimen":
+    """The specimen: flags win over the file, the file over the paper's values. Raises InvalidInput."""
+    from bench.config.toml import read_table
+    from sim.specimen import Block, Specimen
+
+    table = read_table(file, "--specimen") if file is not None else {}
+    if distance is not None:
+        table["d"] = given(Specimen, {"d": distance})["d"]
+    if restitution_factor is not None and isinstance(table.setdefault("block", {}), dict):
+        table["block"]["restitution_factor"] = given(Block, {"restitution_factor": restitution_factor})[
+            "restitution_factor"
+        ]
+    flags = {
+        path for path, value in zip(_OF_SPECIMEN, (distance, restitution_factor), strict=True) if value is not None
+    }
+
+    def named(path: tuple[str | int, ...]) -> str:
+        if path in flags:
+            return _OF_SPECIMEN[path]
+        return f"{file.name}: {dotted(path)}" if file is not None else dotted(path)
+
+    return validated(Specimen, table, named)
+
+
+def _range(item: str, token: str) -> tuple[float, ...]:
+    from bench.prediction.requests import spaced
+
+    try:
+        start, stop, count = token.split(":")
+        n = int(count)
+        if not 2 <= n <= MOST_VALUES or float(start) == float(stop):
+            raise ValueError(token)
+        return spaced(start, stop, n)
+    except (ValueError, OverflowError, ZeroDivisionError):
+        raise InvalidInput(
+            item, token, f"a range is start:stop:count, two different numbers and a count of 2 to {MOST_VALUES}"
+        ) from None

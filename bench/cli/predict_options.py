@@ -1,0 +1,85 @@
+"""The options that every prediction has on the command line."""
+
+from dataclasses import dataclass
+from inspect import Parameter as Argument
+from inspect import signature
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Group, Parameter
+
+_SPECIMEN = Group("Specimen", sort_key=2)
+_RESULT = Group("Result", sort_key=3)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpecimenOptions:
+    """What is predicted for."""
+
+    specimen: Annotated[
+        Path | None,
+        Parameter(
+            name="--specimen",
+            metavar="FILE",
+            group=_SPECIMEN,
+            help="Specimen (TOML, keys as in [specimen] of a configuration); flags win over the file.",
+            show_default="the paper's specimen",
+        ),
+    ] = None
+    distance: Annotated[
+        str | None,
+        Parameter(
+            name="--distance",
+            metavar="NUMBER",
+            group=_SPECIMEN,
+            help="Free length d of the coupling spring [m] (above 0).",
+            show_default="the specimen's, 0.1 m",
+        ),
+    ] = None
+    restitution_factor: Annotated[
+        str | None,
+        Parameter(
+            name="--restitution-factor",
+            metavar="NUMBER",
+            group=_SPECIMEN,
+            help="Restitution of the block over the theoretical one (at least 0).",
+            show_default="the specimen's, 1",
+        ),
+    ] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ResultOptions:
+    """Where the result goes, beside a summary on standard output. Existing files are never overwritten."""
+
+    json: Annotated[
+        bool,
+        Parameter(
+            name="--json",
+            group=_RESULT,
+            negative=(),
+            show_default=False,
+            help="Print one JSON object on standard output and nothing else there.",
+        ),
+    ] = False
+    csv: Annotated[
+        Path | None, Parameter(name="--csv", metavar="FILE", group=_RESULT, help="Write the table as CSV.")
+    ] = None
+    out: Annotated[
+        Path | None,
+        Parameter(
+            name="--out",
+            metavar="FILE",
+            group=_RESULT,
+            help="Write tables, units and what they were computed from as HDF5.",
+        ),
+    ] = None
+    plot: Annotated[
+        Path | None,
+        Parameter(name="--plot", metavar="FILE", group=_RESULT, help="Draw the figure: .png (200 dpi), .pdf or .svg."),
+    ] = None
+
+
+def arguments_of(options: type[SpecimenOptions] | type[ResultOptions]) -> list[Argument]:
+    """One keyword-only argument for each option."""
+    return list(signature(options).parameters.values())

@@ -1,0 +1,88 @@
+"""The gain map: every steady motion over frequency and stiffness, as in Fig. 4 of the paper."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.prediction.requests import MapRequest
+from bench.prediction.steady import amplitude_of, table_of
+from bench.record.tables import Table
+from sim.maps import LayerMap, gain_map
+from sim.specimen import Specimen
+from sim.steady import resting_level
+
+IMPACTS = {"rocking": 2, "resting": 0}
+"""Impacts of each layer in a period of the drive."""
+
+
+def map_table(specimen: Specimen, request: MapRequest) -> Table:
+    """One row for each layer that exists at a point, ascending in stiffness, then frequency.
+
+    Raises SchedulerUnavailable when the request names a scheduler that does not answer.
+    """
+    betas, omegas = np.sort(request.beta), np.sort(request.omega)
+    amplitude = amplitude_of(specimen, request)
+    made = gain_map(specimen, betas, omegas, amplitude, scheduler=request.scheduler)
+    parts = [
+        _columns(name, layer, omegas, betas, amplitude)
+        for name, layer in (("rocking", made.rocking), ("resting", made.resting))
+    ]
+    whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    # stable: of two layers at one point, the rocking one stays first
+    order = np.lexsort((whole["omega_rad_s"], whole["beta"]))
+    return table_of({name: values[order] for name, values in whole.items()})
+
+
+def grids(table: Mapping[str, NDArray[Any]], request: MapRequest, layer: str, name: str) -> NDArray[np.float64]:
+    """A column of one layer over the grid, shape (n_beta, n_omega), ascending in both; NaN where it has no row."""
+    betas, omegas = np.sort(request.beta), np.sort(request.omega)
+    grid = np.full((betas.size, omegas.size), np.nan)
+    rows = table["layer"] == layer
+    i = np.searchsorted(betas, table["beta"][rows])
+    j = np.searchsorted(omegas, table["omega_rad_s"][rows])
+    grid[i, j] = table[name][rows]
+    return grid
+
+
+def resting_margin(specimen: Specimen, request: MapRequest) -> NDArray[np.float64]:
+    """How far a resting block is from lifting, shape (n_beta, n_omega), ascending in both.
+
+    Amplitude that would lift it over the amplitude of the test, minus one: the resting layer exists where it is
+    positive.
+    """
+    amplitude = amplitude_of(specimen, request)
+    return np.array(
+        [
+            [resting_level(specimen.coupled(beta), omega) / amplitude - 1.0 for omega in sorted(request.omega)]
+            for beta in sorted(request.beta)
+        ]
+    )
+
+
+def _columns(
+    name: str, layer: LayerMap, omegas: NDArray[np.float64], betas: NDArray[np.float64], amplitude: float
+) -> dict[str, NDArray[Any]]:
+    here = layer.exists
+    n = int(here.sum())
+    i, j = np.nonzero(here)
+    multipliers = layer.multipliers[here]
+    leading = multipliers[np.arange(n), np.abs(multipliers).argmax(axis=1)] if n else np.empty(0, np.complex128)
+    return {
+        "omega_rad_s": omegas[j],
+        "beta": betas[i],
+        "amplitude_m_s2": np.full(n, amplitude),
+        "layer": np.full(n, name),
+        "stable": layer.stable[here],
+        "alpha_1": layer.alpha_1[here],
+        "alpha_2": layer.alpha_2[here],
+        "u1_max_m": layer.peaks[here, 0],
+        "drift_max_m": layer.peaks[here, 1],
+        "theta_max_rad": layer.peaks[here, 2],
+        "bare_u1_max_m": layer.bare[j, 0],
+        "bare_drift_max_m": layer.bare[j, 1],
+        "impacts_per_period": np.full(n, IMPACTS[name]),
+        "floquet_modulus": np.abs(leading),
+        "floquet_argument_rad": np.abs(np.angle(leading)),
+    }

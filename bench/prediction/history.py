@@ -1,0 +1,179 @@
+"""Time histories under a sine, from rest or in the steady state, as in Fig. 5 of the paper."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import tau
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.prediction.requests import HistoryRequest
+from bench.prediction.steady import amplitude_of
+from bench.record.tables import Column, Table
+from sim.errors import InvalidInput
+from sim.excitation import SineProgram, Sweep
+from sim.gain import predict_gain
+from sim.linear import steady_response
+from sim.solvers.catalogue import solve
+from sim.specimen import Specimen
+from sim.steady import Orbit
+
+FROM_REST = "from rest"
+"""Name of the motion that begins at rest; the others are named after the layer of the steady state."""
+
+TIME = "time_s"
+
+QUANTITIES: dict[str, tuple[str, str]] = {
+    TIME: ("s", "time since the sine began, or since a beginning of its period"),
+    "base_acceleration_m_s2": ("m/s2", "acceleration of the base"),
+    "u1_m": ("m", "displacement of the first storey relative to the ground"),
+    "drift_m": ("m", "drift u2 - u1"),
+    "theta_rad": ("rad", "rotation of the block, positive when its top moves towards the frame"),
+    "bare_u1_m": ("m", "displacement of the first storey of the bare frame"),
+    "bare_drift_m": ("m", "drift of the bare frame"),
+}
+"""What a history holds: unit and meaning. The coupled quantities are NaN after the block has overturned."""
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """One motion: `values` holds an array of shape (n,) for each of `QUANTITIES`.
+
+    `status` says how it ended, at `end_time` [s]; `impacts` are counted to then.
+    """
+
+    omega: float
+    beta: float
+    motion: str
+    status: str
+    end_time: float
+    impacts: int
+    values: Mapping[str, NDArray[np.float64]]
+
+    def peak(self, name: str) -> float:
+        """Greatest absolute value of a sampled quantity; NaN without a sample of it."""
+        values = np.abs(self.values[name])
+        return float(np.nanmax(values)) if np.isfinite(values).any() else float("nan")
+
+
+def histories(specimen: Specimen, request: HistoryRequest) -> list[History]:
+    """A history for every frequency at every stiffness, or one for each steady motion that exists there.
+
+    Raises InvalidInput for steady motions by another solver than taylor, or a tolerance that the solver refuses.
+    """
+    if request.steady and request.solver != "taylor":
+        raise InvalidInput("--solver", request.solver, "steady histories are those of taylor; leave --steady out")
+    amplitude = amplitude_of(specimen, request)
+    made: list[History] = []
+    for beta in request.beta:
+        coupled = specimen.coupled(beta)
+        for omega in request.omega:
+            if request.steady:
+                prediction = predict_gain(coupled, omega, amplitude)
+                made += [_steady(layer.orbit, request) for layer in prediction.layers.values()]
+            else:
+                made.append(_from_rest(coupled, omega, amplitude, request))
+    return made
+
+
+def history_table(made: Sequence[History]) -> Table:
+    """All histories below each other: one row per sample."""
+    columns = _points([history for history in made for _ in history.values[TIME]])
+    for name, (unit, description) in QUANTITIES.items():
+        joined = np.concatenate([history.values[name] for history in made]) if made else np.empty(0)
+        columns[name] = Column(joined, unit, description)
+    return columns
+
+
+def runs_table(made: Sequence[History]) -> Table:
+    """One row per history: how it ended, and the greatest values among its samples."""
+    columns = _points(made)
+    columns["status"] = Column(np.array([history.status for history in made], np.str_), "", "how it ended")
+    columns["end_time_s"] = Column(np.array([history.end_time for history in made], np.float64), "s", "when it ended")
+    columns["impacts"] = Column(np.array([history.impacts for history in made], np.int64), "1", "impacts until then")
+    for name in ("u1_m", "drift_m", "theta_rad", "bare_u1_m", "bare_drift_m"):
+        unit, description = QUANTITIES[name]
+        peaks = np.array([history.peak(name) for history in made], np.float64)
+        columns[f"sampled_max_{name}"] = Column(
+            peaks, unit, f"greatest absolute value among the samples: {description}"
+        )
+    return columns
+
+
+def _points(made: Sequence[History]) -> dict[str, Column]:
+    return {
+        "omega_rad_s": Column(
+            np.array([history.omega for history in made], np.float64), "rad/s", "circular frequency of the base motion"
+        ),
+        "beta": Column(np.array([history.beta for history in made], np.float64), "1", "stiffness ratio of the spring"),
+        "motion": Column(
+            np.array([history.motion for history in made], np.str_), "", "from rest, or the layer of the steady state"
+        ),
+    }
+
+
+def _from_rest(coupled: Specimen, omega: float, amplitude: float, request: HistoryRequest) -> History:
+    drive = SineProgram([Sweep.dwell(request.duration, amplitude, omega)])
+    step = tau / omega / request.samples_per_period
+    times = np.arange(int(request.duration / step) + 1, dtype=np.float64) * step
+    motion, bare = (
+        solve(request.solver, specimen, drive, sample_times=times, tolerance=request.tolerance)
+        for specimen in (coupled, coupled.bare())
+    )
+    return History(
+        omega=omega,
+        beta=coupled.beta or 0.0,
+        motion=FROM_REST,
+        status=str(motion.status),
+        end_time=motion.end_time,
+        impacts=motion.impacts,
+        values=_values(
+            times,
+            amplitude * np.sin(omega * times),
+            _filled(motion.samples, times.size)[:, [0, 1, 4]],
+            _filled(bare.samples, times.size)[:, :2],
+        ),
+    )
+
+
+def _steady(orbit: Orbit, request: HistoryRequest) -> History:
+    """Whole periods, beginning with the base's sine."""
+    n, periods = request.samples_per_period, request.periods
+    one = orbit.samples(n)[:, 1:]
+    count = n * periods + 1
+    phases = np.arange(count, dtype=np.float64) * (tau / n)
+    coupled = np.resize(one, (count, 3))
+    rotation = np.exp(1j * phases)
+    u1, u2 = steady_response(orbit.specimen, orbit.omega, orbit.amplitude)
+    bare = np.column_stack([(u1 * rotation).imag, (u2 * rotation).imag])
+    return History(
+        omega=orbit.omega,
+        beta=orbit.specimen.beta or 0.0,
+        motion=orbit.layer,
+        status="steady" if orbit.stable else "steady, unstable",
+        end_time=periods * orbit.period,
+        impacts=periods * orbit.impacts,
+        values=_values(phases / orbit.omega, orbit.amplitude * np.sin(phases), coupled, bare),
+    )
+
+
+def _values(
+    times: NDArray[np.float64], base: NDArray[np.float64], coupled: NDArray[np.float64], bare: NDArray[np.float64]
+) -> dict[str, NDArray[np.float64]]:
+    """`QUANTITIES` from coupled (u1, u2, theta), shape (n, 3), and bare (u1, u2), shape (n, 2)."""
+    return dict(zip(QUANTITIES, _in_order(times, base, coupled, bare), strict=True))
+
+
+def _in_order(
+    times: NDArray[np.float64], base: NDArray[np.float64], coupled: NDArray[np.float64], bare: NDArray[np.float64]
+) -> Iterator[NDArray[np.float64]]:
+    yield from (times, base, coupled[:, 0], coupled[:, 1] - coupled[:, 0], coupled[:, 2])
+    yield from (bare[:, 0], bare[:, 1] - bare[:, 0])
+
+
+def _filled(samples: NDArray[np.float64] | None, n: int) -> NDArray[np.float64]:
+    """The samples with NaN below them up to `n` rows."""
+    filled = np.full((n, 6), np.nan)
+    if samples is not None:
+        filled[: len(samples)] = samples
+    return filled

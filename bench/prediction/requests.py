@@ -1,0 +1,133 @@
+"""What a prediction is asked for: declared once, used by command line, file and documentation. SI units."""
+
+from fractions import Fraction
+from typing import Annotated, Literal
+
+from pydantic import Field, field_validator
+
+from sim.parameters import Parameters, quantity
+
+Frequency = Annotated[float, Field(gt=0, le=1000)]
+Stiffness = Annotated[float, Field(ge=0, le=1000)]
+
+SolverName = Literal["taylor", "paper", "rk4-located", "dop853"]
+
+
+def spaced(start: str, stop: str, count: int) -> tuple[float, ...]:
+    """`count` (2 or more) equally spaced numbers; decimal ends are taken exactly, so 0.1 to 1.2 has 0.3 in it.
+
+    Raises ValueError for text that is no finite number.
+    """
+    first, last = Fraction(start), Fraction(stop)
+    return tuple(float(first + (last - first) * k / (count - 1)) for k in range(count))
+
+
+class ModesRequest(Parameters):
+    """Frequencies and shapes of the linearised system."""
+
+    beta: tuple[Stiffness, ...] = quantity(
+        (0.25, 0.40, 0.64, 0.97),
+        "1",
+        "stiffness ratios k_C/k1 of the coupling spring: values, or start:stop:count",
+        min_length=1,
+    )
+
+    @field_validator("beta")
+    @classmethod
+    def _each_once(cls, values: tuple[float, ...]) -> tuple[float, ...]:
+        return _once(values)
+
+
+class SineRequest(Parameters):
+    """What every prediction of a response to a sine is asked for."""
+
+    omega: tuple[Frequency, ...] = quantity(
+        (12.5, 15.0, 17.5, 20.0),
+        "rad/s",
+        "circular frequencies of the base motion: values, or start:stop:count",
+        min_length=1,
+    )
+    beta: tuple[Stiffness, ...] = quantity(
+        (0.25, 0.64, 0.97),
+        "1",
+        "stiffness ratios k_C/k1 of the coupling spring: values, or start:stop:count",
+        min_length=1,
+    )
+    amplitude_factor: float = quantity(
+        1.01, "1", "amplitude of the base acceleration over the uplift acceleration g/lambda", gt=0, le=1000
+    )
+    solver: SolverName = quantity(
+        "taylor", "", "what computes motions; others than taylor are for comparison: a steady motion is a run of 120 s"
+    )
+    tolerance: float | None = quantity(
+        None,
+        "1",
+        "relative tolerance of a step of taylor (1e-10 if absent) or dop853, the others have a step of 1 ms; steady "
+        "motions by taylor close to 1e-11 or better, whatever is given",
+        ge=1e-15,
+        le=1e-3,
+    )
+
+    @field_validator("omega", "beta")
+    @classmethod
+    def _each_once(cls, values: tuple[float, ...]) -> tuple[float, ...]:
+        return _once(values)
+
+
+class SteadyRequest(SineRequest):
+    """Steady motions at single points."""
+
+
+class SpectrumRequest(SineRequest):
+    """Gain against frequency, a spectrum for each stiffness."""
+
+    omega: tuple[Frequency, ...] = quantity(
+        spaced("12", "21", 181),
+        "rad/s",
+        "circular frequencies of the base motion: values, or start:stop:count",
+        min_length=1,
+    )
+
+
+class MapRequest(SineRequest):
+    """Gain over frequency and stiffness."""
+
+    omega: tuple[Frequency, ...] = quantity(
+        spaced("12", "21", 100),
+        "rad/s",
+        "circular frequencies of the base motion: values, or start:stop:count",
+        min_length=2,
+    )
+    beta: tuple[Stiffness, ...] = quantity(
+        spaced("0.1", "1.2", 100),
+        "1",
+        "stiffness ratios k_C/k1 of the coupling spring: values, or start:stop:count",
+        min_length=2,
+    )
+    scheduler: str | None = quantity(
+        None, "", "address of a dask.distributed scheduler that shares out the work, such as tcp://10.0.0.5:8786"
+    )
+
+
+class HistoryRequest(SineRequest):
+    """Time histories under a sine, from rest or in the steady state."""
+
+    omega: tuple[Frequency, ...] = quantity(
+        (16.0, 14.0, 17.5),
+        "rad/s",
+        "circular frequencies of the base motion: values, or start:stop:count",
+        min_length=1,
+    )
+    beta: tuple[Stiffness, ...] = quantity(
+        (0.40,), "1", "stiffness ratios k_C/k1 of the coupling spring: values, or start:stop:count", min_length=1
+    )
+    duration: float = quantity(12.0, "s", "length of a history that starts from rest", gt=0, le=3600)
+    steady: bool = quantity(False, "", "show the steady motions instead of a start from rest")
+    periods: int = quantity(3, "1", "periods of the drive that a steady history shows", ge=1, le=1000)
+    samples_per_period: int = quantity(200, "1", "samples in a period of the drive", ge=8, le=10000)
+
+
+def _once(values: tuple[float, ...]) -> tuple[float, ...]:
+    if len(set(values)) < len(values):
+        raise ValueError("each value may be asked for once")
+    return values

@@ -1,0 +1,207 @@
+"""What a stated start leads to: one of the two steady motions, another motion, or the overturned block.
+
+Several motions can coexist, and the way to them is chaotic: which one a test lands on is found by going there.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from math import ceil, log, tau
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.errors import InvalidInput
+from sim.excitation import SineProgram, Sweep
+from sim.maps import GainMap, LayerMap
+from sim.rocking import Mode, Motion, Peaks, Status, simulate
+from sim.specimen import Specimen
+from sim.steady import NoOrbit, check_steady, resting_state, rocking_orbit
+from sim.sweep import sweep
+
+START_DURATION = 120.0
+"""Length [s] of the default start."""
+
+WITHIN = 0.02
+"""Relative difference of every peak from the steady motion's at which that counts as reached."""
+
+WINDOW = 20
+"""Periods of the drive over which the peaks are watched: more than the beats of a modulated motion last."""
+
+LEFT = 1e-3
+"""An undecided motion is watched on until a disturbance of the stable orbit would have shrunk to this part."""
+
+FEWEST_ROUNDS, MOST_ROUNDS = 10, 100
+"""Times WINDOW for which that may be: the fewest are for points without a stable orbit."""
+
+StartProgram = Callable[[float, float], SineProgram]
+"""Makes the drive of a start from the frequency [rad/s] and the amplitude [m/s2] that it ends with."""
+
+
+class Outcome(StrEnum):
+    """Where a start leads. OTHER stays near neither steady motion: it is modulated, or of another period."""
+
+    ROCKING = "rocking"
+    RESTING = "resting"
+    OTHER = "other"
+    TOPPLED = "toppled"
+    FAILED = "failed"
+
+
+@dataclass(frozen=True)
+class Reached:
+    """What a start led to. `time` [s] from its beginning: of the overturning, or when the outcome was decided.
+
+    `side`: the corner of the overturning. `peaks` over the last 20 periods of the drive; None when toppled or failed.
+    """
+
+    outcome: Outcome
+    time: float
+    side: Literal["A", "B"] | None
+    peaks: Peaks | None
+
+
+class Steady(NamedTuple):
+    """Peaks of the stable steady motions at one point, None where there is none, and the rocking one's multiplier."""
+
+    rocking: Peaks | None
+    resting: Peaks | None
+    multiplier: float
+
+
+@dataclass(frozen=True, eq=False)
+class OutcomeMap:
+    """Outcomes over the grid of a gain map, n stiffnesses by m frequencies, each array of shape (n, m).
+
+    `outcome`: texts of `Outcome`. `time` [s] and `side` ("A", "B" or empty) as in `Reached`. `drift` [m]: greatest
+    |u2 - u1| over the last 20 periods, NaN when toppled or failed.
+    """
+
+    outcome: NDArray[np.str_]
+    time: NDArray[np.float64]
+    side: NDArray[np.str_]
+    drift: NDArray[np.float64]
+
+    def count(self, outcome: Outcome) -> int:
+        """In how many cells the start led there."""
+        return int((self.outcome == str(outcome)).sum())
+
+
+def switched_on(omega: float, amplitude: float) -> SineProgram:
+    """The sine switched on at t = 0 and held for START_DURATION."""
+    return SineProgram([Sweep.dwell(START_DURATION, amplitude, omega)])
+
+
+def reached(
+    specimen: Specimen,
+    omega: float,
+    amplitude: float,
+    start: StartProgram = switched_on,
+    steady: Steady | None = None,
+) -> Reached:
+    """What `start` leads to, from rest, under a sine of `omega` [rad/s] and `amplitude` [m/s2] in the end.
+
+    The program must end with a dwell there of WINDOW periods or more. A motion that is near neither steady motion
+    after it is watched on. `steady`: the steady motions, if they are known already.
+
+    Raises InvalidInput for a bare frame, meaningless numbers, or a program that ends otherwise.
+    """
+    check_steady(specimen, omega, amplitude)
+    program, window = start(omega, amplitude), WINDOW * tau / omega
+    last = program.sweeps[-1]
+    if last.omega != (omega, omega) or last.amplitude != (amplitude, amplitude) or last.duration < window:
+        allowed = f"it must end with a dwell of {window:g} s or more at {omega:g} rad/s and {amplitude:g} m/s2"
+        raise InvalidInput("end of a start", last, allowed)
+    steady = steady or _steady(specimen, omega, amplitude)
+    phase = program.phase + sum(float(part.phase_at(np.array(part.duration))) for part in program.sweeps)
+    # whole periods, so that each round begins at the phase at which the one before ended
+    more = SineProgram([Sweep.dwell(window, amplitude, omega)], phase % tau)
+    motion = simulate(specimen, program, peaks_from=program.duration - window)
+    time, rounds = motion.end_time, 0
+    while (outcome := _judged(motion, steady)) is Outcome.OTHER and rounds < _patience(steady):
+        motion = simulate(specimen, more, state=motion.end)
+        time, rounds = time + motion.end_time, rounds + 1
+    return Reached(outcome, time, motion.overturned, motion.peaks if motion.status is Status.COMPLETED else None)
+
+
+def outcome_map(gain_map: GainMap, start: StartProgram = switched_on, scheduler: str | None = None) -> OutcomeMap:
+    """What `start` leads to in every cell of a gain map. Raises InvalidInput as `reached` does.
+
+    `scheduler` is that of `sim.sweep.sweep`; there `start` must be picklable: a function of a module.
+    """
+    n, m = len(gain_map.betas), len(gain_map.omegas)
+    cells = [
+        _Cell(
+            gain_map.specimen.coupled(float(gain_map.betas[i])),
+            float(gain_map.omegas[j]),
+            gain_map.amplitude,
+            start,
+            Steady(
+                _cell_peaks(gain_map.rocking, i, j),
+                _cell_peaks(gain_map.resting, i, j),
+                float(gain_map.rocking.multiplier[i, j]),
+            ),
+        )
+        for i in range(n)
+        for j in range(m)
+    ]
+    results = sweep(_reached_in, cells, scheduler, batch=m)
+    return OutcomeMap(
+        outcome=np.array([str(result.outcome) for result in results]).reshape(n, m),
+        time=np.array([result.time for result in results]).reshape(n, m),
+        side=np.array([result.side or "" for result in results]).reshape(n, m),
+        drift=np.array([result.peaks.drift if result.peaks else np.nan for result in results]).reshape(n, m),
+    )
+
+
+class _Cell(NamedTuple):
+    specimen: Specimen
+    omega: float
+    amplitude: float
+    start: StartProgram
+    steady: Steady
+
+
+def _reached_in(cell: _Cell) -> Reached:
+    return reached(*cell)
+
+
+def _cell_peaks(layer: LayerMap, i: int, j: int) -> Peaks | None:
+    return Peaks(*(float(peak) for peak in layer.peaks[i, j])) if layer.stable[i, j] else None
+
+
+def _steady(specimen: Specimen, omega: float, amplitude: float) -> Steady:
+    resting = resting_state(specimen, omega, amplitude)
+    try:
+        rocking = rocking_orbit(specimen, omega, amplitude)
+    except NoOrbit:
+        rocking = None
+    if rocking is None or not rocking.stable:
+        return Steady(None, resting.peaks if resting else None, np.nan)
+    return Steady(rocking.peaks, resting.peaks if resting else None, rocking.multiplier)
+
+
+def _patience(steady: Steady) -> int:
+    """Rounds of WINDOW periods for which an undecided motion is watched."""
+    if steady.rocking is None:
+        return FEWEST_ROUNDS
+    return min(MOST_ROUNDS, max(FEWEST_ROUNDS, ceil(log(LEFT) / (WINDOW * log(steady.multiplier)))))
+
+
+def _judged(motion: Motion, steady: Steady) -> Outcome:
+    if motion.overturned:
+        return Outcome.TOPPLED
+    if motion.status is not Status.COMPLETED:
+        return Outcome.FAILED
+    if motion.end.mode is Mode.REST and motion.peaks.theta == 0.0:
+        if steady.resting is not None and _near(motion.peaks, steady.resting):
+            return Outcome.RESTING
+    elif steady.rocking is not None and _near(motion.peaks, steady.rocking):
+        return Outcome.ROCKING
+    return Outcome.OTHER
+
+
+def _near(peaks: Peaks, orbit: Peaks) -> bool:
+    pairs = ((peaks.u1, orbit.u1), (peaks.drift, orbit.drift), (peaks.theta, orbit.theta))
+    return all(abs(peak - steady) <= WITHIN * steady for peak, steady in pairs)

@@ -1,0 +1,171 @@
+"""How the gain coefficients move with every parameter.
+
+The rocking orbit is a fixed point x = F(x, p) of the return map. Implicit function theorem: dx/dp = (I - F_x)^-1 F_p;
+F_x is the matrix whose eigenvalues are the Floquet multipliers. A peak is a stationary value u(t*), so it moves as u
+does at a fixed t* (envelope theorem): dP/dp = u_x dx/dp + u_p. The greatest |u| itself would not do: the motions to
+both sides are so nearly alike that a small step changes which of them is the greatest. alpha = P / P_bare then
+follows by the quotient rule.
+"""
+
+from dataclasses import dataclass
+from math import tau
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.excitation import SineProgram, Sweep
+from sim.linear import steady_peaks
+from sim.return_map import STENCIL, images, jacobians, parameters, scales
+from sim.rocking import State, simulate
+from sim.specimen import Block, Frame, Specimen
+from sim.steady import NoOrbit, Orbit, resting_state, rocking_orbit
+
+STEP = 3e-5
+"""Relative step of the differences, of fourth order; absolute for a parameter that is zero."""
+
+TOLERANCE = 1e-13
+"""Of the runs that are differenced."""
+
+SAMPLES, ZOOMS = 401, 2
+"""Samples in which a peak is sought, and how often the search is narrowed down to a few of them."""
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """Derivatives of alpha_1 and alpha_2 [1 / SI unit of the parameter], and the parameter's value [SI]."""
+
+    value: float
+    alpha_1: float
+    alpha_2: float
+
+
+class _Point(NamedTuple):
+    specimen: Specimen
+    omega: float
+    amplitude: float
+
+
+def parameter_values(specimen: Specimen, omega: float, amplitude: float) -> dict[str, float]:
+    """Every number that a prediction depends on, by name [SI]; h2 is not among them: no equation contains it."""
+    frame, block = specimen.frame.model_dump(exclude={"h2"}), specimen.block.model_dump()
+    others = {"beta": specimen.beta or 0.0, "d": specimen.d, "g": specimen.g}
+    return {**frame, **block, **others, "omega": omega, "amplitude": amplitude}
+
+
+def sensitivities(
+    specimen: Specimen,
+    omega: float,
+    amplitude: float,
+    layer: Literal["rocking", "resting"] = "rocking",
+    orbit: Orbit | None = None,
+) -> dict[str, Sensitivity]:
+    """Derivatives of alpha_1 and alpha_2 with respect to every name of `parameter_values`.
+
+    `orbit`: the orbit there, if it is known already. The bare test moves with the parameters too: it has the same
+    frame, frequency [rad/s] and amplitude [m/s2]. beta is k_C / k1: a change of k1 alone takes k_C along. Where the
+    peaks to both sides are equal the derivative is that of one of them.
+
+    Raises InvalidInput as `rocking_orbit` does, NoOrbit when the layer does not exist.
+    """
+    if orbit is None:
+        known = rocking_orbit if layer == "rocking" else resting_state
+        orbit = known(specimen, omega, amplitude)
+    if orbit is None:
+        raise NoOrbit(f"no resting motion at omega = {omega:g} rad/s: the block lifts; lower the amplitude")
+    values = parameter_values(specimen, omega, amplitude)
+    steps = {name: STEP * abs(value) or STEP for name, value in values.items()}
+    nodes = STENCIL[4][0].tolist()
+    moved = [_moved(specimen, values, name, node * step) for name, step in steps.items() for node in nodes]
+    each = np.array(list(steps.values()))
+    if orbit.layer == "rocking":
+        slopes = _along_branch(orbit, moved, each)
+    else:
+        slopes = _slopes(np.array([_linear(point, resting=True) for point in moved]), each)
+    peaks, bare = np.array([orbit.peaks.u1, orbit.peaks.drift]), _linear(_Point(specimen, omega, amplitude))
+    bare_slopes = _slopes(np.array([_linear(point) for point in moved]), each)
+    gains = (slopes - peaks / bare * bare_slopes) / bare
+    return {
+        name: Sensitivity(value, float(gain[0]), float(gain[1]))
+        for (name, value), gain in zip(values.items(), gains, strict=True)
+    }
+
+
+def _along_branch(orbit: Orbit, moved: list[_Point], steps: Floats) -> Floats:
+    """Derivatives of the peaks of u1 and drift along the branch of orbits, shape (n, 2)."""
+    here, section, times = _Point(orbit.specimen, orbit.omega, orbit.amplitude), orbit.section, _peak_times(orbit)
+    q = parameters(*here)
+    there = np.concatenate([parameters(*point) for point in moved])
+    image, _ = images(there, np.tile(section, (len(there), 1)))
+    return_slopes: Floats = jacobians(q, section[None])[0]
+    sections = np.linalg.solve(np.eye(6) - return_slopes, _slopes(image, steps).T)
+
+    moves = STEP * scales(q)[0]
+    starts = section + (np.diag(moves)[:, None, :] * STENCIL[4][0][:, None]).reshape(-1, 6)
+    by_start = _slopes(np.array([_peaks_at(here, start, times) for start in starts]), moves)
+    direct = _slopes(np.array([_peaks_at(point, section, times) for point in moved]), steps)
+    total = direct + sections.T @ by_start
+    return total * np.sign(_peaks_at(here, section, times))
+
+
+def _peak_times(orbit: Orbit) -> Floats:
+    """When |u1| and |u2 - u1| are greatest [s], shape (2,), counted from the orbit's section within one period."""
+    found = np.empty(2)
+    here = _Point(orbit.specimen, orbit.omega, orbit.amplitude)
+    for which in range(2):
+        middle = width = 0.5 * orbit.period
+        for _ in range(ZOOMS):
+            times = np.linspace(max(0.0, middle - width), middle + width, SAMPLES)
+            step = float(times[1] - times[0])
+            motion = _motion(here, orbit.section, times)
+            at = int(np.abs(motion[1:-1, which]).argmax()) + 1
+            # a maximum is flat, so rounding hides where it is: the zero of the velocity is sharp
+            before, rate, after = motion[at - 1 : at + 2, 2 + which]
+            middle = float(times[at] - np.clip(2.0 * step * rate / (after - before), -step, step))
+            width = 2.0 * step
+        found[which] = middle
+    return found
+
+
+def _peaks_at(point: _Point, section: Floats, times: Floats) -> Floats:
+    """u1 at the first of `times` and u2 - u1 at the second [m], shape (2,)."""
+    order = np.argsort(times)
+    return _motion(point, section, times[order])[np.argsort(order), [0, 1]]
+
+
+def _motion(point: _Point, section: Floats, times: Floats) -> Floats:
+    """u1 and u2 - u1 [m] and their rates [m/s] at ascending `times` [s] after a section, shape (n, 4)."""
+    phase, u1, u2, v1, v2, velocity = (float(value) for value in section)
+    duration = float(times[-1]) + tau / point.omega
+    drive = SineProgram([Sweep.dwell(duration, point.amplitude, point.omega)], phase)
+    start = State(u1, u2, v1, v2, 0.0, velocity)
+    samples = simulate(point.specimen, drive, state=start, sample_times=times, tolerance=TOLERANCE).samples
+    if samples is None or len(samples) < len(times):
+        raise NoOrbit(f"the orbit at omega = {point.omega:g} rad/s is too unstable to be differentiated")
+    return np.column_stack([samples[:, 0], samples[:, 1] - samples[:, 0], samples[:, 2], samples[:, 3] - samples[:, 2]])
+
+
+def _linear(point: _Point, *, resting: bool = False) -> Floats:
+    peaks = steady_peaks(*point, resting=resting)
+    return np.array([peaks.u1, peaks.drift])
+
+
+def _slopes(values: Floats, steps: Floats) -> Floats:
+    """Derivatives by n numbers, shape (n, k), from values at the nodes around each, shape (4 n, k)."""
+    nodes, weights = STENCIL[4]
+    return np.einsum("s,nsk->nk", weights, values.reshape(steps.size, nodes.size, -1)) / steps[:, None]
+
+
+def _moved(specimen: Specimen, values: dict[str, float], name: str, change: float) -> _Point:
+    """The point with one parameter changed. Not validated: a step may go just below a parameter's limit of zero."""
+    new = {**values, name: values[name] + change}
+
+    def part(names: Any) -> dict[str, Any]:
+        return {key: new[key] for key in names if key in new}
+
+    frame = Frame.model_construct(None, h2=specimen.frame.h2, **part(Frame.model_fields))
+    block = Block.model_construct(None, **part(Block.model_fields))
+    coupled = Specimen.model_construct(None, frame=frame, block=block, **part(Specimen.model_fields))
+    return _Point(coupled, new["omega"], new["amplitude"])

@@ -1,0 +1,1 @@
+"""Named ways to integrate the same equations, for comparison: `sim.solvers.catalogue` has them all."""

@@ -1,0 +1,1 @@
+"""Measurements that are run by hand: they print numbers and need more time than a test may take."""

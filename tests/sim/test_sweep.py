@@ -1,0 +1,95 @@
+"""Sweeps in threads, on a scheduler with two worker processes, and without one."""
+
+import os
+import socket
+import sys
+import threading
+import warnings
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sim.errors import InvalidInput
+from sim.maps import gain_map
+from sim.outcomes import outcome_map
+from sim.specimen import Specimen
+from sim.sweep import SchedulerUnavailable, sweep
+from tests.sim.runs import A_S
+
+
+def process(_: int) -> int:
+    """The process that did it."""
+    return os.getpid()
+
+
+def inverse(value: int) -> float:
+    return 1.0 / value
+
+
+def test_threads_keep_the_order_and_share_the_work() -> None:
+    together = threading.Barrier(2, timeout=10.0)
+
+    def both(value: int) -> int:
+        if value < 2 and (os.cpu_count() or 1) > 1:
+            together.wait()  # passes only when two run at a time
+        return value * value
+
+    assert sweep(both, range(50)) == [value * value for value in range(50)]
+    assert sweep(both, []) == []
+
+
+def test_errors_come_through() -> None:
+    with pytest.raises(ZeroDivisionError):
+        sweep(inverse, [1, 0])
+    with pytest.raises(InvalidInput, match="batch"):
+        sweep(inverse, [1], batch=0)
+
+
+def test_without_the_client_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(SchedulerUnavailable, match=r"tcp://x:1.*rocking-bench\[distributed\]"):
+        sweep(inverse, [1], "tcp://x:1")
+
+
+def test_a_scheduler_that_is_not_there_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("distributed", reason="dask.distributed is not installed (extra: distributed)")
+    monkeypatch.setattr("sim.sweep.PATIENCE", 0.5)
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        address = f"tcp://127.0.0.1:{free.getsockname()[1]}"
+    with pytest.raises(SchedulerUnavailable, match=address):
+        sweep(inverse, [1], address)
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Any:
+    distributed = pytest.importorskip("distributed", reason="dask.distributed is not installed (extra: distributed)")
+    with (
+        warnings.catch_warnings(),
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, host="127.0.0.1"
+        ) as two_workers,
+    ):
+        yield two_workers
+
+
+def test_a_scheduler_s_workers_do_the_work(cluster: Any) -> None:
+    address = str(cluster.scheduler_address)
+    seen = sweep(process, range(40), address)
+    assert len(set(seen)) == 2
+    assert os.getpid() not in seen
+    assert sweep(inverse, range(1, 8), address, batch=3) == [1.0 / value for value in range(1, 8)]
+    with pytest.raises(ZeroDivisionError):
+        sweep(inverse, [1, 0], address)
+
+
+def test_a_map_and_its_outcomes_are_the_same_on_workers(cluster: Any) -> None:
+    address = str(cluster.scheduler_address)
+    betas, omegas = [0.2, 0.6, 1.0], np.linspace(14.0, 20.0, 8)
+    here, there = gain_map(Specimen(), betas, omegas, A_S), gain_map(Specimen(), betas, omegas, A_S, scheduler=address)
+    assert np.array_equal(here.rocking.peaks, there.rocking.peaks)
+    assert np.array_equal(here.rocking.multipliers, there.rocking.multipliers)
+    first, second = outcome_map(here), outcome_map(there, scheduler=address)
+    assert (first.outcome == second.outcome).all()
+    assert np.array_equal(first.time, second.time)
