@@ -128,7 +128,7 @@ def simulate(
     Source: Eq. (8), (9), (A.1) and (A.3) of the paper; coming to rest is described in `sim.kernel.rocking.run`.
     """
     check_options(tolerance, overturning_angle)
-    run = _Run(specimen, _Drive(excitation), state or State(), sample_times, peaks_from, tolerance, overturning_angle)
+    run = _Run(specimen, Drive(excitation), state or State(), sample_times, peaks_from, tolerance, overturning_angle)
     return run.motion()
 
 
@@ -155,7 +155,7 @@ def simulate_many(
         raise InvalidInput("simulate_many", several, "its sequences must have the same length")
 
     models = list(specimens) if isinstance(specimens, Sequence) else [specimens]
-    drives = [_Drive(item) for item in (excitations if isinstance(excitations, Sequence) else [excitations])]
+    drives = [Drive(item) for item in (excitations if isinstance(excitations, Sequence) else [excitations])]
     check_options(tolerance, overturning_angle)
 
     prepared = [
@@ -229,7 +229,7 @@ def motion_of(
     )
 
 
-class _Drive:
+class Drive:
     """An excitation's table, checked: its segments, its duration [s] and the typical length of a segment [s]."""
 
     def __init__(self, excitation: Excitation) -> None:
@@ -252,7 +252,7 @@ class _Run:
     """One run, checked when it is made."""
 
     specimen: Specimen
-    drive: _Drive
+    drive: Drive
     state: State
     sample_times: ArrayLike | None
     peaks_from: float | None
@@ -268,7 +268,7 @@ class _Run:
     def motion(self) -> Motion:
         from sim.kernel import rocking as kernel
 
-        times = _checked_times(self.sample_times, self.drive.duration)
+        times = checked_times(self.sample_times, self.drive.duration)
         x, samples = self.state.as_array(), np.empty((times.size, 6))
         report, memory = np.zeros(kernel.REPORT), np.zeros((kernel.MEMORY_ROWS, 6))
         memory[0, kernel.LENGTH] = self.drive.segments[0, 0]
@@ -292,7 +292,7 @@ class _Run:
         return motion_of(report, x, None if self.sample_times is None else samples, watched=self.peaks_from is not None)
 
 
-def _checked_times(sample_times: ArrayLike | None, duration: float) -> NDArray[np.float64]:
+def checked_times(sample_times: ArrayLike | None, duration: float) -> NDArray[np.float64]:
     times = np.ascontiguousarray([] if sample_times is None else sample_times, dtype=np.float64)
     if times.ndim != 1 or not np.isfinite(times).all() or (np.diff(times) < 0.0).any():
         raise InvalidInput("sample_times", times.shape, "they must be finite ascending seconds in one row")

@@ -10,11 +10,11 @@ from sim.errors import InvalidInput
 from sim.excitation import Excitation
 from sim.rocking import (
     TOLERANCE,
+    Drive,
     State,
-    _checked_times,  # pyright: ignore[reportPrivateUsage]  # the engine's checks serve all solvers
-    _Drive,  # pyright: ignore[reportPrivateUsage]
     check_options,
     check_state,
+    checked_times,
 )
 from sim.specimen import Specimen
 
@@ -52,7 +52,7 @@ class Problem:
     ) -> "Problem":
         """The problem as `sim.rocking.simulate` takes it. Raises InvalidInput as that does."""
         check_options(TOLERANCE, overturning_angle)
-        drive, start = _Drive(excitation), state or State()
+        drive, start = Drive(excitation), state or State()
         check_state(specimen, start, overturning_angle)
         if peaks_from is not None and not 0.0 <= peaks_from < drive.duration:
             raise InvalidInput("peaks_from", peaks_from, f"it must lie within the {drive.duration:g} s of the run")
@@ -60,7 +60,7 @@ class Problem:
             parameters=specimen.packed(),
             segments=drive.segments,
             start=start.as_array(),
-            times=_checked_times(sample_times, drive.duration),
+            times=checked_times(sample_times, drive.duration),
             sampled=sample_times is not None,
             peaks_from=inf if peaks_from is None else peaks_from,
             overturning_angle=overturning_angle,
