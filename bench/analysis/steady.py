@@ -14,6 +14,9 @@ WINDOW = 12
 
 LONGEST_SUBHARMONIC = 6
 
+SPREAD = 5.0
+"""Tolerances by which a cycle of a steady motion may differ from the mean of its window."""
+
 KIN_SHARE = 0.25
 """A storey that happens to stand almost still is judged on a quarter of the other's motion, not on its own."""
 
@@ -35,10 +38,12 @@ class Steadiness:
 class SteadyDetector:
     """Compares the complex amplitudes of every signal over the last two windows of cycles.
 
-    Steady means: within a window no cycle is farther from the mean than the tolerance, and the means of the two
-    windows differ by less than a third of it, which bounds what a transient that decays by 2 % a cycle still has to go
-    (0.98^12 / (1 - 0.98^12) / 3 = 1.2 tolerances). A noise floor of four standard deviations of a fitted
-    amplitude, sigma sqrt(2 / N), is granted to every signal, and to every phase the jitter of a sensor that runs free.
+    Steady means: the means of the two windows differ by less than a third of the tolerance, which bounds what a
+    transient that decays by 2 % a cycle still has to go (0.98^12 / (1 - 0.98^12) / 3 = 1.2 tolerances); and within the
+    last window no cycle is farther from the mean than `SPREAD` tolerances. A weakly damped orbit that noise keeps
+    shaking, or a transient that turns from cycle to cycle, spreads more than it moves the mean; what is left of it is
+    in the scatter of the measured cycles. A noise floor of four standard deviations of a fitted amplitude,
+    sigma sqrt(2 / N), is granted to every signal, and to every phase the jitter of a sensor that runs free.
     """
 
     def __init__(
@@ -75,7 +80,7 @@ class SteadyDetector:
         spreads, drifts = zip(self._compare(amplitudes, sigma), self._compare(peaks, 2.0 * sigma), strict=True)
         spread, drift = float(np.max(spreads)), float(np.max(drifts))
         tolerance = allowance * self._tolerance
-        steady = spread <= tolerance and drift <= tolerance / 3.0
+        steady = spread <= SPREAD * tolerance and drift <= tolerance / 3.0
         return Steadiness(steady, spread, drift, 1 if steady else self._repeats(amplitudes, sigma))
 
     def _compare(
