@@ -10,11 +10,17 @@ the test for non-finite numbers. Nobody calls them as C functions: without that 
 # numba publishes no types; `cast` below gives the decorated function its own type back.
 
 import hashlib
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-import numba
+# the loops here are short recurrences: vectorising them and the last level of optimisation cost a fifth of the
+# time of compilation and win nothing. numba reads these once, when it is imported; who sets them himself is obeyed
+for name, value in (("NUMBA_OPT", "2"), ("NUMBA_LOOP_VECTORIZE", "0"), ("NUMBA_SLP_VECTORIZE", "0")):
+    os.environ.setdefault(name, value)
+
+import numba  # noqa: E402
 
 F = TypeVar("F", bound=Callable[..., Any])
 
