@@ -29,6 +29,12 @@ def map_table(specimen: Specimen, request: MapRequest) -> Table:
         _columns(name, layer, omegas, betas, amplitude)
         for name, layer in (("rocking", made.rocking), ("resting", made.resting))
     ]
+    if request.outcomes:
+        from sim.outcomes import outcome_map
+
+        came = outcome_map(made, scheduler=request.scheduler)
+        for part, layer in zip(parts, (made.rocking, made.resting), strict=True):
+            part |= {"outcome": came.outcome[layer.exists], "outcome_time_s": came.time[layer.exists]}
     whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     # stable: of two layers at one point, the rocking one stays first
     order = np.lexsort((whole["omega_rad_s"], whole["beta"]))

@@ -104,6 +104,9 @@ class MapRequest(SineRequest):
         "stiffness ratios k_C/k1 of the coupling spring: values, or start:stop:count",
         min_length=2,
     )
+    outcomes: bool = quantity(
+        False, "", "also start every point at rest with the sine switched on, and say what it comes to (3 ms a point)"
+    )
     scheduler: str | None = quantity(
         None, "", "address of a dask.distributed scheduler that shares out the work, such as tcp://10.0.0.5:8786"
     )

@@ -49,6 +49,8 @@ COLUMNS: dict[str, tuple[str, str, int | None]] = {
 
 EXTRA: dict[str, tuple[str, str, int | None]] = {
     "status": ("", "exact, or how the run by another solver ended", None),
+    "outcome": ("", "what the sine switched on at rest comes to: rocking, resting, other, toppled or failed", None),
+    "outcome_time_s": ("s", "time of the overturning, or when the outcome was decided", None),
 }
 
 Row = dict[str, float | str | bool | None]

@@ -19,6 +19,8 @@ from bench.prediction.steady import rounded
 from bench.record import tables
 from bench.record.hdf5 import group, open_to_read
 from sim.errors import InvalidInput
+from sim.excitation import SineProgram, Sweep
+from sim.rocking import simulate
 from sim.specimen import Specimen
 
 STEADY_ALPHA_2 = [
@@ -393,3 +395,16 @@ def test_help_needs_no_numbers_and_a_prediction_no_drawing() -> None:
     loaded = _modules_after("predict", "steady", "--omega", "16", "--beta", "0.4", "--json")
     assert not {"matplotlib", "h5py", "PySide6", "pyqtgraph", "nidaqmx", "distributed"} & loaded
     assert "numba" in loaded
+
+
+def test_a_map_says_on_request_what_the_sine_switched_on_comes_to(capsys: pytest.CaptureFixture[str]) -> None:
+    flags = ["--omega", "13:20:3", "--beta", "0.25:0.64:2", "--outcomes", "--json"]
+    assert main(["predict", "map", *flags]) == 0
+    points = json.loads(capsys.readouterr().out)["points"]
+    assert {point["outcome"] for point in points} <= {"rocking", "resting", "other", "toppled", "failed"}
+    toppled = [point for point in points if point["outcome"] == "toppled"]
+    assert toppled
+    for point in toppled:
+        specimen = Specimen().coupled(point["beta"])
+        switched_on = SineProgram([Sweep.dwell(120.0, point["amplitude_m_s2"], point["omega_rad_s"])])
+        assert simulate(specimen, switched_on).end_time == pytest.approx(point["outcome_time_s"])
