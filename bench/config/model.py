@@ -16,7 +16,7 @@ class Acquisition(Parameters):
     """How the samples travel."""
 
     block_duration: float = quantity(
-        0.1, "s", "length of a block of samples: one turn of the loop that reads, guards and drives", ge=0.01, le=1
+        0.1, "s", "length of a block of samples: one turn of the loop that reads, guards and drives", ge=0.01, le=0.2
     )
 
 

@@ -213,17 +213,6 @@ def test_nothing_is_drawn_without_a_change_and_at_most_eight_times_a_second():
         assert 1 <= written(console).count("bench time") - drawn <= 8 * elapsed + 2
 
 
-def test_a_block_of_samples_costs_next_to_nothing():
-    live = LiveConsole(terminal())
-    n, best = 2000, 1.0
-    for _ in range(10):
-        begin = time.perf_counter()
-        for _ in range(n):
-            live(BLOCK)
-        best = min(best, (time.perf_counter() - begin) / n)
-    assert best < 2e-6
-
-
 @pytest.mark.parametrize(
     ("said", "expected"),
     [
