@@ -33,6 +33,7 @@ from bench.engine.steps import (
 from bench.engine.stream import Stream
 from bench.events import Acquired, LimitExceeded, OperatorAnswered, OperatorAsked, State, StateChanged, Warned
 from bench.guard.guard import Guard
+from bench.guard.watch import Violation
 from drivers.rig import Rig, RigError
 from sim.errors import RockbenchError
 from sim.specimen import Specimen
@@ -78,6 +79,7 @@ class Engine:
         self._fall: FallWatch | None = None
         self._cycles: CycleAnalyser | None = None
         self._drive = np.zeros(0)
+        self._over: Violation | None = None
         self._read = 0
         self._run = 0
 
@@ -214,8 +216,8 @@ class Engine:
         self._read = exchange.block.first + len(exchange.block)
         self._drive = exchange.drive
         self._stream.publish(Acquired(self._stream.now(), self._run, exchange.block, exchange.drive))
-        if exchange.violation is not None and self.state is not State.ABORTING:
-            over = exchange.violation
+        self._over = over = exchange.violation
+        if over is not None and self.state is not State.ABORTING:
             self._stream.say(LimitExceeded(0.0, over.quantity, over.value, over.limit, over.unit))
             self._end(State.ABORTING, Ending("aborted", str(over)))
         self._heed_requests()
@@ -244,6 +246,9 @@ class Engine:
         fell = False
         while not self._guard.at_zero:
             fell |= self._fell(self._signals.of(self._turn()))
+        if self._over is not None:
+            self._cut(f"{self._over} although the drive has been ramped to zero")
+            raise _Ended(Ending("halted", f"{self._over} although the drive has been ramped to zero"))
         self._guard.disarm()
         self._machine.go(State.IDLE, "the output is at zero")
         return Fallen() if fell else Done()

@@ -206,6 +206,20 @@ def _others() -> dict[str, Callable[[np.ndarray], np.ndarray]]:
     }
 
 
+def test_a_table_that_runs_away_without_a_drive_loses_its_enable_line() -> None:
+    away = np.zeros(1)
+
+    def displacement(volts: np.ndarray) -> np.ndarray:
+        away[0] += 0.004
+        return np.full(volts.size, away[0])
+
+    bench = Bench(LoopbackRig({"table_displacement": displacement, **_others()}))
+    ending = bench.run(_plan(*RUN))
+    assert ending.status == "halted"
+    assert "although the drive has been ramped to zero" in ending.reason
+    assert bench.rig.halted
+
+
 class _Failing(LoopbackRig):
     """Fails at its 30th block."""
 
