@@ -25,3 +25,10 @@ def unit_of(field: FieldInfo) -> str:
     """The SI unit that `quantity` stored on a field; empty for texts, switches and nested groups."""
     extra = cast(object, field.json_schema_extra)
     return str(cast(dict[str, object], extra).get("unit", "")) if isinstance(extra, dict) else ""
+
+
+def each_once(values: tuple[float, ...]) -> tuple[float, ...]:
+    """The values of a list of points, when none is there twice; ValueError otherwise. For use as a validator."""
+    if len(set(values)) < len(values):
+        raise ValueError("each value may be asked for once")
+    return values

@@ -70,6 +70,11 @@ def fit_cycle(index: int, phase: NDArray[np.float64], values: NDArray[np.float64
     )
 
 
+def mean_amplitude(cycles: Sequence[Cycle], column: int) -> float:
+    """Mean over cycles of the magnitude of one signal's fundamental."""
+    return float(np.mean([abs(cycle.fundamental[column]) for cycle in cycles]))
+
+
 def mean_cycle(cycles: Sequence[Cycle]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Peaks of the mean of many cycles, shape (m,), each cycle's magnitude there, (n, m), and harmonics, (m,).
 

@@ -6,7 +6,7 @@ from math import hypot, sqrt
 
 import numpy as np
 
-from bench.analysis.cycles import Cycle, mean_cycle
+from bench.analysis.cycles import Cycle, mean_amplitude, mean_cycle
 from bench.analysis.signals import ACCELERATION, DRIFT, LASER_1, LASER_2, U1
 from sim.parameters import Parameters, quantity
 
@@ -79,13 +79,12 @@ def modulated_peak(cycles: Sequence[Cycle]) -> SteadyPeak:
 
 
 def _peak(cycles: Sequence[Cycle], drift: float, scatter: float, u1: float, harmonics: float) -> SteadyPeak:
-    fundamentals = np.array([cycle.fundamental for cycle in cycles])
-    mean = fundamentals.mean(axis=0)
+    mean = np.mean([cycle.fundamental for cycle in cycles], axis=0)
     return SteadyPeak(
         drift=drift,
         scatter=scatter,
         u1=u1,
-        amplitude=float(np.abs(fundamentals[:, ACCELERATION]).mean()),
+        amplitude=mean_amplitude(cycles, ACCELERATION),
         harmonics=harmonics,
         laser_1=complex(mean[LASER_1]),
         laser_2=complex(mean[LASER_2]),

@@ -24,9 +24,3 @@ class DriveCalibration:
     def volts_per_acceleration(self, omega: NDArray[np.float64]) -> NDArray[np.float64]:
         """Drive amplitude per acceleration amplitude [V s2/m], same shape as `omega`."""
         return 1.0 / np.interp(omega, self.omega, self.gain)
-
-    def with_point(self, omega: float, gain: float) -> "DriveCalibration":
-        """The calibration with the gain measured at one more frequency, or measured anew."""
-        points = dict(zip(self.omega, self.gain, strict=True)) | {omega: gain}
-        ordered = sorted(points)
-        return DriveCalibration(tuple(ordered), tuple(points[key] for key in ordered))

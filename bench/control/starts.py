@@ -69,8 +69,8 @@ def plan_starts(specimen: Specimen, omega: float, amplitude: float, orbit: Orbit
     does not fall.
     """
     candidates = _candidates(omega, amplitude)
-    specimens = [_off(specimen, restitution, spring) for _, restitution, spring in OFFSETS]
-    runs = [(start, factor, variant) for start in candidates for (factor, *_), variant in _pairs(specimens)]
+    variants = [(factor, _off(specimen, restitution, spring)) for factor, restitution, spring in OFFSETS]
+    runs = [(start, factor, variant) for start in candidates for factor, variant in variants]
     motions = simulate_many(
         [variant for _, _, variant in runs],
         [program(_scaled(start, factor)) for start, factor, _ in runs],
@@ -82,10 +82,6 @@ def plan_starts(specimen: Specimen, omega: float, amplitude: float, orbit: Orbit
     n = len(OFFSETS)
     rated = [replace(start, chance=sum(good[i * n : (i + 1) * n]) / n) for i, start in enumerate(candidates)]
     return sorted(rated, key=lambda start: (-start.chance, start.duration))[:count]
-
-
-def _pairs(specimens: list[Specimen]) -> list[tuple[tuple[float, float, float], Specimen]]:
-    return list(zip(OFFSETS, specimens, strict=True))
 
 
 def _off(specimen: Specimen, restitution: float, spring: float) -> Specimen:

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, field_validator
 
-from sim.parameters import Parameters, quantity
+from sim.parameters import Parameters, each_once, quantity
 
 Frequency = Annotated[float, Field(gt=0, le=1000)]
 Stiffness = Annotated[float, Field(ge=0, le=1000)]
@@ -32,10 +32,7 @@ class ModesRequest(Parameters):
         min_length=1,
     )
 
-    @field_validator("beta")
-    @classmethod
-    def _each_once(cls, values: tuple[float, ...]) -> tuple[float, ...]:
-        return _once(values)
+    _each_once = field_validator("beta")(each_once)
 
 
 class SineRequest(Parameters):
@@ -68,10 +65,7 @@ class SineRequest(Parameters):
         le=1e-3,
     )
 
-    @field_validator("omega", "beta")
-    @classmethod
-    def _each_once(cls, values: tuple[float, ...]) -> tuple[float, ...]:
-        return _once(values)
+    _each_once = field_validator("omega", "beta")(each_once)
 
 
 class SteadyRequest(SineRequest):
@@ -128,9 +122,3 @@ class HistoryRequest(SineRequest):
     steady: bool = quantity(False, "", "show the steady motions instead of a start from rest")
     periods: int = quantity(3, "1", "periods of the drive that a steady history shows", ge=1, le=1000)
     samples_per_period: int = quantity(200, "1", "samples in a period of the drive", ge=8, le=10000)
-
-
-def _once(values: tuple[float, ...]) -> tuple[float, ...]:
-    if len(set(values)) < len(values):
-        raise ValueError("each value may be asked for once")
-    return values

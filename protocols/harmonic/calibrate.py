@@ -2,9 +2,7 @@
 
 from collections.abc import Generator, Sequence
 
-import numpy as np
-
-from bench.analysis.cycles import Cycle
+from bench.analysis.cycles import Cycle, mean_amplitude
 from bench.analysis.signals import ACCELERATION, SIGNALS
 from bench.control.calibration import DriveCalibration
 from bench.control.legs import Leg
@@ -67,5 +65,4 @@ def _measure(omega: float, amplitude: float) -> Generator[Step, Outcome, float |
 
 def drive_gain(cycles: Sequence[Cycle]) -> float:
     """Amplitude of the table's acceleration over that of the drive, over cycles [m/s2 per V]."""
-    amplitudes = np.abs(np.array([cycle.fundamental for cycle in cycles])).mean(axis=0)
-    return float(amplitudes[ACCELERATION] / amplitudes[_DRIVE])
+    return mean_amplitude(cycles, ACCELERATION) / mean_amplitude(cycles, _DRIVE)

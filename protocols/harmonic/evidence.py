@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bench.analysis.cycles import Cycle
+from bench.analysis.cycles import Cycle, mean_amplitude
 from bench.analysis.signals import ACCELERATION
 from sim.errors import RockbenchError
 
@@ -29,7 +29,7 @@ def need_cycles(cycles: Sequence[Cycle], asked: int) -> None:
 
 def need_answer(cycles: Sequence[Cycle]) -> None:
     """Raise Unmeasurable when the table does not follow the drive."""
-    moved = float(np.mean([abs(cycle.fundamental[ACCELERATION]) for cycle in cycles]))
+    moved = mean_amplitude(cycles, ACCELERATION)
     doubt = float(np.mean([cycle.noise[ACCELERATION] * np.sqrt(2.0 / cycle.samples) for cycle in cycles]))
     if not moved > AUDIBLE * doubt:
         raise Unmeasurable(

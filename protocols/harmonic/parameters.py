@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import Field, field_validator
 
-from sim.parameters import Parameters, quantity
+from sim.parameters import Parameters, each_once, quantity
 
 Frequency = Annotated[float, Field(gt=0, le=40)]
 Stiffness = Annotated[float, Field(gt=0, le=100)]
@@ -20,12 +20,7 @@ class HarmonicParameters(Parameters):
         (0.25, 0.64, 0.97), "1", "stiffness ratios k_C/k1 of the coupling springs", min_length=1
     )
 
-    @field_validator("omega", "beta")
-    @classmethod
-    def _each_once(cls, values: tuple[float, ...]) -> tuple[float, ...]:
-        if len(set(values)) < len(values):
-            raise ValueError("each value may be asked for once")
-        return values
+    _each_once = field_validator("omega", "beta")(each_once)
 
     amplitude_factor: float = quantity(
         1.01, "1", "amplitude of the table acceleration over the uplift acceleration g/lambda", ge=0.1, le=5

@@ -41,10 +41,13 @@ def check_storeys(parameters: HarmonicParameters, configuration: BenchConfigurat
     ranges = (0.5 * bench.laser_1.measuring_range, 0.5 * bench.laser_2.measuring_range)
     for omega in parameters.omega:
         for beta in (None, *parameters.beta):
-            seen = _bare(specimen, omega, amplitude, share) if beta is None else None
-            if beta is not None:
+            if beta is None:
+                seen = _bare(specimen, omega, amplitude, share)
+            else:
                 seen = _rocking(specimen.coupled(beta), omega, amplitude, share)
-            for number, (motion, half) in enumerate(zip(seen or (), ranges, strict=False), 1):
+            if seen is None:
+                continue
+            for number, (motion, half) in enumerate(zip(seen, ranges, strict=True), 1):
                 if motion > half:
                     what = "the bare frame" if beta is None else f"beta = {beta:g}"
                     moves = f"storey {number} of {what} moves {1e3 * motion:.0f} mm there"

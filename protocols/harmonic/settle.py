@@ -7,7 +7,7 @@ from math import tau
 
 import numpy as np
 
-from bench.analysis.cycles import Cycle
+from bench.analysis.cycles import Cycle, mean_amplitude
 from bench.analysis.gain import SensorAccuracy, SteadyPeak, modulated_peak, steady_peak
 from bench.analysis.signals import ACCELERATION, DISPLACEMENT, LASER_1, LASER_2
 from bench.analysis.steady import WINDOW, Steadiness, SteadyDetector
@@ -82,7 +82,7 @@ def settle_and_measure(
         recent.extend(outcome.cycles)
         yield from look(list(recent))
         over = waited >= parameters.settle_limit
-        error = achieved(outcome.cycles) / amplitude - 1.0
+        error = mean_amplitude(outcome.cycles, ACCELERATION) / amplitude - 1.0
         if abs(error) > parameters.amplitude_tolerance and not over:
             correction = float(np.clip(-TRIM_GAIN * error, -LARGEST_TRIM, LARGEST_TRIM))
             yield Trim(1.0 + correction)
@@ -94,8 +94,3 @@ def _settled(
 ) -> Settled:
     peak = steady_peak(cycles, LEFT * parameters.settle_tolerance) if steadiness.steady else modulated_peak(cycles)
     return Settled(peak, steadiness, waited, peak.amplitude / amplitude - 1.0)
-
-
-def achieved(cycles: tuple[Cycle, ...]) -> float:
-    """Mean amplitude of the table's acceleration over cycles [m/s2]."""
-    return float(np.mean([abs(cycle.fundamental[ACCELERATION]) for cycle in cycles]))
