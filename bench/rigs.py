@@ -6,7 +6,11 @@ from drivers.rig import Rig
 
 
 def open_rig(configuration: BenchConfiguration, *, realtime: bool) -> Rig:
-    """The configured backend, stopped. The caller closes it."""
+    """The configured backend, stopped; the hardware is always in real time. The caller closes it."""
+    if configuration.backend == "hardware":
+        from drivers.hardware.rig import HardwareRig
+
+        return HardwareRig(configuration.hardware, lead=configuration.lead_samples)
     from drivers.simulated import SimulatedRig
 
     simulation = configuration.simulation
@@ -16,10 +20,5 @@ def open_rig(configuration: BenchConfiguration, *, realtime: bool) -> Rig:
         seed=simulation.seed,
         spring_factor=simulation.spring_factor,
         clock=WallClock() if realtime else VirtualClock(),
-        lead=block_samples(configuration),
+        lead=configuration.lead_samples,
     )
-
-
-def block_samples(configuration: BenchConfiguration) -> int:
-    """Samples in one turn of the acquisition loop."""
-    return max(round(configuration.acquisition.block_duration * configuration.simulation.bench.sample_rate), 1)

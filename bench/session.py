@@ -21,7 +21,7 @@ from bench.record.recorder import Recorder
 from bench.record.tables import Table
 from bench.report.summary import Summary, write_summary
 from bench.results import FIGURE, FILE, SUMMARY
-from bench.rigs import block_samples, open_rig
+from bench.rigs import open_rig
 from sim.parameters import Parameters
 
 
@@ -124,11 +124,11 @@ def run_session(
             engine = Engine(
                 rig,
                 Guard(rig, configuration.limits, configuration.ramps),
-                SignalMap(rig.channels, configuration.simulation.bench.laser_1.reference),
+                SignalMap(rig.channels, configuration.laser_reference),
                 stream,
                 requests,
                 operator,
-                block_samples(configuration),
+                configuration.block_samples,
             )
             ending = engine.run(protocol.plan(configuration))
             status, reason = ending.status, ending.reason

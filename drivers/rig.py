@@ -13,16 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import Clock
+from drivers.errors import DriveUnderflow as DriveUnderflow
+from drivers.errors import RigError as RigError
 from sim.channel import Channel as Channel
-from sim.errors import RockbenchError
-
-
-class RigError(RockbenchError):
-    """The rig could not do what was asked; its output is at zero or on its way there."""
-
-
-class DriveUnderflow(RigError):
-    """The output ran out of samples: more were asked to be played than were written."""
+from sim.channel import Counts as Counts
 
 
 @dataclass(frozen=True)
@@ -33,10 +27,28 @@ class Block:
     """
 
     first: int
-    counts: NDArray[np.int16]
+    counts: Counts
 
     def __len__(self) -> int:
         return int(self.counts.shape[0])
+
+
+@dataclass(frozen=True)
+class Alignment:
+    """How the values of a sensor with a clock of its own were placed on the sample clock in one run.
+
+    A value taken at second t of the sensor's clock stands at second `offset + rate * t + delay` of the sample clock.
+    `residual` is the root mean square of what the fit leaves of the clock readings that bound it [s], `delay` the
+    fixed delay that was configured [s], `values` how many the sensor gave and `lost` how many it should have given.
+    """
+
+    sensor: str
+    offset: float
+    rate: float
+    residual: float
+    delay: float
+    values: int
+    lost: int
 
 
 class Handwork(StrEnum):
@@ -45,6 +57,9 @@ class Handwork(StrEnum):
     MOUNT_SPRING = "mount spring"
     REMOVE_BLOCK = "remove block"
     STAND_BLOCK_UP = "stand block up"
+    LOCK_FRAME = "lock frame"
+    """The storeys are clamped to the table and move with it, without spring and block."""
+    UNLOCK_FRAME = "unlock frame"
 
 
 class Rig(Protocol):
@@ -80,8 +95,13 @@ class Rig(Protocol):
         """Names, models and identities of the devices, for the data file."""
         ...
 
+    @property
+    def alignments(self) -> tuple[Alignment, ...]:
+        """How sensors with clocks of their own were placed on the sample clock since `arm()`; mostly none."""
+        ...
+
     def arm(self) -> None:
-        """Close the enable line and start the sample clock at index 0, the output at zero."""
+        """Close the enable line with the output at zero; sample 0 is taken then, or when the first block is read."""
         ...
 
     def write(self, volts: NDArray[np.float64]) -> None:
@@ -89,7 +109,11 @@ class Rig(Protocol):
         ...
 
     def read(self, n: int) -> Block:
-        """The next `n` samples of all inputs; waits for them. Raises DriveUnderflow, or RigError when not armed."""
+        """The next `n` samples of all inputs; waits for them.
+
+        Raises DriveUnderflow, InputOverflow, DeviceTimeout or ConnectionLost, and RigError when not armed; the rig is
+        stopped then.
+        """
         ...
 
     def stop(self) -> None:

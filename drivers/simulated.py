@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import Clock, VirtualClock
-from drivers.rig import Block, Channel, DriveUnderflow, Handwork, RigError
+from drivers.errors import DriveUnderflow, RigError
+from drivers.handyman import Handyman
+from drivers.rig import Alignment, Block, Channel, Handwork
 from sim.errors import InvalidInput
 from sim.specimen import Specimen
 from sim.virtual_bench import VirtualBench, VirtualBenchParameters
@@ -54,7 +56,7 @@ class SimulatedRig:
         self._clock = clock if clock is not None else VirtualClock()
         self._lead = round(0.05 * parameters.sample_rate) if lead is None else lead
         self._seed = seed
-        self._spring_factor = spring_factor
+        self._handyman = Handyman(specimen, spring_factor)
         self._state = _State.STOPPED
         self._moved = False
         self._queue: deque[NDArray[np.float64]] = deque()
@@ -93,6 +95,10 @@ class SimulatedRig:
             "filter_unit": f"simulated, Butterworth order {p.filter_unit.order}, {p.filter_unit.cutoff:g} Hz",
             **{channel.name: channel.device for channel in self.bench.channels},
         }
+
+    @property
+    def alignments(self) -> tuple[Alignment, ...]:
+        return ()
 
     def arm(self) -> None:
         if self._state is not _State.STOPPED:
@@ -152,15 +158,7 @@ class SimulatedRig:
     def handwork(self, work: Handwork, stiffness: float | None = None) -> None:
         if self._state is not _State.STOPPED:
             raise RigError(f"{work.value} is refused: the rig is {self._state.value}; hands belong on a stopped rig")
-        specimen = self.bench.specimen
-        if work is Handwork.MOUNT_SPRING:
-            if stiffness is None:
-                raise InvalidInput("stiffness", stiffness, "mounting a spring needs its stiffness in N/m")
-            specimen = specimen.coupled(self._spring_factor * stiffness / specimen.frame.k1)
-        elif work is Handwork.REMOVE_BLOCK:
-            specimen = specimen.bare()
-        elif specimen.beta is None:
-            raise RigError("stand block up is refused: there is no block on the table; mount a spring and block first")
+        specimen = self._handyman.after(work, stiffness, self.bench.specimen)
         self._come_to_rest()
         self.bench.mount(specimen)
 

@@ -46,10 +46,10 @@ class AtTheConsole:
                 return True
 
 
-def choose(backend: str, *, yes: bool, ask: bool, terminal: bool) -> Operator:
+def choose(*, serves_itself: bool, yes: bool, ask: bool, terminal: bool) -> Operator:
     """Who answers the questions of a run.
 
-    The simulated backend does the hand work itself unless `ask`; on a real bench a person at a `terminal` is asked
+    A bench that `serves_itself` does the hand work unless `ask`; on a real one a person at a `terminal` is asked
     unless `yes`. Raises RockbenchError when nobody could answer.
     """
     if yes and ask:
@@ -58,8 +58,8 @@ def choose(backend: str, *, yes: bool, ask: bool, terminal: bool) -> Operator:
         return Unattended("unattended run (--yes)")
     if ask:
         return AtTheConsole()
-    if backend == "simulated":
-        return Unattended("the simulated bench")
+    if serves_itself:
+        return Unattended("the bench itself")
     if terminal:
         return AtTheConsole()
     raise RockbenchError("nobody can answer the operator's questions: run in a terminal, or give --yes")

@@ -86,7 +86,9 @@ def _perform(entry: Entry, arguments: dict[str, Any], options: Options, start: S
     configuration = configuration_from(options.config, options.seed)
     out = options.out or default_folder(entry.name, datetime.now())
     check_folder(out)
-    operator = choose(configuration.backend, yes=options.yes, ask=options.ask, terminal=sys.stdin.isatty())
+    operator = choose(
+        serves_itself=configuration.serves_itself, yes=options.yes, ask=options.ask, terminal=sys.stdin.isatty()
+    )
     person = operator if isinstance(operator, AtTheConsole) else None
     if start is None:
         from bench.session import run_session

@@ -6,6 +6,7 @@ from pydantic import model_validator
 
 from bench.analysis.gain import SensorAccuracy
 from bench.guard.limits import Limits, Ramps
+from drivers.hardware.parameters import Hardware
 from sim.errors import InvalidInput
 from sim.parameters import Parameters, quantity
 from sim.specimen import Specimen
@@ -17,6 +18,14 @@ class Acquisition(Parameters):
 
     block_duration: float = quantity(
         0.1, "s", "length of a block of samples: one turn of the loop that reads, guards and drives", ge=0.01, le=0.2
+    )
+
+    lead: float = quantity(
+        0.1,
+        "s",
+        "drive that waits in the output ahead of what is read: covers the time a turn of the loop takes",
+        ge=0.0,
+        le=2.0,
     )
 
 
@@ -34,13 +43,52 @@ class Simulation(Parameters):
 class BenchConfiguration(Parameters):
     """Everything that describes a bench. The defaults are the paper's specimen on the simulated bench."""
 
-    backend: Literal["simulated"] = quantity("simulated", "", "what drives and reads the bench")
+    backend: Literal["simulated", "hardware"] = quantity("simulated", "", "what drives and reads the bench")
     specimen: Specimen = Specimen()
     limits: Limits = Limits()
     ramps: Ramps = Ramps()
     acquisition: Acquisition = Acquisition()
     analysis: SensorAccuracy = SensorAccuracy()
     simulation: Simulation = Simulation()
+    hardware: Hardware = Hardware()
+
+    @property
+    def sample_rate(self) -> float:
+        """Samples per second of drive and inputs that the configured backend is asked for [1/s]."""
+        return self.simulation.bench.sample_rate if self.backend == "simulated" else self.hardware.sample_rate
+
+    @property
+    def block_samples(self) -> int:
+        """Samples in one turn of the acquisition loop."""
+        return max(round(self.acquisition.block_duration * self.sample_rate), 1)
+
+    @property
+    def lead_samples(self) -> int:
+        """Drive samples that wait ahead of the sample that is read."""
+        return round(self.acquisition.lead * self.sample_rate)
+
+    @property
+    def half_stroke(self) -> float:
+        """Displacement of the table from mid stroke at which the end stops touch [m]."""
+        simulated = self.backend == "simulated"
+        return self.simulation.bench.shaker.half_stroke if simulated else self.hardware.half_stroke
+
+    @property
+    def laser_reference(self) -> Literal["ground", "table"]:
+        """Where the lasers stand."""
+        simulated = self.backend == "simulated"
+        return self.simulation.bench.laser_1.reference if simulated else self.hardware.lasers.reference
+
+    @property
+    def laser_ranges(self) -> tuple[float, float]:
+        """Measuring ranges of the lasers on the first and the second storey [m]."""
+        lasers = self.simulation.bench if self.backend == "simulated" else self.hardware
+        return lasers.laser_1.measuring_range, lasers.laser_2.measuring_range
+
+    @property
+    def serves_itself(self) -> bool:
+        """Whether no person is needed for the work between two tests: the bench is simulated or emulated."""
+        return self.backend == "simulated" or self.hardware.hands is not None
 
     @model_validator(mode="after")
     def _springs_belong_to_the_protocol(self) -> "BenchConfiguration":

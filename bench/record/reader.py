@@ -1,5 +1,6 @@
 """Reads the file of a campaign: finished, still being written, or left by a killed writer."""
 
+import json
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -14,7 +15,7 @@ from bench.record.errors import RecordError, reason
 from bench.record.fields import decode
 from bench.record.layout import COUNTED, FIXED_GROUPS, FORMAT, FORMAT_VERSION
 from bench.record.tables import Column
-from drivers.rig import Channel
+from drivers.rig import Channel, Counts
 from sim.errors import InvalidInput
 
 ALL = slice(None)
@@ -133,7 +134,7 @@ class Record:
         stored.append(hdf5.dataset(self._instrument, "drive/voltage"))
         return min(self._complete("samples"), *(data.shape[0] for data in stored))
 
-    def counts(self, name: str, rows: slice = ALL) -> NDArray[np.int16]:
+    def counts(self, name: str, rows: slice = ALL) -> Counts:
         """Counts of a channel as converted. Raises InvalidInput for an unknown channel."""
         return self._cut(self._counts(self._channel_named(name).name), rows)
 
@@ -231,4 +232,6 @@ class Record:
             offset=float(attrs["offset"]),
             valid=(low, high),
             device=str(attrs["device"]),
+            higher=tuple(float(term) for term in attrs.get("higher", ())),
+            faults={int(count): text for count, text in json.loads(attrs.get("faults", "{}")).items()},
         )

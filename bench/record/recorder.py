@@ -16,7 +16,7 @@ from bench.record.journal import NOT_JOURNALLED
 from bench.record.layout import Skeleton, Status
 from bench.record.tables import Table
 from bench.record.writer import RecordWriter
-from drivers.rig import Channel
+from drivers.rig import Channel, Counts
 from sim.errors import InvalidInput
 from sim.parameters import Parameters
 
@@ -35,7 +35,7 @@ class _Block:
     time: float
     run: int
     first: int
-    counts: NDArray[np.int16]
+    counts: Counts
     drive: NDArray[np.float32]
 
 
@@ -134,7 +134,7 @@ class Recorder:
                 f"block at sample {event.block.first} has inputs {counts.shape} and drive {event.drive.shape};"
                 f" expected ({n}, {self._n_channels}) and ({n},)"
             )
-        copy = np.array(counts.T, dtype=np.int16, order="C")
+        copy = np.array(counts.T, order="C")
         return _Block(event.time, event.run, event.block.first, copy, event.drive.astype(np.float32))
 
     def _raise_failure(self) -> None:

@@ -4,26 +4,27 @@ A compressed chunk that is written twice leaves its first copy behind as dead sp
 full unless they must reach the file now.
 """
 
+import json
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bench.record import hdf5
-from drivers.rig import Channel
+from drivers.rig import Channel, Counts
 
 CHUNK_TIME = 0.5
 """Seconds of samples in a chunk: what is at risk in a run at real time."""
 
 
 class Samples:
-    """One int16 dataset of counts per channel and one float32 dataset of the drive, always of one length."""
+    """One integer dataset of counts per channel and one float32 dataset of the drive, always of one length."""
 
     def __init__(self, instrument: hdf5.Group, channels: Sequence[Channel], sample_rate: float) -> None:
         self.chunk = max(1, round(CHUNK_TIME * sample_rate))
         self._stored = [_create_channel(instrument, channel, self.chunk) for channel in channels]
         self._stored.append(_create_drive(instrument, self.chunk))
-        self._pending: list[tuple[NDArray[np.int16], NDArray[np.float32]]] = []
+        self._pending: list[tuple[Counts, NDArray[np.float32]]] = []
         self._waiting = 0
         self._written = 0
 
@@ -40,7 +41,7 @@ class Samples:
         """How many chunks could be completed with the rows that wait."""
         return len(self) // self.chunk - self._written // self.chunk
 
-    def add(self, counts: NDArray[np.int16], drive: NDArray[np.float32]) -> None:
+    def add(self, counts: Counts, drive: NDArray[np.float32]) -> None:
         """Append rows: counts of shape (n_channels, n) and drive of shape (n,) [V]."""
         self._pending.append((counts, drive))
         self._waiting += len(drive)
@@ -66,10 +67,14 @@ def _create_channel(instrument: hdf5.Group, channel: Channel, chunk: int) -> hdf
     hdf5.write_text(sensor, "model", channel.device)
     description = f"{channel.quantity} as converted: counts * scale + offset is in {channel.unit}"
     counts = hdf5.grow_numbers(
-        sensor, "counts", np.int16, unit="counts", description=description, chunk=chunk, compress=True
+        sensor, "counts", channel.storage, unit="counts", description=description, chunk=chunk, compress=True
     )
     counts.attrs["long_name"] = f"{channel.name} [counts]"
     counts.attrs["scale"], counts.attrs["offset"] = channel.scale, channel.offset
+    if channel.higher:
+        counts.attrs["higher"] = np.array(channel.higher)
+    if channel.faults:
+        counts.attrs["faults"] = json.dumps({str(count): text for count, text in channel.faults.items()})
     counts.attrs["value_units"] = channel.unit
     counts.attrs["valid"] = np.array(channel.valid, dtype=np.int64)
     counts.attrs["quantity"], counts.attrs["device"] = channel.quantity, channel.device

@@ -11,6 +11,7 @@ from bench.record import hdf5
 from bench.record.errors import RecordError, reason
 from bench.record.journal import text_of
 from bench.record.layout import STATUS_WIDTH, SUMMARY_WIDTH, TIME_WIDTH, Skeleton, Status, build, now
+from drivers.rig import Counts
 from sim.errors import InvalidInput
 
 _EXISTS = "the file exists and is never overwritten; name another"
@@ -68,9 +69,7 @@ class RecordWriter:
         """How many chunks of samples wait."""
         return self._parts.samples.full_chunks
 
-    def add_block(
-        self, time: float, run: int, first: int, counts: NDArray[np.int16], drive: NDArray[np.float32]
-    ) -> None:
+    def add_block(self, time: float, run: int, first: int, counts: Counts, drive: NDArray[np.float32]) -> None:
         """Append a block: counts of shape (n_channels, n), drive of shape (n,) [V]."""
         self._parts.blocks.add(len(self._parts.samples), run, first, time)
         self._parts.samples.add(counts, drive)

@@ -14,7 +14,7 @@ from sim.specimen import Specimen
 
 def check_table(parameters: HarmonicParameters, configuration: BenchConfiguration) -> None:
     """Refuse table motions beyond limits or stroke, overshoot of a start included: x = a / Omega^2, v = a / Omega."""
-    limits, stroke = configuration.limits, configuration.simulation.bench.shaker.half_stroke
+    limits, stroke = configuration.limits, configuration.half_stroke
     peak = max(OVERSHOOTS) * parameters.amplitude_factor * configuration.specimen.uplift_acceleration
     if peak > limits.acceleration:
         allowed = f"a start needs {peak:.3g} m/s2, limits.acceleration = {limits.acceleration:g} m/s2"
@@ -35,10 +35,10 @@ def check_table(parameters: HarmonicParameters, configuration: BenchConfiguratio
 
 def check_storeys(parameters: HarmonicParameters, configuration: BenchConfiguration) -> None:
     """Refuse frequencies at which a storey would leave its laser's range, bare or on the steady rocking motion."""
-    bench, specimen = configuration.simulation.bench, configuration.specimen
+    specimen = configuration.specimen
     amplitude = parameters.amplitude_factor * specimen.uplift_acceleration
-    share = 1.0 if bench.laser_1.reference == "ground" else 0.0
-    ranges = (0.5 * bench.laser_1.measuring_range, 0.5 * bench.laser_2.measuring_range)
+    share = 1.0 if configuration.laser_reference == "ground" else 0.0
+    ranges = tuple(0.5 * whole for whole in configuration.laser_ranges)
     for omega in parameters.omega:
         for beta in (None, *parameters.beta):
             if beta is None:

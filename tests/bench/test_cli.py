@@ -79,7 +79,7 @@ def test_without_options_the_paper_campaign_runs_unattended_in_a_folder_of_its_o
     call = session.calls[0]
     assert call["parameters"] == HarmonicParameters()
     assert call["configuration"] == BenchConfiguration()
-    assert call["operator"] == Unattended("the simulated bench")
+    assert call["operator"] == Unattended("the bench itself")
     assert call["out"].parent == Path("runs")
     assert call["out"].name.startswith("harmonic-20")
     assert ":" not in call["out"].name
@@ -271,14 +271,14 @@ def test_the_operator_answers_at_the_console(typed: str, answer: bool):
 
 
 def test_who_answers():
-    assert choose("simulated", yes=False, ask=False, terminal=True) == Unattended("the simulated bench")
-    assert isinstance(choose("simulated", yes=False, ask=True, terminal=False), AtTheConsole)
-    assert isinstance(choose("nidaqmx", yes=False, ask=False, terminal=True), AtTheConsole)
-    unattended = choose("nidaqmx", yes=True, ask=False, terminal=False)
+    assert choose(serves_itself=True, yes=False, ask=False, terminal=True) == Unattended("the bench itself")
+    assert isinstance(choose(serves_itself=True, yes=False, ask=True, terminal=False), AtTheConsole)
+    assert isinstance(choose(serves_itself=False, yes=False, ask=False, terminal=True), AtTheConsole)
+    unattended = choose(serves_itself=False, yes=True, ask=False, terminal=False)
     assert unattended.confirm("Mount the spring.")
     assert "--yes" in unattended.name
     with pytest.raises(RockbenchError, match="give --yes"):
-        choose("nidaqmx", yes=False, ask=False, terminal=False)
+        choose(serves_itself=False, yes=False, ask=False, terminal=False)
 
 
 def test_config_init_and_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):

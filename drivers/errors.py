@@ -1,0 +1,34 @@
+"""What goes wrong with instruments. Whatever is raised here, the output is at zero or on its way there."""
+
+from sim.errors import RockbenchError
+
+
+class RigError(RockbenchError):
+    """The rig could not do what was asked; its output is at zero or on its way there.
+
+    `code` is the number that the instrument's own driver gave, where it gave one.
+    """
+
+    def __init__(self, text: str, code: int | None = None) -> None:
+        super().__init__(text if code is None else f"{text} (code {code})")
+        self.code = code
+
+
+class DriveUnderflow(RigError):
+    """The output ran out of samples: more were asked to be played than were written."""
+
+
+class InputOverflow(RigError):
+    """Inputs were read too late: samples that nobody fetched were overwritten."""
+
+
+class DeviceTimeout(RigError):
+    """A device did not answer in time."""
+
+
+class ConnectionLost(RigError):
+    """A device that was there is gone."""
+
+
+class DeviceNotFound(RigError):
+    """A device, its driver or its port is not there, or somebody else holds it."""

@@ -1,0 +1,1 @@
+"""The bench in the laboratory: DAQ and lasers as one rig."""

@@ -1,0 +1,85 @@
+"""The bench in the laboratory as the configuration describes it."""
+
+from typing import Literal
+
+from pydantic import model_validator
+
+from drivers.daqmx.parameters import AnalogInput, Daq
+from sim.errors import InvalidInput
+from sim.parameters import Parameters, quantity
+
+
+class TableDisplacement(AnalogInput):
+    """Input of the displacement transducer between table and ground."""
+
+    sensitivity: float = quantity(100.0, "V/m", "volts per metre as calibrated; its sign is the polarity")
+    zero: float = quantity(0.0, "V", "voltage at mid stroke")
+
+
+class TableAcceleration(AnalogInput):
+    """Input of the table's accelerometer."""
+
+    terminal: str = quantity("Dev1/ai1", "", "physical channel of the input")
+    sensitivity: float = quantity(1.0, "V s2/m", "volts per m/s2 as calibrated; its sign is the polarity")
+    zero: float = quantity(0.0, "V", "voltage at rest")
+
+
+class Lasers(Parameters):
+    """What both lasers have in common."""
+
+    connection: Literal["serial", "analogue"] = quantity(
+        "serial", "", "how the lasers are read: the sensor cannot do both at once"
+    )
+    reference: Literal["ground", "table"] = quantity(
+        "ground", "", "where the lasers stand: on the ground they see x + u, on the table they see u"
+    )
+    rate: float = quantity(4000.0, "1/s", "measurements per second of each laser", gt=0, le=8000)
+    delay: float = quantity(
+        0.0, "s", "by how much later the laser values are placed; `rockbench check` measures it", ge=-0.1, le=0.1
+    )
+    load: float = quantity(500.0, "ohm", "resistor that turns the current of an analogue output into volts", gt=0)
+
+
+class Laser1(AnalogInput):
+    """The laser on the first storey; terminal, wiring and range are for its analogue output."""
+
+    terminal: str = quantity("Dev1/ai2", "", "physical channel of the input")
+    port: str | None = quantity(None, "", "serial port, such as COM5 or /dev/ttyUSB0; needed when it is read serially")
+    baud: int | None = quantity(None, "1/s", "baud rate; absent: it is searched for", ge=9600, le=1_000_000)
+    measuring_range: float = quantity(0.200, "m", "measuring range; checked with the sensor when read serially", gt=0)
+    polarity: Literal[1, -1] = quantity(1, "", "1 when the distance grows with the displacement of the storey")
+
+
+class Laser2(Laser1):
+    """The laser on the second storey; terminal, wiring and range are for its analogue output."""
+
+    terminal: str = quantity("Dev1/ai3", "", "physical channel of the input")
+
+
+class Hardware(Parameters):
+    """The bench in the laboratory: DAQ device, transducers of the table, lasers."""
+
+    sample_rate: float = quantity(2000.0, "1/s", "samples per second of drive and inputs", gt=0, le=20_000)
+    half_stroke: float = quantity(0.075, "m", "displacement from mid stroke at which the end stops touch", gt=0)
+    hands: str | None = quantity(
+        None, "", "host:port that is told of the operator's work; only an emulated bench has one"
+    )
+    daq: Daq = Daq()
+    table_displacement: TableDisplacement = TableDisplacement()
+    table_acceleration: TableAcceleration = TableAcceleration()
+    lasers: Lasers = Lasers()
+    laser_1: Laser1 = Laser1()
+    laser_2: Laser2 = Laser2()
+
+    @model_validator(mode="after")
+    def _no_terminal_twice(self) -> "Hardware":
+        analogue = self.lasers.connection == "analogue"
+        used = [("table_displacement", self.table_displacement), ("table_acceleration", self.table_acceleration)]
+        used += [("laser_1", self.laser_1), ("laser_2", self.laser_2)] if analogue else []
+        seen: dict[str, str] = {}
+        for name, given in used:
+            if (other := seen.setdefault(given.terminal.lower(), name)) != name:
+                raise InvalidInput(f"{name}.terminal", given.terminal, f"{other} has this terminal already")
+        if not analogue and self.laser_1.port is not None and self.laser_1.port == self.laser_2.port:
+            raise InvalidInput("laser_2.port", self.laser_2.port, "laser_1 has this port already")
+        return self
