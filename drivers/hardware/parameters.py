@@ -24,6 +24,25 @@ class TableAcceleration(AnalogInput):
     zero: float = quantity(0.0, "V", "voltage at rest")
 
 
+class TableForce(AnalogInput):
+    """Input of a load cell between armature and table."""
+
+    terminal: str = quantity("Dev1/ai4", "", "physical channel of the input")
+    sensitivity: float = quantity(0.01, "V/N", "volts per newton as calibrated; its sign is the polarity")
+    zero: float = quantity(0.0, "V", "voltage without force")
+
+
+class CoilCurrent(AnalogInput):
+    """Input of the amplifier's current monitor."""
+
+    terminal: str = quantity("Dev1/ai5", "", "physical channel of the input")
+    sensitivity: float = quantity(0.2, "V/A", "volts per ampere as calibrated; its sign is the polarity")
+    zero: float = quantity(0.0, "V", "voltage without current")
+
+
+Transducer = TableDisplacement | TableAcceleration | TableForce | CoilCurrent
+
+
 class Lasers(Parameters):
     """What both lasers have in common."""
 
@@ -67,19 +86,37 @@ class Hardware(Parameters):
     daq: Daq = Daq()
     table_displacement: TableDisplacement = TableDisplacement()
     table_acceleration: TableAcceleration = TableAcceleration()
+    table_force: TableForce | None = quantity(None, "", "the load cell; absent when there is none")
+    coil_current: CoilCurrent | None = quantity(None, "", "the current monitor; absent when there is none")
     lasers: Lasers = Lasers()
     laser_1: Laser1 = Laser1()
     laser_2: Laser2 = Laser2()
 
+    @property
+    def transducers(self) -> tuple[tuple[str, Transducer], ...]:
+        """The analogue inputs that every way of reading the lasers has: name of the channel and its input."""
+        given = (
+            ("table_displacement", self.table_displacement),
+            ("table_acceleration", self.table_acceleration),
+            ("table_force", self.table_force),
+            ("coil_current", self.coil_current),
+        )
+        return tuple((name, one) for name, one in given if one is not None)
+
+    @property
+    def analogue_lasers(self) -> tuple[tuple[str, "Laser1"], ...]:
+        """The analogue inputs of the lasers; none when they are read serially."""
+        if self.lasers.connection == "serial":
+            return ()
+        return ("laser_1", self.laser_1), ("laser_2", self.laser_2)
+
     @model_validator(mode="after")
     def _no_terminal_twice(self) -> "Hardware":
-        analogue = self.lasers.connection == "analogue"
-        used = [("table_displacement", self.table_displacement), ("table_acceleration", self.table_acceleration)]
-        used += [("laser_1", self.laser_1), ("laser_2", self.laser_2)] if analogue else []
         seen: dict[str, str] = {}
-        for name, given in used:
+        for name, given in (*self.transducers, *self.analogue_lasers):
             if (other := seen.setdefault(given.terminal.lower(), name)) != name:
                 raise InvalidInput(f"{name}.terminal", given.terminal, f"{other} has this terminal already")
-        if not analogue and self.laser_1.port is not None and self.laser_1.port == self.laser_2.port:
+        serial = self.lasers.connection == "serial"
+        if serial and self.laser_1.port is not None and self.laser_1.port == self.laser_2.port:
             raise InvalidInput("laser_2.port", self.laser_2.port, "laser_1 has this port already")
         return self

@@ -1,0 +1,163 @@
+"""The virtual bench in real time: what the emulated instruments are wired to."""
+
+import threading
+import time
+from math import floor
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.emulation.history import History
+from drivers.emulation.plant import Output
+from drivers.errors import RigError
+from drivers.handyman import Handyman
+from drivers.rig import Handwork
+from sim.channel import Channel, Counts
+from sim.specimen import Specimen
+from sim.virtual_bench import VirtualBench, VirtualBenchParameters
+
+_KEPT = 30.0
+"""How long the past can be asked for [s]."""
+_IDLE_TURN = 0.02
+"""How often the bench moves on when nobody looks at it [s]."""
+
+
+class EmulatedBench:
+    """A `Plant` made of the virtual bench. It moves on whenever somebody looks, and by itself in between.
+
+    One tick is one sample of the virtual bench; `clock_error` is the relative error of the tick rate.
+    """
+
+    def __init__(
+        self,
+        parameters: VirtualBenchParameters,
+        specimen: Specimen,
+        *,
+        seed: int,
+        spring_factor: float = 1.0,
+        clock_error: float = 0.0,
+    ) -> None:
+        self._bench = VirtualBench(parameters, specimen, seed)
+        self._handyman = Handyman(specimen, spring_factor)
+        self._rate = parameters.sample_rate * (1.0 + clock_error)
+        kept = round(_KEPT * parameters.sample_rate)
+        self._counts = History(kept, self.terminals, np.int16)
+        self._seen = History(kept, 4, np.float64)
+        self._on_ground = parameters.laser_1.reference == "ground"
+        self._output: Output | None = None
+        self._enabled = False
+        self._lock = threading.RLock()
+        # the compiled bench is loaded and has seen a sample before its clock starts
+        self._bench.run(np.zeros(1))
+        self._started = time.monotonic()
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._idle, name="emulated-bench", daemon=True)
+
+    def start(self) -> None:
+        """Let it move by itself."""
+        while self._seen.end < 2:
+            # two ticks, so that there is something between them to look at
+            self._advance()
+        self._thread.start()
+
+    def close(self) -> None:
+        """Stand still. Allowed any number of times."""
+        self._over.set()
+        if self._thread.is_alive():
+            self._thread.join()
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """What the inputs measure."""
+        return self._bench.channels
+
+    @property
+    def tick_rate(self) -> float:
+        return self._bench.parameters.sample_rate
+
+    @property
+    def terminals(self) -> int:
+        return len(self._bench.channels)
+
+    def tick(self) -> int:
+        return floor((time.monotonic() - self._started) * self._rate)
+
+    def time_of(self, tick: int) -> float:
+        return self._started + tick / self._rate
+
+    def inputs(self, first: int, n: int) -> Counts:
+        with self._lock:
+            if first + n > self._counts.end:
+                self._advance()
+            return self._counts.at(np.arange(first, first + n))
+
+    def wire(self, output: Output) -> None:
+        with self._lock:
+            self._advance()
+            self._output = output
+
+    def enable(self, closed: bool) -> None:
+        with self._lock:
+            self._advance()
+            self._enabled = closed
+
+    def sight(self, storey: int) -> "Storey":
+        """What the laser on a storey sees: 1 or 2."""
+        return Storey(self, storey)
+
+    def seen(self, storey: int, times: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Displacement of a storey [m] as its laser sees it at monotonic times [s]: cubic between the ticks."""
+        ticks = (times - self._started) * self._rate
+        with self._lock:
+            if ticks.size and ticks[-1] > self._seen.end - 1:
+                self._advance()
+            ticks = np.clip(ticks, 0.0, self._seen.end - 1)
+            before = np.minimum(np.floor(ticks).astype(np.int64), max(self._seen.end - 2, 0))
+            columns = [2 * (storey - 1), 2 * (storey - 1) + 1]
+            (x0, v0), (x1, v1) = self._seen.at(before)[:, columns].T, self._seen.at(before + 1)[:, columns].T
+        place, length = ticks - before, 1.0 / self.tick_rate
+        rest = 1.0 - place
+        start = x0 * (1.0 + 2.0 * place) + length * v0 * place
+        end = x1 * (1.0 + 2.0 * rest) - length * v1 * rest
+        return start * rest * rest + end * place * place
+
+    def handwork(self, work: Handwork, stiffness: float | None) -> None:
+        """Do to the specimen what a person does. Raises RigError while the amplifier is enabled."""
+        with self._lock:
+            if self._enabled:
+                raise RigError(f"{work.value} is refused: the amplifier is enabled; hands belong on a stopped bench")
+            self._advance()
+            self._bench.mount(self._handyman.after(work, stiffness, self._bench.specimen))
+
+    @property
+    def fallen(self) -> bool:
+        """Whether the block hangs in its catch."""
+        return self._bench.fallen
+
+    def _idle(self) -> None:
+        while not self._over.wait(_IDLE_TURN):
+            with self._lock:
+                self._advance()
+
+    def _advance(self) -> None:
+        """Compute every tick that has passed."""
+        first = self._counts.end
+        n = self.tick() - first
+        if n <= 0:
+            return
+        # the output plays on whether or not the amplifier listens
+        volts = np.zeros(n) if self._output is None else self._output(first, n)
+        self._counts.append(self._bench.run(volts if self._enabled else np.zeros(n)))
+        truth = self._bench.truth
+        x, v = (truth.x, truth.v) if self._on_ground else (0.0, 0.0)
+        self._seen.append(np.column_stack((truth.u1 + x, truth.v1 + v, truth.u2 + x, truth.v2 + v)))
+
+
+class Storey:
+    """A `Sight`: what one of the lasers looks at."""
+
+    def __init__(self, bench: EmulatedBench, storey: int) -> None:
+        self._bench, self._storey = bench, storey
+
+    def displacement(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
+        return self._bench.seen(self._storey, times)

@@ -1,0 +1,74 @@
+"""The channels of the laboratory's bench: converter, transducer and sign in one conversion."""
+
+from collections.abc import Mapping, Sequence
+from typing import Protocol
+
+from drivers.hardware.parameters import Hardware
+from drivers.optoncdt.analogue import laser_scaling
+from sim.channel import Channel
+
+_MEASURED = {
+    "table_displacement": ("displacement", "m"),
+    "table_acceleration": ("acceleration", "m/s2"),
+    "table_force": ("force", "N"),
+    "coil_current": ("current", "A"),
+}
+"""Quantity and unit of the transducers."""
+
+
+class Scaling(Protocol):
+    """What a converter says of one input: volts = coefficients[0] + coefficients[1] counts + ..., and where it is
+    not at its rail."""
+
+    @property
+    def coefficients(self) -> tuple[float, ...]:
+        """Volts per power of the counts [V]."""
+        ...
+
+    @property
+    def valid(self) -> tuple[int, int]:
+        """Inclusive range of counts that are measurements."""
+        ...
+
+
+def analogue_channels(hardware: Hardware, scalings: Sequence[Scaling], product: str) -> tuple[Channel, ...]:
+    """The channels of the DAQ's inputs, in their order: transducers first, then lasers on their analogue outputs."""
+    channels: list[Channel] = []
+    transducers = hardware.transducers
+    for (name, given), scaling in zip(transducers, scalings, strict=False):
+        quantity, unit = _MEASURED[name]
+        device = f"{product} {given.terminal}"
+        channels.append(_analogue(name, quantity, unit, device, scaling, 1.0 / given.sensitivity, given.zero))
+    for (name, given), scaling in zip(hardware.analogue_lasers, scalings[len(transducers) :], strict=True):
+        output = laser_scaling(given.measuring_range, hardware.lasers.load)
+        device = f"optoNCDT 1420, analogue, {product} {given.terminal}"
+        slope = given.polarity * output.slope
+        channels.append(_analogue(name, "displacement", "m", device, scaling, slope, output.middle, output.valid))
+    return tuple(channels)
+
+
+def _analogue(
+    name: str,
+    quantity: str,
+    unit: str,
+    device: str,
+    scaling: Scaling,
+    slope: float,
+    zero: float,
+    volts: tuple[float, float] | None = None,
+) -> Channel:
+    """A channel with value = (volts - zero) * slope in `unit`; outside the range `volts` [V] it says nothing."""
+    c0, c1, *higher = scaling.coefficients
+    valid = scaling.valid
+    if volts is not None:
+        # the polynomial is straight to a part in a thousand: far better than the reserve of the sensor needs
+        ends = sorted(round((end - c0) / c1) for end in volts)
+        valid = max(valid[0], ends[0]), min(valid[1], ends[1])
+    terms = tuple(c * slope for c in higher)
+    return Channel(name, quantity, unit, c1 * slope, (c0 - zero) * slope, valid, device, terms if any(terms) else ())
+
+
+def serial_laser(name: str, measuring_range: float, polarity: int, device: str, faults: Mapping[int, str]) -> Channel:
+    """A laser read serially: counts from mid range, 65520 of them over 102 % of the measuring range (manual, p. 65)."""
+    scale = polarity * 1.02 * measuring_range / 65520
+    return Channel(name, "displacement", "m", scale, 0.0, (-32760, 32760), device, faults=faults)

@@ -1,0 +1,206 @@
+"""The bench in the laboratory behind the interface of every rig: the DAQ is master, lasers are placed on its clock."""
+
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from enum import Enum
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.clock import Clock, WallClock
+from drivers.daqmx.session import DaqSession
+from drivers.errors import DriveUnderflow, RigError
+from drivers.hands import Person, RemoteHands
+from drivers.hardware.channels import analogue_channels
+from drivers.hardware.parameters import Hardware
+from drivers.hardware.serial_lasers import SerialLasers
+from drivers.rig import Alignment, Block, Channel, Counts, Handwork
+from sim.errors import InvalidInput
+
+_FIRST_LOOKS = 20
+"""How often the sample clock is read when it has just been started: it is then known to a fraction of a call."""
+
+
+class _State(Enum):
+    STOPPED = "not armed"
+    ARMED = "armed"
+    RUNNING = "running"
+    CLOSED = "closed"
+
+
+class HardwareRig:
+    """DAQ and lasers as one rig. The sample clock starts with the first block that is read.
+
+    `lead` is the number of drive samples that must be waiting. Raises InvalidInput or RigError when the bench is not
+    as configured; nothing is left open then.
+    """
+
+    def __init__(self, hardware: Hardware, *, lead: int) -> None:
+        self._lead = lead
+        self._clock = WallClock()
+        self._hands = RemoteHands(hardware.hands) if hardware.hands is not None else Person()
+        serial = hardware.lasers.connection == "serial"
+        inputs = [given for _, given in (*hardware.transducers, *hardware.analogue_lasers)]
+        with ExitStack() as opened:
+            self._lasers = SerialLasers(hardware) if serial else None
+            if self._lasers is not None:
+                opened.callback(self._lasers.close)
+            self._daq = DaqSession(hardware.daq, inputs, hardware.sample_rate, lead)
+            opened.callback(self._daq.close)
+            analogue = analogue_channels(hardware, self._daq.scalings, self._daq.description["product"])
+            self._channels = analogue if self._lasers is None else (*analogue, *self._lasers.channels)
+            self._opened = opened.pop_all()
+        self._state = _State.STOPPED
+        self._written = 0
+        self._index = 0
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        return self._channels
+
+    @property
+    def sample_rate(self) -> float:
+        return self._daq.sample_rate
+
+    @property
+    def drive_range(self) -> float:
+        return self._daq.drive_range
+
+    @property
+    def lead(self) -> int:
+        return self._lead
+
+    @property
+    def clock(self) -> Clock:
+        return self._clock
+
+    @property
+    def description(self) -> dict[str, str]:
+        return {
+            "backend": "hardware",
+            **self._daq.description,
+            **{channel.name: channel.device for channel in self._channels},
+        }
+
+    @property
+    def alignments(self) -> tuple[Alignment, ...]:
+        return self._lasers.alignments if self._lasers is not None else ()
+
+    def arm(self) -> None:
+        if self._state is not _State.STOPPED:
+            raise RigError(f"arm is refused: the rig is {self._state.value}; stop it first, or open a new one")
+        if self._lasers is not None:
+            self._lasers.begin(self.sample_rate)
+        try:
+            self._daq.prepare()
+        except BaseException:
+            self._daq.stop()
+            raise
+        self._written = self._index = 0
+        self._state = _State.ARMED
+
+    def write(self, volts: NDArray[np.float64]) -> None:
+        self._require_armed("write")
+        samples = np.array(volts, dtype=np.float64)
+        if samples.ndim != 1:
+            self._refuse(f"a drive of shape {samples.shape} is refused: it must be one row of samples")
+        if samples.size == 0:
+            return
+        if not np.isfinite(samples).all():
+            self._refuse("a drive with samples that are not finite is refused: the output is at zero")
+        if (peak := float(np.abs(samples).max())) > self.drive_range:
+            self._refuse(f"a drive of {peak:.6g} V is refused: the range is +-{self.drive_range:g} V")
+        with self._ending_on_failure():
+            self._daq.write(samples)
+        self._written += samples.size
+
+    def read(self, n: int) -> Block:
+        self._require_armed("read")
+        if n < 1:
+            raise InvalidInput("samples to read", n, "it must be at least 1")
+        if self._written - self._index < n + self._lead:
+            waiting, needed = self._written - self._index, n + self._lead
+            self.stop()
+            raise DriveUnderflow(
+                f"the drive ran out at sample {self._index}: {waiting} samples were waiting and {needed} are needed;"
+                " the output is at zero, write earlier or read less at once"
+            )
+        with self._ending_on_failure():
+            if self._state is _State.ARMED:
+                self._start()
+            counts = self._read_all(n)
+        first, self._index = self._index, self._index + n
+        return Block(first, counts)
+
+    def stop(self) -> None:
+        if self._state is _State.CLOSED:
+            return
+        self._state = _State.STOPPED
+        self._daq.stop()
+
+    def halt(self) -> None:
+        if self._state is _State.CLOSED:
+            return
+        try:
+            self._daq.cut()
+        finally:
+            self.stop()
+
+    def close(self) -> None:
+        if self._state is _State.CLOSED:
+            return
+        self._state = _State.CLOSED
+        self._opened.close()
+
+    def handwork(self, work: Handwork, stiffness: float | None = None) -> None:
+        if self._state is not _State.STOPPED:
+            raise RigError(f"{work.value} is refused: the rig is {self._state.value}; hands belong on a stopped rig")
+        self._hands.do(work, stiffness)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _start(self) -> None:
+        self._daq.start()
+        self._state = _State.RUNNING
+        if self._lasers is not None:
+            for _ in range(_FIRST_LOOKS):
+                self._look_at_clock()
+
+    def _look_at_clock(self) -> None:
+        """Bound the sample clock between two looks at the machine's clock."""
+        assert self._lasers is not None
+        before = time.monotonic()
+        count = self._daq.acquired()
+        self._lasers.observe(before, count, time.monotonic())
+
+    def _read_all(self, n: int) -> Counts:
+        """Counts of all channels, shape (n, n_channels): from the DAQ, and from the lasers when they are serial."""
+        counts = self._daq.read(n)
+        if self._lasers is None:
+            return counts
+        self._look_at_clock()
+        return np.column_stack((counts, self._lasers.counts(self._index, n)))
+
+    def _require_armed(self, what: str) -> None:
+        if self._state not in (_State.ARMED, _State.RUNNING):
+            raise RigError(f"{what} is refused: the rig is {self._state.value}; arm it first")
+
+    def _refuse(self, why: str) -> None:
+        self.stop()
+        raise RigError(why)
+
+    @contextmanager
+    def _ending_on_failure(self) -> Iterator[None]:
+        """Whatever fails inside, the output is cut, and what failed is what is told."""
+        try:
+            yield
+        except BaseException:
+            with suppress(RigError):
+                self.halt()
+            raise
