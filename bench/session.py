@@ -123,7 +123,7 @@ def run_session(
         try:
             engine = Engine(
                 rig,
-                Guard(rig, configuration.limits, configuration.ramps),
+                Guard(rig, configuration.limits, configuration.ramps, configuration.mover),
                 SignalMap(rig.channels, configuration.laser_reference),
                 stream,
                 requests,

@@ -6,6 +6,7 @@ from pydantic import model_validator
 
 from bench.analysis.gain import SensorAccuracy
 from bench.guard.limits import Limits, Ramps
+from bench.guard.quantities import Mover
 from drivers.hardware.parameters import Hardware
 from sim.errors import InvalidInput
 from sim.parameters import Parameters, quantity
@@ -72,6 +73,17 @@ class BenchConfiguration(Parameters):
         """Displacement of the table from mid stroke at which the end stops touch [m]."""
         simulated = self.backend == "simulated"
         return self.simulation.bench.shaker.half_stroke if simulated else self.hardware.half_stroke
+
+    @property
+    def mover(self) -> Mover | None:
+        """What force and current are estimated from, with the assumed specimen on the table; None when unknown."""
+        frame, block = self.specimen.frame, self.specimen.block
+        payload = frame.m1 + frame.m2 + block.mass
+        if self.backend == "simulated":
+            shaker = self.simulation.bench.shaker
+            return Mover(shaker.moving_mass + payload, shaker.k_s, shaker.bl)
+        mass, constant = self.hardware.moving_mass, self.hardware.force_constant
+        return None if mass is None or constant is None else Mover(mass + payload, 0.0, constant)
 
     @property
     def laser_reference(self) -> Literal["ground", "table"]:

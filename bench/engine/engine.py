@@ -33,7 +33,7 @@ from bench.engine.steps import (
 from bench.engine.stream import Stream
 from bench.events import Acquired, LimitExceeded, OperatorAnswered, OperatorAsked, State, StateChanged, Warned
 from bench.guard.guard import Guard
-from bench.guard.watch import Violation
+from bench.guard.violation import Violation
 from drivers.rig import Rig, RigError
 from sim.errors import RockbenchError
 from sim.specimen import Specimen
@@ -156,7 +156,9 @@ class Engine:
         self._heed_requests()
         self._machine.go(State.ARMED, "the operator's work is done")
         self._guard.arm()
-        self._signals.tare(self._stillness(step))
+        rest = self._stillness(step)
+        self._signals.tare(rest)
+        self._guard.tare(rest)
         self._fall = FallWatch(self._specimen, self._rig.sample_rate) if self._specimen else None
         self._machine.go(State.RUNNING, "at rest, zero taken")
 
@@ -216,6 +218,8 @@ class Engine:
         self._read = exchange.block.first + len(exchange.block)
         self._drive = exchange.drive
         self._stream.publish(Acquired(self._stream.now(), self._run, exchange.block, exchange.drive))
+        for near in exchange.warnings:
+            self._stream.say(Warned(0.0, f"{near.quantity} {near.value:.4g} {near.unit} comes near {near.limit:.4g}"))
         self._over = over = exchange.violation
         if over is not None and self.state is not State.ABORTING:
             self._stream.say(LimitExceeded(0.0, over.quantity, over.value, over.limit, over.unit))

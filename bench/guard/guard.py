@@ -10,8 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.guard.health import SensorWatch
 from bench.guard.limits import Limits, Ramps
-from bench.guard.watch import MotionWatch, Violation
+from bench.guard.quantities import Mover
+from bench.guard.timing import TimeWatch
+from bench.guard.violation import Violation
+from bench.guard.watch import MotionWatch
 from drivers.rig import Block, Rig, RigError
 from sim.errors import InvalidInput
 
@@ -21,27 +25,33 @@ class Exchange:
     """One turn of the acquisition loop.
 
     `values` are the block's counts in units, shape (n, n_channels); `drive` [V], shape (n,), is what was played
-    while they were taken; `violation` is the limit that was exceeded, if one was.
+    while they were taken; `violation` is the limit that was exceeded first, if one was, and `warnings` are those that
+    the motion has come near for the first time since arming.
     """
 
     block: Block
     values: NDArray[np.float64]
     drive: NDArray[np.float64]
     violation: Violation | None
+    warnings: tuple[Violation, ...] = ()
 
 
 class Guard:
-    """Stands between the engine and the rig."""
+    """Stands between the engine and the rig.
 
-    def __init__(self, rig: Rig, limits: Limits, ramps: Ramps) -> None:
+    With a `mover`, a force and a current that no channel measures are estimated from the motion.
+    """
+
+    def __init__(self, rig: Rig, limits: Limits, ramps: Ramps, mover: Mover | None = None) -> None:
         self._rig = rig
         self._limits = limits
         self._ramps = ramps
+        self._mover = mover
         self._channels = rig.channels
         self._waiting = np.zeros(0)
         self._command = 0.0
         self._held: float | None = None
-        self._watch = MotionWatch(self._channels, rig.sample_rate, limits)
+        self._make_watches()
         self._ramp_samples: int | None = None
         self._ramp_done = 0
         self._ramp_from = 1.0
@@ -66,7 +76,7 @@ class Guard:
         """Arm the rig with zeros waiting ahead of the first sample."""
         self._ramp_samples, self._ramp_done, self._ramp_from = None, 0, 1.0
         self._command, self._held, self._expected = 0.0, None, 0
-        self._watch = MotionWatch(self._channels, self._rig.sample_rate, self._limits)
+        self._make_watches()
         self._waiting = np.zeros(self._rig.lead)
         self._rig.arm()
         self._rig.write(self._waiting)
@@ -93,10 +103,17 @@ class Guard:
         self._expected += len(block)
         played, self._waiting = queue[: volts.size], queue[volts.size :]
         values = self._values(block)
-        seen = self._watch.check(block.first, values)
+        exceeded, near = self._motion.check(block.first, values)
+        exceeded += self._sensors.check(block.first, block.counts, values, played)
+        exceeded += self._time.check(self._rig.clock.now(), self._expected)
+        seen = min(exceeded, key=lambda violation: violation.sample) if exceeded else None
         if seen is not None:
             self.abort()
-        return Exchange(block, values, played, refused or seen)
+        return Exchange(block, values, played, refused or seen, tuple(near))
+
+    def tare(self, values: NDArray[np.float64]) -> None:
+        """Take a rest, values of shape (n, n_channels), as the zero of the specimen's drift."""
+        self._motion.tare(values)
 
     def stop(self) -> None:
         """Begin the smooth ramp to zero; a ramp that has begun goes on."""
@@ -116,6 +133,12 @@ class Guard:
     def disarm(self) -> None:
         """Stop the rig; its output is at zero afterwards."""
         self._rig.stop()
+
+    def _make_watches(self) -> None:
+        rate = self._rig.sample_rate
+        self._motion = MotionWatch(self._channels, rate, self._limits, self._mover)
+        self._sensors = SensorWatch(self._channels, rate, self._limits)
+        self._time = TimeWatch(rate, self._limits)
 
     def _begin(self, duration: float) -> None:
         self._ramp_from = 1.0 if self._ramp_samples is None else float(self._gain(0))

@@ -1,8 +1,37 @@
-"""What the table and the drive may do at most."""
+"""What the table, the shaker and the specimen may do at most, and what is expected of the sensors."""
 
 from pydantic import model_validator
 
 from sim.parameters import Parameters, quantity
+
+_SHARE = "share of the limit from which the operator is warned"
+_PERSISTENCE = "how long the limit must be exceeded before it counts"
+
+
+class Warnings(Parameters):
+    """From which share of a limit the operator is warned, once in a run."""
+
+    displacement: float = quantity(0.9, "1", f"displacement of the table: {_SHARE}", gt=0, le=1)
+    velocity: float = quantity(0.9, "1", f"velocity of the table: {_SHARE}", gt=0, le=1)
+    acceleration: float = quantity(0.9, "1", f"acceleration of the table: {_SHARE}", gt=0, le=1)
+    force: float = quantity(0.9, "1", f"force on the table: {_SHARE}", gt=0, le=1)
+    current: float = quantity(0.9, "1", f"current of the coil: {_SHARE}", gt=0, le=1)
+    heating: float = quantity(0.8, "1", f"heating of the coil: {_SHARE}", gt=0, le=1)
+    laser_range: float = quantity(0.95, "1", f"place in the laser's range: {_SHARE}", gt=0, le=1)
+    drift: float = quantity(0.9, "1", f"drift of the specimen: {_SHARE}", gt=0, le=1)
+
+
+class Debounce(Parameters):
+    """How long a measured limit must be exceeded before it counts: single spikes are noise."""
+
+    displacement: float = quantity(0.003, "s", f"displacement of the table: {_PERSISTENCE}", ge=0)
+    velocity: float = quantity(0.003, "s", f"velocity of the table: {_PERSISTENCE}", ge=0)
+    acceleration: float = quantity(0.003, "s", f"acceleration of the table: {_PERSISTENCE}", ge=0)
+    force: float = quantity(0.003, "s", f"force on the table: {_PERSISTENCE}", ge=0)
+    current: float = quantity(0.01, "s", f"current of the coil: {_PERSISTENCE}", ge=0)
+    heating: float = quantity(0.0, "s", f"heating of the coil: {_PERSISTENCE}", ge=0)
+    laser_range: float = quantity(0.01, "s", f"place in the laser's range: {_PERSISTENCE}", ge=0)
+    drift: float = quantity(0.01, "s", f"drift of the specimen: {_PERSISTENCE}", ge=0)
 
 
 class Limits(Parameters):
@@ -13,8 +42,20 @@ class Limits(Parameters):
     displacement: float = quantity(0.060, "m", "largest displacement of the table from mid stroke", gt=0)
     velocity: float = quantity(0.60, "m/s", "largest velocity of the table", gt=0)
     acceleration: float = quantity(6.0, "m/s2", "largest acceleration of the table", gt=0)
-    debounce: float = quantity(0.003, "s", "how long a measured limit must be exceeded before it counts", ge=0)
+    force: float = quantity(700.0, "N", "largest force on table and specimen, measured or estimated", gt=0)
+    current: float = quantity(16.0, "A", "largest current of the coil, measured or estimated", gt=0)
+    heating: float = quantity(9.0, "A", "largest root mean square current of the coil over heating_time", gt=0)
+    heating_time: float = quantity(60.0, "s", "time constant of the coil's temperature", gt=0)
+    laser_range: float = quantity(0.99, "1", "share of half its range that a storey may leave the laser's middle", gt=0)
+    drift: float = quantity(0.080, "m", "largest drift of the specimen from rest", gt=0)
     sensor_loss: float = quantity(0.5, "s", "how long a sensor may give no valid sample before the run aborts", gt=0)
+    stuck: float = quantity(1.0, "s", "how long a sensor may show the same count while the table is driven", gt=0)
+    late: float = quantity(0.5, "s", "how much later than due a block of samples may come", gt=0)
+    clock: float = quantity(
+        1.0e-3, "1", "largest relative difference between the sample clock and the computer's clock", gt=0
+    )
+    warning: Warnings = Warnings()
+    debounce: Debounce = Debounce()
 
 
 class Ramps(Parameters):

@@ -80,6 +80,10 @@ class Hardware(Parameters):
 
     sample_rate: float = quantity(2000.0, "1/s", "samples per second of drive and inputs", gt=0, le=20_000)
     half_stroke: float = quantity(0.075, "m", "displacement from mid stroke at which the end stops touch", gt=0)
+    moving_mass: float | None = quantity(
+        None, "kg", "armature, table and fixtures, to estimate force and current; absent: they are not estimated", gt=0
+    )
+    force_constant: float | None = quantity(None, "N/A", "of the coil, to estimate its current", gt=0)
     hands: str | None = quantity(
         None, "", "host:port that is told of the operator's work; only an emulated bench has one"
     )

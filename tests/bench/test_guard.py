@@ -5,13 +5,22 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bench.guard.guard import Guard
-from bench.guard.limits import Limits, Ramps
+from bench.guard.guard import Exchange, Guard
+from bench.guard.limits import Debounce, Limits, Ramps, Warnings
+from bench.guard.quantities import Mover, Quantities
+from bench.guard.timing import TimeWatch
 from sim.errors import InvalidInput
 from tests.loopback import LoopbackRig
 
 N = 100
-LIMITS = Limits(drive_voltage=5.0, drive_slew=200.0, displacement=0.04, velocity=3.0, acceleration=4.5, debounce=0.002)
+LIMITS = Limits(
+    drive_voltage=5.0,
+    drive_slew=200.0,
+    displacement=0.04,
+    velocity=3.0,
+    acceleration=4.5,
+    debounce=Debounce(displacement=0.002, velocity=0.002, acceleration=0.002),
+)
 RAMPS = Ramps(stop=1.0, abort=0.2)
 
 
@@ -164,7 +173,7 @@ def test_velocity_is_seen_through_missing_samples() -> None:
         t = np.arange(volts.size) / 1000.0
         return np.where(np.arange(volts.size) % 5 == 0, np.nan, 3.5 * t - 0.02)
 
-    limits = Limits(displacement=30.0, velocity=3.0, acceleration=4.5, debounce=0.01)
+    limits = Limits(displacement=30.0, velocity=3.0, acceleration=4.5, debounce=Debounce(velocity=0.01))
     guard = Guard(LoopbackRig({"table_displacement": moving}), limits, RAMPS)
     guard.arm()
     violation = guard.exchange(np.zeros(N)).violation
@@ -214,3 +223,119 @@ def test_whatever_is_asked_the_output_stays_within_limits_and_ends_at_zero(acts:
     assert np.abs(rig.played).max() <= LIMITS.drive_voltage
     assert np.abs(np.diff(rig.played, prepend=0.0)).max() <= LIMITS.drive_slew / rig.sample_rate + 1e-12
     assert rig.played[-1] == 0.0
+
+
+def _bench_rig(**response: object) -> LoopbackRig:
+    """A loopback with every channel that the guard knows; volts are answered as given, the others stay at zero."""
+    channels = ("table_displacement", "table_acceleration", "laser_1", "laser_2")
+    return LoopbackRig({name: response.get(name, lambda v: 0.0 * v) for name in channels})  # type: ignore[misc]
+
+
+def _until_violation(rig: LoopbackRig, limits: Limits, volts: float, mover: Mover | None = None) -> Exchange:
+    """A slow rise to `volts`, then hold; the first exchange with a violation."""
+    guard = Guard(rig, limits, RAMPS, mover)
+    guard.arm()
+    guard.tare(guard.exchange(np.zeros(N)).values)
+    levels = [np.linspace(volts * k / 30, volts * (k + 1) / 30, N) for k in range(30)]
+    wobble = 0.01 * np.sin(np.arange(N))
+    for block in [*levels, *[np.full(N, volts) + wobble] * 60]:
+        found = guard.exchange(block)
+        if found.violation is not None:
+            return found
+    raise AssertionError("nothing was noticed")
+
+
+def test_force_and_current_are_estimated_from_the_motion() -> None:
+    """4 m/s2 of 60 kg are 240 N; with 20 N/A and no springs 12 A."""
+    mover = Mover(mass=60.0, stiffness=0.0, force_constant=20.0)
+    rig = _bench_rig(table_acceleration=lambda v: v)
+    found = _until_violation(rig, Limits(force=200.0, current=16.0), 4.0, mover).violation
+    assert found is not None
+    assert (found.quantity, found.unit) == ("force on the table", "N")
+    assert found.value == pytest.approx(200.0, rel=0.02)
+    found = _until_violation(_bench_rig(table_acceleration=lambda v: v), Limits(current=10.0), 4.0, mover).violation
+    assert found is not None
+    assert found.quantity == "coil current"
+
+
+def test_heating_follows_the_square_of_the_current() -> None:
+    """A constant 10 A reaches 8 A rms of a first-order mean after tau ln(1 / (1 - 0.64))."""
+    tau = 2.0
+    limits = Limits(heating=8.0, heating_time=tau)
+    quantities = Quantities(_bench_rig().channels, 1000.0, tau, Mover(20.0, 0.0, 20.0))
+    values = np.zeros((4000, 4))
+    values[:, 1] = 10.0
+    heating = quantities.of(values)["heating"]
+    reached = int(np.argmax(heating > limits.heating)) / 1000.0
+    assert reached == pytest.approx(tau * np.log(1.0 / 0.36), abs=0.002)
+
+
+@pytest.mark.parametrize(
+    ("channel", "reading", "quantity"),
+    [("laser_1", 33.0, "share of the laser's range"), ("laser_2", 0.09, "drift")],
+)
+def test_the_specimen_is_watched(channel: str, reading: float, quantity: str) -> None:
+    """Lasers of the loopback reach +-32.767."""
+    limits = Limits(drift=100.0 if channel == "laser_1" else 0.08)
+    found = _until_violation(_bench_rig(**{channel: lambda v: reading * v / 4.0}), limits, 4.0).violation
+    assert found is not None
+    assert found.quantity == quantity
+
+
+def test_a_warning_comes_once_and_before_the_end() -> None:
+    rig = _bench_rig(table_acceleration=lambda v: v)
+    guard = Guard(rig, Limits(acceleration=5.0, warning=Warnings(acceleration=0.8)), RAMPS)
+    guard.arm()
+    warnings = []
+    for k in range(30):
+        found = guard.exchange(np.linspace(4.5 * k / 30, 4.5 * (k + 1) / 30, N))
+        assert found.violation is None
+        warnings += found.warnings
+    (warning,) = warnings
+    assert warning.quantity == "table acceleration"
+    assert warning.value == pytest.approx(4.0, rel=0.02)
+    assert not guard.ramping
+
+
+def test_a_stuck_sensor_ends_a_run_in_which_the_table_is_driven() -> None:
+    rig = _bench_rig(table_acceleration=lambda v: v, table_displacement=lambda v: 0.01 * v, laser_1=lambda v: v)
+    guard = Guard(rig, Limits(stuck=0.5), RAMPS)
+    guard.arm()
+    seen = [guard.exchange(_sine(1.0, N * k)).violation for k in range(9)]
+    found = [violation for violation in seen if violation is not None]
+    assert found[0].quantity == "time that laser_2 has shown one count"
+    assert guard.ramping
+
+
+def test_sensors_may_stand_still_while_nothing_is_driven() -> None:
+    guard = Guard(_bench_rig(), Limits(stuck=0.5), RAMPS)
+    guard.arm()
+    assert all(guard.exchange(np.zeros(N)).violation is None for _ in range(20))
+
+
+class TestTime:
+    LIMITS = Limits(late=0.5, clock=1e-3)
+
+    def test_regular_blocks_are_good(self) -> None:
+        watch = TimeWatch(1000.0, self.LIMITS)
+        assert not any(watch.check(7.0 + 0.1 * k * 1.0005, 100 * (k + 1)) for k in range(3000))
+
+    def test_a_late_block(self) -> None:
+        watch = TimeWatch(1000.0, self.LIMITS)
+        watch.check(7.0, 100)
+        assert watch.check(7.1 + 0.4, 200) == []
+        (found,) = watch.check(7.2 + 0.51, 300)
+        assert (found.quantity, found.unit, found.sample) == ("delay of a block of samples", "s", 299)
+        assert found.value == pytest.approx(0.51)
+
+    @pytest.mark.parametrize("ratio", [1.002, 0.998])
+    def test_clocks_that_disagree(self, ratio: float) -> None:
+        watch = TimeWatch(1000.0, self.LIMITS)
+        found = [one for k in range(400) for one in watch.check(7.0 + 0.1 * k * ratio, 100 * (k + 1))]
+        assert found[0].quantity == "difference of the clocks"
+        assert found[0].sample < 35_000
+
+    def test_single_late_blocks_are_no_clock(self) -> None:
+        watch = TimeWatch(1000.0, self.LIMITS)
+        late = [0.0, 0.1, 0.2, 0.3]
+        assert not any(watch.check(0.1 * k + late[k % 4], 100 * (k + 1)) for k in range(1000))

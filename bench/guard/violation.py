@@ -1,0 +1,17 @@
+"""A limit that was reached."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Violation:
+    """`quantity` reached `value` where `limit` is allowed, in `unit`; the sample's index since arming."""
+
+    quantity: str
+    value: float
+    limit: float
+    unit: str
+    sample: int
+
+    def __str__(self) -> str:
+        return f"{self.quantity} {self.value:.4g} {self.unit} exceeds {self.limit:.4g} {self.unit}"
