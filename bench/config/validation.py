@@ -88,9 +88,14 @@ def _suggestion(model: type[Parameters], path: Path) -> str:
     close = get_close_matches(name, siblings, n=1)
     if close:
         return f"; the nearest is {dotted((*parent, close[0]))}"
-    # names only: paths of one group are all alike
-    named = {key.rpartition(".")[2]: key for key in reversed(list(keys(model)))}
-    elsewhere = get_close_matches(name, named, n=1)
+    everywhere = list(keys(model))
+    elsewhere = [key for key in everywhere if key.rpartition(".")[2] == name] or get_close_matches(
+        # paths of one group are half alike to begin with
+        dotted(path),
+        everywhere,
+        n=1,
+        cutoff=0.8,
+    )
     if elsewhere:
-        return f"; the nearest is {named[elsewhere[0]]}"
+        return f"; the nearest is {elsewhere[0]}"
     return f"; the keys here are {', '.join(siblings)}" if siblings else ""
