@@ -5,6 +5,7 @@ Sample `i` of the drive leaves the output while sample `i` of the inputs is take
 `lead` samples must be waiting when a block is read.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
@@ -98,6 +99,10 @@ class Rig(Protocol):
     @property
     def alignments(self) -> tuple[Alignment, ...]:
         """How sensors with clocks of their own were placed on the sample clock since `arm()`; mostly none."""
+        ...
+
+    def interlocks(self) -> Mapping[str, bool]:
+        """The safety inputs that exist, by name, and whether each is good at this moment."""
         ...
 
     def arm(self) -> None:

@@ -1,6 +1,7 @@
 """The simulated rig: the virtual bench behind the interface of the hardware."""
 
 from collections import deque
+from collections.abc import Mapping
 from enum import Enum
 from typing import Self
 
@@ -99,6 +100,9 @@ class SimulatedRig:
     @property
     def alignments(self) -> tuple[Alignment, ...]:
         return ()
+
+    def interlocks(self) -> Mapping[str, bool]:
+        return {}
 
     def arm(self) -> None:
         if self._state is not _State.STOPPED:

@@ -38,8 +38,12 @@ class LoopbackRig:
         self.halted = False
         self.done: list[Handwork] = []
         self.played = np.zeros(0)
+        self.safety: dict[str, bool] = {}
         self._queue = np.zeros(0)
         self._index = 0
+
+    def interlocks(self) -> dict[str, bool]:
+        return self.safety
 
     def arm(self) -> None:
         self.armed, self._index, self._queue = True, 0, np.zeros(0)

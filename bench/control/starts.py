@@ -1,35 +1,40 @@
 """How to bring the block onto its steady rocking motion: planned with the model before anything moves.
 
-Switching the sine on topples the block at many points, and near high frequencies it leaves it at rest. Most often a
-soft ramp well above the asked frequency, followed by a slow chirp down, works; the transient is chaotic, so each
-candidate is simulated with the specimen and the drive a little off, and the most robust one comes first.
+Switching the sine on topples the block at many points, and near high frequencies it leaves it at rest. The transient
+is chaotic and the specimen is known so well only, so each candidate is simulated with specimens drawn from what the
+identification leaves open, and with the drive a little off. A few draws sift the candidates, fresh ones rate those
+that are left: the chance that is stated is not the luck of the draws that chose them.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import product
 
+import numpy as np
+
+from bench.control.candidates import Candidate, candidates
 from bench.control.legs import Leg, program
 from sim.rocking import Motion, Status, simulate_many
 from sim.specimen import Specimen
-from sim.steady import Orbit
+from sim.steady import NoOrbit, Orbit, rocking_orbit
+from sim.uncertainty import SpecimenUncertainty
 
-TOPS = (22.0, 24.0, 26.0, 28.0)
-"""Frequencies [rad/s] of the soft ramp: where the block rocks little and the frame is far from resonance."""
+DRIVE = 0.03
+"""Relative half width of the table's amplitude during a start, before the amplitude's control has closed on it."""
 
-RAMPS = (6.0, 12.0)
-"""Lengths of the soft ramp [s]."""
+SIEVES = ((5, 2.0), (10, 1.0))
+"""Draws of each sifting, and how many candidates it leaves for each start that is asked for."""
 
-CHIRPS = (0.5, 1.0)
-"""Rates at which the frequency comes down [rad/s per s]."""
+RATING = 32
+"""Draws that rate the candidates that are left."""
 
-OVERSHOOTS = (1.0, 1.2)
-"""Amplitude of ramp and chirp over the asked one: more lifts a block that would stay at rest."""
-
-EASE = 6.0
-"""Time in which an overshoot is taken back at the asked frequency [s]."""
+SEED = 1
+"""Of the draws: the same question has the same answer."""
 
 DWELL, WINDOW = 40.0, 4.0
 """Time that is simulated at the asked frequency, and its last part that is judged [s]."""
+
+TOLERANCE = 1e-7
+"""Of the simulations."""
 
 CATCH_ANGLE = 0.35
 """Tilt [rad] that counts as fallen: beyond it no spring of the campaign brings the block back."""
@@ -37,20 +42,13 @@ CATCH_ANGLE = 0.35
 CLOSE = 0.10
 """Relative distance of the peaks of drift and tilt at which a motion counts as on its way to the orbit."""
 
-OFFSETS = (
-    # amplitude, restitution, spring: what the drive's control and the specimen's identification leave open
-    (1.00, 1.000, 1.00),
-    (0.97, 1.000, 1.00),
-    (1.03, 1.000, 1.00),
-    (1.00, 0.992, 1.00),
-    (1.00, 1.000, 0.97),
-    (1.00, 1.000, 1.03),
-)
-
 
 @dataclass(frozen=True)
 class Start:
-    """A way to the steady state: its legs end at the asked amplitude and frequency; `chance` is 0 to 1."""
+    """A way to the steady state: its legs end at the asked amplitude and frequency.
+
+    `chance`, between 0 and 1, is estimated from s successes of n draws as (s + 1) / (n + 2) (rule of succession).
+    """
 
     name: str
     legs: tuple[Leg, ...]
@@ -62,50 +60,84 @@ class Start:
         return sum(leg.duration for leg in self.legs)
 
 
-def plan_starts(specimen: Specimen, omega: float, amplitude: float, orbit: Orbit | None, count: int) -> list[Start]:
-    """The `count` most robust starts to `amplitude` [m/s2] at `omega` [rad/s], best first.
+@dataclass(frozen=True, eq=False)
+class _Case:
+    """A specimen as it may be, the drive's relative amplitude, and the specimen's own orbit under that drive."""
 
-    A start succeeds when the simulated motion ends close to a stable `orbit`; where there is none, when the block
-    does not fall.
+    specimen: Specimen
+    drive: float
+    orbit: Orbit | None
+
+
+def plan_starts(
+    specimen: Specimen,
+    omega: float,
+    amplitude: float,
+    orbit: Orbit | None,
+    count: int,
+    uncertainty: SpecimenUncertainty | None = None,
+) -> list[Start]:
+    """The `count` most robust starts to `amplitude` [m/s2] at `omega` [rad/s], best first, the shorter one of equals.
+
+    `orbit` is the rocking orbit of `specimen`, None where there is none. A start succeeds with a drawn specimen when
+    the simulated motion ends close to that specimen's own stable orbit; where it has none, when the block stands.
+    Raises InvalidInput for a bare frame or meaningless numbers.
     """
-    candidates = _candidates(omega, amplitude)
-    variants = [(factor, _off(specimen, restitution, spring)) for factor, restitution, spring in OFFSETS]
-    runs = [(start, factor, variant) for start in candidates for factor, variant in variants]
+    random = np.random.default_rng(SEED)
+    allowed = uncertainty or SpecimenUncertainty()
+
+    def cases(n: int) -> list[_Case]:
+        return _cases(allowed.draws(specimen, n, random), omega, amplitude, orbit, random)
+
+    left = candidates(omega, amplitude)
+    won = np.zeros(len(left))
+    for draws, keep in SIEVES:
+        won = won + _successes(left, cases(draws))
+        order = _best_first(left, won)[: round(keep * count)]
+        left, won = [left[i] for i in order], won[order]
+    won = _successes(left, cases(RATING))
+    chances = (won + 1.0) / (RATING + 2.0)
+    return [Start(left[i].name, left[i].legs, float(chances[i])) for i in _best_first(left, won)]
+
+
+def _cases(
+    specimens: Sequence[Specimen], omega: float, amplitude: float, orbit: Orbit | None, random: np.random.Generator
+) -> list[_Case]:
+    found: list[_Case] = []
+    for specimen in specimens:
+        drive = 1.0 + DRIVE * float(random.uniform(-1.0, 1.0))
+        own = None if orbit is None else _own_orbit(specimen, omega, drive * amplitude, orbit)
+        found.append(_Case(specimen, drive, own))
+    return found
+
+
+def _own_orbit(specimen: Specimen, omega: float, amplitude: float, guess: Orbit) -> Orbit | None:
+    try:
+        return rocking_orbit(specimen, omega, amplitude, guess=guess)
+    except NoOrbit:
+        return None
+
+
+def _successes(ways: Sequence[Candidate], cases: Sequence[_Case]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    """In how many of the cases each candidate succeeds, shape (n,)."""
+    runs = [(way, case) for way in ways for case in cases]
     motions = simulate_many(
-        [variant for _, _, variant in runs],
-        [program(_scaled(start, factor)) for start, factor, _ in runs],
-        peaks_from=[start.duration + DWELL - WINDOW for start, _, _ in runs],
-        tolerance=1e-7,
+        [case.specimen for _, case in runs],
+        [program(_scaled(way, case.drive)) for way, case in runs],
+        peaks_from=[way.duration + DWELL - WINDOW for way, _ in runs],
+        tolerance=TOLERANCE,
         overturning_angle=CATCH_ANGLE,
     )
-    good = [_success(motion, orbit) for motion in motions]
-    n = len(OFFSETS)
-    rated = [replace(start, chance=sum(good[i * n : (i + 1) * n]) / n) for i, start in enumerate(candidates)]
-    return sorted(rated, key=lambda start: (-start.chance, start.duration))[:count]
+    good = [_success(motion, case.orbit) for motion, (_, case) in zip(motions, runs, strict=True)]
+    return np.array(good, dtype=np.float64).reshape(len(ways), len(cases)).sum(axis=1)
 
 
-def _off(specimen: Specimen, restitution: float, spring: float) -> Specimen:
-    block = specimen.block.model_copy(update={"restitution_factor": specimen.block.restitution_factor * restitution})
-    return specimen.model_copy(update={"block": block, "beta": (specimen.beta or 0.0) * spring})
+def _best_first(ways: Sequence[Candidate], won: np.ndarray[tuple[int], np.dtype[np.float64]]) -> list[int]:
+    return sorted(range(len(ways)), key=lambda i: (-won[i], ways[i].duration))
 
 
-def _candidates(omega: float, amplitude: float) -> list[Start]:
-    found: list[Start] = []
-    for top, ramp, rate, overshoot in product(TOPS, RAMPS, CHIRPS, OVERSHOOTS):
-        high = max(top, omega)
-        name = f"ramp {ramp:g} s at {high:g} rad/s, chirp {rate:g} rad/s per s"
-        legs = [Leg(ramp, overshoot * amplitude, high)]
-        if high > omega:
-            legs.append(Leg((high - omega) / rate, overshoot * amplitude, omega))
-        if overshoot != 1.0:
-            legs.append(Leg(EASE, amplitude, omega))
-            name += f", {overshoot:g} x amplitude"
-        found.append(Start(name, tuple(legs), 0.0))
-    return list({start.legs: start for start in found}.values())
-
-
-def _scaled(start: Start, factor: float) -> list[Leg]:
-    legs = [*start.legs, Leg(DWELL, start.legs[-1].amplitude, start.legs[-1].omega)]
+def _scaled(way: Candidate, factor: float) -> list[Leg]:
+    legs = [*way.legs, Leg(DWELL, way.legs[-1].amplitude, way.legs[-1].omega)]
     return [replace(leg, amplitude=factor * leg.amplitude) for leg in legs]
 
 

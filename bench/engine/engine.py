@@ -218,6 +218,10 @@ class Engine:
         self._read = exchange.block.first + len(exchange.block)
         self._drive = exchange.drive
         self._stream.publish(Acquired(self._stream.now(), self._run, exchange.block, exchange.drive))
+        if exchange.opened:
+            reason = f"{', '.join(exchange.opened)} opened"
+            self._cut(reason)
+            raise _Ended(Ending("halted", reason))
         for near in exchange.warnings:
             self._stream.say(Warned(0.0, f"{near.quantity} {near.value:.4g} {near.unit} comes near {near.limit:.4g}"))
         self._over = over = exchange.violation

@@ -26,7 +26,8 @@ class Exchange:
 
     `values` are the block's counts in units, shape (n, n_channels); `drive` [V], shape (n,), is what was played
     while they were taken; `violation` is the limit that was exceeded first, if one was, and `warnings` are those that
-    the motion has come near for the first time since arming.
+    the motion has come near for the first time since arming. `opened` names the safety inputs that are not good: the
+    enable line is cut then.
     """
 
     block: Block
@@ -34,6 +35,7 @@ class Exchange:
     drive: NDArray[np.float64]
     violation: Violation | None
     warnings: tuple[Violation, ...] = ()
+    opened: tuple[str, ...] = ()
 
 
 class Guard:
@@ -73,7 +75,9 @@ class Guard:
         return self.ramping and self._gain(0) == 0.0 and not self._waiting.any()
 
     def arm(self) -> None:
-        """Arm the rig with zeros waiting ahead of the first sample."""
+        """Arm the rig with zeros waiting ahead of the first sample. Raises RigError while a safety input is open."""
+        if opened := self._opened():
+            raise RigError(f"arming is refused: {', '.join(opened)} open; close it, then begin again")
         self._ramp_samples, self._ramp_done, self._ramp_from = None, 0, 1.0
         self._command, self._held, self._expected = 0.0, None, 0
         self._make_watches()
@@ -109,7 +113,10 @@ class Guard:
         seen = min(exceeded, key=lambda violation: violation.sample) if exceeded else None
         if seen is not None:
             self.abort()
-        return Exchange(block, values, played, refused or seen, tuple(near))
+        opened = self._opened()
+        if opened:
+            self.halt()
+        return Exchange(block, values, played, refused or seen, tuple(near), opened)
 
     def tare(self, values: NDArray[np.float64]) -> None:
         """Take a rest, values of shape (n, n_channels), as the zero of the specimen's drift."""
@@ -133,6 +140,9 @@ class Guard:
     def disarm(self) -> None:
         """Stop the rig; its output is at zero afterwards."""
         self._rig.stop()
+
+    def _opened(self) -> tuple[str, ...]:
+        return tuple(name for name, good in self._rig.interlocks().items() if not good)
 
     def _make_watches(self) -> None:
         rate = self._rig.sample_rate

@@ -9,6 +9,7 @@ from bench.guard.guard import Exchange, Guard
 from bench.guard.limits import Debounce, Limits, Ramps, Warnings
 from bench.guard.quantities import Mover, Quantities
 from bench.guard.timing import TimeWatch
+from drivers.errors import RigError
 from sim.errors import InvalidInput
 from tests.loopback import LoopbackRig
 
@@ -339,3 +340,20 @@ class TestTime:
         watch = TimeWatch(1000.0, self.LIMITS)
         late = [0.0, 0.1, 0.2, 0.3]
         assert not any(watch.check(0.1 * k + late[k % 4], 100 * (k + 1)) for k in range(1000))
+
+
+def test_an_open_safety_input_cuts_the_enable_line() -> None:
+    guard, rig = _armed()
+    rig.safety = {"emergency stop": True, "over-travel": True}
+    assert guard.exchange(_sine(1.0)).opened == ()
+    rig.safety["emergency stop"] = False
+    assert guard.exchange(_sine(1.0, N)).opened == ("emergency stop",)
+    assert rig.halted
+
+
+def test_nothing_is_armed_while_a_safety_input_is_open() -> None:
+    rig = LoopbackRig()
+    rig.safety = {"amplifier ready": False}
+    with pytest.raises(RigError, match="amplifier ready"):
+        Guard(rig, LIMITS, RAMPS).arm()
+    assert not rig.armed
