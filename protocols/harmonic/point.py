@@ -36,6 +36,9 @@ class HarmonicPoint(Parameters):
     bare_amplitude_m_s2: float | None = quantity(None, "m/s2", "achieved amplitude of the table, bare")
     table_harmonics: float | None = quantity(None, "1", "rms of the table's harmonics over its fundamental, coupled")
     starts_tried: int = quantity(0, "1", "starts tried")
+    start_chance: float | None = quantity(
+        None, "1", "estimated chance of success of the start that was measured, or of the best where all fell"
+    )
     cycles_measured: int = quantity(0, "1", "cycles over which the peaks were measured")
     settle_time_s: float | None = quantity(None, "s", "time from the dwell's begin to the steady state")
     reason: str = quantity("", "", "why the point is not steady, or what was noticed")

@@ -6,7 +6,7 @@ import numpy as np
 
 from bench.analysis.steady import WINDOW
 from bench.config.model import BenchConfiguration
-from bench.control.starts import OVERSHOOTS
+from bench.control.candidates import OVERSHOOTS
 from protocols.harmonic.parameters import HarmonicParameters
 from sim.errors import InvalidInput
 from sim.specimen import Specimen

@@ -110,7 +110,7 @@ class HarmonicSheet:
         falls = 0
         for tried, start in enumerate(starts, 1):
             where = f"beta = {specimen.beta:g} at {omega:g} rad/s, start {tried} of {len(starts)}: {start.name}"
-            yield Say(StepStarted(0.0, where))
+            yield Say(StepStarted(0.0, f"{where}, chance {start.chance:.0%}"))
             yield Arm(REST)
             yield Calibrate(calibration)
             settled: Settled | Fallen | None = None
@@ -123,12 +123,13 @@ class HarmonicSheet:
             yield from self._end_test(specimen, fast=False)
             accuracy = self._configuration.analysis
             point = judge(settled, self._bare[omega], omega, specimen, accuracy, tried)
+            point = point.model_copy(update={"start_chance": start.chance})
             if point.status is PointStatus.STEADY or not point.predicted_stable:
                 return point
             found = found or point
         if found is not None:
             return found.model_copy(update={"starts_tried": len(starts)})
-        return self._overturned(specimen, omega, falls)
+        return self._overturned(specimen, omega, falls, starts[0].chance)
 
     def _end_test(self, specimen: Specimen, *, fast: bool) -> Generator[Step, Outcome, None]:
         """Ramp out, fast when the block has fallen; a block that has fallen by then is stood up again."""
@@ -136,7 +137,7 @@ class HarmonicSheet:
         if fast or isinstance(outcome, Fallen):
             yield Handle(Handwork.STAND_BLOCK_UP, specimen, FALLEN_REQUEST)
 
-    def _overturned(self, specimen: Specimen, omega: float, falls: int) -> HarmonicPoint:
+    def _overturned(self, specimen: Specimen, omega: float, falls: int, chance: float) -> HarmonicPoint:
         bare = self._bare[omega].peak
         layer = predict_gain(specimen, omega, self._amplitude, bare.amplitude).rocking
         kind = "stable" if layer and layer.stable else "unstable"
@@ -150,6 +151,7 @@ class HarmonicSheet:
             bare_drift_peak_m=bare.drift,
             bare_amplitude_m_s2=bare.amplitude,
             starts_tried=falls,
+            start_chance=chance,
             reason=f"the block fell in each of {falls} starts; the predicted orbit is {kind}",
         )
 

@@ -1,0 +1,66 @@
+"""What a pass of a replication achieved."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.analysis.response_spectrum import DAMPING, logarithmic_periods, pseudo_acceleration
+from bench.control.envelope import Verdict
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Pass:
+    """One pass; errors are relative to the target [1], both seen through the target's window.
+
+    `error` is the root mean square as measured; `floor` is the part of it that does not repeat: measurement noise,
+    and after a drive was played twice all that differed. `repeatable` is what is left, and what a correction can take
+    away. `peak_error` is the largest error over the target's peak, `spectrum_error` the largest deviation of the
+    response spectrum. A pass is `accepted` when its error is the smallest so far; otherwise the drive goes back.
+    `replayed` says that the best drive was played again; `gain` and `verdict` belong to the correction that led here.
+    """
+
+    number: int
+    error: float
+    floor: float
+    peak_error: float
+    spectrum_error: float
+    accepted: bool
+    replayed: bool
+    gain: float
+    verdict: Verdict
+
+    @property
+    def repeatable(self) -> float:
+        """Root mean square of the error without its floor."""
+        return max(self.error**2 - self.floor**2, 0.0) ** 0.5
+
+    def __str__(self) -> str:
+        kind = "replay" if self.replayed else f"gain {self.gain:.2g}"
+        fate = "accepted" if self.accepted else "rolled back"
+        limited = "" if self.verdict.binds is None else f"; {self.verdict}"
+        return (
+            f"pass {self.number} ({kind}): error {self.error:.2%}, repeatable {self.repeatable:.2%}, peak"
+            f" {self.peak_error:.2%}, response spectrum {self.spectrum_error:.2%}, {fate}{limited}"
+        )
+
+
+class SpectrumCheck:
+    """Compares response spectra with that of a target."""
+
+    def __init__(
+        self, target: Array, sample_rate: float, band: tuple[float, float], periods: tuple[float, ...]
+    ) -> None:
+        """`band` [s] and single `periods` [s] at which spectra are compared."""
+        self._dt = 1.0 / sample_rate
+        self._periods = np.concatenate((logarithmic_periods(*band), np.array(periods)))
+        self._wanted = self._spectrum(target)
+
+    def error(self, achieved: Array) -> float:
+        """Largest relative deviation of the response spectrum."""
+        return float(np.abs(self._spectrum(achieved) / self._wanted - 1.0).max())
+
+    def _spectrum(self, acceleration: Array) -> Array:
+        return pseudo_acceleration(acceleration, self._dt, self._periods, DAMPING)

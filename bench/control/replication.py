@@ -1,0 +1,237 @@
+"""Waveform replication: the drive that makes the table follow a record, found by playing it again and again.
+
+A pass plays the drive u and measures the table. What is missing, E, goes through the inverse of the table:
+
+    u <- u + Q IFFT{ W K conj(H) / (|H|^2 + eps^2 max|H|^2) E },
+
+with the coherence and the share of E that is not noise in K. It converges where |1 - Q H_true / H| < 1. After a pass
+that is far off, H is corrected by what that pass has shown. A pass that comes out worse than the best one is rolled
+back; the best drive is played once more, which tells what does not repeat, and the correction is halved. So the
+accepted error never grows, and neither noise nor a motion that is different every time is learned
+(De Cuyper, Linear feedback control for durability test rigs in the automotive industry, thesis, KU Leuven 2006).
+"""
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.control.envelope import Envelope, Verdict, fitting
+from bench.control.inverse import TableInverse
+from bench.control.octaves import octave_mean
+from bench.control.passes import Pass, SpectrumCheck
+from bench.control.table_model import TableModel
+from bench.control.target import Target
+from bench.guard.limits import Limits
+from sim.errors import InvalidInput
+from sim.parameters import Parameters, quantity
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+Status = Literal["running", "converged", "out of passes", "limited"]
+
+_REFINE_ABOVE, _REFINE_ON_ABOVE = 0.05, 0.01
+"""Error above which a pass says more about the response than about friction and noise; and once it has, until when."""
+_LEAST_SHARE = 0.02
+"""A correction of which less than this fits within the limits is not worth a pass."""
+
+
+class ReplicationParameters(Parameters):
+    """How a record is replicated."""
+
+    passes: int = quantity(8, "1", "passes at most", ge=1, le=50)
+    tolerance: float = quantity(
+        0.003, "1", "root mean square error over that of the target, without its noise, that is good enough", gt=0, lt=1
+    )
+    gains: tuple[float, ...] = quantity(
+        (1.0, 1.0, 1.0, 0.7),
+        "1",
+        "share Q of each correction, that from rest included; the last one holds on",
+        min_length=1,
+    )
+    replay_first: bool = quantity(
+        False, "", "play the first drive twice before it is corrected: for a block that rocks, different every time"
+    )
+    margin: float = quantity(1.1, "1", "limits over what drive and motion are predicted to reach at most", ge=1, le=3)
+    beyond: Literal["refuse", "scale"] = quantity(
+        "refuse", "", "what becomes of a drive beyond a limit: refuse it, or scale it down until it fits"
+    )
+    spectrum_band: tuple[float, float] = quantity(
+        (0.1, 1.0), "s", "periods between which the response spectrum is compared"
+    )
+    spectrum_periods: tuple[float, ...] = quantity((), "s", "further periods, such as those of the specimen")
+
+
+class Replication:
+    """Finds the drive for `target`. Play `drive`, give what was measured to `learn`, until `finished`.
+
+    ::
+
+        while not replication.finished:
+            acceleration, displacement = ...  # of the table, while replication.drive was played
+            report = replication.learn(acceleration, displacement)
+        volts = replication.best
+
+    The rig is at rest before each pass; sample i was taken when drive sample i began to act. Raises InvalidInput when
+    the model does not cover the target, or when the first drive is beyond a limit and is not to be scaled.
+    """
+
+    def __init__(
+        self, target: Target, model: TableModel, limits: Limits, parameters: ReplicationParameters | None = None
+    ) -> None:
+        self.parameters = p = parameters or ReplicationParameters()
+        self._target, self._limits = target, limits
+        self._table = TableInverse(model, target)
+        self._wanted = self._table.spectrum(target.acceleration)
+        self._norm = self._size(np.abs(self._wanted) ** 2)
+        if self._norm == 0.0:
+            raise InvalidInput("target", "all zero", "there is nothing to replicate")
+        seen = self._table.record(self._table.window * self._wanted)
+        self._peak = float(np.abs(seen).max())
+        self._spectrum = SpectrumCheck(seen, target.sample_rate, p.spectrum_band, p.spectrum_periods)
+        self._noise = self._table.noise
+        self._plays = 1
+        self._corrections, self._halvings, self._replaying = 0, 0, False
+        self._refining = False
+        self._passes: list[Pass] = []
+        self._least = np.inf
+        self._status: Status = "running"
+        # before the first pass: nothing was played, nothing moved, all is missing
+        still = np.zeros(target.acceleration.size)
+        self._best, self._missing = still, self._wanted
+        self._present = Envelope.of(still, still, still, target.sample_rate)
+        self._drive, self._gain, self._verdict = self._next()
+        if self._verdict.binds is not None and p.beyond == "refuse":
+            raise InvalidInput("target", f"peak {self._peak:.4g} m/s2", str(self._verdict))
+
+    @property
+    def drive(self) -> Array:
+        """Volts of the next pass, shape (n,); zero at both ends."""
+        return self._drive
+
+    @property
+    def best(self) -> Array:
+        """Volts of the best pass so far, shape (n,)."""
+        return self._best
+
+    @property
+    def passes(self) -> tuple[Pass, ...]:
+        """Every pass so far."""
+        return tuple(self._passes)
+
+    @property
+    def status(self) -> Status:
+        """Running, or why no further pass is asked for."""
+        return self._status
+
+    @property
+    def finished(self) -> bool:
+        """Whether no further pass is asked for."""
+        return self._status != "running"
+
+    def learn(self, acceleration: Array, displacement: Array | None = None) -> Pass:
+        """Take what the table did while `drive` was played: acceleration [m/s2] and displacement [m], shape (n,).
+
+        The displacement says how much stroke is left; without it the acceleration is integrated. Raises InvalidInput
+        when samples are missing.
+        """
+        for name, values in (("acceleration", acceleration), ("displacement", displacement)):
+            if values is not None and (values.shape != self._drive.shape or not np.isfinite(values).all()):
+                raise InvalidInput(f"measured {name}", values.shape, "every sample of the pass is needed; repeat it")
+        measured = self._table.spectrum(acceleration)
+        missing = self._wanted - measured
+        error = self._size(np.abs(missing) ** 2) / self._norm
+        accepted, replayed, verdict, gain = error <= self._least, self._replaying, self._verdict, self._gain
+        if replayed:
+            self._compare(missing)
+            if not self._passes[-1].accepted and not self._scatter_explains(self._passes[-1].error):
+                self._halvings += 1
+        elif accepted:
+            self._accept(missing, acceleration, displacement)
+            self._refining = error > (_REFINE_ON_ABOVE if self._refining else _REFINE_ABOVE)
+            if self._refining:
+                self._table.refine(self._drive, measured)
+        elif self._plays > 1:
+            self._halvings += 1
+        self._least = min(error, self._least)
+        first = self.parameters.replay_first and not self._passes
+        self._replaying = first or (not accepted and not replayed and self._plays == 1)
+        report = self._report(error, missing, accepted, replayed, gain, verdict)
+        self._passes.append(report)
+        self._go_on()
+        return report
+
+    def _accept(self, missing: Complex, acceleration: Array, displacement: Array | None) -> None:
+        rate = self._target.sample_rate
+        self._best, self._missing, self._plays = self._drive, missing, 1
+        self._present = Envelope.of(self._drive, acceleration, displacement, rate)
+
+    def _compare(self, missing: Complex) -> None:
+        """The best drive was played twice: what differs is no use to learn, and the mean is better known."""
+        difference = 0.5 * octave_mean(np.abs(missing - self._missing) ** 2, self._table.frequency)
+        # two plays may agree by chance: what was seen to scatter once stays known
+        self._noise = np.maximum(self._noise, difference)
+        self._missing = 0.5 * (self._missing + missing)
+        self._plays = 2
+
+    def _scatter_explains(self, rejected: float) -> bool:
+        """Whether a `rejected` error is no worse than what learning one scatter and meeting another makes."""
+        repeatable = self._size(np.abs(self._missing) ** 2)
+        return (rejected * self._norm) ** 2 <= repeatable**2 + 2.0 * self._size(self._noise) ** 2
+
+    def _report(
+        self, error: float, missing: Complex, accepted: bool, replayed: bool, gain: float, verdict: Verdict
+    ) -> Pass:
+        table = self._table
+        return Pass(
+            number=len(self._passes) + 1,
+            error=error,
+            floor=self._size(self._noise) / self._norm,
+            peak_error=float(np.abs(table.record(table.window * missing)).max()) / self._peak,
+            spectrum_error=self._spectrum.error(table.record(table.window * (self._wanted - missing))),
+            accepted=accepted,
+            replayed=replayed,
+            gain=gain,
+            verdict=verdict,
+        )
+
+    def _go_on(self) -> None:
+        """Decide whether another pass follows, and with which drive."""
+        repeatable = self._size(np.abs(self._missing) ** 2) ** 2 - self._size(self._noise) ** 2 / self._plays
+        if repeatable <= (self.parameters.tolerance * self._norm) ** 2:
+            self._status = "converged"
+        elif len(self._passes) >= self.parameters.passes:
+            self._status = "out of passes"
+        elif self._replaying:
+            self._drive = self._best
+        else:
+            self._drive, self._gain, self._verdict = self._next()
+            refused = self._verdict.binds is not None and self.parameters.beyond == "refuse"
+            if refused or self._verdict.share < _LEAST_SHARE:
+                self._status = "limited"
+            elif np.array_equal(self._drive, self._best):
+                # no line is left whose error stands out of what does not repeat
+                self._status = "converged"
+
+    def _next(self) -> tuple[Array, float, Verdict]:
+        """The best drive with its correction, as far as the limits allow; the gain; and what the limits said."""
+        gains, rate = self.parameters.gains, self._target.sample_rate
+        gain = gains[min(self._corrections, len(gains) - 1)] * 0.5**self._halvings
+        self._corrections += 1
+        step = gain * self._table.correction(self._missing, self._noise / self._plays) * self._ends()
+        change = Envelope.of(step, self._table.predicted(step), None, rate)
+        verdict = fitting(self._present, change, self._limits, self.parameters.margin)
+        return self._best + verdict.share * step, gain, verdict
+
+    def _ends(self) -> Array:
+        """A factor that leads the drive from zero and back to it within the rest before and after the record."""
+        n = max(self._target.rest // 4, 2)
+        ramp = 0.5 * (1.0 - np.cos(np.pi * np.arange(n) / n))
+        ends = np.ones(self._target.acceleration.size)
+        ends[:n], ends[-n:] = ramp, ramp[::-1]
+        return ends
+
+    def _size(self, power: Array) -> float:
+        """Root of the power of a spectrum as seen through the window."""
+        return float(np.sqrt(np.sum(self._table.window**2 * power)))

@@ -1,0 +1,112 @@
+"""A record made to fit the table, and what that did to it."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from math import tau
+
+import numpy as np
+
+from bench.analysis.response_spectrum import DAMPING, pseudo_acceleration
+from bench.control.stroke.highpass import fit_by_high_pass
+from bench.control.stroke.least_change import fit_by_least_change
+from bench.control.stroke.motion import Array, TableMotion, table_motion
+from bench.control.stroke.reach import Reach
+from sim.errors import InvalidInput
+from sim.excitation import SampledRecord
+from sim.specimen import Frame
+
+PERIODS = np.geomspace(0.1, 2.0, 40)
+"""Periods [s] at which the change of the response spectrum is told, and kept small."""
+
+SHORTEST = 16
+"""Samples that a record must have."""
+
+ROUNDING = 1e-9
+"""Share of its peak at which a velocity or displacement counts as none."""
+
+
+class Method(StrEnum):
+    """How a record is made to fit."""
+
+    LEAST_CHANGE = "least change"
+    HIGH_PASS = "high-pass"
+
+
+@dataclass(frozen=True, eq=False)
+class StrokeFit:
+    """A fitted record: it ends at rest where it began, and stays within the table's reach at every sample.
+
+    `record` begins `lead` [s] before the original. `before` and `after` are the table's motions under the original
+    and under the fitted record. `spectrum` and `spectrum_before`, shape (n,), are pseudo-accelerations [m/s2] at
+    `periods` [s]. `done` says in words what was done.
+    """
+
+    record: SampledRecord
+    lead: float
+    done: str
+    before: TableMotion
+    after: TableMotion
+    periods: Array
+    spectrum_before: Array
+    spectrum: Array
+
+    @property
+    def change(self) -> Array:
+        """Relative change of the response spectrum at `periods`, shape (n,)."""
+        return self.spectrum / self.spectrum_before - 1.0
+
+    @property
+    def rms_change(self) -> float:
+        """Root mean square of `change`."""
+        return float(np.sqrt(np.mean(self.change**2)))
+
+
+def periods_of(frame: Frame) -> Array:
+    """`PERIODS` and the periods of the frame's modes [s], ascending."""
+    return np.unique(np.append(PERIODS, [tau / omega for omega in frame.natural_frequencies]))
+
+
+def fit_stroke(
+    record: SampledRecord,
+    reach: Reach,
+    method: Method = Method.LEAST_CHANGE,
+    periods: Array = PERIODS,
+    damping: float = DAMPING,
+) -> StrokeFit:
+    """`record` made to keep the table within `reach`.
+
+    A record that does so and ends at rest is returned as it is. Raises InvalidInput for a record without motion or
+    shorter than 16 samples, and where the method cannot make it fit, with the reason.
+    """
+    original, dt = record.acceleration, record.dt
+    if original.size < SHORTEST or not original.any():
+        needs = f"fitting needs at least {SHORTEST} samples, and some that are not zero"
+        raise InvalidInput("record", f"{original.size} samples", needs)
+    before = table_motion(original, dt)
+    lead = 0
+    if reach.holds(before) and _at_rest(before):
+        fitted, done = original, "nothing: the record fits as it is"
+    elif method is Method.HIGH_PASS:
+        passed = fit_by_high_pass(original, dt, reach)
+        fitted, lead = passed.acceleration, passed.lead
+        done = f"zero-phase high-pass at {passed.corner:.3g} Hz"
+    else:
+        fitted = fit_by_least_change(original, dt, reach, periods, damping)
+        changed = float(np.sqrt(np.mean((fitted - original) ** 2) / np.mean(original**2)))
+        done = f"least change below 2 Hz: {100.0 * changed:.3g} % of the record's rms acceleration"
+    return StrokeFit(
+        record=SampledRecord(fitted, dt),
+        lead=lead * dt,
+        done=done,
+        before=before,
+        after=table_motion(fitted, dt),
+        periods=periods,
+        spectrum_before=pseudo_acceleration(original, dt, periods, damping),
+        spectrum=pseudo_acceleration(fitted, dt, periods, damping),
+    )
+
+
+def _at_rest(motion: TableMotion) -> bool:
+    """Whether the table ends at rest where it began, but for rounding."""
+    still = abs(motion.velocity[-1]) <= ROUNDING * motion.peak_velocity
+    return still and abs(motion.displacement[-1]) <= ROUNDING * motion.peak_displacement

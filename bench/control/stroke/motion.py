@@ -1,0 +1,56 @@
+"""The table's motion under sampled accelerations: exact where straight lines join the samples (first-order hold).
+
+v += (a0 + a1) dt / 2,    d += v dt + (2 a0 + a1) dt^2 / 6
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class TableMotion(NamedTuple):
+    """Velocity [m/s] and displacement [m] at the samples, shape (n,) each, from rest."""
+
+    velocity: Array
+    displacement: Array
+
+    @property
+    def peak_velocity(self) -> float:
+        """Greatest |v| [m/s]."""
+        return float(np.abs(self.velocity).max())
+
+    @property
+    def peak_displacement(self) -> float:
+        """Greatest |d| [m]."""
+        return float(np.abs(self.displacement).max())
+
+
+def table_motion(acceleration: Array, dt: float) -> TableMotion:
+    """The motion under `acceleration` [m/s2], shape (n,), sampled every `dt` [s]."""
+    before, after = acceleration[:-1], acceleration[1:]
+    velocity, displacement = np.zeros_like(acceleration), np.zeros_like(acceleration)
+    np.cumsum((before + after) * (0.5 * dt), out=velocity[1:])
+    np.cumsum(velocity[:-1] * dt + (2.0 * before + after) * (dt * dt / 6.0), out=displacement[1:])
+    return TableMotion(velocity, displacement)
+
+
+def at_rest_in_the_end(acceleration: Array, dt: float) -> Array:
+    """`acceleration` less the two lowest sines over its length, sized so that the table ends at rest where it began.
+
+    Velocity and displacement at the end are linear in the two sizes, so this is exact but for rounding; the second
+    turn takes back what the first one rounded. The sines vanish at both ends: the record begins and ends as it did.
+    """
+    place = np.linspace(0.0, np.pi, acceleration.size)
+    shapes = np.array([np.sin(place), np.sin(2.0 * place)])
+    ends = np.array([_end(shape, dt) for shape in shapes]).T
+    for _ in range(2):
+        acceleration = acceleration - np.linalg.solve(ends, _end(acceleration, dt)) @ shapes
+    return acceleration
+
+
+def _end(acceleration: Array, dt: float) -> Array:
+    velocity, displacement = table_motion(acceleration, dt)
+    return np.array([velocity[-1], displacement[-1]])

@@ -1,0 +1,110 @@
+"""The motion that the table is asked for: a record within the table's band, at rest at both ends."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.errors import InvalidInput
+
+Array = NDArray[np.float64]
+
+ORDER = 4
+"""Order of the Butterworth filters, applied forwards and backwards, that limit a record to the band."""
+
+FLAT, REACH = 1.6, 2.0
+"""Factors on the ends of the band: up to the first everything counts in full, beyond the second nothing."""
+
+_REST = 4.0
+"""Rest before and after the record, in periods of the band's lower end: the filters have rung out by then."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """Table acceleration [m/s2] at `sample_rate` [1/s], shape (n,); rest at either end lasts `rest` samples.
+
+    `band` [Hz] are the -6 dB points of the filters that shaped it. Its spectrum is zero outside `support`.
+    """
+
+    acceleration: Array
+    sample_rate: float
+    band: tuple[float, float]
+    rest: int
+
+    @property
+    def support(self) -> tuple[float, float]:
+        """Lowest and highest frequency [Hz] that is compared and corrected."""
+        return self.band[0] / REACH, self.band[1] * REACH
+
+    @property
+    def frequency(self) -> Array:
+        """Frequencies [Hz] of the transform of the record, shape (n // 2 + 1,)."""
+        return np.fft.rfftfreq(self.acceleration.size, 1.0 / self.sample_rate).astype(np.float64)
+
+    @property
+    def window(self) -> Array:
+        """The zero-phase filter through which target and measurement are compared, shape (n // 2 + 1,): 0 to 1."""
+        return band_window(self.frequency, self.band)
+
+    @property
+    def peaks(self) -> dict[str, float]:
+        """Largest magnitudes of acceleration [m/s2], velocity [m/s] and displacement [m]."""
+        velocity, displacement = integrated(self.acceleration, self.sample_rate)
+        series = {"acceleration": self.acceleration, "velocity": velocity, "displacement": displacement}
+        return {name: float(np.abs(values).max()) for name, values in series.items()}
+
+    @property
+    def duration(self) -> float:
+        """Length [s], the rest included."""
+        return self.acceleration.size / self.sample_rate
+
+    def scaled(self, factor: float) -> "Target":
+        """The same motion, `factor` times as strong."""
+        return replace(self, acceleration=factor * self.acceleration)
+
+
+def band_limited(record: Array, dt: float, sample_rate: float, band: tuple[float, float]) -> Target:
+    """The part of a record that a table can make: `record` [m/s2], shape (n,), its samples joined by straight lines.
+
+    The filter has zero phase and no response at zero frequency: velocity and displacement end at zero like the
+    acceleration. Raises InvalidInput.
+    """
+    from scipy.fft import next_fast_len
+
+    low, high = band
+    if not 0.0 < low < high or REACH * high > 0.5 * sample_rate:
+        allowed = f"it must go up from above 0 to {0.5 * sample_rate / REACH:g} Hz at most"
+        raise InvalidInput("band", band, allowed)
+    if record.ndim != 1 or record.size < 2 or not np.isfinite(record).all() or not dt > 0.0:
+        raise InvalidInput("record", (record.shape, dt), "it must be two finite samples in one row or more, dt > 0")
+    times = np.arange(int((record.size - 1) * dt * sample_rate) + 1) / sample_rate
+    resampled = np.interp(times, dt * np.arange(record.size), record)
+    rest = round(_REST / low * sample_rate)
+    padded = np.zeros(next_fast_len(times.size + 2 * rest, real=True))
+    padded[rest : rest + times.size] = resampled
+    frequency = np.fft.rfftfreq(padded.size, 1.0 / sample_rate).astype(np.float64)
+    shape = band_window(frequency, band)
+    inside = shape > 0.0
+    shape[inside] /= 1.0 + (low / frequency[inside]) ** (2 * ORDER)
+    shape[inside] /= 1.0 + (frequency[inside] / high) ** (2 * ORDER)
+    return Target(np.fft.irfft(shape * np.fft.rfft(padded), padded.size), sample_rate, band, rest)
+
+
+def integrated(acceleration: Array, sample_rate: float) -> tuple[Array, Array]:
+    """Velocity [m/s] and displacement [m] from the first sample on, of an acceleration without its mean."""
+    spectrum = np.fft.rfft(acceleration)
+    omega = 2.0 * np.pi * np.fft.rfftfreq(acceleration.size, 1.0 / sample_rate)
+    spectrum[0], omega[0] = 0.0, 1.0
+    velocity = np.fft.irfft(-1j * spectrum / omega, acceleration.size)
+    displacement = np.fft.irfft(-spectrum / omega**2, acceleration.size)
+    return velocity - velocity[0], displacement - displacement[0]
+
+
+def band_window(frequency: Array, band: tuple[float, float]) -> Array:
+    """1 within the band and FLAT beyond, 0 from REACH on, half a cosine over the logarithm between; same shape."""
+    low, high = band
+    inside = (frequency > low / REACH) & (frequency < high * REACH)
+    beyond = np.zeros_like(frequency)
+    beyond[inside] = np.maximum(low / frequency[inside], frequency[inside] / high)
+    over = np.log(np.maximum(beyond, FLAT) / FLAT) / np.log(REACH / FLAT)
+    return np.where(inside, 0.5 * (1.0 + np.cos(np.pi * over)), 0.0)
