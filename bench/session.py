@@ -14,19 +14,21 @@ from bench.engine.operator import Operator
 from bench.engine.requests import Requests
 from bench.engine.steps import Plan
 from bench.engine.stream import Stream
-from bench.events import Event, PointFinished, Subscriber
+from bench.events import Event, PointFinished, Subscriber, Warned
 from bench.guard.guard import Guard
+from bench.preflight.compiled import compile_run
 from bench.provenance import software
-from bench.record.recorder import Recorder
+from bench.record.recorder import PATIENCE, Recorder
 from bench.record.tables import Table
 from bench.report.summary import Summary, write_summary
 from bench.results import FIGURE, FILE, SUMMARY
 from bench.rigs import open_rig
+from drivers.clock import VirtualClock
 from sim.parameters import Parameters
 
 
 class Experiment(Protocol):
-    """What a protocol offers to a session."""
+    """What a protocol offers to a session. One that is `bench.preflight.forecast.Forecasting` besides has margins."""
 
     @property
     def name(self) -> str:
@@ -103,6 +105,8 @@ def run_session(
     """
     started = time.monotonic()
     protocol.check(configuration)
+    preflight = compile_run(protocol, configuration, out)
+    preflight.require()
     prediction = protocol.predict(configuration)
     if requests.strongest is not None:
         raise KeyboardInterrupt
@@ -114,8 +118,10 @@ def run_session(
             channels=rig.channels,
             sample_rate=rig.sample_rate,
             point_type=protocol.point_type,
-            metadata=_metadata(protocol, configuration, rig.description),
-            tables={"prediction": prediction},
+            metadata=_metadata(protocol, configuration, rig.description) | {"plan_hash": preflight.plan_hash},
+            tables={"prediction": prediction, **preflight.tables},
+            # in virtual time nothing moves on while the disk is waited for
+            hold_up=PATIENCE if isinstance(rig.clock, VirtualClock) else 0.0,
         )
         points = _Points()
         stream = Stream(rig.clock, [recorder, points, *subscribers])
@@ -130,6 +136,8 @@ def run_session(
                 operator,
                 configuration.block_samples,
             )
+            for warning in preflight.warnings:
+                stream.say(Warned(0.0, warning))
             ending = engine.run(protocol.plan(configuration))
             status, reason = ending.status, ending.reason
         finally:
@@ -147,6 +155,7 @@ def run_session(
         seed=configuration.simulation.seed,
         elapsed=time.monotonic() - started,
         bench_time=stream.now(),
+        plan_hash=preflight.plan_hash,
     )
     write_summary(out / SUMMARY, summary)
     protocol.figure(points.all, prediction, out / FIGURE)

@@ -126,7 +126,12 @@ class Rig(Protocol):
         ...
 
     def halt(self) -> None:
-        """Cut the enable line now, then put the output to zero. Allowed in every state, any number of times."""
+        """Cut the enable line now, then put the output to zero. Allowed in every state, any number of times.
+
+        The one method that may be called while another is at work: from another thread while `read` waits, and from
+        a signal handler in the middle of any call, so it waits for no lock that a call may hold. A call that it
+        interrupts raises RigError, a `read` at the latest when its block was due.
+        """
         ...
 
     def close(self) -> None:

@@ -144,6 +144,8 @@ class SimulatedRig:
         counts = self.bench.run(self._next_samples(n))
         self._index += n
         self._clock.wait_until(self._started + self._index / self.sample_rate)
+        if self._state is not _State.ARMED:
+            raise RigError("the rig was halted while it read a block; the block is lost, arm it again")
         return Block(first, counts)
 
     def stop(self) -> None:
@@ -152,8 +154,10 @@ class SimulatedRig:
         self._drop_queue()
 
     def halt(self) -> None:
-        # the enable line and the output are one thing here: what follows is zero drive
-        self.stop()
+        # the enable line and the output are one thing here: what follows is zero drive. Another thread may be taking
+        # samples from the queue, so that is left to the next `arm`
+        if self._state is _State.ARMED:
+            self._state = _State.STOPPED
 
     def close(self) -> None:
         self.stop()

@@ -11,7 +11,7 @@ from math import ceil, tau
 import numpy as np
 from numpy.typing import NDArray
 
-HARMONICS = 9
+HARMONICS = 10
 """Harmonics fitted jointly: the drift of a rocking frame has less than 1e-5 of its peak above them."""
 
 COMPLETE = 0.98
@@ -46,6 +46,17 @@ class Cycle:
     fundamental: NDArray[np.complex128]
     peak: NDArray[np.float64]
     noise: NDArray[np.float64]
+
+    def harmonics(self, column: int) -> NDArray[np.complex128]:
+        """Complex amplitudes z_k of one signal, shape (HARMONICS,): it is Im(sum of z_k exp(i k phase)) and its mean.
+
+        Harmonics that were not fitted are zero.
+        """
+        fitted = (self.coefficients.shape[0] - 1) // 2
+        found = np.zeros(HARMONICS, dtype=np.complex128)
+        cosines, sines = self.coefficients[1 : 1 + fitted, column], self.coefficients[1 + fitted :, column]
+        found[:fitted] = sines + 1j * cosines
+        return found
 
 
 def fit_cycle(index: int, phase: NDArray[np.float64], values: NDArray[np.float64]) -> Cycle | None:

@@ -32,8 +32,13 @@ class SignalMap:
         self._zero = np.zeros(len(SIGNALS))
 
     def tare(self, values: NDArray[np.float64]) -> None:
-        """Take the mean of channel values at rest, shape (n, n_channels), as the zero of every signal."""
-        self._zero = np.nan_to_num(np.nanmean(self._raw(values), axis=0))
+        """Take the mean of channel values at rest, shape (n, n_channels), as the zero of every signal.
+
+        A signal without any value keeps the zero of its sensor.
+        """
+        raw = self._raw(values)
+        valid = np.count_nonzero(np.isfinite(raw), axis=0)
+        self._zero = np.nansum(raw, axis=0) / np.maximum(valid, 1)
 
     def scatter(self, values: NDArray[np.float64]) -> float:
         """Larger standard deviation of u1 and drift [m] in channel values; infinite where samples are missing."""

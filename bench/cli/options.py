@@ -50,6 +50,16 @@ class Options:
             name="--seed", metavar="INT", group=_RUN, help="Seed of the simulation, in place of the configuration's."
         ),
     ] = None
+    dry_run: Annotated[
+        bool,
+        Parameter(
+            name="--dry-run",
+            group=_RUN,
+            negative=(),
+            show_default=False,
+            help="Compute the whole run, check it against every limit, print the margins and stop: nothing is opened.",
+        ),
+    ] = False
     yes: Annotated[
         bool,
         Parameter(
@@ -87,7 +97,7 @@ class Options:
             group=_RUN,
             negative=(),
             show_default=False,
-            help="Print one JSON object, the summary of the run, on standard output and nothing else there.",
+            help="Print one JSON object, the summary of the run or its margins, on standard output, and nothing else.",
         ),
     ] = False
 

@@ -30,7 +30,8 @@ GOOD = ("completed", "stopped")
 
 _EXIT_CODES = (
     "The exit code is 0 when the campaign was carried out (also when a point was not reached: its status says so), "
-    "1 when it failed or was aborted, 2 when something was refused before it began, 130 after Ctrl-C."
+    "1 when it failed or was aborted, 2 when something was refused before it began, 130 after Ctrl-C. "
+    "With --dry-run it is 0 when the campaign would be carried out."
 )
 
 
@@ -86,6 +87,10 @@ def _perform(entry: Entry, arguments: dict[str, Any], options: Options, start: S
     configuration = configuration_from(options.config, options.seed)
     out = options.out or default_folder(entry.name, datetime.now())
     check_folder(out)
+    if options.dry_run:
+        from bench.cli.dry_run import dry_run
+
+        return dry_run(experiment, configuration, out, as_json=options.json)
     operator = choose(
         serves_itself=configuration.serves_itself, yes=options.yes, ask=options.ask, terminal=sys.stdin.isatty()
     )

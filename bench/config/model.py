@@ -11,6 +11,7 @@ from drivers.hardware.parameters import Hardware
 from sim.errors import InvalidInput
 from sim.parameters import Parameters, quantity
 from sim.specimen import Specimen
+from sim.uncertainty import SpecimenUncertainty
 from sim.virtual_bench import VirtualBenchParameters
 
 
@@ -46,6 +47,12 @@ class BenchConfiguration(Parameters):
 
     backend: Literal["simulated", "hardware"] = quantity("simulated", "", "what drives and reads the bench")
     specimen: Specimen = Specimen()
+    uncertainty: SpecimenUncertainty = SpecimenUncertainty()
+    table_model: str | None = quantity(
+        None,
+        "",
+        "JSON file of an identified table, from which the drive is predicted; absent: from the simulated shaker",
+    )
     limits: Limits = Limits()
     ramps: Ramps = Ramps()
     acquisition: Acquisition = Acquisition()

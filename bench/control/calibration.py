@@ -1,4 +1,4 @@
-"""How much table acceleration a volt of drive makes, at each frequency."""
+"""How much table acceleration a volt of drive makes, at each frequency, and how far it lags."""
 
 from dataclasses import dataclass
 
@@ -8,19 +8,32 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class DriveCalibration:
-    """Gain of the drive, `gain` [m/s2 per V] at `omega` [rad/s], both ascending in omega, shape (n,).
+    """Response of the table to the drive, `response` [m/s2 per V] at `omega` [rad/s], ascending, shape (n,).
 
-    Between the points the gain is interpolated linearly; outside it is held.
+    Complex with the convention exp(+i omega t), as measured: the delay of the filter in front of the converter is in
+    it. Between the points it is interpolated linearly, in its real and its imaginary part; outside it is held.
     """
 
     omega: tuple[float, ...]
-    gain: tuple[float, ...]
+    response: tuple[complex, ...]
 
     @staticmethod
-    def flat(gain: float) -> "DriveCalibration":
-        """One gain for every frequency: where a calibration starts."""
-        return DriveCalibration((1.0,), (gain,))
+    def flat(response: complex) -> "DriveCalibration":
+        """One response for every frequency: where a calibration starts."""
+        return DriveCalibration((1.0,), (response,))
 
-    def volts_per_acceleration(self, omega: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Drive amplitude per acceleration amplitude [V s2/m], same shape as `omega`."""
-        return 1.0 / np.interp(omega, self.omega, self.gain)
+    def at(self, omega: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """Response at `omega` [rad/s], same shape."""
+        return np.asarray(np.interp(omega, self.omega, np.asarray(self.response, dtype=np.complex128)), np.complex128)
+
+    def beyond(self, other: "DriveCalibration") -> "DriveCalibration":
+        """This calibration, continued above its last frequency by what `other` has there."""
+        above = [(omega, response) for omega, response in other.points if omega > self.omega[-1]]
+        return DriveCalibration(
+            (*self.omega, *(omega for omega, _ in above)), (*self.response, *(response for _, response in above))
+        )
+
+    @property
+    def points(self) -> list[tuple[float, complex]]:
+        """Frequencies [rad/s] with their responses."""
+        return list(zip(self.omega, self.response, strict=True))

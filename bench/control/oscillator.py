@@ -1,7 +1,11 @@
-"""The phase-continuous sine that drives the table.
+"""The phase-continuous waveform that drives the table: a sine, and the harmonics that make its motion one.
 
-It follows sweeps of target acceleration (`sim.excitation.Sweep`), divides by the calibrated gain of the drive at the
-momentary frequency, and holds the last amplitude and frequency until told otherwise.
+It follows sweeps of target acceleration (`sim.excitation.Sweep`) and holds the last amplitude and frequency until told
+otherwise. With its phase phi, the amplitude A asked, shares c_k and the calibrated response H, the drive is
+
+    sum over k of Im(A c_k / H(k omega) exp(i k phi)):
+
+a table that answers as calibrated moves with the acceleration A sin(phi) when the shares are (1, 0, 0, ...).
 """
 
 from collections import deque
@@ -11,7 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.control.calibration import DriveCalibration
+from bench.control.glide import Glide
 from sim.excitation import Sweep
+
+Array = NDArray[np.float64]
 
 
 class Oscillator:
@@ -27,10 +34,10 @@ class Oscillator:
         self._sweeps: deque[Sweep] = deque()
         self._into = 0  # samples played of the first sweep
         self._amplitude, self._omega, self._phase = 0.0, tau, 0.0
-        self._trim, self._trim_to, self._trim_left = 1.0, 1.0, 0
+        self._shares = Glide()
 
     def use(self, calibration: DriveCalibration) -> None:
-        """Divide by the gain of `calibration` from now on."""
+        """Divide by the response of `calibration` from now on."""
         self._calibration = calibration
 
     @property
@@ -44,39 +51,41 @@ class Oscillator:
         return self._sweeps[-1].omega[1] if self._sweeps else self._omega
 
     def follow(self, sweep: Sweep) -> None:
-        """Append a sweep."""
+        """Append a sweep; shares found for the sine that is left are given up over one cycle."""
+        self._shares.to_pure(self._cycle)
         self._sweeps.append(sweep)
 
-    def trim(self, factor: float) -> None:
-        """Multiply the drive by `factor`, over one cycle of the present frequency."""
-        self._trim_to *= factor
-        self._trim_left = max(round(tau / self._omega * self._rate), 1)
+    def trim(self, shares: tuple[complex, ...]) -> None:
+        """Go to `shares` of fundamental, second harmonic and so on, over one cycle of the present frequency."""
+        self._shares.to(shares, self._cycle)
 
     @property
     def remaining(self) -> int:
         """Samples until the last sweep has been played."""
         return sum(self._length(sweep) for sweep in self._sweeps) - self._into
 
-    def next(self, n: int) -> NDArray[np.float64]:
+    def next(self, n: int) -> Array:
         """The next `n` samples of drive [V], shape (n,)."""
-        pieces: list[NDArray[np.float64]] = []
+        pieces: list[Array] = []
         while n > 0:
             piece = self._from_sweep(n) if self._sweeps else self._held(n)
             pieces.append(piece)
             n -= piece.size
-        volts = pieces[0] if len(pieces) == 1 else np.concatenate(pieces)
-        return self._trimmed(volts)
+        return pieces[0] if len(pieces) == 1 else np.concatenate(pieces)
+
+    @property
+    def _cycle(self) -> int:
+        return max(round(tau / self._omega * self._rate), 1)
 
     def _length(self, sweep: Sweep) -> int:
         return max(round(sweep.duration * self._rate), 1)
 
-    def _from_sweep(self, n: int) -> NDArray[np.float64]:
+    def _from_sweep(self, n: int) -> Array:
         sweep = self._sweeps[0]
         length = self._length(sweep)
         n = min(n, length - self._into)
         t = np.arange(self._into + 1, self._into + n + 1) / self._rate
-        volts = sweep.amplitude_at(t) * self._per_acceleration(sweep.omega_at(t))
-        volts *= np.sin(self._phase + sweep.phase_at(t))
+        volts = self._drive(sweep.amplitude_at(t), sweep.omega_at(t), self._phase + sweep.phase_at(t))
         self._into += n
         if self._into == length:
             self._phase = (self._phase + float(sweep.phase_at(np.array(length / self._rate)))) % tau
@@ -85,24 +94,23 @@ class Oscillator:
             self._sweeps.popleft()
         return volts
 
-    def _held(self, n: int) -> NDArray[np.float64]:
+    def _held(self, n: int) -> Array:
         step = self._omega / self._rate
-        phase = self._phase + step * np.arange(1, n + 1)
+        phase: Array = self._phase + step * np.arange(1, n + 1, dtype=np.float64)
         self._phase = (self._phase + step * n) % tau
         if self._amplitude == 0.0:
             return np.zeros(n)
-        return self._amplitude * self._per_acceleration(np.array(self._omega)) * np.sin(phase)
+        return self._drive(np.array(self._amplitude), np.array(self._omega), phase)
 
-    def _per_acceleration(self, omega: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _drive(self, amplitude: Array, omega: Array, phase: Array) -> Array:
+        """Drive [V] at `phase` [rad], shape (n,); `amplitude` and `omega` have that shape or none."""
         if self._calibration is None:
             raise RuntimeError("the oscillator was asked to move the table before the drive was calibrated")
-        return self._calibration.volts_per_acceleration(omega)
-
-    def _trimmed(self, volts: NDArray[np.float64]) -> NDArray[np.float64]:
-        if self._trim_left == 0:
-            return volts if self._trim == 1.0 else volts * self._trim
-        steps = np.minimum(np.arange(1, volts.size + 1), self._trim_left)
-        factor = self._trim + (self._trim_to - self._trim) * steps / self._trim_left
-        self._trim_left -= int(steps[-1])
-        self._trim = float(factor[-1]) if self._trim_left else self._trim_to
-        return volts * factor
+        shares = self._shares.next(phase.size)
+        turn = np.exp(1j * phase)
+        power, volts = np.ones_like(turn), np.zeros(phase.size)
+        for k, share in enumerate(shares.T, 1):
+            power = power * turn
+            if share.any():
+                volts += np.imag(amplitude * share / self._calibration.at(k * omega) * power)
+        return volts

@@ -1,6 +1,6 @@
 """Runs a plan on a rig, through the guard, block by block."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
 from typing import Never
 
 import numpy as np
@@ -11,6 +11,7 @@ from bench.analysis.fall import FallWatch
 from bench.analysis.signals import SignalMap
 from bench.control.legs import sweeps
 from bench.control.oscillator import Oscillator
+from bench.engine.ending import Ended, Ending
 from bench.engine.machine import Machine
 from bench.engine.operator import Operator
 from bench.engine.requests import Requests
@@ -38,27 +39,15 @@ from drivers.rig import Rig, RigError
 from sim.errors import RockbenchError
 from sim.specimen import Specimen
 
-
-@dataclass(frozen=True)
-class Ending:
-    """How a session ended: `status` is completed, stopped, aborted, halted or failed, with the reason."""
-
-    status: str
-    reason: str
-
-
-class _Ended(Exception):
-    """The plan is over before its end."""
-
-    def __init__(self, ending: Ending) -> None:
-        super().__init__(ending.reason)
-        self.ending = ending
+_DRIVEN = (State.ARMED, State.RUNNING, State.STOPPING, State.ABORTING)
+"""States in which the rig is armed."""
 
 
 class Engine:
     """Owns the loop: drive from the oscillator, through the guard, signals back to the plan.
 
-    `block` is the number of samples of one turn. Whatever happens, `run` leaves the output at zero.
+    `block` is the number of samples of one turn. Whatever happens, `run` leaves the output at zero. A halt that is
+    asked for cuts the enable line in the thread that asks, also while the loop waits for a block.
     """
 
     def __init__(
@@ -80,8 +69,10 @@ class Engine:
         self._cycles: CycleAnalyser | None = None
         self._drive = np.zeros(0)
         self._over: Violation | None = None
+        self._runaway: Violation | None = None
         self._read = 0
         self._run = 0
+        requests.cut_by(rig.halt)
 
     @property
     def state(self) -> State:
@@ -89,45 +80,59 @@ class Engine:
         return self._machine.state
 
     def run(self, plan: Plan) -> Ending:
-        """Carry out `plan` to its end, or to the first reason to end it."""
+        """Carry out `plan` to its end, or to the first reason to end it.
+
+        An error of rig, record, plan or analysis is an ending. Any other exception is raised, the output cut before.
+        """
         try:
             ending = self._until_ended(plan)
-        except RigError as error:
-            self._cut(str(error))
-            ending = Ending("failed", str(error))
+            # whatever the plan came to, nothing stays armed
+            for last in (self._rig.stop, plan.close):
+                ending = ending.then(self._ending_of(last))
+            return ending.then(self._ending_of(lambda: self._machine.go(State.CLOSED, ending.reason)))
         except BaseException as error:
-            self._cut(f"{type(error).__name__} in the plan or a subscriber")
+            self._rescue(error, plan)
             raise
-        finally:
-            try:
-                self._rig.stop()
-            finally:
-                plan.close()
-        self._machine.go(State.CLOSED, ending.reason)
-        return ending
 
     def _until_ended(self, plan: Plan) -> Ending:
         """The ending of a plan, with the output brought to zero along a ramp wherever the rig still works."""
-        try:
-            ending = self._carry_out(plan)
-        except _Ended as ended:
-            return ended.ending
-        except RigError:
-            raise
-        except RockbenchError as error:
+        ending = self._ending_of(lambda: self._carry_out(plan)) or Ending("completed", "the plan was carried out")
+        if self.state in _DRIVEN:
             # the record, the plan or an analysis gave up: no reason to jerk the table
-            ending = Ending("failed", str(error))
-        if self.state in (State.ARMED, State.RUNNING, State.STOPPING, State.ABORTING):
-            self._ramp_out(State.ABORTING, ending.reason)
-        return ending
+            ending = ending.then(self._ending_of(lambda: self._ramp_out(State.ABORTING, ending.reason)))
+        return self._cut(ending) if self.state in _DRIVEN else ending
 
-    def _carry_out(self, plan: Plan) -> Ending:
+    def _ending_of(self, work: Callable[[], object]) -> Ending | None:
+        """Why `work` could not be done to its end, or None."""
+        try:
+            work()
+        except Ended as ended:
+            return ended.ending
+        except RigError as error:
+            if self._requests.strongest == "halt" and self.state in _DRIVEN:
+                # the rig was cut under the loop by the thread that asked
+                return self._cut(Ending("halted", "halt was asked for"))
+            return self._cut(Ending("failed", str(error)))
+        except RockbenchError as error:
+            return Ending("failed", str(error))
+        return None
+
+    def _rescue(self, error: BaseException, plan: Plan) -> None:
+        """Cut the output for an error that is about to be raised, and note on it what else goes wrong."""
+        ending = Ending("failed", f"{type(error).__name__} in the plan or a subscriber")
+        for last in (lambda: self._cut(ending), self._rig.stop, plan.close):
+            try:
+                last()
+            except Exception as another:
+                error.add_note(f"then {type(another).__name__}: {another}")
+
+    def _carry_out(self, plan: Plan) -> None:
         try:
             step = next(plan)
             while True:
                 step = plan.send(self._do(step))
         except StopIteration:
-            return Ending("completed", "the plan was carried out")
+            return
 
     def _do(self, step: Step) -> Outcome:
         match step:
@@ -138,13 +143,13 @@ class Engine:
             case Say():
                 self._stream.say(step.event)
             case Trim():
-                self._oscillator.trim(step.factor)
+                self._oscillator.trim(step.shares)
             case Calibrate():
                 self._oscillator.use(step.calibration)
             case Arm():
                 self._arm(step)
             case RampOut():
-                return self._ramp_out(State.ABORTING if step.fast else State.STOPPING, "the test is over")
+                return self._end_test(step)
             case Handle():
                 self._handle(step)
         return Done()
@@ -152,10 +157,13 @@ class Engine:
     def _arm(self, step: Arm) -> None:
         self._oscillator.reset()
         self._read, self._cycles = 0, None
+        self._over = self._runaway = None
         self._run += 1
         self._heed_requests()
         self._machine.go(State.ARMED, "the operator's work is done")
         self._guard.arm()
+        # a halt that came while the rig was being armed found no enable line to cut
+        self._heed_requests()
         rest = self._stillness(step)
         self._signals.tare(rest)
         self._guard.tare(rest)
@@ -205,9 +213,9 @@ class Engine:
         self._stream.say(OperatorAsked(0.0, step.request))
         agreed = self._operator.confirm(step.request)
         self._machine.go(State.IDLE, "the operator answered")
-        if not agreed:
-            raise _Ended(Ending("aborted", f"the operator declined: {step.request}"))
         self._heed_requests()
+        if not agreed:
+            raise Ended(Ending("aborted", f"the operator declined: {step.request}"))
         self._rig.handwork(step.work, step.specimen.k_c or None)
         self._specimen = step.specimen
         self._stream.say(OperatorAnswered(0.0, step.request, self._operator.name))
@@ -219,23 +227,26 @@ class Engine:
         self._drive = exchange.drive
         self._stream.publish(Acquired(self._stream.now(), self._run, exchange.block, exchange.drive))
         if exchange.opened:
-            reason = f"{', '.join(exchange.opened)} opened"
-            self._cut(reason)
-            raise _Ended(Ending("halted", reason))
+            raise Ended(self._cut(Ending("halted", f"{', '.join(exchange.opened)} opened")))
         for near in exchange.warnings:
             self._stream.say(Warned(0.0, f"{near.quantity} {near.value:.4g} {near.unit} comes near {near.limit:.4g}"))
-        self._over = over = exchange.violation
-        if over is not None and self.state is not State.ABORTING:
-            self._stream.say(LimitExceeded(0.0, over.quantity, over.value, over.limit, over.unit))
-            self._end(State.ABORTING, Ending("aborted", str(over)))
+        self._runaway = exchange.runaway
+        if exchange.violation is not None and self._over is None:
+            self._exceeded(exchange.violation)
         self._heed_requests()
         return exchange.values
+
+    def _exceeded(self, over: Violation) -> None:
+        """The first limit that is exceeded since arming ends the run; a fast ramp that has begun goes on."""
+        self._over = over
+        self._stream.say(LimitExceeded(0.0, over.quantity, over.value, over.limit, over.unit))
+        if self.state is not State.ABORTING:
+            self._end(State.ABORTING, Ending("aborted", str(over)))
 
     def _heed_requests(self) -> None:
         asked = self._requests.strongest
         if asked == "halt":
-            self._cut("halt was asked for")
-            raise _Ended(Ending("halted", "halt was asked for"))
+            raise Ended(self._cut(Ending("halted", "halt was asked for")))
         if asked == "abort" and self.state is not State.ABORTING:
             self._end(State.ABORTING, Ending("aborted", "abort was asked for"))
         if asked == "stop" and self.state not in (State.ABORTING, State.STOPPING):
@@ -243,28 +254,42 @@ class Engine:
 
     def _end(self, way: State, ending: Ending) -> Never:
         if self.state is not State.IDLE:
-            self._ramp_out(way, ending.reason)
-        raise _Ended(ending)
+            ending = ending.then(self._ending_of(lambda: self._ramp_out(way, ending.reason)))
+        raise Ended(ending)
+
+    def _end_test(self, step: RampOut) -> Outcome:
+        outcome = self._ramp_out(State.ABORTING if step.fast else State.STOPPING, "the test is over")
+        if self._over is not None:
+            raise Ended(Ending("aborted", str(self._over)))
+        return outcome
 
     def _ramp_out(self, way: State, reason: str) -> Outcome:
-        if self.state is not way:
-            self._machine.go(way, reason)
         begin = self._guard.abort if way is State.ABORTING else self._guard.stop
         begin()
+        if self.state is not way:
+            self._machine.go(way, reason)
         fell = False
         while not self._guard.at_zero:
             fell |= self._fell(self._signals.of(self._turn()))
-        if self._over is not None:
-            self._cut(f"{self._over} although the drive has been ramped to zero")
-            raise _Ended(Ending("halted", f"{self._over} although the drive has been ramped to zero"))
+        if self._runaway is not None:
+            reason = f"{self._runaway} although the drive has been ramped to zero"
+            raise Ended(self._cut(Ending("halted", reason)))
         self._guard.disarm()
         self._machine.go(State.IDLE, "the output is at zero")
         return Fallen() if fell else Done()
 
-    def _cut(self, reason: str) -> None:
-        self._guard.halt()
+    def _cut(self, ending: Ending) -> Ending:
+        """Cut the enable line now. Returns the ending, with what went wrong while cutting."""
+        try:
+            self._guard.halt()
+        except RigError as error:
+            ending = ending.then(Ending("failed", str(error)))
         if self.state not in (State.HALTED, State.CLOSED):
-            self._machine.go(State.HALTED, reason)
+            try:
+                self._machine.go(State.HALTED, ending.reason)
+            except RockbenchError as error:
+                ending = ending.then(Ending("failed", str(error)))
+        return ending
 
     def _fell(self, signals: NDArray[np.float64]) -> bool:
         return self._fall is not None and self._fall.fallen(signals)

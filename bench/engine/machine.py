@@ -6,7 +6,7 @@ from bench.events import State
 
 LEGAL: dict[State, frozenset[State]] = {
     State.IDLE: frozenset({State.ARMED, State.WAITING, State.HALTED, State.CLOSED}),
-    State.WAITING: frozenset({State.IDLE, State.HALTED}),
+    State.WAITING: frozenset({State.IDLE, State.HALTED, State.CLOSED}),
     State.ARMED: frozenset({State.RUNNING, State.STOPPING, State.ABORTING, State.HALTED}),
     State.RUNNING: frozenset({State.STOPPING, State.ABORTING, State.HALTED}),
     State.STOPPING: frozenset({State.IDLE, State.ABORTING, State.HALTED}),

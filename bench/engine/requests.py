@@ -1,31 +1,46 @@
 """What a person may ask of a running bench, from any thread or signal handler."""
 
-from threading import Event
+from collections.abc import Callable
+from contextlib import suppress
+
+from drivers.errors import RigError
 
 
 class Requests:
-    """Three ways to end, each stronger than the one before; a request once made is never taken back."""
+    """Three ways to end, each stronger than the one before; a request once made is never taken back.
+
+    Plain flags: an assignment needs no lock that a signal handler could find taken.
+    """
 
     def __init__(self) -> None:
-        self._stop, self._abort, self._halt = Event(), Event(), Event()
+        self._stop = self._abort = self._halt = False
+        self._cut: Callable[[], None] | None = None
+
+    def cut_by(self, cut: Callable[[], None]) -> None:
+        """From now on `halt` also calls `cut`, in the thread that asks."""
+        self._cut = cut
 
     def stop(self) -> None:
         """Ramp the output out; what was measured is good."""
-        self._stop.set()
+        self._stop = True
 
     def abort(self) -> None:
         """Ramp the output out fast; the run is bad."""
-        self._abort.set()
+        self._abort = True
 
     def halt(self) -> None:
-        """Cut the enable line now."""
-        self._halt.set()
+        """Cut the enable line now, in this thread; the loop finds the rig halted and ends by itself."""
+        self._halt = True
+        if self._cut is not None:
+            # the loop cuts once more, and that is where a failure is told
+            with suppress(RigError):
+                self._cut()
 
     @property
     def strongest(self) -> str | None:
         """The strongest request made so far: "halt", "abort", "stop" or None."""
-        if self._halt.is_set():
+        if self._halt:
             return "halt"
-        if self._abort.is_set():
+        if self._abort:
             return "abort"
-        return "stop" if self._stop.is_set() else None
+        return "stop" if self._stop else None

@@ -59,9 +59,11 @@ class Dwell:
 
 @dataclass(frozen=True)
 class Trim:
-    """Multiply the drive by `factor`, over one cycle."""
+    """Go to `shares`, over one cycle: complex, of the asked amplitude, for the fundamental, the second harmonic and so
+    on, as `bench.control.oscillator` plays them. A `Follow` gives them up again.
+    """
 
-    factor: float
+    shares: tuple[complex, ...]
 
 
 @dataclass(frozen=True)

@@ -25,9 +25,9 @@ class Exchange:
     """One turn of the acquisition loop.
 
     `values` are the block's counts in units, shape (n, n_channels); `drive` [V], shape (n,), is what was played
-    while they were taken; `violation` is the limit that was exceeded first, if one was, and `warnings` are those that
-    the motion has come near for the first time since arming. `opened` names the safety inputs that are not good: the
-    enable line is cut then.
+    while they were taken; `violation` is the limit that was exceeded first, if one was, `runaway` the first of those
+    that say that the table itself moves too much, and `warnings` are those that the motion has come near for the first
+    time since arming. `opened` names the safety inputs that are not good: the enable line is cut then.
     """
 
     block: Block
@@ -36,6 +36,7 @@ class Exchange:
     violation: Violation | None
     warnings: tuple[Violation, ...] = ()
     opened: tuple[str, ...] = ()
+    runaway: Violation | None = None
 
 
 class Guard:
@@ -51,7 +52,7 @@ class Guard:
         self._mover = mover
         self._channels = rig.channels
         self._waiting = np.zeros(0)
-        self._command = 0.0
+        self._command = self._sent = 0.0
         self._held: float | None = None
         self._make_watches()
         self._ramp_samples: int | None = None
@@ -79,7 +80,7 @@ class Guard:
         if opened := self._opened():
             raise RigError(f"arming is refused: {', '.join(opened)} open; close it, then begin again")
         self._ramp_samples, self._ramp_done, self._ramp_from = None, 0, 1.0
-        self._command, self._held, self._expected = 0.0, None, 0
+        self._command, self._sent, self._held, self._expected = 0.0, 0.0, None, 0
         self._make_watches()
         self._waiting = np.zeros(self._rig.lead)
         self._rig.arm()
@@ -103,20 +104,23 @@ class Guard:
         queue = np.concatenate((self._waiting, sent))
         block = self._rig.read(volts.size)
         if block.first != self._expected or len(block) != volts.size:
-            raise RigError(f"samples are missing: a block begins at {block.first} where {self._expected} was due")
+            came = f"{len(block)} from {block.first} on came where {volts.size} from {self._expected} on were due"
+            raise RigError(f"samples are missing: {came}")
         self._expected += len(block)
         played, self._waiting = queue[: volts.size], queue[volts.size :]
         values = self._values(block)
         exceeded, near = self._motion.check(block.first, values)
         exceeded += self._sensors.check(block.first, block.counts, values, played)
         exceeded += self._time.check(self._rig.clock.now(), self._expected)
-        seen = min(exceeded, key=lambda violation: violation.sample) if exceeded else None
+        exceeded.sort(key=lambda violation: violation.sample)
+        seen = exceeded[0] if exceeded else None
         if seen is not None:
             self.abort()
         opened = self._opened()
         if opened:
-            self.halt()
-        return Exchange(block, values, played, refused or seen, tuple(near), opened)
+            self._cut_because(f"{', '.join(opened)} opened")
+        runaway = next((violation for violation in exceeded if violation.of_table), None)
+        return Exchange(block, values, played, refused or seen, tuple(near), opened, runaway)
 
     def tare(self, values: NDArray[np.float64]) -> None:
         """Take a rest, values of shape (n, n_channels), as the zero of the specimen's drift."""
@@ -134,12 +138,27 @@ class Guard:
             self._begin(self._ramps.abort)
 
     def halt(self) -> None:
-        """Cut the enable line now."""
-        self._rig.halt()
+        """Cut the enable line now; a rig that fails to is stopped instead. Raises RigError that says so."""
+        try:
+            self._rig.halt()
+        except RigError as error:
+            failed = f"the enable line could not be cut ({error})"
+            try:
+                self._rig.stop()
+            except RigError as another:
+                failed = f"{failed}, nor the output be stopped ({another}): press the emergency stop"
+                raise RigError(failed) from another
+            raise RigError(f"{failed}, the output was stopped: switch the amplifier off") from error
 
     def disarm(self) -> None:
         """Stop the rig; its output is at zero afterwards."""
         self._rig.stop()
+
+    def _cut_because(self, reason: str) -> None:
+        try:
+            self.halt()
+        except RigError as error:
+            raise RigError(f"{reason}, and {error}") from error
 
     def _opened(self) -> tuple[str, ...]:
         return tuple(name for name, good in self._rig.interlocks().items() if not good)
@@ -163,11 +182,21 @@ class Guard:
         return np.where(x < 1.0, self._ramp_from * 0.5 * (1.0 + np.cos(np.pi * x)), 0.0)
 
     def _ramped(self, volts: NDArray[np.float64]) -> NDArray[np.float64]:
-        if self._ramp_samples is None:
+        if self._ramp_samples is not None:
+            volts = self._slewed(volts * self._gain(np.arange(1, volts.size + 1)))
+            self._ramp_done += volts.size
+        self._sent = float(volts[-1])
+        return volts
+
+    def _slewed(self, volts: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Follows `volts` no faster than the limit: a command may slew by all of it, and the ramp adds its own."""
+        if np.abs(np.diff(volts, prepend=self._sent)).max() <= self._slew:
             return volts
-        sent = volts * self._gain(np.arange(1, volts.size + 1))
-        self._ramp_done += volts.size
-        return sent
+        slowed, last = np.empty_like(volts), self._sent
+        for i, target in enumerate(volts):
+            last += min(max(target - last, -self._slew), self._slew)
+            slowed[i] = last
+        return slowed
 
     def _refusal(self, volts: NDArray[np.float64]) -> Violation | None:
         if not np.isfinite(volts).all():

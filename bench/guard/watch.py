@@ -18,6 +18,9 @@ _MEASURED_BY = {
 }
 """Quantities that are a channel's own: a limit beyond what it can measure would never be seen."""
 
+_OF_TABLE = frozenset({"displacement", "velocity", "acceleration", "force", "current"})
+"""Quantities that a drive of zero brings to zero at once."""
+
 
 class MotionWatch:
     """Checks blocks of values against the limits. Channels are found by name; absent ones are not watched.
@@ -57,7 +60,7 @@ class MotionWatch:
     @staticmethod
     def _violation(key: str, size: NDArray[np.float64], limit: float, first: int, at: int) -> Violation:
         name, unit = NAMES[key]
-        return Violation(name, float(size[at]), limit, unit, first + at)
+        return Violation(name, float(size[at]), limit, unit, first + at, key in _OF_TABLE)
 
 
 def _check_reach(channels: tuple[Channel, ...], limits: Limits) -> None:

@@ -3,8 +3,9 @@
 import queue
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -27,7 +28,10 @@ BATCH = 20
 """Chunks that are written at once when samples come faster than real time."""
 
 BACKLOG = 4096
-"""Events that may wait for the disk: minutes at real time; then the caller waits too, rather than lose one."""
+"""Events that may wait for the disk: minutes at real time. A disk that is farther behind ends the run."""
+
+PATIENCE = 60.0
+"""Longest wait for the disk when nothing moves [s]: at the end, and in `sync`."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +58,8 @@ class Recorder:
     """Writes one new HDF5 file; call it with each event of the engine, and `close` it at the end.
 
     Samples reach the file within a second, journalled events at once. An error of the disk is raised as RecordError
-    by the next call, once; what comes after it is not recorded, and what was written before stays readable.
+    by the next call, once; what comes after it is not recorded, and what was written before stays readable. So is a
+    disk that does not keep up: no call waits for it, but for `hold_up` seconds, which only a run in virtual time has.
 
     `metadata` is stored as texts under /entry/metadata, `tables` (such as {"prediction": ...}) under /entry.
     Raises InvalidInput, and creates nothing, when `path` exists or cannot be created, or a name or table is unfit.
@@ -70,6 +75,7 @@ class Recorder:
         metadata: Mapping[str, str],
         tables: Mapping[str, Table] | None = None,
         title: str = "rocking-bench campaign",
+        hold_up: float = 0.0,
     ) -> None:
         self.path = path
         self._point_type = point_type
@@ -77,8 +83,11 @@ class Recorder:
         self._writer = RecordWriter(
             path, Skeleton(title, tuple(channels), sample_rate, point_type, metadata, tables or {})
         )
-        self._queue: queue.Queue[_Block | Event | _Sync | _End] = queue.Queue(BACKLOG)
+        self._queue: queue.Queue[_Block | Event | _Sync] = queue.Queue(BACKLOG)
+        self._end: _End | None = None
+        self._hold_up = hold_up
         self._failure: RecordError | None = None
+        self._behind: RecordError | None = None
         self._told = False
         self._closed = False
         self._committed = time.monotonic()
@@ -91,30 +100,31 @@ class Recorder:
         if self._closed:
             raise RecordError(f"{self.path} is closed: {type(event).__name__} at {event.time:.3f} s was not recorded")
         self._raise_failure()
-        if self._failure is not None:
+        if self._failure is not None or self._behind is not None:
             return
         if isinstance(event, Acquired):
-            self._queue.put(self._checked(event))
+            self._offer(self._checked(event))
         elif isinstance(event, PointFinished) and not isinstance(event.point, self._point_type):
             raise RecordError(
                 f"point of type {type(event.point).__name__} was not recorded: {self.path} is for"
                 f" {self._point_type.__name__}"
             )
         elif isinstance(event, Estimate) or not isinstance(event, NOT_JOURNALLED):
-            self._queue.put(event)
+            self._offer(event)
 
     def sync(self) -> None:
         """Return when everything so far is in the file. Raises RecordError, once, when it could not be written."""
         if not self._closed:
             marker = _Sync(threading.Event())
-            self._queue.put(marker)
-            marker.done.wait()
+            if not (self._put(marker, PATIENCE) and marker.done.wait(PATIENCE)):
+                self._fall_behind(f"has not answered for {PATIENCE:g} s")
         self._raise_failure()
 
     def close(self, status: Status | str, summary: str = "") -> None:
         """Write what waits, how it ended and when, and close the file; closing again does nothing.
 
-        Raises InvalidInput for an unknown status, RecordError when the end of the record could not be written.
+        Raises InvalidInput for an unknown status, RecordError when the end of the record could not be written. A disk
+        that does not answer is left to itself: the program can end.
         """
         ends = [str(end) for end in Status if end is not Status.RUNNING]
         if status not in ends:
@@ -122,9 +132,31 @@ class Recorder:
         if self._closed:
             return
         self._closed = True
-        self._queue.put(_End(Status(status), summary))
-        self._thread.join()
+        self._end = _End(Status(status), summary)
+        # wakes a thread that waits; one that has something to do looks at the end by itself
+        self._put(_Sync(threading.Event()), 0.0)
+        self._thread.join(PATIENCE)
+        if self._thread.is_alive():
+            self._fall_behind(f"has not answered for {PATIENCE:g} s")
         self._raise_failure()
+
+    def _offer(self, item: _Block | Event) -> None:
+        if not self._put(item, self._hold_up):
+            self._fall_behind(f"is {BACKLOG} events behind")
+            self._raise_failure()
+
+    def _put(self, item: _Block | Event | _Sync, patience: float) -> bool:
+        """Queue an item if there is room within `patience` seconds."""
+        try:
+            self._queue.put(item, block=patience > 0.0, timeout=patience)
+        except queue.Full:
+            return False
+        return True
+
+    def _fall_behind(self, how: str) -> None:
+        """What waits is still written should the disk come back, but nothing more is taken."""
+        told = f"{self.path} is not recorded further, its disk {how}: what was written before is readable; see to it"
+        self._behind = self._behind or RecordError(told)
 
     def _checked(self, event: Acquired) -> _Block:
         """The block's own copy of the arrays, transposed: a driver may use its buffer again."""
@@ -139,37 +171,39 @@ class Recorder:
 
     def _raise_failure(self) -> None:
         """Tell of a failure once: the steps that bring the bench down are events too, and must not be stopped by it."""
-        if self._failure is not None and not self._told:
+        failure = self._failure or self._behind
+        if failure is not None and not self._told:
             self._told = True
-            raise self._failure
+            raise failure
 
     def _work(self) -> None:
         """The thread: take what comes until the end; after a failure, only drain."""
-        while True:
+        while self._end is None or not self._queue.empty():
             try:
                 item = self._queue.get(timeout=PERIOD)
             except queue.Empty:
                 item = None
-            if self._failure is None:
-                try:
-                    self._take(item)
-                except Exception as error:
-                    # whatever it was, the run must hear of it: an unrecorded campaign is worth nothing
-                    self._writer.abandon()
-                    failure = RecordError(
-                        f"{self.path} cannot be written further ({reason(error)}): see to the disk, start a new record"
-                    )
-                    failure.__cause__ = error
-                    self._failure = failure
+            self._attempt(partial(self._take, item))
             if isinstance(item, _Sync):
                 item.done.set()
-            if isinstance(item, _End):
-                return
+        self._attempt(partial(self._writer.finish, self._end.status, self._end.summary))
 
-    def _take(self, item: _Block | Event | _Sync | _End | None) -> None:
+    def _attempt(self, work: Callable[[], None]) -> None:
+        if self._failure is not None:
+            return
+        try:
+            work()
+        except Exception as error:
+            # whatever it was, the run must hear of it: an unrecorded campaign is worth nothing
+            self._writer.abandon()
+            failure = RecordError(
+                f"{self.path} cannot be written further ({reason(error)}): see to the disk, start a new record"
+            )
+            failure.__cause__ = error
+            self._failure = failure
+
+    def _take(self, item: _Block | Event | _Sync | None) -> None:
         match item:
-            case _End():
-                self._writer.finish(item.status, item.summary)
             case _Block():
                 self._writer.add_block(item.time, item.run, item.first, item.counts, item.drive)
                 self._commit_if_due()

@@ -14,7 +14,10 @@ from bench.report.rows import PointLike, plain
 
 @dataclass(frozen=True)
 class Summary:
-    """What the summary says. Times are seconds: `elapsed` on the wall, `bench_time` on the bench's clock."""
+    """What the summary says. Times are seconds: `elapsed` on the wall, `bench_time` on the bench's clock.
+
+    `plan_hash` is that of the preflight (docs/preflight.md).
+    """
 
     protocol: str
     status: str
@@ -26,6 +29,7 @@ class Summary:
     seed: int | None
     elapsed: float
     bench_time: float
+    plan_hash: str | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Ready for JSON: enumerations as their text, NaN and infinity as null, paths with forward slashes."""
@@ -41,6 +45,8 @@ class Summary:
             "elapsed_s": self.elapsed,
             "bench_time_s": self.bench_time,
         }
+        if self.plan_hash is not None:
+            content["plan_hash"] = self.plan_hash
         return {key: _clean(value) for key, value in content.items()}
 
 

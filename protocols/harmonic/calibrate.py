@@ -1,8 +1,11 @@
-"""How much drive makes how much acceleration: measured at each frequency, at a level that leaves the block at rest."""
+"""What acceleration the drive makes: measured at each frequency, at a level that leaves the block at rest."""
 
 from collections.abc import Generator, Sequence
+from math import ceil, log2
 
-from bench.analysis.cycles import Cycle, mean_amplitude
+import numpy as np
+
+from bench.analysis.cycles import Cycle
 from bench.analysis.signals import ACCELERATION, SIGNALS
 from bench.control.calibration import DriveCalibration
 from bench.control.legs import Leg
@@ -25,32 +28,38 @@ _DRIVE = len(SIGNALS)
 def calibrate_drive(
     omegas: Sequence[float], level: float, start: DriveCalibration | None
 ) -> Generator[Step, Outcome, DriveCalibration | Fallen]:
-    """Measure the gain of the drive at `omegas` [rad/s] with table accelerations of `level` [m/s2].
+    """Measure the table's response to the drive at `omegas` [rad/s] with table accelerations of `level` [m/s2].
 
-    Without a `start` the gain is first probed in two steps, from a command too small to do harm.
+    Without a `start` the response is first probed in two steps, from a command too small to do harm.
     """
     if start is None:
         start = DriveCalibration.flat(1.0)
         for volts in (PROBE, 10.0 * PROBE):
             yield Calibrate(start)
-            gain = yield from _measure(omegas[0], volts * start.gain[0])
-            if isinstance(gain, Fallen):
-                return gain
+            response = yield from _measure(omegas[0], volts * abs(start.response[0]))
+            if isinstance(response, Fallen):
+                return response
             yield Follow((Leg(CHANGE_TIME, 0.0, omegas[0]),))
-            start = DriveCalibration.flat(gain)
+            start = DriveCalibration.flat(response)
     yield Calibrate(start)
-    points: dict[float, float] = {}
+    points: dict[float, complex] = {}
     for omega in sorted(omegas):
-        gain = yield from _measure(omega, level)
-        if isinstance(gain, Fallen):
-            return gain
-        points[omega] = gain
+        response = yield from _measure(omega, level)
+        if isinstance(response, Fallen):
+            return response
+        points[omega] = response
     outcome = yield Follow((Leg(CHANGE_TIME, 0.0, max(omegas)),))
     return outcome if isinstance(outcome, Fallen) else DriveCalibration(tuple(points), tuple(points.values()))
 
 
-def _measure(omega: float, amplitude: float) -> Generator[Step, Outcome, float | Fallen]:
-    """Gain [m/s2 per V] at one frequency."""
+def harmonic_frequencies(omega: float, highest: int) -> list[float]:
+    """Frequencies [rad/s] from `omega` up to its harmonic `highest`, `omega` itself left out, half an octave apart."""
+    steps = ceil(2.0 * log2(highest))
+    return [omega * highest ** (step / steps) for step in range(1, steps + 1)]
+
+
+def _measure(omega: float, amplitude: float) -> Generator[Step, Outcome, complex | Fallen]:
+    """Response [m/s2 per V] at one frequency."""
     outcome = yield Follow((Leg(CHANGE_TIME, amplitude, omega),))
     if isinstance(outcome, Fallen):
         return outcome
@@ -60,9 +69,10 @@ def _measure(omega: float, amplitude: float) -> Generator[Step, Outcome, float |
     used = outcome.cycles[SETTLING:]
     need_cycles(used, MEASURED)
     need_answer(used)
-    return drive_gain(used)
+    return drive_response(used)
 
 
-def drive_gain(cycles: Sequence[Cycle]) -> float:
-    """Amplitude of the table's acceleration over that of the drive, over cycles [m/s2 per V]."""
-    return mean_amplitude(cycles, ACCELERATION) / mean_amplitude(cycles, _DRIVE)
+def drive_response(cycles: Sequence[Cycle]) -> complex:
+    """Fundamental of the table's acceleration over that of the drive, over cycles [m/s2 per V]."""
+    moved, driven = (np.array([cycle.harmonics(column)[0] for cycle in cycles]) for column in (ACCELERATION, _DRIVE))
+    return complex(np.vdot(driven, moved) / np.vdot(driven, driven))

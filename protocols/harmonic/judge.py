@@ -11,8 +11,11 @@ from sim.specimen import Specimen
 
 _ROCKING = "rocking"
 
-AMPLITUDE_NOTE = 0.005
+AMPLITUDE_NOTE = 0.002
 """Relative error of the table's amplitude that is worth a word; the prediction is for the achieved one all the same."""
+
+HARMONICS_NOTE = 0.01
+"""Total harmonic distortion of the table that is worth a word: the prediction is for a pure sine."""
 
 AGREEMENT = 0.02
 """Relative difference between measured and predicted that is allowed where the uncertainty is smaller."""
@@ -52,7 +55,10 @@ def judge(
         starts_tried=starts,
         cycles_measured=peak.cycles,
         settle_time_s=settled.time,
+        amplitude_error=settled.amplitude_error,
+        phase_error_rad=settled.phase_error,
         table_harmonics=peak.harmonics,
+        table_updates=settled.updates,
         reason="; ".join(_reasons(settled, reference, name, layers, agrees)),
     )
 
@@ -77,14 +83,19 @@ def _reasons(
     settled: Settled, reference: Settled, name: str, layers: dict[str, Layer], agrees: bool | None
 ) -> Iterator[str]:
     """Everything that a reader of the point should know."""
-    state = settled.steadiness
+    state, peak = settled.steadiness, settled.peak
     if not state.steady:
         how = f"repeats every {state.repeats} cycles" if state.repeats else "does not repeat"
         yield f"not steady after {settled.time:.0f} s: the motion {how}, spread {100.0 * state.spread:.1f} %"
+    elif name in layers and not layers[name].stable:
+        grows = 100.0 * (layers[name].multiplier - 1.0)
+        yield f"steady while it was measured, but the predicted orbit is unstable: it leaves by {grows:.1f} % a cycle"
     elif name != _ROCKING and _ROCKING in layers and layers[_ROCKING].stable:
         yield "no start reached the stable rocking motion: the block rests"
     if abs(settled.amplitude_error) > AMPLITUDE_NOTE:
         yield f"the table's amplitude is {100.0 * settled.amplitude_error:+.2f} % off"
+    if peak.harmonics > HARMONICS_NOTE:
+        yield f"the table's harmonics are {100.0 * peak.harmonics:.1f} % of its fundamental"
     if not reference.steadiness.steady:
         yield "the bare frame was not steady: its drift is no reference"
     if agrees is False:

@@ -26,7 +26,20 @@ class HarmonicParameters(Parameters):
         1.01, "1", "amplitude of the table acceleration over the uplift acceleration g/lambda", ge=0.1, le=5
     )
     amplitude_tolerance: float = quantity(
-        0.002, "1", "largest relative error of the measured table amplitude before a point is measured", gt=0, le=0.1
+        0.001, "1", "largest relative error of the measured table amplitude before a point is measured", gt=0, le=0.1
+    )
+    phase_tolerance: float = quantity(
+        0.00175,
+        "rad",
+        "largest error of the table's phase against the oscillator before a point is measured",
+        gt=0,
+        le=1,
+    )
+    distortion_tolerance: float = quantity(
+        0.01, "1", "largest rms of the table's harmonics over its fundamental before a point is measured", gt=0, le=1
+    )
+    harmonics: int = quantity(
+        10, "1", "highest harmonic of the table's acceleration that is cancelled; 1 for none", ge=1, le=10
     )
     calibration_level: float = quantity(
         0.5, "1", "level of the drive calibration relative to the test; below 1 so that the block rests", gt=0, lt=1

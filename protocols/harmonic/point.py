@@ -34,7 +34,12 @@ class HarmonicPoint(Parameters):
     bare_drift_peak_m: float | None = quantity(None, "m", "peak drift of the bare frame")
     amplitude_m_s2: float | None = quantity(None, "m/s2", "achieved amplitude of the table, coupled")
     bare_amplitude_m_s2: float | None = quantity(None, "m/s2", "achieved amplitude of the table, bare")
-    table_harmonics: float | None = quantity(None, "1", "rms of the table's harmonics over its fundamental, coupled")
+    amplitude_error: float | None = quantity(None, "1", "relative error of the table's amplitude, coupled")
+    phase_error_rad: float | None = quantity(None, "rad", "how far the table is ahead of the oscillator, coupled")
+    table_harmonics: float | None = quantity(
+        None, "1", "total harmonic distortion: rms of the table's harmonics 2 to 10 over its fundamental, coupled"
+    )
+    table_updates: int = quantity(0, "1", "corrections of the drive until the table moved as asked, coupled")
     starts_tried: int = quantity(0, "1", "starts tried")
     start_chance: float | None = quantity(
         None, "1", "estimated chance of success of the start that was measured, or of the best where all fell"

@@ -1,15 +1,24 @@
-"""Whether a bench can do what a campaign asks: refused before anything starts, with the value that binds."""
+"""Whether a bench can do what a campaign asks, as far as closed forms and steady states tell.
 
+These refusals come at once and name the parameter; `protocols.harmonic.preflight` has the whole run, starts included.
+"""
+
+from functools import lru_cache
 from math import tau
+from typing import Literal
 
 import numpy as np
 
 from bench.analysis.steady import WINDOW
 from bench.config.model import BenchConfiguration
 from bench.control.candidates import OVERSHOOTS
+from bench.preflight.motion import Travel
 from protocols.harmonic.parameters import HarmonicParameters
 from sim.errors import InvalidInput
 from sim.specimen import Specimen
+
+Reference = Literal["ground", "table"]
+"""Where the lasers stand."""
 
 
 def check_table(parameters: HarmonicParameters, configuration: BenchConfiguration) -> None:
@@ -37,17 +46,17 @@ def check_storeys(parameters: HarmonicParameters, configuration: BenchConfigurat
     """Refuse frequencies at which a storey would leave its laser's range, bare or on the steady rocking motion."""
     specimen = configuration.specimen
     amplitude = parameters.amplitude_factor * specimen.uplift_acceleration
-    share = 1.0 if configuration.laser_reference == "ground" else 0.0
+    reference = configuration.laser_reference
     ranges = tuple(0.5 * whole for whole in configuration.laser_ranges)
     for omega in parameters.omega:
         for beta in (None, *parameters.beta):
             if beta is None:
-                seen = _bare(specimen, omega, amplitude, share)
+                seen = bare_travel(specimen, omega, amplitude, reference)
             else:
-                seen = _rocking(specimen.coupled(beta), omega, amplitude, share)
+                seen = rocking_travel(specimen.coupled(beta), omega, amplitude, reference)
             if seen is None:
                 continue
-            for number, (motion, half) in enumerate(zip(seen, ranges, strict=True), 1):
+            for number, (motion, half) in enumerate(zip((seen.storey_1, seen.storey_2), ranges, strict=True), 1):
                 if motion > half:
                     what = "the bare frame" if beta is None else f"beta = {beta:g}"
                     moves = f"storey {number} of {what} moves {1e3 * motion:.0f} mm there"
@@ -55,20 +64,28 @@ def check_storeys(parameters: HarmonicParameters, configuration: BenchConfigurat
                     raise InvalidInput("omega", omega, needs)
 
 
-def _bare(specimen: Specimen, omega: float, amplitude: float, share: float) -> tuple[float, float]:
+def bare_travel(specimen: Specimen, omega: float, amplitude: float, reference: Reference) -> Travel:
+    """What the lasers see of the bare frame, and its drift, in the steady state under `amplitude` [m/s2]."""
     from sim.linear import steady_response
 
     u1, u2 = steady_response(specimen, omega, amplitude)
-    table = -share * amplitude / omega**2
-    return abs(u1 + table), abs(u2 + table)
+    table = -amplitude / omega**2 if reference == "ground" else 0.0
+    return Travel(abs(u1 + table), abs(u2 + table), abs(u2 - u1))
 
 
-def _rocking(specimen: Specimen, omega: float, amplitude: float, share: float) -> tuple[float, float] | None:
+def rocking_travel(specimen: Specimen, omega: float, amplitude: float, reference: Reference) -> Travel | None:
+    """The same of the steady rocking motion; None where it does not exist or was not found."""
+    # frozen parameters are hashable, though pydantic does not declare it
+    return _rocking_travel(specimen, omega, amplitude, reference)  # pyright: ignore[reportArgumentType]
+
+
+@lru_cache(maxsize=1024)
+def _rocking_travel(specimen: Specimen, omega: float, amplitude: float, reference: Reference) -> Travel | None:
     from sim.steady import NoOrbit, rocking_orbit
 
     try:
         phase, u1, u2, _ = rocking_orbit(specimen, omega, amplitude).samples(64).T
     except NoOrbit:
         return None
-    table = -share * amplitude / omega**2 * np.sin(phase)
-    return float(np.abs(u1 + table).max()), float(np.abs(u2 + table).max())
+    table = -amplitude / omega**2 * np.sin(phase) if reference == "ground" else np.zeros_like(phase)
+    return Travel(*(float(np.abs(each).max()) for each in (u1 + table, u2 + table, u2 - u1)))

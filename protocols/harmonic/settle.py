@@ -1,38 +1,43 @@
-"""From a dwell that has just begun to a measured steady state: hold the amplitude, wait, measure."""
+"""From a dwell that has just begun to a measured steady state: hold the sine, wait, measure."""
 
 from collections import deque
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from math import tau
 
-import numpy as np
-
-from bench.analysis.cycles import Cycle, mean_amplitude
+from bench.analysis.cycles import Cycle
 from bench.analysis.gain import SensorAccuracy, SteadyPeak, modulated_peak, steady_peak
 from bench.analysis.signals import ACCELERATION, DISPLACEMENT, LASER_1, LASER_2
 from bench.analysis.steady import WINDOW, Steadiness, SteadyDetector
+from bench.control.answer import Answer, Sine
+from bench.control.sine import SineControl, Tolerance
 from bench.engine.steps import Dwell, Fallen, Measured, Outcome, Step, Trim
 from protocols.harmonic.evidence import need_cycles
 from protocols.harmonic.parameters import HarmonicParameters
 
 TURN = 6
-"""Cycles between two looks at amplitude and steadiness."""
+"""Cycles between two looks at the table's motion and at steadiness."""
 
-LARGEST_TRIM = 0.10
-"""Largest relative change of the drive at one look."""
+TURNING = 2
+"""First cycles of a look, in which the table goes to what it was last told: they say nothing of how well it does."""
 
-TRIM_GAIN = 0.7
-"""Share of an amplitude error that one trim removes: below 1 because the block's reaction lags by many cycles."""
+AIM = 0.5
+"""Share of the tolerances that is aimed at: a block that has not settled yet still moves the table by the rest."""
 
 
 @dataclass(frozen=True)
 class Settled:
-    """What a dwell came to: its peak, how steady it was, how long that took, and how far off the amplitude is."""
+    """What a dwell came to: its peak, how steady it was, and how long that took [s].
+
+    `amplitude_error` (relative) and `phase_error` [rad] are the table's, after `updates` corrections of its drive.
+    """
 
     peak: SteadyPeak
     steadiness: Steadiness
     time: float
     amplitude_error: float
+    phase_error: float
+    updates: int
 
 
 JUDGED = (ACCELERATION, DISPLACEMENT, LASER_1, LASER_2)
@@ -53,13 +58,23 @@ Look = Callable[[list[Cycle]], Generator[Step, Outcome, None]]
 
 
 def settle_and_measure(
-    omega: float, amplitude: float, parameters: HarmonicParameters, accuracy: SensorAccuracy, look: Look
+    sine: Sine, parameters: HarmonicParameters, accuracy: SensorAccuracy, look: Look
 ) -> Generator[Step, Outcome, Settled | Fallen]:
-    """Hold `amplitude` [m/s2] at `omega` [rad/s] until every signal is steady, then measure.
+    """Hold the table at `sine` until every signal is steady, then measure.
 
     A motion that does not become steady within the settle limit is measured as it is: as a modulated one.
     """
-    detector = SteadyDetector(parameters.settle_tolerance, JUDGED, KIN, omega * accuracy.laser_timing)
+    detector = SteadyDetector(parameters.settle_tolerance, JUDGED, KIN, sine.omega * accuracy.laser_timing)
+    control = SineControl(
+        parameters.harmonics,
+        Tolerance(
+            AIM * parameters.amplitude_tolerance,
+            AIM * parameters.phase_tolerance,
+            AIM * parameters.distortion_tolerance,
+        ),
+    )
+    turn: complex | None = None
+    updates = 0
     recent: deque[Cycle] = deque(maxlen=WINDOW)
     measured = max(parameters.measured_cycles, 2 * WINDOW)
     waited, over = 0.0, False
@@ -69,8 +84,9 @@ def settle_and_measure(
         outcome = yield Dwell(asked)
         if not isinstance(outcome, Measured):
             return Fallen()
-        waited += asked * tau / omega
+        waited += asked * tau / sine.omega
         need_cycles(outcome.cycles, asked)
+        turn = sine.turn(outcome.cycles[0]) if turn is None else turn
         for cycle in outcome.cycles:
             detector.push(cycle)
         if ready:
@@ -78,19 +94,18 @@ def settle_and_measure(
             steadiness = detector.judge(allowance=2.0)
             if steadiness.steady or over:
                 used = outcome.cycles[-parameters.measured_cycles :]
-                return _settled(used, steadiness, waited, amplitude, parameters)
+                table = Answer.of(used, sine, turn)
+                peak = _peak(used, steadiness, parameters)
+                return Settled(peak, steadiness, waited, table.amplitude_error, table.phase_error, updates)
         recent.extend(outcome.cycles)
         yield from look(list(recent))
         over = waited >= parameters.settle_limit
-        error = mean_amplitude(outcome.cycles, ACCELERATION) / amplitude - 1.0
-        if abs(error) > parameters.amplitude_tolerance and not over:
-            correction = float(np.clip(-TRIM_GAIN * error, -LARGEST_TRIM, LARGEST_TRIM))
-            yield Trim(1.0 + correction)
+        shares = control.next(Answer.of(outcome.cycles[TURNING:], sine, turn))
+        if shares is not None and not over:
+            yield Trim(shares)
+            updates += 1
             detector.restart()
 
 
-def _settled(
-    cycles: tuple[Cycle, ...], steadiness: Steadiness, waited: float, amplitude: float, parameters: HarmonicParameters
-) -> Settled:
-    peak = steady_peak(cycles, LEFT * parameters.settle_tolerance) if steadiness.steady else modulated_peak(cycles)
-    return Settled(peak, steadiness, waited, peak.amplitude / amplitude - 1.0)
+def _peak(cycles: tuple[Cycle, ...], steadiness: Steadiness, parameters: HarmonicParameters) -> SteadyPeak:
+    return steady_peak(cycles, LEFT * parameters.settle_tolerance) if steadiness.steady else modulated_peak(cycles)

@@ -13,18 +13,20 @@ import numpy as np
 from bench.analysis.cycles import Cycle
 from bench.analysis.gain import gain, steady_peak
 from bench.config.model import BenchConfiguration
+from bench.control.answer import Sine
 from bench.control.calibration import DriveCalibration
 from bench.control.legs import Leg
-from bench.control.starts import Start, plan_starts
+from bench.control.starts import Start
 from bench.engine.steps import Arm, Calibrate, Fallen, Follow, Handle, Outcome, Plan, RampOut, Say, Step
 from bench.events import Estimate, PointFinished, StepStarted, Warned
 from drivers.rig import Handwork, RigError
-from protocols.harmonic.calibrate import calibrate_drive
+from protocols.harmonic.calibrate import calibrate_drive, harmonic_frequencies
 from protocols.harmonic.judge import judge
 from protocols.harmonic.pace import Pace
 from protocols.harmonic.parameters import HarmonicParameters
 from protocols.harmonic.point import HarmonicPoint, PointStatus
 from protocols.harmonic.settle import Look, Settled, settle_and_measure
+from protocols.harmonic.stages import planned_starts
 from sim.gain import predict_gain
 from sim.specimen import Specimen
 from sim.steady import resting_level
@@ -62,7 +64,8 @@ class HarmonicSheet:
         yield Arm(REST)
         yield Say(StepStarted(0.0, "calibrate the drive, bare frame"))
         level = self._parameters.calibration_level * self._amplitude
-        calibration = yield from calibrate_drive(self._parameters.omega, level, None)
+        above = harmonic_frequencies(max(self._parameters.omega), self._parameters.harmonics)
+        calibration = yield from calibrate_drive((*self._parameters.omega, *above), level, None)
         if isinstance(calibration, Fallen):
             raise RigError(NO_BLOCK)
         yield Calibrate(calibration)
@@ -70,7 +73,7 @@ class HarmonicSheet:
         for omega in self._parameters.omega:
             yield Say(StepStarted(0.0, f"bare frame at {omega:g} rad/s"))
             yield Follow((Leg(duration, self._amplitude, omega),))
-            settled = yield from self._settle(omega, None)
+            settled = yield from self._settle(omega, None, calibration)
             if isinstance(settled, Fallen):
                 raise RigError(NO_BLOCK)
             if not settled.steadiness.steady:
@@ -95,7 +98,8 @@ class HarmonicSheet:
         measured = yield from calibrate_drive(wanted, level, calibration)
         yield from self._end_test(specimen, fast=isinstance(measured, Fallen))
         if isinstance(measured, DriveCalibration):
-            calibration = measured
+            # far above the frame's modes the block adds its mass alone: what the bare frame showed there will do
+            calibration = measured.beyond(calibration)
         for omega in self._parameters.omega:
             point = yield from self._point(specimen, omega, calibration, plans[omega])
             self._pace.finished(omega)
@@ -115,7 +119,7 @@ class HarmonicSheet:
             yield Calibrate(calibration)
             settled: Settled | Fallen | None = None
             if not isinstance((yield Follow(start.legs)), Fallen):
-                settled = yield from self._settle(omega, specimen)
+                settled = yield from self._settle(omega, specimen, calibration)
             if not isinstance(settled, Settled):
                 falls += 1
                 yield from self._end_test(specimen, fast=True)
@@ -155,14 +159,15 @@ class HarmonicSheet:
             reason=f"the block fell in each of {falls} starts; the predicted orbit is {kind}",
         )
 
-    def _settle(self, omega: float, specimen: Specimen | None) -> Generator[Step, Outcome, Settled | Fallen]:
-        look = self._look(omega, specimen)
-        return settle_and_measure(omega, self._amplitude, self._parameters, self._configuration.analysis, look)
+    def _settle(
+        self, omega: float, specimen: Specimen | None, calibration: DriveCalibration
+    ) -> Generator[Step, Outcome, Settled | Fallen]:
+        asked = Sine(omega, self._amplitude, calibration)
+        return settle_and_measure(asked, self._parameters, self._configuration.analysis, self._look(omega, specimen))
 
     def _starts(self, specimen: Specimen, omega: float) -> list[Start]:
-        layer = predict_gain(specimen, omega, self._amplitude).rocking
-        orbit = layer.orbit if layer else None
-        return plan_starts(specimen, omega, self._amplitude, orbit, self._parameters.starts)
+        uncertainty = self._configuration.uncertainty
+        return list(planned_starts(specimen, omega, self._amplitude, self._parameters.starts, uncertainty))
 
     def _look(self, omega: float, specimen: Specimen | None) -> Look:
         """What the operator is told while a test settles: running alpha_2 beside the predicted one."""

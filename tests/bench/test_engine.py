@@ -47,7 +47,12 @@ OMEGA = 16.0
 class Bench:
     """An engine on a loopback rig, with what it published."""
 
-    def __init__(self, rig: LoopbackRig | None = None, listener: Callable[[Event], None] | None = None) -> None:
+    def __init__(
+        self,
+        rig: LoopbackRig | None = None,
+        listener: Callable[[Event], None] | None = None,
+        limits: Limits | None = None,
+    ) -> None:
         self.rig = rig or LoopbackRig()
         self.events: list[Event] = []
         self.requests = Requests()
@@ -55,7 +60,7 @@ class Bench:
         subscribers = [self.events.append, *([listener] if listener else [])]
         self.engine = Engine(
             self.rig,
-            Guard(self.rig, Limits(), Ramps(stop=1.0, abort=0.2)),
+            Guard(self.rig, limits or Limits(), Ramps(stop=1.0, abort=0.2)),
             SignalMap(self.rig.channels, "table"),
             Stream(self.rig.clock, subscribers),
             self.requests,
@@ -121,7 +126,7 @@ def test_a_dwell_measures_the_cycles_of_the_motion_that_was_asked_for() -> None:
 
 def test_dwells_follow_each_other_without_a_gap() -> None:
     bench, outcomes = Bench(), list[Outcome]()
-    bench.run(_plan(*RUN[:5], Dwell(3), Trim(1.1), Dwell(4), RampOut(), outcomes=outcomes))
+    bench.run(_plan(*RUN[:5], Dwell(3), Trim((1.1,)), Dwell(4), RampOut(), outcomes=outcomes))
     indices = [cycle.index for outcome in outcomes if isinstance(outcome, Measured) for cycle in outcome.cycles]
     assert indices == list(range(len(indices)))
     assert np.abs(outcomes[-2].cycles[-1].fundamental[0]) == pytest.approx(1.1, rel=1e-3)  # type: ignore[union-attr]
@@ -269,6 +274,47 @@ def test_a_plan_that_forgets_its_ramp_is_ramped_out() -> None:
     assert not bench.rig.halted
 
 
+@pytest.mark.parametrize(("way", "status"), [("abort", "completed"), ("halt", "halted")])
+def test_what_is_asked_in_the_last_ramp_of_a_plan_that_forgot_it_is_an_ending(way: str, status: str) -> None:
+    """The ramp is the fast one already: an abort finds nothing left to end."""
+
+    def listener(event: Event) -> None:
+        if isinstance(event, StateChanged) and event.after is State.ABORTING:
+            getattr(bench.requests, way)()
+
+    bench = Bench(listener=listener)
+    assert bench.run(_plan(*RUN[:4])).status == status
+
+
+def test_an_ending_that_grows_worse_names_both_reasons() -> None:
+    def listener(event: Event) -> None:
+        if isinstance(event, StateChanged) and event.after is State.RUNNING:
+            bench.requests.stop()
+        if isinstance(event, StateChanged) and event.after is State.STOPPING:
+            bench.requests.abort()
+
+    bench = Bench(listener=listener)
+    assert bench.run(_plan(*RUN)) == Ending("aborted", "stop was asked for; then abort was asked for")
+    assert bench.ends_at_zero()
+
+
+def test_a_limit_that_is_exceeded_in_the_fast_ramp_of_a_test_ends_the_campaign() -> None:
+    lost = [False]
+
+    def laser(volts: np.ndarray) -> np.ndarray:
+        return np.full(volts.size, np.nan) if lost[0] else 0.002 * volts
+
+    def listener(event: Event) -> None:
+        lost[0] |= isinstance(event, StateChanged) and event.after is State.ABORTING
+
+    limits = Limits(sensor_loss=0.1)
+    bench = Bench(LoopbackRig({**LoopbackRig().response, "laser_2": laser}), listener=listener, limits=limits)
+    ending = bench.run(_plan(*RUN[:5], RampOut(fast=True), *RUN))
+    assert ending.status == "aborted"
+    assert "valid sample of laser_2" in ending.reason
+    assert sum(isinstance(event, LimitExceeded) for event in bench.events) == 1
+
+
 def test_missing_samples_are_a_failed_run() -> None:
     class Leaky(LoopbackRig):
         def read(self, n: int) -> Block:
@@ -355,7 +401,7 @@ def test_illegal_transitions_are_refused() -> None:
 
 @settings(max_examples=30, deadline=None)
 @given(
-    st.lists(st.sampled_from([Dwell(2), Trim(1.2), Trim(0.5), Follow((Leg(0.5, 2.0, 20.0),))]), max_size=6),
+    st.lists(st.sampled_from([Dwell(2), Trim((1.2,)), Trim((0.5, 0.1j)), Follow((Leg(0.5, 2.0, 20.0),))]), max_size=6),
     st.integers(0, 60),
     st.sampled_from(["stop", "abort", "halt"]),
 )

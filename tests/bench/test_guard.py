@@ -227,9 +227,18 @@ def test_whatever_is_asked_the_output_stays_within_limits_and_ends_at_zero(acts:
 
 
 def _bench_rig(**response: object) -> LoopbackRig:
-    """A loopback with every channel that the guard knows; volts are answered as given, the others stay at zero."""
+    """A loopback with every channel that the guard knows; volts are answered as given, the others show noise only."""
     channels = ("table_displacement", "table_acceleration", "laser_1", "laser_2")
-    return LoopbackRig({name: response.get(name, lambda v: 0.0 * v) for name in channels})  # type: ignore[misc]
+    return LoopbackRig({name: response.get(name, _noise) for name in channels})  # type: ignore[misc]
+
+
+def _noise(volts: np.ndarray) -> np.ndarray:
+    """One count to and fro."""
+    return 0.001 * (np.arange(volts.size) % 2)
+
+
+def _nothing(volts: np.ndarray) -> np.ndarray:
+    return 0.0 * volts
 
 
 def _until_violation(rig: LoopbackRig, limits: Limits, volts: float, mover: Mover | None = None) -> Exchange:
@@ -299,7 +308,7 @@ def test_a_warning_comes_once_and_before_the_end() -> None:
 
 
 def test_a_stuck_sensor_ends_a_run_in_which_the_table_is_driven() -> None:
-    rig = _bench_rig(table_acceleration=lambda v: v, table_displacement=lambda v: 0.01 * v, laser_1=lambda v: v)
+    rig = _bench_rig(laser_2=_nothing)
     guard = Guard(rig, Limits(stuck=0.5), RAMPS)
     guard.arm()
     seen = [guard.exchange(_sine(1.0, N * k)).violation for k in range(9)]
@@ -308,8 +317,19 @@ def test_a_stuck_sensor_ends_a_run_in_which_the_table_is_driven() -> None:
     assert guard.ramping
 
 
+@pytest.mark.parametrize("n", [20, 100, 500])
+def test_a_stuck_sensor_is_found_whatever_the_block_and_however_slow_the_drive(n: int) -> None:
+    """A volt at 0.5 Hz: within 100 ms around its peak it changes by 12 mV only."""
+    guard = Guard(_bench_rig(laser_2=_nothing), Limits(stuck=0.5), RAMPS)
+    guard.arm()
+    drive = np.sin(2.0 * np.pi * 0.5 * np.arange(3000) / 1000.0)
+    found = [guard.exchange(block).violation for block in np.split(drive, 3000 // n)]
+    assert any(one is not None and "laser_2" in one.quantity for one in found)
+
+
 def test_sensors_may_stand_still_while_nothing_is_driven() -> None:
-    guard = Guard(_bench_rig(), Limits(stuck=0.5), RAMPS)
+    still = dict.fromkeys(("table_displacement", "table_acceleration", "laser_1", "laser_2"), _nothing)
+    guard = Guard(_bench_rig(**still), Limits(stuck=0.5), RAMPS)
     guard.arm()
     assert all(guard.exchange(np.zeros(N)).violation is None for _ in range(20))
 
@@ -357,3 +377,58 @@ def test_nothing_is_armed_while_a_safety_input_is_open() -> None:
     with pytest.raises(RigError, match="amplifier ready"):
         Guard(rig, LIMITS, RAMPS).arm()
     assert not rig.armed
+
+
+@pytest.mark.parametrize("way", ["stop", "abort"])
+def test_a_ramp_adds_nothing_to_the_fastest_command(way: str) -> None:
+    """4.5 V at 44 rad/s slew by 198 V/s of the 200 allowed; the ramp of 0.2 s by itself by up to 35 V/s."""
+    guard, rig = _armed(LoopbackRig({"table_displacement": lambda volts: 0.0 * volts}))
+    command = 4.5 * np.sin(44.0 * np.arange(4 * N) / 1000.0)
+    for block in np.split(command, 4):
+        guard.exchange(block)
+    getattr(guard, way)()
+    phase = 44.0 * (np.arange(12 * N) + 4 * N) / 1000.0
+    for block in np.split(4.5 * np.sin(phase), 12):
+        guard.exchange(block)
+    assert guard.at_zero
+    assert np.abs(np.diff(rig.played)).max() <= LIMITS.drive_slew / rig.sample_rate * (1.0 + 1e-12)
+    assert rig.played[-1] == 0.0
+
+
+class _Uncuttable(LoopbackRig):
+    """Its enable line does not obey; perhaps its output does not either."""
+
+    def __init__(self, *, stops: bool) -> None:
+        super().__init__()
+        self.stops = stops
+
+    def halt(self) -> None:
+        raise RigError("the digital output does not answer")
+
+    def stop(self) -> None:
+        if not self.stops:
+            raise RigError("the task is gone")
+        super().stop()
+
+
+@pytest.mark.parametrize(("stops", "told"), [(True, "switch the amplifier off"), (False, "press the emergency stop")])
+def test_an_enable_line_that_does_not_obey_is_told_and_the_output_stopped(stops: bool, told: str) -> None:
+    guard, rig = _armed(_Uncuttable(stops=stops))
+    with pytest.raises(RigError, match=told):
+        guard.halt()
+    assert rig.armed is not stops
+    rig.safety = {"emergency stop": False}
+    if not stops:
+        with pytest.raises(RigError, match=r"emergency stop opened, and the enable line could not be cut"):
+            guard.exchange(np.zeros(N))
+
+
+def test_only_the_table_itself_runs_away() -> None:
+    """A lost sensor ends the run, and says nothing against a table at rest."""
+    guard, _ = _armed(LoopbackRig({"laser_1": lambda volts: np.full(volts.size, np.nan)}))
+    last = [guard.exchange(np.zeros(N)) for _ in range(6)][-1]
+    assert last.violation is not None
+    assert last.runaway is None
+    guard, _ = _armed(LoopbackRig({"table_displacement": lambda volts: np.full(volts.size, 0.05)}))
+    last = guard.exchange(np.zeros(N))
+    assert last.runaway == last.violation

@@ -56,11 +56,60 @@ def test_after_the_last_leg_the_sine_is_held() -> None:
 def test_a_trim_changes_the_amplitude_without_a_jump() -> None:
     oscillator = _oscillator()
     before = oscillator.next(6000)
-    oscillator.trim(1.1)
+    oscillator.trim((1.1,))
     after = oscillator.next(2000)
     steps = np.abs(np.diff(np.concatenate((before[-10:], after))))
     assert steps.max() < 0.22 * 16.0 / RATE * 1.1
     assert np.abs(after[-500:]).max() == pytest.approx(0.22, rel=1e-3)
+
+
+def _held(oscillator: Oscillator, n: int = 4000) -> np.ndarray:
+    """Complex amplitudes of harmonics 1 to 4 of the next samples; the phase is zero one sample before them."""
+    volts = oscillator.next(n)
+    phase = 16.0 * np.arange(1, n + 1) / RATE
+    orders = np.arange(1, 5)
+    basis = np.concatenate((np.sin(phase[:, None] * orders), np.cos(phase[:, None] * orders)), axis=1)
+    fit = np.linalg.lstsq(basis, volts, rcond=None)[0]
+    return fit[:4] + 1j * fit[4:]
+
+
+def test_harmonics_are_played_in_the_fundamentals_phase_through_the_response_at_their_own_frequency() -> None:
+    calibration = DriveCalibration((10.0, 20.0, 40.0), (2.0j, 1.0 + 1.0j, 4.0))
+    oscillator = Oscillator(RATE)
+    oscillator.use(calibration)
+    oscillator.follow(sweeps((Leg(1.0, 3.0, 16.0),), 0.0, 16.0)[0])
+    oscillator.next(1000)
+    oscillator.trim((0.9 + 0.1j, 0.05, 0.02j))
+    oscillator.next(400)
+    turn = np.exp(16j * 1.4)  # the sweep begins at phase 0, and 1.4 s of 16 rad/s have gone by
+    # linear in between, real and imaginary part apart: at 16 rad/s 0.4 (2j) + 0.6 (1 + 1j), and so on
+    response = np.array([0.6 + 1.4j, 0.4 * (1.0 + 1.0j) + 0.6 * 4.0, 4.0])
+    expected = 3.0 * np.array([0.9 + 0.1j, 0.05, 0.02j]) / response * turn ** np.arange(1, 4)
+    np.testing.assert_allclose(_held(oscillator), [*expected, 0.0], atol=1e-9)
+
+
+def test_a_trim_is_given_up_when_the_drive_moves_on() -> None:
+    oscillator = _oscillator()
+    oscillator.next(5500)
+    oscillator.trim((1.1, 0.1, 0.1j))
+    oscillator.next(400)
+    assert np.abs(_held(oscillator)) == pytest.approx([0.22, 0.02, 0.02, 0.0], abs=1e-9)
+    oscillator.follow(sweeps((Leg(1.0, 0.4, 16.0),), oscillator.amplitude, oscillator.omega)[0])
+    before = oscillator.next(1000)
+    assert np.abs(_held(oscillator)) == pytest.approx([0.2, 0.0, 0.0, 0.0], abs=1e-9)
+    assert np.abs(np.diff(before)).max() < 2.0 * 0.22 * 16.0 / RATE
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.lists(st.integers(1, 300), min_size=1, max_size=8))
+def test_a_trim_does_not_depend_on_the_size_of_the_blocks(sizes: list[int]) -> None:
+    pieces: list[np.ndarray] = []
+    for cut in ([sum(sizes)], sizes):
+        oscillator = _oscillator()
+        oscillator.next(5500)
+        oscillator.trim((1.1, 0.1 + 0.2j))
+        pieces.append(np.concatenate([oscillator.next(size) for size in cut]))
+    np.testing.assert_allclose(pieces[1], pieces[0], rtol=0, atol=1e-12)
 
 
 def test_moving_before_calibration_is_refused() -> None:

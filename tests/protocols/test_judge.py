@@ -1,5 +1,7 @@
 """A measured dwell is compared with the layer on which it lies."""
 
+from dataclasses import replace
+
 import pytest
 
 from bench.analysis.gain import SensorAccuracy, SteadyPeak
@@ -18,7 +20,7 @@ STEADY = Steadiness(True, 0.0, 0.0, 1)
 
 
 def _settled(drift: float, u1: float, steadiness: Steadiness = STEADY) -> Settled:
-    return Settled(SteadyPeak(drift, 0.0, u1, AMPLITUDE, 0.02, 0.007, 0.009, 24), steadiness, 60.0, 0.0)
+    return Settled(SteadyPeak(drift, 0.0, u1, AMPLITUDE, 0.002, 0.007, 0.009, 24), steadiness, 60.0, 0.0, 0.0, 3)
 
 
 BARE = _settled(PREDICTED.bare.drift, PREDICTED.bare.u1)
@@ -67,6 +69,29 @@ def test_a_bare_frame_that_was_not_steady_is_no_reference() -> None:
     point = judge(_settled(peaks.drift, peaks.u1), wandering, OMEGA, SPECIMEN, SensorAccuracy(), 1)
     assert point.agrees is None
     assert "bare frame was not steady" in point.reason
+
+
+def test_a_steady_motion_on_an_unstable_orbit_says_that_it_will_not_last() -> None:
+    specimen = Specimen().coupled(0.64)
+    predicted = predict_gain(specimen, 12.5, AMPLITUDE)
+    assert predicted.rocking is not None
+    peaks = predicted.rocking.orbit.peaks
+    bare = _settled(predicted.bare.drift, predicted.bare.u1)
+    point = judge(_settled(peaks.drift, peaks.u1), bare, 12.5, specimen, SensorAccuracy(), 1)
+    assert point.predicted_stable is False
+    assert "the predicted orbit is unstable" in point.reason
+
+
+def test_a_table_that_is_off_is_told() -> None:
+    peaks = PREDICTED.layers["rocking"].orbit.peaks
+    good = _settled(peaks.drift, peaks.u1)
+    assert judge(good, BARE, OMEGA, SPECIMEN, SensorAccuracy(), 1).reason == ""
+    off = replace(good, amplitude_error=-0.004, phase_error=0.002, peak=replace(good.peak, harmonics=0.013))
+    point = judge(off, BARE, OMEGA, SPECIMEN, SensorAccuracy(), 1)
+    assert "the table's amplitude is -0.40 % off" in point.reason
+    assert "the table's harmonics are 1.3 % of its fundamental" in point.reason
+    assert (point.amplitude_error, point.phase_error_rad, point.table_harmonics) == (-0.004, 0.002, 0.013)
+    assert point.table_updates == 3
 
 
 def test_a_resting_block_says_that_the_stable_rocking_motion_was_not_reached() -> None:

@@ -1,0 +1,103 @@
+"""`--dry-run`: what a run would ask of the bench, the limit that binds, and the margin to each; nothing is opened."""
+
+import json
+import sys
+from contextlib import redirect_stdout
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from bench.cli.predict_text import aligned
+from bench.cli.refusal import tell
+from bench.cli.words import ABSENT, clock
+
+if TYPE_CHECKING:
+    from bench.config.model import BenchConfiguration
+    from bench.preflight.compiled import Preflight
+    from bench.preflight.margins import Margin
+    from bench.session import Experiment
+
+
+def dry_run(experiment: "Experiment", configuration: "BenchConfiguration", out: Path, *, as_json: bool) -> int:
+    """Print the preflight on standard output. Returns 0 when the run may begin, 2 when it is refused."""
+    from bench.preflight.compiled import compile_run
+
+    # standard output belongs to the result
+    with redirect_stdout(sys.stderr):
+        experiment.check(configuration)
+        found = compile_run(experiment, configuration, out)
+    print(json.dumps(_content(found), allow_nan=False) if as_json else _text(found))
+    if found.refusal is not None:
+        tell(found.refusal)
+        return 2
+    return 0
+
+
+def _content(found: "Preflight") -> dict[str, Any]:
+    refused, room = found.refusal, found.room
+    return {
+        "would_run": refused is None,
+        "refused": None if refused is None else str(refused),
+        "warnings": list(found.warnings),
+        "margins": [
+            {
+                "quantity": each.bound.quantity,
+                "name": each.bound.name,
+                "unit": each.bound.unit,
+                "demand": each.demand.value,
+                "demand_95": each.demand.likely,
+                "limit": each.bound.limit,
+                "owner": each.bound.owner,
+                "margin": each.margin,
+                "margin_95": each.likely,
+                "where": each.demand.where,
+            }
+            for each in found.margins
+        ],
+        "starts": [
+            {"name": stage.name, "chance": stage.chance} for stage in found.forecast.stages if stage.chance is not None
+        ],
+        "duration_s": found.forecast.duration,
+        "disk": None if room is None else {"needed_bytes": room.needed, "free_bytes": room.free},
+        "plan_hash": found.plan_hash,
+    }
+
+
+def _text(found: "Preflight") -> str:
+    lines = [_margins(found.margins)] if found.margins else ["This protocol predicts no margins."]
+    if found.margins:
+        binding = found.margins[0]
+        lines += ["", f"Tightest: {binding.bound.name}, limited by {binding.bound.owner}."]
+    lines += [f"Warning: {warning}" for warning in found.warnings]
+    chances = [(stage.name, stage.chance) for stage in found.forecast.stages if stage.chance is not None]
+    if chances:
+        names, stated = zip(*chances, strict=True)
+        table = aligned([["start", "", *names], ["chance", "", *(f"{chance:.0%}" for chance in stated)]])
+        lines += ["", table, ""]
+    if found.forecast.duration is not None:
+        lines.append(f"Expected duration: {clock(found.forecast.duration)}")
+    if found.room is not None:
+        lines.append(f"Disk: {found.room.needed / 1e6:.0f} MB may be needed, {found.room.free / 1e6:.0f} MB are free")
+    return "\n".join([*lines, f"Plan: {found.plan_hash}"])
+
+
+def _margins(margins: "tuple[Margin, ...]") -> str:
+    """Tightest first; "95 %" is for the specimens within the uncertainty."""
+
+    def number(value: float | None) -> str:
+        return ABSENT if value is None else f"{value:.4g}"
+
+    def share(value: float | None) -> str:
+        return ABSENT if value is None else f"{100.0 * value:.1f}"
+
+    return aligned(
+        [
+            ["quantity", "", *(each.bound.name for each in margins)],
+            ["unit", "", *(each.bound.unit for each in margins)],
+            ["demand", "", *(number(each.demand.value) for each in margins)],
+            ["at 95 %", "", *(number(each.demand.likely) for each in margins)],
+            ["limit", "", *(number(each.bound.limit) for each in margins)],
+            ["margin", "[%]", *(share(each.margin) for each in margins)],
+            ["at 95 %", "[%]", *(share(each.likely) for each in margins)],
+            ["where", "", *(each.demand.where for each in margins)],
+        ]
+    )

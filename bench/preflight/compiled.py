@@ -1,0 +1,83 @@
+"""A run before it runs: its forecast, the margin to every limit, room on the disk, and the hash of it all."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from bench.config.model import BenchConfiguration
+from bench.preflight.bounds import bounds
+from bench.preflight.disk import Room, room
+from bench.preflight.fingerprint import plan_hash
+from bench.preflight.forecast import Forecast, Forecasting
+from bench.preflight.margins import Margin, margins, refusal, warnings
+from bench.preflight.tables import drive_table, margins_table
+from bench.provenance import software
+from bench.record.tables import Table
+from sim.errors import InvalidInput
+from sim.parameters import Parameters
+
+
+class Asked(Protocol):
+    """An experiment, as far as it matters here."""
+
+    @property
+    def name(self) -> str:
+        """The protocol's name."""
+        ...
+
+    @property
+    def parameters(self) -> Parameters:
+        """What was asked for."""
+        ...
+
+
+@dataclass(frozen=True)
+class Preflight:
+    """What was found. `margins` are tightest first; `room` is None where the run's duration is not known."""
+
+    forecast: Forecast
+    margins: tuple[Margin, ...]
+    room: Room | None
+    plan_hash: str
+
+    @property
+    def refusal(self) -> InvalidInput | None:
+        """Why the run is refused: the limit that binds, else the disk; None when it may run."""
+        return refusal(self.margins) or (self.room.refusal() if self.room else None)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the operator should know although the run may begin."""
+        return warnings(self.margins)
+
+    @property
+    def tables(self) -> Mapping[str, Table]:
+        """What the file keeps, empty tables left out."""
+        kept: dict[str, Table] = {}
+        if self.margins:
+            kept["preflight"] = margins_table(self.margins)
+        if self.forecast.stages:
+            kept["planned_drive"] = drive_table(self.forecast.stages)
+        return kept
+
+    def require(self) -> None:
+        """Raise InvalidInput, naming what binds, when the run is refused."""
+        if (refused := self.refusal) is not None:
+            raise refused
+
+
+def compile_run(experiment: Asked, configuration: BenchConfiguration, folder: Path) -> Preflight:
+    """Compute and check the whole run; its results would go to `folder`. Opens nothing, creates nothing.
+
+    Raises InvalidInput only for what cannot be planned at all: a refusal is part of the answer.
+    """
+    forecast = experiment.preflight(configuration) if isinstance(experiment, Forecasting) else Forecast()
+    return Preflight(
+        forecast=forecast,
+        margins=margins(forecast.demands, bounds(configuration)),
+        room=None if forecast.duration is None else room(configuration, forecast.duration, folder),
+        plan_hash=plan_hash(
+            experiment.name, experiment.parameters, configuration, software()["rocking-bench"], forecast
+        ),
+    )

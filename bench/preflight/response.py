@@ -1,0 +1,68 @@
+"""What drive a motion of the table needs: from the simulated shaker, or from a table that has been identified."""
+
+from dataclasses import dataclass
+from math import pi, tau
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.config.model import BenchConfiguration
+from bench.control.table_model import TableModel
+from sim.shaker import Shaker
+
+Array = NDArray[np.float64]
+
+
+class TableResponse(Protocol):
+    """Acceleration of the table per volt of drive."""
+
+    def gain(self, omega: Array, payload: float) -> Array:
+        """Magnitude [m/s2/V] at `omega` [rad/s], same shape, with `payload` [kg] on the table."""
+        ...
+
+    @property
+    def friction(self) -> float:
+        """Drive that friction takes besides [V]: the fundamental of a force that changes sign with the velocity."""
+        ...
+
+
+@dataclass(frozen=True)
+class SimulatedTable:
+    """The shaker of the simulated bench, linear but for its friction, the payload as a rigid mass."""
+
+    shaker: Shaker
+
+    def gain(self, omega: Array, payload: float) -> Array:
+        return np.abs(self.shaker.frequency_response(omega, payload))
+
+    @property
+    def friction(self) -> float:
+        return 4.0 / pi * self.shaker.friction / self.shaker.force_per_volt
+
+
+@dataclass(frozen=True)
+class IdentifiedTable:
+    """A table as identified; specimen and friction are in it as they were then."""
+
+    model: TableModel
+
+    def gain(self, omega: Array, payload: float) -> Array:  # noqa: ARG002
+        return np.abs(self.model.response(omega / tau))
+
+    @property
+    def friction(self) -> float:
+        return 0.0
+
+
+def response_of(configuration: BenchConfiguration) -> TableResponse | None:
+    """What is known of this bench's table; None for a real one that has no stored model.
+
+    Raises InvalidInput when the stored model cannot be read.
+    """
+    if configuration.table_model is not None:
+        return IdentifiedTable(TableModel.read(Path(configuration.table_model)))
+    if configuration.backend == "simulated":
+        return SimulatedTable(configuration.simulation.bench.shaker)
+    return None

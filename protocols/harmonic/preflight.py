@@ -1,0 +1,154 @@
+"""What a harmonic campaign will ask of the bench: predicted for every stage, over what is not known of the specimen."""
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from importlib import import_module
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.config.model import BenchConfiguration
+from bench.control.legs import program
+from bench.control.starts import CATCH_ANGLE, DRIVE, SEED
+from bench.preflight.bounds import bounds
+from bench.preflight.forecast import Demand, Forecast
+from bench.preflight.load import load
+from bench.preflight.motion import Travel, travel
+from bench.preflight.response import TableResponse, response_of
+from protocols.harmonic.pace import Pace
+from protocols.harmonic.parameters import HarmonicParameters
+from protocols.harmonic.reach import bare_travel, rocking_travel
+from protocols.harmonic.stages import Trial, payload_of, trials
+from sim.specimen import Specimen
+
+Array = NDArray[np.float64]
+
+DRAWS = 16
+"""Specimens that are drawn besides the assumed one: their 95 % lies close below the worst of them."""
+
+LIKELY = 0.95
+
+RIPPLE = 0.03
+"""Share by which every quantity of the table and its drive may exceed the asked one: noise, and what a calibration at
+half the level leaves open of the friction."""
+
+IMPACTS = 0.15
+"""The same where the block rocks, for what its impacts raise until the table's harmonics are cancelled."""
+
+OFF_MIDDLE = 0.015
+"""Share of half its range by which a storey may rest off the laser's middle."""
+
+_RAISED = ("acceleration", "force", "current", "drive_slew")
+"""Quantities that impacts raise: what is fast."""
+
+_UNKNOWN = {
+    "drive_voltage": "nothing is known of this table: give table_model",
+    "drive_slew": "nothing is known of this table: give table_model",
+    "force": "the moving mass is not known: give hardware.moving_mass and hardware.force_constant",
+    "current": "the force constant is not known: give hardware.moving_mass and hardware.force_constant",
+    "heating": "the force constant is not known: give hardware.moving_mass and hardware.force_constant",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class _Asked:
+    """What one trial asks of each quantity, shape (1 + DRAWS,): as assumed first, then as drawn."""
+
+    name: str
+    values: dict[str, Array]
+
+
+def forecast(parameters: HarmonicParameters, configuration: BenchConfiguration) -> Forecast:
+    """The campaign's stages with the demands of them all. Plans the starts, which are kept for the run.
+
+    A drawn specimen is the same one throughout the campaign, and so is how far its drive is off.
+    Raises InvalidInput when a table model is named that cannot be read or does not reach far enough.
+    """
+    response = response_of(configuration)
+    found = list(trials(parameters, configuration, response))
+    factors = np.concatenate(([1.0], 1.0 + DRIVE * np.random.default_rng(SEED).uniform(-1.0, 1.0, DRAWS)))
+    moved = _travels(found, factors, configuration)
+    asked = [
+        _asked(trial, travels, factors, parameters, configuration, response)
+        for trial, travels in zip(found, moved, strict=True)
+    ]
+    return Forecast(
+        demands=tuple(_demand(quantity, asked) for quantity in bounds(configuration)),
+        stages=tuple(trial.stage for trial in found),
+        duration=Pace(parameters.omega, 1 + len(parameters.beta)).progress("").remaining,
+    )
+
+
+def _travels(found: Sequence[Trial], factors: Array, configuration: BenchConfiguration) -> list[list[Travel]]:
+    """Motion of the specimen in each trial, as assumed and as drawn, on all processors."""
+    import_module("sim.kernel.rocking")  # compiled once, before the threads start
+    drawn: dict[Specimen, list[Specimen]] = {}
+    for trial in found:
+        if trial.specimen not in drawn:
+            others = configuration.uncertainty.draws(trial.specimen, DRAWS, np.random.default_rng(SEED))
+            drawn[trial.specimen] = [trial.specimen, *others]
+
+    def one(run: tuple[Trial, int]) -> Travel:
+        trial, i = run
+        legs = [type(leg)(leg.duration, float(factors[i]) * leg.amplitude, leg.omega) for leg in trial.legs]
+        specimen = drawn[trial.specimen][i]
+        return travel(specimen, program(legs), trial.begin, configuration.laser_reference, CATCH_ANGLE)
+
+    n = len(factors)
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        every = list(pool.map(one, [(trial, i) for trial in found for i in range(n)]))
+    return [every[k * n : (k + 1) * n] for k in range(len(found))]
+
+
+def _asked(
+    trial: Trial,
+    travels: Sequence[Travel],
+    factors: Array,
+    parameters: HarmonicParameters,
+    configuration: BenchConfiguration,
+    response: TableResponse | None,
+) -> _Asked:
+    loads = load(
+        program(trial.legs),
+        trial.begin,
+        trial.longest,
+        payload=payload_of(trial.specimen),
+        mover=configuration.mover,
+        response=response,
+        heating_time=configuration.limits.heating_time,
+    )
+    raised = _RAISED if trial.rocks else ()
+    values = {
+        quantity: factors * value * (1.0 + (IMPACTS if quantity in raised else RIPPLE))
+        for quantity, value in loads.items()
+    }
+    steady = _steady(trial, parameters, configuration)
+    halves = [0.5 * whole for whole in configuration.laser_ranges]
+    values |= {
+        "laser_1": np.array([max(each.storey_1, steady.storey_1) for each in travels]) / halves[0] + OFF_MIDDLE,
+        "laser_2": np.array([max(each.storey_2, steady.storey_2) for each in travels]) / halves[1] + OFF_MIDDLE,
+        "drift": np.array([max(each.drift, steady.drift) for each in travels]),
+    }
+    return _Asked(trial.stage.name, values)
+
+
+def _steady(trial: Trial, parameters: HarmonicParameters, configuration: BenchConfiguration) -> Travel:
+    """The steady state of the assumed specimen, which a simulation of limited length may not have reached."""
+    if trial.steady is None:
+        return Travel(0.0, 0.0, 0.0)
+    amplitude = parameters.amplitude_factor * configuration.specimen.uplift_acceleration
+    motion = rocking_travel if trial.rocks else bare_travel
+    return motion(trial.specimen, trial.steady, amplitude, configuration.laser_reference) or Travel(0.0, 0.0, 0.0)
+
+
+def _demand(quantity: str, asked: Sequence[_Asked]) -> Demand:
+    known = [each for each in asked if quantity in each.values]
+    if not known:
+        return Demand(quantity, None, None, _UNKNOWN[quantity])
+    values = np.array([each.values[quantity] for each in known])
+    where, most = int(values[:, 0].argmax()), values.max(axis=0)
+    likely = max(float(np.quantile(most[1:], LIKELY)), float(most[0]))
+    storey = {"laser_1": "storey 1 in ", "laser_2": "storey 2 in "}.get(quantity, "")
+    return Demand(quantity, float(most[0]), likely, f"{storey}{known[where].name}")

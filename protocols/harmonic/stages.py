@@ -1,0 +1,176 @@
+"""The whole drive of a harmonic campaign, told before it runs: what the lab sheet will ask of the table, in order.
+
+The starts are planned here, once: the lab sheet takes them from the same cache, and nothing is computed while the bench
+is armed.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from math import tau
+
+import numpy as np
+
+from bench.config.model import BenchConfiguration
+from bench.control.legs import Leg
+from bench.control.starts import Start, plan_starts
+from bench.preflight.forecast import Stage
+from bench.preflight.response import TableResponse
+from protocols.harmonic.calibrate import CHANGE_TIME, MEASURED, PROBE, SETTLING, harmonic_frequencies
+from protocols.harmonic.parameters import HarmonicParameters
+from sim.gain import predict_gain
+from sim.specimen import Specimen
+from sim.steady import resting_level
+from sim.uncertainty import SpecimenUncertainty
+
+BARE_CHANGE = 4.0
+"""Time in which the bare frame goes from one frequency to the next [s], as the lab sheet has it."""
+
+HOLD, BARE_HOLD = 20.0, 40.0
+"""Time for which the sine that ends a stage is simulated [s]: the transients of a rocking block are shorter."""
+
+PROBES = (PROBE, 10.0 * PROBE)
+"""Drive amplitudes [V] before anything is known of the table."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A stage as it is simulated: `before` it the legs that lead up to it and do not count, after it its last sine.
+
+    That one is simulated for `hold` [s] and may last `longest` [s]. `rocks` says whether the block is to rock.
+    `steady` is the sine [rad/s] whose steady state counts as well.
+    """
+
+    stage: Stage
+    specimen: Specimen
+    before: tuple[Leg, ...] = ()
+    hold: float = 0.0
+    longest: float = 0.0
+    rocks: bool = False
+    steady: float | None = None
+
+    @property
+    def legs(self) -> tuple[Leg, ...]:
+        """All of what is simulated."""
+        legs = (*self.before, *self.stage.legs)
+        return (*legs, _held(legs[-1], self.hold)) if self.hold > 0.0 else legs
+
+    @property
+    def begin(self) -> float:
+        """When it begins to count [s]."""
+        return sum(leg.duration for leg in self.before)
+
+
+def planned_starts(
+    specimen: Specimen, omega: float, amplitude: float, count: int, uncertainty: SpecimenUncertainty
+) -> tuple[Start, ...]:
+    """The starts that are tried at `amplitude` [m/s2] and `omega` [rad/s], best first, see
+    `bench.control.starts.plan_starts`; computed once.
+    """
+    # frozen parameters are hashable, though pydantic does not declare it
+    return _planned_starts(specimen, omega, amplitude, count, uncertainty)  # pyright: ignore[reportArgumentType]
+
+
+@lru_cache(maxsize=1024)
+def _planned_starts(
+    specimen: Specimen, omega: float, amplitude: float, count: int, uncertainty: SpecimenUncertainty
+) -> tuple[Start, ...]:
+    layer = predict_gain(specimen, omega, amplitude).rocking
+    return tuple(plan_starts(specimen, omega, amplitude, layer.orbit if layer else None, count, uncertainty))
+
+
+def trials(
+    parameters: HarmonicParameters, configuration: BenchConfiguration, response: TableResponse | None
+) -> Iterator[Trial]:
+    """Every stage that the lab sheet may come to, each planned start among them.
+
+    Without a `response` of the table the calibration of the bare frame is taken to move it as asked.
+    """
+    specimen = configuration.specimen
+    amplitude = parameters.amplitude_factor * specimen.uplift_acceleration
+    yield _bare_calibration(parameters, specimen, response)
+    yield from _bare_tests(parameters, specimen)
+    longest = _longest_dwell(parameters)
+    for beta in parameters.beta:
+        coupled = specimen.coupled(beta)
+        plans = {
+            omega: planned_starts(coupled, omega, amplitude, parameters.starts, configuration.uncertainty)
+            for omega in parameters.omega
+        }
+        wanted, level = spring_calibration(parameters, coupled, [start for each in plans.values() for start in each])
+        legs = _calibration_legs([(omega, level) for omega in wanted])
+        yield Trial(Stage(f"calibration of the drive with beta = {beta:g}", legs), coupled)
+        for omega, starts in plans.items():
+            for number, start in enumerate(starts, 1):
+                name = f"start {number} of beta = {beta:g} at omega = {omega:g} rad/s"
+                stage = Stage(name, start.legs, start.chance)
+                yield Trial(stage, coupled, hold=HOLD, longest=longest, rocks=True, steady=omega)
+
+
+def spring_calibration(
+    parameters: HarmonicParameters, specimen: Specimen, starts: Sequence[Start]
+) -> tuple[list[float], float]:
+    """Frequencies [rad/s] and level [m/s2] at which the drive is calibrated with a spring: the block provably rests."""
+    amplitude = parameters.amplitude_factor * specimen.uplift_acceleration
+    omegas = sorted({leg.omega for start in starts for leg in start.legs})
+    grid = np.linspace(omegas[0], omegas[-1], max(round((omegas[-1] - omegas[0]) / 1.5) + 1, 2))
+    wanted = sorted({*(round(float(omega), 2) for omega in grid), *parameters.omega})
+    allowed = 0.6 * min(resting_level(specimen, omega) for omega in wanted)
+    return wanted, min(parameters.calibration_level * amplitude, allowed)
+
+
+def _bare_calibration(parameters: HarmonicParameters, specimen: Specimen, response: TableResponse | None) -> Trial:
+    """The bare frame's calibration divides by one response, probed at the first frequency, at every other too.
+
+    The probe is so small that friction takes a good part of it: what is made of its response moves the table more.
+    """
+    level = parameters.calibration_level * parameters.amplitude_factor * specimen.uplift_acceleration
+    first = parameters.omega[0]
+    wanted = sorted({*parameters.omega, *harmonic_frequencies(max(parameters.omega), parameters.harmonics)})
+    legs: list[Leg] = []
+    if response is None:
+        levels = [(omega, level) for omega in wanted]
+    else:
+        gains = response.gain(np.array([first, *wanted]), payload_of(specimen.bare()))
+        for volts in PROBES:
+            legs += [*_measured(first, volts * float(gains[0])), Leg(CHANGE_TIME, 0.0, first)]
+        probed = gains[0] * (1.0 - response.friction / PROBES[-1])
+        levels = [(omega, level * float(gain / probed)) for omega, gain in zip(wanted, gains[1:], strict=True)]
+    legs += _calibration_legs(levels)
+    return Trial(Stage("calibration of the drive with the bare frame", tuple(legs)), specimen.bare())
+
+
+def _bare_tests(parameters: HarmonicParameters, specimen: Specimen) -> Iterator[Trial]:
+    amplitude = parameters.amplitude_factor * specimen.uplift_acceleration
+    before: tuple[Leg, ...] = ()
+    for omega in parameters.omega:
+        leg = Leg(BARE_CHANGE if before else parameters.ramp_time, amplitude, omega)
+        stage = Stage(f"the bare frame at omega = {omega:g} rad/s", (leg,))
+        longest = _longest_dwell(parameters)
+        yield Trial(stage, specimen.bare(), before, hold=BARE_HOLD, longest=longest, steady=omega)
+        # what the next one starts from, as steady as a frame of this damping is after so long
+        before = (Leg(parameters.ramp_time, amplitude, omega), _held(leg, BARE_HOLD))
+
+
+def _calibration_legs(levels: Sequence[tuple[float, float]]) -> tuple[Leg, ...]:
+    """Up and down over (frequency [rad/s], level [m/s2])."""
+    legs = [leg for omega, level in levels for leg in _measured(omega, level)]
+    return (*legs, Leg(CHANGE_TIME, 0.0, levels[-1][0]))
+
+
+def _measured(omega: float, level: float) -> tuple[Leg, Leg]:
+    return Leg(CHANGE_TIME, level, omega), Leg((SETTLING + MEASURED) * tau / omega, level, omega)
+
+
+def _held(leg: Leg, duration: float) -> Leg:
+    return Leg(duration, leg.amplitude, leg.omega)
+
+
+def _longest_dwell(parameters: HarmonicParameters) -> float:
+    return parameters.settle_limit + parameters.measured_cycles * tau / min(parameters.omega)
+
+
+def payload_of(specimen: Specimen) -> float:
+    """Mass on the table [kg]."""
+    block = specimen.block.mass if specimen.beta is not None else 0.0
+    return specimen.frame.m1 + specimen.frame.m2 + block

@@ -1,0 +1,160 @@
+"""Faults of plans, of those who listen, of the disk and of the operator; and the requests of a person."""
+
+import errno
+from threading import Thread
+
+from bench.control.calibration import DriveCalibration
+from bench.control.legs import Leg
+from bench.engine.steps import Calibrate, Follow, Step, Trim
+from sim.errors import RockbenchError
+from tests.faults.bench import Begin, FaultyBench
+from tests.faults.fault import Fault, answered, asks, heeded, never, reads, strikes
+from tests.faults.setup import GAIN
+
+
+def _does(step: Step | Exception) -> Begin:
+    def begin(bench: FaultyBench) -> None:
+        bench.extra.append(step)
+
+    return begin
+
+
+def plans() -> list[Fault]:
+    """Steps that ask for what is not allowed, and plans that break down."""
+    bad: dict[str, Step] = {
+        "nan": Trim((complex("nan"),)),
+        "over-range": Calibrate(DriveCalibration.flat(GAIN / 10.0)),
+        # 1.4 V at 500 rad/s change by 680 V/s
+        "slewing": Follow((Leg(0.05, 2.0, 500.0),)),
+    }
+    return [
+        *(Fault(f"{name} drive", _does(step), "aborted", "drive", strikes) for name, step in bad.items()),
+        Fault(
+            "mistake in the plan",
+            _does(ZeroDivisionError("sheet")),
+            "failed",
+            "sheet",
+            strikes,
+            raises=ZeroDivisionError,
+        ),
+        Fault("the plan gives up", _does(RockbenchError("no steady state")), "failed", "no steady state", strikes),
+    ]
+
+
+def _raises(error: BaseException, *, always: bool = False) -> Begin:
+    def begin(bench: FaultyBench) -> None:
+        bench.raising, bench.raises_always = error, always
+
+    return begin
+
+
+def subscribers() -> list[Fault]:
+    """Whoever listens breaks down."""
+    return [
+        Fault("OSError in a subscriber", _raises(OSError("pipe")), "failed", "pipe", strikes, raises=OSError),
+        Fault(
+            "OSError in a subscriber, always",
+            _raises(OSError("pipe"), always=True),
+            "failed",
+            "pipe",
+            strikes,
+            raises=OSError,
+        ),
+        Fault("an analysis gives up", _raises(RockbenchError("no cycles")), "failed", "no cycles", strikes),
+        Fault(
+            "an analysis gives up, always",
+            _raises(RockbenchError("no cycles"), always=True),
+            "failed",
+            "no cycles",
+            strikes,
+        ),
+        Fault(
+            "KeyboardInterrupt", _raises(KeyboardInterrupt("key")), "failed", "key", strikes, raises=KeyboardInterrupt
+        ),
+    ]
+
+
+def _full(bench: FaultyBench) -> None:
+    bench.disk.error = OSError(errno.ENOSPC, "No space left on device")
+
+
+def _hangs(bench: FaultyBench) -> None:
+    assert bench.recorder is not None
+    bench.disk.free.clear()
+    # from now on as if in real time: nobody waits for the disk
+    bench.recorder._hold_up = 0.0  # pyright: ignore[reportPrivateUsage]
+
+
+def _hangs_and_recovers(bench: FaultyBench) -> None:
+    _hangs(bench)
+    bench.recovers = True
+
+
+def disks() -> list[Fault]:
+    """The file cannot be written: told by the run, or at the latest when the file is closed."""
+    return [
+        Fault("disk full", _full, "failed", "No space left on device", never, True, disk="full"),
+        Fault("disk hangs for ever", _hangs, "failed", "its disk", never, True, disk="hung"),
+        Fault("disk hangs and recovers", _hangs_and_recovers, "failed", "its disk", never, True, disk="slow"),
+    ]
+
+
+def _declines(bench: FaultyBench) -> None:
+    bench.person.agrees = False
+
+
+def _operator(error: BaseException) -> Begin:
+    def begin(bench: FaultyBench) -> None:
+        bench.person.error = error
+
+    return begin
+
+
+def operators() -> list[Fault]:
+    """The person at the bench says no, or cannot be asked."""
+    gone = RockbenchError("nobody can answer")
+    return [
+        Fault("operator declines", _declines, "aborted", "declined", answered),
+        Fault("operator cannot be asked", _operator(gone), "failed", "nobody can answer", strikes),
+        Fault(
+            "KeyboardInterrupt at the question",
+            _operator(KeyboardInterrupt("key")),
+            "failed",
+            "key",
+            strikes,
+            raises=KeyboardInterrupt,
+        ),
+    ]
+
+
+def _halt_from_another_thread(bench: FaultyBench) -> None:
+    thread = Thread(target=bench.requests.halt)
+    thread.start()
+    thread.join()
+
+
+def requests() -> list[Fault]:
+    """A person ends the run, in any order."""
+    return [
+        asks("stop", status="stopped"),
+        asks("abort", status="aborted"),
+        asks("halt", status="halted", must=reads),
+        asks("stop", "abort", status="aborted"),
+        asks("abort", "stop", status="aborted", says="abort was asked for"),
+        asks("abort", "abort", status="aborted"),
+        asks("stop", "abort", "halt", status="halted", must=reads),
+        asks("halt", "halt", status="halted", must=reads),
+        Fault("halt from another thread", _halt_from_another_thread, "halted", "halt was asked for", reads, True),
+        *(_sequence(*pair) for pair in (("stop", "abort"), ("stop", "halt"), ("abort", "halt"), ("abort", "stop"))),
+    ]
+
+
+def _sequence(first: str, second: str) -> Fault:
+    """The second request comes two turns later, in the ramp that the first has begun."""
+
+    def begin(bench: FaultyBench) -> None:
+        getattr(bench.requests, first)()
+        bench.later(2, lambda: getattr(bench.requests, second)())
+
+    ways = {"stop": "stopped", "abort": "aborted", "halt": "halted"}
+    return Fault(f"{first}, then {second}", begin, f"{ways[first]}|{ways[second]}", "was asked for", heeded, True)
