@@ -53,6 +53,11 @@ class BenchConfiguration(Parameters):
     hardware: Hardware = Hardware()
 
     @property
+    def seed(self) -> int | None:
+        """Seed of every random number of the bench; a real one has none."""
+        return self.simulation.seed if self.backend == "simulated" else None
+
+    @property
     def sample_rate(self) -> float:
         """Samples per second of drive and inputs that the configured backend is asked for [1/s]."""
         return self.simulation.bench.sample_rate if self.backend == "simulated" else self.hardware.sample_rate

@@ -1,5 +1,6 @@
 """Runs a plan on a rig, through the guard, block by block."""
 
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Never
 
@@ -13,6 +14,7 @@ from bench.control.legs import sweeps
 from bench.control.oscillator import Oscillator
 from bench.engine.machine import Machine
 from bench.engine.operator import Operator
+from bench.engine.placements import Placements
 from bench.engine.requests import Requests
 from bench.engine.steps import (
     Arm,
@@ -22,6 +24,8 @@ from bench.engine.steps import (
     Fallen,
     Follow,
     Handle,
+    Heard,
+    Listen,
     Measured,
     Outcome,
     Plan,
@@ -32,9 +36,9 @@ from bench.engine.steps import (
 )
 from bench.engine.stream import Stream
 from bench.events import Acquired, LimitExceeded, OperatorAnswered, OperatorAsked, State, StateChanged, Warned
-from bench.guard.guard import Guard
+from bench.guard.guard import Exchange, Guard
 from bench.guard.watch import Violation
-from drivers.rig import Rig, RigError
+from drivers.rig import Counts, Rig, RigError
 from sim.errors import RockbenchError
 from sim.specimen import Specimen
 
@@ -74,6 +78,7 @@ class Engine:
         self._rig, self._guard, self._signals, self._stream = rig, guard, signals, stream
         self._requests, self._operator, self._block = requests, operator, block
         self._machine = Machine(self._announce)
+        self._placements = Placements(rig, stream)
         self._oscillator = Oscillator(rig.sample_rate)
         self._specimen: Specimen | None = None
         self._fall: FallWatch | None = None
@@ -143,6 +148,8 @@ class Engine:
                 self._oscillator.use(step.calibration)
             case Arm():
                 self._arm(step)
+            case Listen():
+                return self._listen(step)
             case RampOut():
                 return self._ramp_out(State.ABORTING if step.fast else State.STOPPING, "the test is over")
             case Handle():
@@ -150,15 +157,37 @@ class Engine:
         return Done()
 
     def _arm(self, step: Arm) -> None:
+        self._begin("the operator's work is done")
+        self._signals.tare(self._stillness(step))
+        self._fall = FallWatch(self._specimen, self._rig.sample_rate) if self._specimen else None
+        self._machine.go(State.RUNNING, "at rest, zero taken")
+
+    def _begin(self, reason: str) -> None:
+        """Arm the rig, with silence ahead."""
         self._oscillator.reset()
         self._read, self._cycles = 0, None
         self._run += 1
         self._heed_requests()
-        self._machine.go(State.ARMED, "the operator's work is done")
+        self._machine.go(State.ARMED, reason)
         self._guard.arm()
-        self._signals.tare(self._stillness(step))
-        self._fall = FallWatch(self._specimen, self._rig.sample_rate) if self._specimen else None
-        self._machine.go(State.RUNNING, "at rest, zero taken")
+        self._placements.begin(self._run)
+
+    def _listen(self, step: Listen) -> Heard:
+        """A violation ends the listening but not the plan, which may want to know what is wrong: nothing is driven."""
+        self._begin("to listen with the output at zero")
+        counts: list[Counts] = []
+        violation: Violation | None = None
+        for _ in range(max(round(step.duration * self._rig.sample_rate / self._block), 1)):
+            exchange = self._exchange()
+            counts.append(exchange.block.counts)
+            violation = exchange.violation
+            if violation is not None:
+                self._guard.halt()
+                break
+            self._heed_requests()
+        self._machine.go(State.STOPPING, "enough was heard" if violation is None else str(violation))
+        self._rest()
+        return Heard(self._rig.channels, np.concatenate(counts), violation)
 
     def _stillness(self, step: Arm) -> NDArray[np.float64]:
         """Channel values over a rest during which the storeys were still, shape (n, n_channels)."""
@@ -212,16 +241,20 @@ class Engine:
 
     def _turn(self) -> NDArray[np.float64]:
         """One turn of the loop: the channels' values, shape (block, n_channels)."""
-        exchange = self._guard.exchange(self._oscillator.next(self._block))
-        self._read = exchange.block.first + len(exchange.block)
-        self._drive = exchange.drive
-        self._stream.publish(Acquired(self._stream.now(), self._run, exchange.block, exchange.drive))
+        exchange = self._exchange()
         self._over = over = exchange.violation
         if over is not None and self.state is not State.ABORTING:
             self._stream.say(LimitExceeded(0.0, over.quantity, over.value, over.limit, over.unit))
             self._end(State.ABORTING, Ending("aborted", str(over)))
         self._heed_requests()
         return exchange.values
+
+    def _exchange(self) -> Exchange:
+        exchange = self._guard.exchange(self._oscillator.next(self._block))
+        self._read = exchange.block.first + len(exchange.block)
+        self._drive = exchange.drive
+        self._stream.publish(Acquired(self._stream.now(), self._run, exchange.block, exchange.drive))
+        return exchange
 
     def _heed_requests(self) -> None:
         asked = self._requests.strongest
@@ -249,14 +282,21 @@ class Engine:
         if self._over is not None:
             self._cut(f"{self._over} although the drive has been ramped to zero")
             raise _Ended(Ending("halted", f"{self._over} although the drive has been ramped to zero"))
+        self._rest()
+        return Fallen() if fell else Done()
+
+    def _rest(self) -> None:
         self._guard.disarm()
         self._machine.go(State.IDLE, "the output is at zero")
-        return Fallen() if fell else Done()
+        self._placements.tell()
 
     def _cut(self, reason: str) -> None:
         self._guard.halt()
         if self.state not in (State.HALTED, State.CLOSED):
             self._machine.go(State.HALTED, reason)
+        # what ended the run is what must be told of it
+        with suppress(RockbenchError):
+            self._placements.tell()
 
     def _fell(self, signals: NDArray[np.float64]) -> bool:
         return self._fall is not None and self._fall.fallen(signals)

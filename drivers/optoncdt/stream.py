@@ -121,8 +121,10 @@ class Stream:
         port = self._dialogue.port
         try:
             while not self._over.wait(_PACE):
-                if waiting := port.in_waiting:
-                    chunk = port.read(waiting)
+                # what has waited may have come long ago; what comes next tells when it came
+                chunk = port.read(port.in_waiting) + port.read(1)
+                chunk += port.read(port.in_waiting)
+                if chunk:
                     self._accept(chunk, time.monotonic())
         except OSError as error:
             self._fail(self._dialogue.gone(error))

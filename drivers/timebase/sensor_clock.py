@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from drivers.timebase.bounds import Bounds
 from drivers.timebase.fit import bends, due, floor_below, rate_error
 
-_TOLERANCE = 20e-6
+_TOLERANCE = 100e-6
 """How far a history may keep away from one line [s] before its older half is forgotten."""
 
 

@@ -56,3 +56,19 @@ def test_a_locked_frame_takes_no_spring_stiffer_than_it_says() -> None:
     hands = Handyman(BARE)
     locked = hands.after(Handwork.LOCK_FRAME, None, BARE)
     assert hands.after(Handwork.MOUNT_SPRING, 100.0, locked).k_c == pytest.approx(100.0)
+
+
+def test_a_locked_frame_is_damped_as_one_of_its_stiffness() -> None:
+    """Dashpots for the same damping ratios grow with the root of the stiffness: 20 times."""
+    locked = Handyman(BARE).after(Handwork.LOCK_FRAME, None, BARE)
+    assert BARE.frame.dashpots != locked.frame.dashpots
+    assert locked.frame.dashpots == pytest.approx([20.0 * c for c in BARE.frame.dashpots])
+
+
+@pytest.mark.parametrize(("work", "stiffness"), [(Handwork.REMOVE_BLOCK, None), (Handwork.MOUNT_SPRING, 100.0)])
+def test_who_takes_the_block_off_or_mounts_a_spring_has_taken_the_clamps_off(
+    work: Handwork, stiffness: float | None
+) -> None:
+    hands = Handyman(BARE)
+    locked = hands.after(Handwork.LOCK_FRAME, None, BARE)
+    assert hands.after(work, stiffness, locked).frame == BARE.frame
