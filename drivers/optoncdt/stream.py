@@ -15,7 +15,7 @@ from drivers.optoncdt.frames import Assembler, Frames
 from drivers.optoncdt.layout import Layout
 from drivers.optoncdt.reply import Reply
 
-_PACE = 0.01
+_PACE = 0.006
 """How long the line is left alone between two reads [s]: each costs the same, however much there is."""
 _KEPT = 60.0
 """How much is kept when nobody takes it [s]."""

@@ -7,43 +7,18 @@ real pyserial, 4 analogue inputs at 20 000 samples/s each and two lasers at 4 kH
 """
 
 import argparse
-import signal
-import subprocess
 import sys
-import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
-from pathlib import Path
 
 import numpy as np
 
-from bench.config.model import BenchConfiguration
-from bench.config.toml import read_configuration
 from drivers.hardware.parameters import CoilCurrent, TableForce
 from drivers.hardware.rig import HardwareRig
+from tests.emulated import emulated
 
 SAMPLE_RATE = 20_000.0
 BLOCK = 2_000
 LEAD = 8_000
-
-
-@contextmanager
-def emulated(*arguments: str) -> Iterator[BenchConfiguration]:
-    """An emulated laboratory in another process, and the configuration that it wrote."""
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "emulated.toml"
-        command = [sys.executable, "-m", "bench", "emulate", "--write", str(file), *arguments]
-        process = subprocess.Popen(command, stderr=subprocess.DEVNULL)
-        try:
-            while not file.exists():
-                if process.poll() is not None:
-                    raise SystemExit(f"the emulated laboratory ended with {process.returncode}")
-                time.sleep(0.05)
-            yield read_configuration(file)
-        finally:
-            process.send_signal(signal.SIGINT)
-            process.wait(30.0)
 
 
 def measure(minutes: float) -> bool:

@@ -21,7 +21,7 @@ from bench.config.model import BenchConfiguration
 from drivers.hands import ask
 from drivers.hardware.rig import HardwareRig
 from drivers.rig import Alignment
-from tests.benchmarks.acquisition import emulated
+from tests.emulated import emulated
 
 BLOCK, LEAD = 200, 800
 ALLOWED = 50e-6
@@ -36,8 +36,10 @@ def checked_delay(configuration: BenchConfiguration) -> float:
         done = subprocess.run([*command, "--out", f"{folder}/check"], capture_output=True, text=True, check=False)
     if done.returncode not in (0, 1):
         raise SystemExit(done.stderr)
-    lines = json.loads(done.stdout)["points"]
-    return next(line["measured"] for line in lines if "hardware.lasers.delay" in line["what"])
+    for line in json.loads(done.stdout)["points"]:
+        if "hardware.lasers.delay" in line["what"]:
+            return line["measured"]
+    raise SystemExit(f"the check measured no delay:\n{done.stderr}")
 
 
 def errors(one: Alignment, truth: dict[str, float], zero: float, clock: float, lag: float, until: float) -> np.ndarray:

@@ -21,7 +21,11 @@ SERIAL = pytest.mark.skipif(sys.platform == "win32", reason="emulated serial las
 
 
 def laboratory(connection: Connection, device: Device = "usb") -> Laboratory:
-    return Laboratory(VirtualBenchParameters(), Specimen(), seed=1, connection=connection, device=device)
+    """A laboratory whose clients listen to the lasers for as short a time as they may."""
+    emulated = Laboratory(VirtualBenchParameters(), Specimen(), seed=1, connection=connection, device=device)
+    lasers = emulated.hardware.lasers.model_copy(update={"listening": 1.0})
+    emulated.hardware = emulated.hardware.model_copy(update={"lasers": lasers})
+    return emulated
 
 
 class OnEmulatedWire(RigConformance):
