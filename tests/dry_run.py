@@ -16,7 +16,10 @@ from bench.config.dump import as_toml
 from bench.config.model import BenchConfiguration
 from tests.emulated import emulated
 
-SHORT = ("--omega", "20", "--beta", "0.25", "--ramp-time", "3", "--measured-cycles", "8", "--settle-tolerance", "0.01")
+SHORT = (
+    *("--omega", "20", "--beta", "0.25", "--ramp-time", "2", "--measured-cycles", "8"),
+    *("--settle-tolerance", "0.01", "--amplitude-tolerance", "0.01"),
+)
 """The point that takes least time on the bench."""
 
 
