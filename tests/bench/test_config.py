@@ -205,3 +205,22 @@ def test_what_is_wrong_with_the_laboratory_is_said(file: Callable[[str], Path], 
 def test_a_configuration_as_text_reads_back_as_the_same(file: Callable[[str], Path], text: str):
     configuration = read_configuration(file(text))
     assert read_configuration(file(as_toml(configuration))) == configuration
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        (
+            "[acquisition]\nblock_duration = 0.2\n[hardware.daq]\nwatchdog = 0.5",
+            r"hardware\.daq\.watchdog = 0\.5 .* 3 blocks",
+        ),
+        ("[acquisition]\nblock_duration = 0.01", r"acquisition\.block_duration = 0\.01 .* analogue"),
+    ],
+)
+def test_blocks_suit_the_devices(tmp_path: Path, text: str, named: str) -> None:
+    file = tmp_path / "bench.toml"
+    file.write_text(text)
+    read_configuration(file)
+    file.write_text(f'backend = "hardware"\n{text}')
+    with pytest.raises(InvalidInput, match=named):
+        read_configuration(file)
