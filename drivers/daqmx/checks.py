@@ -5,16 +5,11 @@ from collections.abc import Mapping, Sequence
 from drivers.daqmx import library
 from drivers.daqmx.devices import FoundDevice, described
 from drivers.daqmx.inputs import TERMINAL_CONFIGURATIONS
-from drivers.daqmx.parameters import AnalogInput, Daq
+from drivers.daqmx.parameters import AnalogInput, Daq, device_name
 from sim.errors import InvalidInput
 
 _TERMINAL = "terminal of an input"
 _RANGE = "range of input {}"
-
-
-def device_name(terminal: str) -> str:
-    """The device of a physical channel or line."""
-    return terminal.split("/")[0]
 
 
 def checked_devices(

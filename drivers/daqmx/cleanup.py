@@ -40,8 +40,9 @@ def clear_stale(connection: Connection, devices: Iterable[str]) -> tuple[str, ..
             task.close()
         if found:
             known = {device.name.lower(): device for device in library.system(connection.options()).devices}
-            for name in devices:
-                known[name.lower()].reset_device()
+            for name in {name.lower() for name in devices}:
+                if name in known:
+                    known[name].reset_device()
     return tuple(found)
 
 

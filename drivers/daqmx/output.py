@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from drivers.daqmx import library
 from drivers.daqmx.connection import Connection
 from drivers.daqmx.errors import code_of, is_unsupported, translated
-from drivers.daqmx.parameters import Daq
+from drivers.daqmx.parameters import Daq, device_name
 from drivers.errors import RigError
 
 NAME = "rockbench_out"
@@ -76,14 +76,14 @@ class Output:
 
     def zero(self) -> None:
         """Put the output to 0 V now; no other task may hold it."""
-        with translated("putting the output to 0 V"):
-            # without a name: one that a late server still makes must not stand in the way of the next
-            task = library.task("", self._connection.options())
-            try:
-                self._add_channel(task)
-                library.analog_writer(task, auto_start=True).write_many_sample(np.zeros(1), _ZERO_TIME)
-            finally:
-                task.close()
+        put_to_zero(self._connection, self._daq)
+
+    def reset_device(self) -> None:
+        """Put every output of the device to its state at power-up, 0 V and low lines; its tasks are gone."""
+        with translated("resetting the device of the output"):
+            devices = library.system(self._connection.options()).devices
+            name = device_name(self._daq.output).lower()
+            next(device for device in devices if device.name.lower() == name).reset_device()
 
     def clear(self) -> None:
         """Stop playing and forget what waits; the output holds its last value."""
@@ -98,7 +98,7 @@ class Output:
         """The task that plays; its rate is read back."""
         with translated("making the output task"):
             self._task = task = library.task(NAME, self._connection.options(NAME))
-            channel = self._add_channel(task)
+            channel = _add_channel(task, self._daq)
             task.timing.cfg_samp_clk_timing(
                 self._asked, sample_mode=AcquisitionType.CONTINUOUS, samps_per_chan=self._buffer
             )
@@ -109,10 +109,6 @@ class Output:
             self._writer = library.analog_writer(task, auto_start=False)
         return task
 
-    def _add_channel(self, task: library.Task) -> library.OutputChannel:
-        limit = self._daq.output_range
-        return task.ao_channels.add_ao_voltage_chan(self._daq.output, min_val=-limit, max_val=limit)
-
     def _append(self, volts: NDArray[np.float64], remaining: float) -> int:
         """How many samples were taken before the buffer was full or the time over."""
         with translated("writing the drive"):
@@ -122,6 +118,23 @@ class Output:
                 if code_of(error) != _FULL or remaining <= 0.0:
                     raise
                 return int(cast(Any, error).samps_per_chan_written)
+
+
+def put_to_zero(connection: Connection, daq: Daq) -> None:
+    """Put the output to 0 V now; no task may hold it."""
+    with translated("putting the output to 0 V"):
+        # without a name: one that a late server still makes must not stand in the way of the next
+        task = library.task("", connection.options())
+        try:
+            _add_channel(task, daq)
+            library.analog_writer(task, auto_start=True).write_many_sample(np.zeros(1), _ZERO_TIME)
+        finally:
+            task.close()
+
+
+def _add_channel(task: library.Task, daq: Daq) -> library.OutputChannel:
+    limit = daq.output_range
+    return task.ao_channels.add_ao_voltage_chan(daq.output, min_val=-limit, max_val=limit)
 
 
 def _transfer_early(channel: library.OutputChannel) -> str:

@@ -2,7 +2,7 @@
 
 import threading
 from collections.abc import Generator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from enum import Enum
 from typing import Self
 
@@ -13,8 +13,10 @@ from drivers.daqmx import library
 from drivers.daqmx.checks import checked_devices
 from drivers.daqmx.cleanup import clear_stale
 from drivers.daqmx.connection import Connection
+from drivers.daqmx.enable import EnableLine
 from drivers.daqmx.errors import translated
-from drivers.daqmx.parameters import AnalogInput, Daq
+from drivers.daqmx.output import put_to_zero
+from drivers.daqmx.parameters import AnalogInput, Daq, device_name
 from drivers.daqmx.scaling import InputScaling
 from drivers.daqmx.tasks import Tasks
 from drivers.errors import ConnectionLost, RigError
@@ -48,11 +50,17 @@ class DaqSession:
         self._lost = False
         self._connection = Connection(daq.server, daq.patience)
         try:
-            with translated("asking the driver for its devices"):
-                system = library.system(self._connection.options())
-                used = checked_devices(system, daq, inputs, sample_rate, lead)
-                version = system.driver_version
-            stale = clear_stale(self._connection, [device.name for device in used])
+            # whatever is wrong with the rest: an earlier program may have died with the shaker enabled
+            terminals = (daq.output, daq.enable_line or daq.output, *(given.terminal for given in inputs))
+            stale = clear_stale(self._connection, [device_name(terminal) for terminal in terminals])
+            try:
+                with translated("asking the driver for its devices"):
+                    system = library.system(self._connection.options())
+                    used = checked_devices(system, daq, inputs, sample_rate, lead)
+                    version = system.driver_version
+            except BaseException:
+                _make_safe(self._connection, daq)
+                raise
             self._tasks = Tasks(self._connection, daq, inputs, sample_rate, lead)
         except BaseException:
             self._connection.close()
@@ -67,7 +75,9 @@ class DaqSession:
             "output transfer": self._tasks.output.transfer,
             "start trigger": self._tasks.inputs.trigger,
             "enable line": daq.enable_line or "none",
-            "watchdog": "none" if daq.watchdog is None else f"{daq.watchdog:g} s",
+            "watchdog": "none: a program that dies leaves the relay as it is"
+            if daq.watchdog is None
+            else f"{daq.watchdog:g} s",
             "tasks left by another client": ", ".join(stale) or "none",
         }
 
@@ -102,6 +112,8 @@ class DaqSession:
             self._require(_State.IDLE, "prepare")
             if self._lost:
                 raise ConnectionLost("prepare is refused: the device was lost in an earlier run; open a new session")
+            if self._tasks.was_reset:
+                raise ConnectionLost("prepare is refused: the device had to be reset; open a new session")
             if not self._tasks.inputs.are_ours():
                 raise ConnectionLost("prepare is refused: another client has taken the device; open a new session")
             self._state, self._at_rest, self._cut = _State.PREPARED, False, False
@@ -227,10 +239,22 @@ class DaqSession:
                 try:
                     self._rest()
                 except RigError as second:
+                    error.add_note(f"{second}; the relay may be closed: press the emergency stop")
+                except BaseException as second:
                     error.add_note(str(second))
+                    raise second from error
             raise
 
     def _rest(self) -> None:
         if not self._at_rest:
             self._tasks.rest()
             self._at_rest = True
+
+
+def _make_safe(connection: Connection, daq: Daq) -> None:
+    """Open the relay and put the output to 0 V, as far as their names are right and the device obeys."""
+    with suppress(RigError):
+        if daq.enable_line is not None:
+            EnableLine(connection, daq.enable_line).close()
+    with suppress(RigError):
+        put_to_zero(connection, daq)

@@ -17,9 +17,10 @@ _SAME_RATE = 1.0e-9
 
 
 class Tasks:
-    """Watchdog, enable relay, output and inputs. When one cannot be made, those that were are cleared.
+    """Enable relay, watchdog, output and inputs. When one cannot be made, those that were are cleared.
 
-    After the constructor the relay is open and the output at 0 V. Raises InvalidInput for a sample rate that the
+    After the constructor the relay is open and the output at 0 V. `was_reset` says that the device had to be reset to
+    bring the output to rest: its tasks are gone then. Raises InvalidInput for a sample rate that the
     device would not make exactly.
     """
 
@@ -28,13 +29,14 @@ class Tasks:
     ) -> None:
         self.relay: EnableLine | None = None
         self.watchdog: Watchdog | None = None
+        self.was_reset = False
         with ExitStack() as made:
             if daq.enable_line is not None:
+                self.relay = EnableLine(connection, daq.enable_line)
+                made.callback(_quietly, self.relay.close)
                 if daq.watchdog is not None:
                     self.watchdog = Watchdog(connection, daq.enable_line, daq.watchdog)
                     made.callback(_quietly, self.watchdog.close)
-                self.relay = EnableLine(connection, daq.enable_line)
-                made.callback(_quietly, self.relay.close)
             self.output = Output(connection, daq, sample_rate, lead)
             made.callback(_quietly, self.output.clear)
             self.inputs = Inputs(connection, daq, inputs, sample_rate)
@@ -44,22 +46,34 @@ class Tasks:
             self._made = made.pop_all()
 
     def rest(self) -> None:
-        """Relay open, nothing runs, output at 0 V. Every step is tried; raises the first failure of relay or output."""
-        failures: list[RigError] = []
+        """Relay open, nothing runs, output at 0 V.
 
-        def attempt(step: Callable[[], None], *, matters: bool = False) -> None:
+        Every step is tried, whatever happens in another, also an interrupt. Raises what is no error of the rig, or
+        the first failure of relay or output.
+        """
+        failures: list[BaseException] = []
+
+        def attempt(step: Callable[[], None], *, matters: bool = False) -> bool:
             try:
                 step()
             except RigError as error:
                 if matters:
                     failures.append(error)
+                return False
+            except BaseException as error:
+                failures.insert(0, error)
+                return False
+            return True
 
         if self.relay is not None:
             attempt(self.relay.open, matters=True)
         # stopping a task that an error has ended raises that error once more; a task that is not cleared keeps the
         # output, and then the zero fails
-        attempt(self.output.clear)
-        attempt(self.output.zero, matters=True)
+        cleared = attempt(self.output.clear)
+        zeroed = attempt(self.output.zero, matters=cleared)
+        if not (cleared or zeroed) and attempt(self.output.reset_device, matters=True):
+            self.was_reset = True
+            failures.append(RigError("the output was held by its task: the device was reset; open a new session"))
         attempt(self.inputs.stop)
         if self.watchdog is not None:
             attempt(self.watchdog.stop)

@@ -29,6 +29,8 @@ Device = Literal["usb", "crio"]
 _VALUES = 4
 """Values of a measurement on the serial line: distance, counter, and the two halves of the time stamp."""
 _BAUD = 921_600
+_WATCHDOG = 1.0
+"""Time-out of the device's watchdog on the enable line [s]."""
 _PIPELINE = 3
 """Measurements from exposure to output (manual of the optoNCDT 1420, p. 52)."""
 
@@ -118,7 +120,13 @@ class Laboratory:
             sample_rate=p.sample_rate,
             half_stroke=p.shaker.half_stroke,
             hands=self._control.address,
-            daq=Daq(server=self.daq.address, output=output, output_range=p.shaker.drive_range, enable_line=line),
+            daq=Daq(
+                server=self.daq.address,
+                output=output,
+                output_range=p.shaker.drive_range,
+                enable_line=line,
+                watchdog=_WATCHDOG if device == "usb" else None,
+            ),
             table_displacement=TableDisplacement(
                 terminal=f"{inputs}/ai0", range=p.converter.range, sensitivity=1.0 / p.displacement_sensor.nominal[0]
             ),

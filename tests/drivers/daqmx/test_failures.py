@@ -3,13 +3,16 @@
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from typing import Any
 
 import numpy as np
 import pytest
 
+from drivers.daqmx.enable import EnableLine
 from drivers.daqmx.session import DaqSession
 from drivers.emulation.daqmx.server import DaqServer
 from drivers.errors import ConnectionLost, DeviceTimeout, DriveUnderflow, InputOverflow, RigError
+from sim.errors import InvalidInput
 from tests.drivers.daqmx.conftest import LEAD, RATE, OpenSession, eventually
 from tests.drivers.daqmx.loopback import Loopback
 from tests.drivers.daqmx.runs import BLOCK, driving, is_safe, started
@@ -137,14 +140,48 @@ def test_a_relay_whose_task_does_not_stop_is_reported_though_it_is_open(
     eventually(lambda: is_safe(plant))
 
 
-def test_an_output_that_is_not_given_back_leaves_the_relay_open(
+def test_an_output_that_is_not_given_back_is_taken_by_a_reset(
     session: DaqSession, server: DaqServer, plant: Loopback
 ) -> None:
     driving(session)
     server.fail_next("ClearTask", -200077)
-    with pytest.raises(RigError, match="putting the output to 0 V"):
+    with pytest.raises(RigError, match="the device was reset"):
         session.stop()
-    assert not plant.enabled
+    eventually(lambda: is_safe(plant))
+    with pytest.raises(ConnectionLost, match="open a new session"):
+        session.prepare()
+
+
+@pytest.mark.parametrize("mishap", [KeyboardInterrupt, ValueError("a closed channel")])
+def test_whatever_happens_in_one_step_of_a_stop_the_others_are_done(
+    session: DaqSession, plant: Loopback, monkeypatch: pytest.MonkeyPatch, mishap: BaseException
+) -> None:
+    driving(session)
+
+    def interrupted(_: EnableLine) -> None:
+        raise mishap
+
+    monkeypatch.setattr(EnableLine, "open", interrupted)
+    with pytest.raises((KeyboardInterrupt, ValueError)):
+        session.stop()
+    monkeypatch.undo()
+    eventually(lambda: plant.present_output() == 0.0)
+    session.close()
+    eventually(lambda: is_safe(plant))
+
+
+@pytest.mark.parametrize(
+    ("change", "refused"), [({"rate": 1.0e9}, InvalidInput), ({"output": "Dev1/ao9"}, InvalidInput)]
+)
+def test_an_opening_that_fails_makes_safe_what_a_dead_client_left(
+    session: DaqSession, open_session: OpenSession, plant: Loopback, change: dict[str, Any], refused: type[Exception]
+) -> None:
+    # who does not write any more cannot be told from who has died: its tasks stay on the server
+    driving(session)
+    assert plant.enabled
+    with pytest.raises(refused):
+        open_session(**change)
+    eventually(lambda: is_safe(plant))
 
 
 def gone_server(server: DaqServer, wire: Wire) -> None:  # noqa: ARG001

@@ -44,9 +44,9 @@ from tests.drivers.daqmx.others import Another
 def test_what_the_device_cannot_do_is_refused_before_any_task(
     server: DaqServer, open_session: OpenSession, change: dict[str, Any], item: str, told: str
 ) -> None:
-    # any task that is made would fail with this instead
-    server.fail_next("CreateTask", -200077)
-    server.fail_next("CreateWatchdogTimerTaskEx", -200077)
+    # any task that measures, plays or watches would fail with this instead
+    for call in ("CreateAIVoltageChan", "CfgSampClkTiming", "CreateWatchdogTimerTaskEx"):
+        server.fail_next(call, -200077)
     with pytest.raises(InvalidInput) as caught:
         open_session(**change)
     assert caught.value.item == item
