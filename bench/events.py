@@ -11,7 +11,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.rig import Block
+from drivers.rig import Alignment, Block
 from sim.parameters import Parameters
 
 
@@ -54,6 +54,14 @@ class Acquired(Event):
     run: int
     block: Block
     drive: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SensorsAligned(Event):
+    """How sensors with clocks of their own were placed on the sample clock in `run`; told when the run is over."""
+
+    run: int
+    alignments: tuple[Alignment, ...]
 
 
 @dataclass(frozen=True)

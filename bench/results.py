@@ -1,3 +1,3 @@
-"""The names of what a campaign leaves in its folder."""
+"""The names of what every campaign leaves in its folder; its figure has the name that the protocol gives it."""
 
-FILE, FIGURE, SUMMARY = "campaign.h5", "gain_spectra.png", "summary.json"
+FILE, SUMMARY = "campaign.h5", "summary.json"

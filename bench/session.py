@@ -21,7 +21,7 @@ from bench.provenance import software
 from bench.record.recorder import PATIENCE, Recorder
 from bench.record.tables import Table
 from bench.report.summary import Summary, write_summary
-from bench.results import FIGURE, FILE, SUMMARY
+from bench.results import FILE, SUMMARY
 from bench.rigs import open_rig
 from drivers.clock import VirtualClock
 from sim.parameters import Parameters
@@ -33,6 +33,11 @@ class Experiment(Protocol):
     @property
     def name(self) -> str:
         """The protocol's name."""
+        ...
+
+    @property
+    def figure_name(self) -> str:
+        """File name of its figure."""
         ...
 
     @property
@@ -149,16 +154,16 @@ def run_session(
         status=ending.status,
         points=points.all,
         file=out / FILE,
-        figure=out / FIGURE,
+        figure=out / protocol.figure_name,
         reason=ending.reason,
         software=f"rocking-bench {software()['rocking-bench']}",
-        seed=configuration.simulation.seed,
+        seed=configuration.seed,
         elapsed=time.monotonic() - started,
         bench_time=stream.now(),
         plan_hash=preflight.plan_hash,
     )
     write_summary(out / SUMMARY, summary)
-    protocol.figure(points.all, prediction, out / FIGURE)
+    protocol.figure(points.all, prediction, out / protocol.figure_name)
     return SessionResult(
         status=ending.status,
         reason=ending.reason,
@@ -174,7 +179,7 @@ def _metadata(protocol: Experiment, configuration: BenchConfiguration, devices: 
         "parameters": protocol.parameters.model_dump_json(),
         "configuration": configuration.model_dump_json(),
         "specimen": configuration.specimen.model_dump_json(),
-        "seed": str(configuration.simulation.seed),
+        **({} if configuration.seed is None else {"seed": str(configuration.seed)}),
         "devices": json.dumps(devices),
         **software(),
     }

@@ -3,7 +3,7 @@
 from drivers.errors import RigError
 from drivers.rig import Handwork
 from sim.errors import InvalidInput
-from sim.specimen import Specimen
+from sim.specimen import Frame, Specimen
 
 _CLAMPED = 400.0
 """How much stiffer the storeys are when they are clamped to the table: their modes lie 20 times higher."""
@@ -25,9 +25,9 @@ class Handyman:
             case Handwork.MOUNT_SPRING:
                 if stiffness is None:
                     raise InvalidInput("stiffness", stiffness, "mounting a spring needs its stiffness in N/m")
-                return specimen.coupled(self._spring_factor * stiffness / specimen.frame.k1)
+                return self._free(specimen).coupled(self._spring_factor * stiffness / self._frame.k1)
             case Handwork.REMOVE_BLOCK:
-                return specimen.bare()
+                return self._free(specimen).bare()
             case Handwork.STAND_BLOCK_UP:
                 if specimen.beta is None:
                     nothing = (
@@ -37,6 +37,12 @@ class Handyman:
                 return specimen
             case Handwork.LOCK_FRAME:
                 stiff = {"k1": _CLAMPED * self._frame.k1, "k2": _CLAMPED * self._frame.k2}
-                return specimen.bare().model_copy(update={"frame": self._frame.model_copy(update=stiff)})
+                # made anew: a copy would keep the modes of the soft frame
+                clamped = Frame.model_validate(self._frame.model_dump() | stiff)
+                return specimen.bare().model_copy(update={"frame": clamped})
             case Handwork.UNLOCK_FRAME:
                 return specimen.model_copy(update={"frame": self._frame})
+
+    def _free(self, specimen: Specimen) -> Specimen:
+        """The specimen with its storeys free: nobody mounts anything on a clamped frame."""
+        return specimen.model_copy(update={"frame": self._frame})

@@ -5,7 +5,7 @@ the same samples as a result. Every stream draws from its own random generator, 
 """
 
 from functools import lru_cache
-from math import floor
+from math import floor, pi, sin, tan
 from typing import Any, Literal
 
 import numpy as np
@@ -164,6 +164,15 @@ class FilterUnit(Parameters):
 
     order: int = quantity(4, "1", "order of the Butterworth low-pass", ge=1, le=10)
     cutoff: float = quantity(100.0, "Hz", "frequency at which the gain is -3 dB", gt=0)
+
+    def delay(self, sample_rate: float) -> float:
+        """Delay of slow signals [s], as simulated at `sample_rate` [1/s]: 1 / (omega_c sin(pi / 2n)).
+
+        The group delay of a Butterworth low-pass at zero frequency, from its poles; omega_c as the bilinear transform
+        bends it.
+        """
+        bent = 2.0 * sample_rate * tan(pi * self.cutoff / sample_rate)
+        return 1.0 / (bent * sin(pi / (2 * self.order)))
 
     def stream(self, sample_rate: float) -> "FilterStream":
         """Start filtering channels sampled at `sample_rate` [1/s]."""

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import VirtualClock
-from drivers.rig import Block, Channel, DriveUnderflow, Handwork, RigError
+from drivers.rig import Alignment, Block, Channel, DriveUnderflow, Handwork, RigError
 
 COUNTS_PER_UNIT = 1000.0
 
@@ -34,11 +34,13 @@ class LoopbackRig:
         self.sample_rate, self.drive_range, self.lead = sample_rate, 10.0, lead
         self.clock = VirtualClock()
         self.description = {"rig": "loopback"}
+        self.alignments: tuple[Alignment, ...] = ()
         self.armed = False
         self.halted = False
         self.done: list[Handwork] = []
         self.played = np.zeros(0)
         self.safety: dict[str, bool] = {}
+        self.alignments: tuple[Alignment, ...] = ()
         self._queue = np.zeros(0)
         self._index = 0
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from bench.cli.flags import flag, given
 from bench.config.validation import dotted, validated
+from sim.errors import InvalidInput
 from sim.parameters import Parameters
 
 if TYPE_CHECKING:
@@ -37,6 +38,8 @@ def configuration_from(file: Path | None, seed: str | None) -> "BenchConfigurati
     configuration = read_configuration(file) if file is not None else BenchConfiguration()
     if seed is None:
         return configuration
+    if configuration.backend != "simulated":
+        raise InvalidInput("--seed", seed, f"the backend {configuration.backend} has no seed; leave it out")
     wanted = given(Simulation, {"seed": seed})
     simulation = configuration.simulation.model_dump(mode="json") | wanted
     return configuration.model_copy(update={"simulation": validated(Simulation, simulation, lambda _path: "--seed")})

@@ -8,7 +8,10 @@ from io import TextIOWrapper
 from cyclopts import App, CycloptsError, UnusedCliTokensError
 
 from bench.cli.benchmark import benchmark_app
+from bench.cli.check import check_app
 from bench.cli.configure import config_app
+from bench.cli.devices import devices_app
+from bench.cli.emulate import emulate_app
 from bench.cli.predict import predict_app
 from bench.cli.refusal import tell
 from bench.cli.run import Start, run_app
@@ -41,6 +44,9 @@ def main(argv: Sequence[str] | None = None, start: Start | None = None) -> int:
         suppress_keyboard_interrupt=False,
     )
     app.command(run_app(start))
+    app.command(check_app(start))
+    app.command(devices_app())
+    app.command(emulate_app())
     app.command(predict_app())
     app.command(config_app())
     app.command(benchmark_app())

@@ -5,7 +5,6 @@ from collections.abc import Iterable
 from datetime import datetime
 from pathlib import Path
 
-from bench.results import FIGURE, FILE, SUMMARY
 from sim.errors import InvalidInput
 
 
@@ -14,7 +13,7 @@ def default_folder(protocol: str, now: datetime) -> Path:
     return Path("runs", f"{protocol}-{now:%Y-%m-%dT%H-%M-%S}")
 
 
-def check_folder(folder: Path, results: Iterable[str] = (FILE, FIGURE, SUMMARY)) -> None:
+def check_folder(folder: Path, results: Iterable[str]) -> None:
     """Refuse a folder that cannot take the `results` of a run. Leaves nothing behind, and creates no folder.
 
     Raises InvalidInput naming what stands in the way.

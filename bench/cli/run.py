@@ -16,6 +16,7 @@ from bench.cli.catalogue import CATALOGUE, Entry
 from bench.cli.flags import arguments_of
 from bench.cli.options import Options, arguments_of_options
 from bench.cli.refusal import tell
+from bench.results import FILE, SUMMARY
 from sim.errors import InvalidInput, RockbenchError
 
 if TYPE_CHECKING:
@@ -57,11 +58,11 @@ def run_app(start: Start | None = None) -> App:
     """`rockbench run`, with one command for each protocol. Without `start`, sessions are the real ones."""
     app = App(name="run", help="Run a protocol on the bench.", version_flags=())
     for entry in CATALOGUE:
-        app.command(_command(entry, start), name=entry.name)
+        app.command(command_of(entry, start), name=entry.name)
     return app
 
 
-def _command(entry: Entry, start: Start | None) -> Callable[..., int]:
+def command_of(entry: Entry, start: Start | None) -> Callable[..., int]:
     """The function behind a protocol's command; its signature is the protocol's flags and the common options."""
 
     def execute(**arguments: Any) -> int:
@@ -76,7 +77,6 @@ def _command(entry: Entry, start: Start | None) -> Callable[..., int]:
 
 
 def _perform(entry: Entry, arguments: dict[str, Any], options: Options, start: Start | None) -> int:
-    from bench.cli.console import progress_on
     from bench.cli.inputs import configuration_from, parameters_from
     from bench.cli.interrupt import interruptible
     from bench.cli.operator import AtTheConsole, choose
@@ -86,7 +86,7 @@ def _perform(entry: Entry, arguments: dict[str, Any], options: Options, start: S
     experiment = entry.campaign(parameters_from(entry.parameters, arguments, options.protocol_file))
     configuration = configuration_from(options.config, options.seed)
     out = options.out or default_folder(entry.name, datetime.now())
-    check_folder(out)
+    check_folder(out, (FILE, experiment.figure_name, SUMMARY))
     if options.dry_run:
         from bench.cli.dry_run import dry_run
 
@@ -102,7 +102,7 @@ def _perform(entry: Entry, arguments: dict[str, Any], options: Options, start: S
     requests = Requests()
     with (
         interruptible(requests, asking=lambda: person is not None and person.asking) as interrupts,
-        progress_on(sys.stderr, person_answers=person is not None) as progress,
+        entry.progress(sys.stderr, person is not None) as progress,
         # standard output belongs to the result
         redirect_stdout(sys.stderr),
     ):
@@ -123,10 +123,10 @@ def _perform(entry: Entry, arguments: dict[str, Any], options: Options, start: S
     if isinstance(ended, Exception):
         tell(ended)
         return interrupts.exit_code or 1
-    return _report(ended, out, options.json, interrupts.exit_code)
+    return _report(entry, ended, out, options.json, interrupts.exit_code)
 
 
-def _report(result: "SessionResult", out: Path, as_json: bool, interrupted: int | None) -> int:
+def _report(entry: Entry, result: "SessionResult", out: Path, as_json: bool, interrupted: int | None) -> int:
     """Print the result, and turn the way it ended into an exit code."""
     if as_json:
         print(json.dumps({"status": result.status, "reason": result.reason, **result.summary}, allow_nan=False))
@@ -134,6 +134,6 @@ def _report(result: "SessionResult", out: Path, as_json: bool, interrupted: int 
         print(f"{result.table.rstrip()}\nResults are in {out}")
     if result.status in GOOD:
         # an end that was asked for when there was nothing left to end changes nothing
-        return 0
+        return 0 if entry.passed(result.summary) else 1
     tell(f"the run was {result.status}: {result.reason}")
     return interrupted or (130 if result.interrupted else 1)

@@ -14,6 +14,11 @@ from sim.specimen import Specimen
 from sim.uncertainty import SpecimenUncertainty
 from sim.virtual_bench import VirtualBenchParameters
 
+_BLOCKS_OF_WATCHDOG = 3
+"""How many blocks a device's watchdog must outlast: one that is late is no dead program."""
+_SHORTEST_WITH_SERIAL_LASERS = 0.02
+"""Shortest block with lasers whose values come in bursts of some milliseconds [s]."""
+
 
 class Acquisition(Parameters):
     """How the samples travel."""
@@ -59,6 +64,11 @@ class BenchConfiguration(Parameters):
     analysis: SensorAccuracy = SensorAccuracy()
     simulation: Simulation = Simulation()
     hardware: Hardware = Hardware()
+
+    @property
+    def seed(self) -> int | None:
+        """Seed of every random number of the bench; a real one has none."""
+        return self.simulation.seed if self.backend == "simulated" else None
 
     @property
     def sample_rate(self) -> float:
@@ -115,4 +125,17 @@ class BenchConfiguration(Parameters):
             if specimen is not None and specimen.beta is not None:
                 allowed = "the protocol says which springs are mounted; leave it out (see simulation.spring_factor)"
                 raise InvalidInput(f"{name}.beta", specimen.beta, allowed)
+        return self
+
+    @model_validator(mode="after")
+    def _blocks_suit_the_devices(self) -> "BenchConfiguration":
+        block, watchdog = self.acquisition.block_duration, self.hardware.daq.watchdog
+        if self.backend != "hardware":
+            return self
+        if watchdog is not None and watchdog < _BLOCKS_OF_WATCHDOG * block:
+            allowed = f"it is told once in a block of {block:g} s: give it at least {_BLOCKS_OF_WATCHDOG} blocks"
+            raise InvalidInput("hardware.daq.watchdog", watchdog, allowed)
+        if self.hardware.lasers.connection == "serial" and block < _SHORTEST_WITH_SERIAL_LASERS:
+            allowed = f"serial lasers come in bursts: at least {_SHORTEST_WITH_SERIAL_LASERS:g} s, or analogue lasers"
+            raise InvalidInput("acquisition.block_duration", block, allowed)
         return self

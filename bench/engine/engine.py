@@ -1,6 +1,7 @@
 """Runs a plan on a rig, through the guard, block by block."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Never
 
 import numpy as np
@@ -14,6 +15,7 @@ from bench.control.oscillator import Oscillator
 from bench.engine.ending import Ended, Ending
 from bench.engine.machine import Machine
 from bench.engine.operator import Operator
+from bench.engine.placements import Placements
 from bench.engine.requests import Requests
 from bench.engine.steps import (
     Arm,
@@ -23,6 +25,8 @@ from bench.engine.steps import (
     Fallen,
     Follow,
     Handle,
+    Heard,
+    Listen,
     Measured,
     Outcome,
     Plan,
@@ -33,9 +37,9 @@ from bench.engine.steps import (
 )
 from bench.engine.stream import Stream
 from bench.events import Acquired, LimitExceeded, OperatorAnswered, OperatorAsked, State, StateChanged, Warned
-from bench.guard.guard import Guard
+from bench.guard.guard import Exchange, Guard
 from bench.guard.violation import Violation
-from drivers.rig import Rig, RigError
+from drivers.rig import Counts, Rig, RigError
 from sim.errors import RockbenchError
 from sim.specimen import Specimen
 
@@ -63,6 +67,7 @@ class Engine:
         self._rig, self._guard, self._signals, self._stream = rig, guard, signals, stream
         self._requests, self._operator, self._block = requests, operator, block
         self._machine = Machine(self._announce)
+        self._placements = Placements(rig, stream)
         self._oscillator = Oscillator(rig.sample_rate)
         self._specimen: Specimen | None = None
         self._fall: FallWatch | None = None
@@ -148,6 +153,8 @@ class Engine:
                 self._oscillator.use(step.calibration)
             case Arm():
                 self._arm(step)
+            case Listen():
+                return self._listen(step)
             case RampOut():
                 return self._end_test(step)
             case Handle():
@@ -155,20 +162,42 @@ class Engine:
         return Done()
 
     def _arm(self, step: Arm) -> None:
-        self._oscillator.reset()
-        self._read, self._cycles = 0, None
-        self._over = self._runaway = None
-        self._run += 1
-        self._heed_requests()
-        self._machine.go(State.ARMED, "the operator's work is done")
-        self._guard.arm()
-        # a halt that came while the rig was being armed found no enable line to cut
-        self._heed_requests()
+        self._begin("the operator's work is done")
         rest = self._stillness(step)
         self._signals.tare(rest)
         self._guard.tare(rest)
         self._fall = FallWatch(self._specimen, self._rig.sample_rate) if self._specimen else None
         self._machine.go(State.RUNNING, "at rest, zero taken")
+
+    def _begin(self, reason: str) -> None:
+        """Arm the rig, with silence ahead."""
+        self._oscillator.reset()
+        self._read, self._cycles = 0, None
+        self._over = self._runaway = None
+        self._run += 1
+        self._heed_requests()
+        self._machine.go(State.ARMED, reason)
+        self._guard.arm()
+        self._placements.begin(self._run)
+        # a halt that came while the rig was being armed found no enable line to cut
+        self._heed_requests()
+
+    def _listen(self, step: Listen) -> Heard:
+        """A violation ends the listening but not the plan, which may want to know what is wrong: nothing is driven."""
+        self._begin("to listen with the output at zero")
+        counts: list[Counts] = []
+        violation: Violation | None = None
+        for _ in range(max(round(step.duration * self._rig.sample_rate / self._block), 1)):
+            exchange = self._exchange()
+            counts.append(exchange.block.counts)
+            violation = exchange.violation
+            if violation is not None:
+                self._guard.halt()
+                break
+            self._heed_requests()
+        self._machine.go(State.STOPPING, "enough was heard" if violation is None else str(violation))
+        self._rest()
+        return Heard(self._rig.channels, np.concatenate(counts), violation)
 
     def _stillness(self, step: Arm) -> NDArray[np.float64]:
         """Channel values over a rest during which the storeys were still, shape (n, n_channels)."""
@@ -222,12 +251,7 @@ class Engine:
 
     def _turn(self) -> NDArray[np.float64]:
         """One turn of the loop: the channels' values, shape (block, n_channels)."""
-        exchange = self._guard.exchange(self._oscillator.next(self._block))
-        self._read = exchange.block.first + len(exchange.block)
-        self._drive = exchange.drive
-        self._stream.publish(Acquired(self._stream.now(), self._run, exchange.block, exchange.drive))
-        if exchange.opened:
-            raise Ended(self._cut(Ending("halted", f"{', '.join(exchange.opened)} opened")))
+        exchange = self._exchange()
         for near in exchange.warnings:
             self._stream.say(Warned(0.0, f"{near.quantity} {near.value:.4g} {near.unit} comes near {near.limit:.4g}"))
         self._runaway = exchange.runaway
@@ -235,6 +259,16 @@ class Engine:
             self._exceeded(exchange.violation)
         self._heed_requests()
         return exchange.values
+
+    def _exchange(self) -> Exchange:
+        """Drive and read one block; an open safety input ends everything."""
+        exchange = self._guard.exchange(self._oscillator.next(self._block))
+        self._read = exchange.block.first + len(exchange.block)
+        self._drive = exchange.drive
+        self._stream.publish(Acquired(self._stream.now(), self._run, exchange.block, exchange.drive))
+        if exchange.opened:
+            raise Ended(self._cut(Ending("halted", f"{', '.join(exchange.opened)} opened")))
+        return exchange
 
     def _exceeded(self, over: Violation) -> None:
         """The first limit that is exceeded since arming ends the run; a fast ramp that has begun goes on."""
@@ -274,9 +308,13 @@ class Engine:
         if self._runaway is not None:
             reason = f"{self._runaway} although the drive has been ramped to zero"
             raise Ended(self._cut(Ending("halted", reason)))
+        self._rest()
+        return Fallen() if fell else Done()
+
+    def _rest(self) -> None:
         self._guard.disarm()
         self._machine.go(State.IDLE, "the output is at zero")
-        return Fallen() if fell else Done()
+        self._placements.tell()
 
     def _cut(self, ending: Ending) -> Ending:
         """Cut the enable line now. Returns the ending, with what went wrong while cutting."""
@@ -289,6 +327,9 @@ class Engine:
                 self._machine.go(State.HALTED, ending.reason)
             except RockbenchError as error:
                 ending = ending.then(Ending("failed", str(error)))
+        # what ended the run is what must be told of it
+        with suppress(RockbenchError):
+            self._placements.tell()
         return ending
 
     def _fell(self, signals: NDArray[np.float64]) -> bool:

@@ -10,7 +10,8 @@ from bench.analysis.cycles import Cycle
 from bench.control.calibration import DriveCalibration
 from bench.control.legs import Leg
 from bench.events import Event
-from drivers.rig import Handwork
+from bench.guard.violation import Violation
+from drivers.rig import Channel, Counts, Handwork
 from sim.specimen import Specimen
 
 
@@ -34,6 +35,13 @@ class Arm:
     rest: float
     still: float = 1e-4
     patience: float = 240.0
+
+
+@dataclass(frozen=True)
+class Listen:
+    """Take samples for `duration` seconds with the output at zero, on a rig that is not armed. Comes to `Heard`."""
+
+    duration: float
 
 
 @dataclass(frozen=True)
@@ -83,7 +91,7 @@ class Say:
     event: Event
 
 
-Step = Handle | Arm | Calibrate | Follow | Dwell | Trim | RampOut | Say
+Step = Handle | Arm | Listen | Calibrate | Follow | Dwell | Trim | RampOut | Say
 
 
 @dataclass(frozen=True)
@@ -103,5 +111,17 @@ class Measured:
     cycles: tuple[Cycle, ...]
 
 
-Outcome = Done | Fallen | Measured
+@dataclass(frozen=True)
+class Heard:
+    """What all inputs gave with the output at zero: counts of shape (n, n_channels).
+
+    `violation` is what the guard found wrong, if it did: the listening ended there, and with it nothing else.
+    """
+
+    channels: tuple[Channel, ...]
+    counts: Counts
+    violation: Violation | None
+
+
+Outcome = Done | Fallen | Measured | Heard
 Plan = Generator[Step, Outcome, None]

@@ -10,10 +10,12 @@ from bench.events import (
     OperatorAnswered,
     OperatorAsked,
     Progress,
+    SensorsAligned,
     StateChanged,
     StepStarted,
     Warned,
 )
+from drivers.rig import Alignment
 
 NOT_JOURNALLED = (Acquired, Estimate, Progress)
 """Too many to read; samples and estimates have their own place in the file."""
@@ -32,6 +34,14 @@ def text_of(event: Event) -> str:
             return event.request
         case OperatorAnswered():
             return f"{event.request} (answered by {event.by})"
+        case SensorsAligned():
+            return "; ".join(_placed(one) for one in event.alignments)
         case _:
             names = (field.name for field in fields(event) if field.name != "time")
             return ", ".join(f"{name} = {getattr(event, name)}" for name in names)
+
+
+def _placed(one: Alignment) -> str:
+    rate, residual = 1e6 * (one.rate - 1.0), 1e6 * one.residual
+    given = f"{one.values} values, {one.lost} lost"
+    return f"{one.sensor}: clock {rate:+.1f} ppm, readings within {residual:.0f} us, {given}"

@@ -25,10 +25,10 @@ FORMAT_VERSION = 1
 STATUS_WIDTH, TIME_WIDTH, SUMMARY_WIDTH = 16, 40, 4096
 FIXED_GROUPS = ("data", "estimates", "events", "instrument", "metadata", "points")
 FIXED_ENTRIES = ("complete", "end_time", "program_name", "start_time", "status", "summary", "title")
-COUNTED = ("samples", "blocks", "events", "estimates", "points")
+COUNTED = ("samples", "blocks", "events", "estimates", "points", "alignments")
 """What is counted in the dataset `complete`: rows beyond were still on their way when the disk or the writer failed."""
 
-FIXED_INSTRUMENTS = ("blocks", "drive", "sample_rate")
+FIXED_INSTRUMENTS = ("alignments", "blocks", "drive", "sample_rate")
 
 
 class Status(StrEnum):
@@ -47,6 +47,16 @@ BLOCKS = (
     Field("run", Kind.WHOLE, "1", "how many times the rig had been armed"),
     Field("first", Kind.WHOLE, "1", "index of the block's first sample, counted from 0 in each run"),
     Field("time", Kind.REAL, "s", "bench time at which the block had been read"),
+)
+ALIGNMENTS = (
+    Field("run", Kind.WHOLE, "1", "how many times the rig had been armed"),
+    Field("sensor", Kind.TEXT, "", "name of the channel"),
+    Field("offset", Kind.REAL, "s", "time of the run at which second 0 of the sensor's clock stands, without delay"),
+    Field("rate", Kind.REAL, "1", "seconds of the sample clock per second of the sensor's clock"),
+    Field("residual", Kind.REAL, "s", "root mean square of what the fit leaves of the readings of the clocks"),
+    Field("delay", Kind.REAL, "s", "fixed delay by which the values were placed later, as configured"),
+    Field("values", Kind.WHOLE, "1", "values that the sensor gave"),
+    Field("lost", Kind.WHOLE, "1", "values that it should have given and that did not arrive"),
 )
 EVENTS = (
     Field("time", Kind.REAL, "s", "bench time"),
@@ -100,6 +110,7 @@ class Parts:
     events: Rows
     estimates: Rows
     points: Rows
+    alignments: Rows
     complete: hdf5.Dataset
     status: hdf5.Dataset
     summary: hdf5.Dataset
@@ -134,6 +145,7 @@ def build(file: hdf5.File, skeleton: Skeleton) -> Parts:
         events=Rows(entry, "events", EVENTS),
         estimates=Rows(entry, "estimates", ESTIMATES),
         points=Rows(entry, "points", fields_of(skeleton.point_type)),
+        alignments=Rows(instrument, "alignments", ALIGNMENTS),
         complete=hdf5.write_numbers(
             entry, "complete", np.zeros(len(COUNTED), dtype=np.int64), unit="1", description=f"rows of {COUNTED}"
         ),

@@ -15,7 +15,7 @@ from bench.record.errors import RecordError, reason
 from bench.record.fields import decode
 from bench.record.layout import COUNTED, FIXED_GROUPS, FORMAT, FORMAT_VERSION
 from bench.record.tables import Column
-from drivers.rig import Channel, Counts
+from drivers.rig import Alignment, Channel, Counts
 from sim.errors import InvalidInput
 
 ALL = slice(None)
@@ -181,6 +181,16 @@ class Record:
         """The running estimates, one list per column; an absent value is None, an unknown one NaN."""
         return self._decoded("estimates")
 
+    @property
+    def alignments(self) -> dict[int, tuple[Alignment, ...]]:
+        """How sensors with clocks of their own were placed on the sample clock, by run; empty where there are none."""
+        if "alignments" not in self._instrument:
+            return {}
+        columns = self._decoded("alignments", self._instrument)
+        runs = columns.pop("run")
+        found = [Alignment(**dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True)]
+        return {run: tuple(one for of, one in zip(runs, found, strict=True) if of == run) for run in sorted({*runs})}
+
     @cached_property
     def tables(self) -> dict[str, dict[str, Column]]:
         """The tables that were stored before the run, such as "prediction"."""
@@ -191,13 +201,14 @@ class Record:
     def _growing(self) -> list[str]:
         """Paths of the datasets that change while the file is written."""
         paths = [f"instrument/{channel.name}/counts" for channel in self.channels]
-        folders = ("instrument/blocks", "events", "estimates", "points")
+        folders = ["instrument/blocks", "events", "estimates", "points"]
+        folders += ["instrument/alignments"] if "alignments" in self._instrument else []
         paths += [f"{folder}/{name}" for folder in folders for name in hdf5.group(self._entry, folder)]
         return ["complete", *paths, "instrument/drive/voltage", "status", "summary", "end_time"]
 
-    def _decoded(self, name: str) -> dict[str, list[Any]]:
+    def _decoded(self, name: str, parent: hdf5.Group | None = None) -> dict[str, list[Any]]:
         """The columns of a table that grew, in the order in which they were declared."""
-        group = hdf5.group(self._entry, name)
+        group = hdf5.group(parent or self._entry, name)
         columns = {column: decode(hdf5.dataset(group, column)) for column in group}
         whole = min(self._complete(name), *(len(values) for values in columns.values()))
         return {column: values[:whole] for column, values in columns.items()}

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.events import Estimate, Event, PointFinished
+from bench.events import Estimate, Event, PointFinished, SensorsAligned
 from bench.record import hdf5
 from bench.record.errors import RecordError, reason
 from bench.record.journal import text_of
@@ -60,7 +60,7 @@ class RecordWriter:
             path.unlink(missing_ok=True)
             raise RecordError(f"{path} could not be begun ({reason(error)}): see to the disk") from error
         parts = self._parts
-        self._tables = (parts.blocks, parts.events, parts.estimates, parts.points)
+        self._tables = (parts.blocks, parts.events, parts.estimates, parts.points, parts.alignments)
         self._complete: list[int] = []
         self._point_fields = tuple(skeleton.point_type.model_fields)
 
@@ -81,6 +81,10 @@ class RecordWriter:
             values = (event.beta, event.cycles, event.drift_peak, event.alpha_2, event.uncertainty, event.predicted)
             parts.estimates.add(event.time, event.omega, *values)
             return
+        if isinstance(event, SensorsAligned):
+            for one in event.alignments:
+                placed = (one.offset, one.rate, one.residual, one.delay, one.values, one.lost)
+                parts.alignments.add(event.run, one.sensor, *placed)
         if isinstance(event, PointFinished):
             text = f"row {len(parts.points)} of points"
             parts.points.add(*(getattr(event.point, name) for name in self._point_fields))

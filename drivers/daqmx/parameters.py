@@ -34,3 +34,8 @@ class Daq(Parameters):
     )
     buffer: float = quantity(10.0, "s", "length of the input buffer: how late a block may be read", ge=1.0, le=60.0)
     patience: float = quantity(2.0, "s", "how long a call may take beyond its own duration", ge=0.1, le=60)
+
+
+def device_name(terminal: str) -> str:
+    """The device of a physical channel or line, as it is written there; DAQmx does not tell upper from lower case."""
+    return terminal.split("/")[0]

@@ -2,6 +2,7 @@
 
 import threading
 import time
+from collections.abc import Callable
 from math import floor
 
 import numpy as np
@@ -44,6 +45,9 @@ class EmulatedBench:
         self._counts = History(kept, self.terminals, np.int16)
         self._seen = History(kept, 4, np.float64)
         self._on_ground = parameters.laser_1.reference == "ground"
+        laser, lsb = parameters.laser_1, parameters.converter.lsb
+        self._error_counts = round(laser.error_current * laser.load / lsb)
+        self._outputs: dict[int, Callable[[], bool]] = {}
         self._output: Output | None = None
         self._enabled = False
         self._lock = threading.RLock()
@@ -76,6 +80,11 @@ class EmulatedBench:
         return self._bench.parameters.sample_rate
 
     @property
+    def rate_true(self) -> float:
+        """Ticks per second of the machine's clock."""
+        return self._rate
+
+    @property
     def terminals(self) -> int:
         return len(self._bench.channels)
 
@@ -100,6 +109,11 @@ class EmulatedBench:
         with self._lock:
             self._advance()
             self._enabled = closed
+
+    def connect_laser(self, storey: int, live: Callable[[], bool]) -> None:
+        """Let the analogue output of the laser on a storey, 1 or 2, show its error current while it is not `live`."""
+        with self._lock:
+            self._outputs[1 + storey] = live
 
     def sight(self, storey: int) -> "Storey":
         """What the laser on a storey sees: 1 or 2."""
@@ -130,6 +144,16 @@ class EmulatedBench:
             self._bench.mount(self._handyman.after(work, stiffness, self._bench.specimen))
 
     @property
+    def enabled(self) -> bool:
+        """Whether the amplifier listens to the drive."""
+        return self._enabled
+
+    @property
+    def specimen(self) -> Specimen:
+        """What stands on the table."""
+        return self._bench.specimen
+
+    @property
     def fallen(self) -> bool:
         """Whether the block hangs in its catch."""
         return self._bench.fallen
@@ -147,7 +171,11 @@ class EmulatedBench:
             return
         # the output plays on whether or not the amplifier listens
         volts = np.zeros(n) if self._output is None else self._output(first, n)
-        self._counts.append(self._bench.run(volts if self._enabled else np.zeros(n)))
+        counts = self._bench.run(volts if self._enabled else np.zeros(n))
+        for column, live in self._outputs.items():
+            if not live():
+                counts[:, column] = self._error_counts
+        self._counts.append(counts)
         truth = self._bench.truth
         x, v = (truth.x, truth.v) if self._on_ground else (0.0, 0.0)
         self._seen.append(np.column_stack((truth.u1 + x, truth.v1 + v, truth.u2 + x, truth.v2 + v)))

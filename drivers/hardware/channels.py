@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Protocol
 
+from drivers.daqmx.parameters import AnalogInput
 from drivers.hardware.parameters import Hardware
 from drivers.optoncdt.analogue import laser_scaling
 from sim.channel import Channel
@@ -17,8 +18,7 @@ _MEASURED = {
 
 
 class Scaling(Protocol):
-    """What a converter says of one input: volts = coefficients[0] + coefficients[1] counts + ..., and where it is
-    not at its rail."""
+    """What a converter says of one input: volts = coefficients[0] + coefficients[1] counts + ..., between its rails."""
 
     @property
     def coefficients(self) -> tuple[float, ...]:
@@ -26,25 +26,39 @@ class Scaling(Protocol):
         ...
 
     @property
-    def valid(self) -> tuple[int, int]:
-        """Inclusive range of counts that are measurements."""
+    def lowest(self) -> int:
+        """Lowest count that is a measurement."""
+        ...
+
+    @property
+    def highest(self) -> int:
+        """Highest count that is a measurement."""
         ...
 
 
-def analogue_channels(hardware: Hardware, scalings: Sequence[Scaling], product: str) -> tuple[Channel, ...]:
-    """The channels of the DAQ's inputs, in their order: transducers first, then lasers on their analogue outputs."""
+def analogue_channels(
+    hardware: Hardware, scalings: Sequence[Scaling], devices: Mapping[str, str]
+) -> tuple[Channel, ...]:
+    """The channels of the DAQ's inputs, in their order: transducers first, then lasers on their analogue outputs.
+
+    `devices` is the description of the DAQ, with the identity of each device.
+    """
     channels: list[Channel] = []
     transducers = hardware.transducers
     for (name, given), scaling in zip(transducers, scalings, strict=False):
         quantity, unit = _MEASURED[name]
-        device = f"{product} {given.terminal}"
+        device = f"{_device(devices, given)}, {given.terminal}"
         channels.append(_analogue(name, quantity, unit, device, scaling, 1.0 / given.sensitivity, given.zero))
     for (name, given), scaling in zip(hardware.analogue_lasers, scalings[len(transducers) :], strict=True):
         output = laser_scaling(given.measuring_range, hardware.lasers.load)
-        device = f"optoNCDT 1420, analogue, {product} {given.terminal}"
+        device = f"optoNCDT 1420 on its analogue output, {_device(devices, given)}, {given.terminal}"
         slope = given.polarity * output.slope
         channels.append(_analogue(name, "displacement", "m", device, scaling, slope, output.middle, output.valid))
     return tuple(channels)
+
+
+def _device(devices: Mapping[str, str], given: AnalogInput) -> str:
+    return devices.get(f"device {given.terminal.split('/')[0]}", "unknown device")
 
 
 def _analogue(
@@ -59,7 +73,7 @@ def _analogue(
 ) -> Channel:
     """A channel with value = (volts - zero) * slope in `unit`; outside the range `volts` [V] it says nothing."""
     c0, c1, *higher = scaling.coefficients
-    valid = scaling.valid
+    valid = scaling.lowest, scaling.highest
     if volts is not None:
         # the polynomial is straight to a part in a thousand: far better than the reserve of the sensor needs
         ends = sorted(round((end - c0) / c1) for end in volts)

@@ -56,6 +56,9 @@ class Lasers(Parameters):
     delay: float = quantity(
         0.0, "s", "by how much later the laser values are placed; `rockbench check` measures it", ge=-0.1, le=0.1
     )
+    listening: float = quantity(
+        10.0, "s", "how long the lasers are listened to before the first run: their clocks are known then", ge=1, le=120
+    )
     load: float = quantity(500.0, "ohm", "resistor that turns the current of an analogue output into volts", gt=0)
 
 

@@ -1,7 +1,7 @@
 """The bench in the laboratory behind the interface of every rig: the DAQ is master, lasers are placed on its clock."""
 
 import time
-from collections.abc import Iterator
+from collections.abc import Generator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from enum import Enum
 from typing import Self
@@ -16,11 +16,15 @@ from drivers.hands import Person, RemoteHands
 from drivers.hardware.channels import analogue_channels
 from drivers.hardware.parameters import Hardware
 from drivers.hardware.serial_lasers import SerialLasers
+from drivers.optoncdt.analogue import require_input_range
 from drivers.rig import Alignment, Block, Channel, Counts, Handwork
 from sim.errors import InvalidInput
 
 _FIRST_LOOKS = 20
 """How often the sample clock is read when it has just been started: it is then known to a fraction of a call."""
+
+_LOOKS = 3
+"""How often it is read after each block: the best of a few calls is much better than one."""
 
 
 class _State(Enum):
@@ -43,18 +47,21 @@ class HardwareRig:
         self._hands = RemoteHands(hardware.hands) if hardware.hands is not None else Person()
         serial = hardware.lasers.connection == "serial"
         inputs = [given for _, given in (*hardware.transducers, *hardware.analogue_lasers)]
+        for name, given in hardware.analogue_lasers:
+            require_input_range(f"hardware.{name}.range", given.range, hardware.lasers.load)
         with ExitStack() as opened:
             self._lasers = SerialLasers(hardware) if serial else None
             if self._lasers is not None:
                 opened.callback(self._lasers.close)
             self._daq = DaqSession(hardware.daq, inputs, hardware.sample_rate, lead)
             opened.callback(self._daq.close)
-            analogue = analogue_channels(hardware, self._daq.scalings, self._daq.description["product"])
+            analogue = analogue_channels(hardware, self._daq.scalings, self._daq.description)
             self._channels = analogue if self._lasers is None else (*analogue, *self._lasers.channels)
             self._opened = opened.pop_all()
         self._state = _State.STOPPED
         self._written = 0
         self._index = 0
+        self._failed = False
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -88,17 +95,22 @@ class HardwareRig:
     def alignments(self) -> tuple[Alignment, ...]:
         return self._lasers.alignments if self._lasers is not None else ()
 
+    def interlocks(self) -> Mapping[str, bool]:
+        # no safety input is wired to this rig: emergency stop and over-travel act on the enable line by themselves
+        return {}
+
     def arm(self) -> None:
         if self._state is not _State.STOPPED:
             raise RigError(f"arm is refused: the rig is {self._state.value}; stop it first, or open a new one")
         if self._lasers is not None:
-            self._lasers.begin(self.sample_rate)
+            self._lasers.begin(self.sample_rate, self._clock)
         try:
             self._daq.prepare()
         except BaseException:
             self._daq.stop()
             raise
         self._written = self._index = 0
+        self._failed = False
         self._state = _State.ARMED
 
     def write(self, volts: NDArray[np.float64]) -> None:
@@ -138,7 +150,8 @@ class HardwareRig:
         if self._state is _State.CLOSED:
             return
         self._state = _State.STOPPED
-        self._daq.stop()
+        with self._told_once():
+            self._daq.stop()
 
     def halt(self) -> None:
         if self._state is _State.CLOSED:
@@ -152,7 +165,8 @@ class HardwareRig:
         if self._state is _State.CLOSED:
             return
         self._state = _State.CLOSED
-        self._opened.close()
+        with self._told_once():
+            self._opened.close()
 
     def handwork(self, work: Handwork, stiffness: float | None = None) -> None:
         if self._state is not _State.STOPPED:
@@ -169,22 +183,21 @@ class HardwareRig:
         self._daq.start()
         self._state = _State.RUNNING
         if self._lasers is not None:
-            for _ in range(_FIRST_LOOKS):
-                self._look_at_clock()
+            self._look_at_clock(self._lasers, _FIRST_LOOKS)
 
-    def _look_at_clock(self) -> None:
+    def _look_at_clock(self, lasers: SerialLasers, times: int) -> None:
         """Bound the sample clock between two looks at the machine's clock."""
-        assert self._lasers is not None
-        before = time.monotonic()
-        count = self._daq.acquired()
-        self._lasers.observe(before, count, time.monotonic())
+        for _ in range(times):
+            before = time.monotonic()
+            count = self._daq.acquired()
+            lasers.observe(before, count, time.monotonic())
 
     def _read_all(self, n: int) -> Counts:
         """Counts of all channels, shape (n, n_channels): from the DAQ, and from the lasers when they are serial."""
         counts = self._daq.read(n)
         if self._lasers is None:
             return counts
-        self._look_at_clock()
+        self._look_at_clock(self._lasers, _LOOKS)
         return np.column_stack((counts, self._lasers.counts(self._index, n)))
 
     def _require_armed(self, what: str) -> None:
@@ -196,11 +209,24 @@ class HardwareRig:
         raise RigError(why)
 
     @contextmanager
-    def _ending_on_failure(self) -> Iterator[None]:
+    def _ending_on_failure(self) -> Generator[None]:
         """Whatever fails inside, the output is cut, and what failed is what is told."""
         try:
             yield
-        except BaseException:
+        except BaseException as error:
+            self._failed = True
             with suppress(RigError):
                 self.halt()
+            # what the device said of the enable line and the output is part of what failed
+            if notes := getattr(error, "__notes__", None):
+                error.args = ("; ".join((str(error), *notes)), *error.args[1:])
             raise
+
+    @contextmanager
+    def _told_once(self) -> Generator[None]:
+        """A device that has failed may fail again when it is stopped: that has been told."""
+        try:
+            yield
+        except RigError:
+            if not self._failed:
+                raise

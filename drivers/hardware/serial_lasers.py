@@ -6,6 +6,7 @@ from contextlib import ExitStack
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.clock import Clock
 from drivers.errors import ConnectionLost
 from drivers.hardware.channels import serial_laser
 from drivers.hardware.parameters import Hardware, Laser1
@@ -16,8 +17,6 @@ from drivers.timebase.laser_track import LaserTrack
 from drivers.timebase.sample_clock import SampleClock
 from sim.errors import InvalidInput
 
-_HISTORY = 2.0
-"""How long the lasers are listened to before the first run, so that their clocks are known [s]."""
 _PATIENCE = 0.05
 """How long a block waits for the lasers' values to arrive before they count as lost [s]."""
 
@@ -39,7 +38,7 @@ class SerialLasers:
             for sensor in self._sensors:
                 sensor.start()
             self._opened = opened.pop_all()
-        self._listening_since = time.monotonic()
+        self._known_from = time.monotonic() + hardware.lasers.listening
         self._tracks = [LaserTrack(s.name, self._rate, self._delay, marked, LOST) for s in self._sensors]
         self._sample_rate = 0.0
         self._clock: SampleClock | None = None
@@ -48,9 +47,9 @@ class SerialLasers:
             for sensor, given in zip(self._sensors, (hardware.laser_1, hardware.laser_2), strict=True)
         )
 
-    def begin(self, sample_rate: float) -> None:
+    def begin(self, sample_rate: float, clock: Clock) -> None:
         """A run begins: its sample clock is not known yet, the lasers' own clocks are."""
-        time.sleep(max(0.0, self._listening_since + _HISTORY - time.monotonic()))
+        clock.wait_until(self._known_from)
         self._take()
         for track in self._tracks:
             track.begin()

@@ -16,6 +16,7 @@ class HarmonicCampaign:
     """Steady-state harmonic tests, bare and coupled (section 4.3 of the paper)."""
 
     name = "harmonic"
+    figure_name = "gain_spectra.png"
     point_type: type[Parameters] = HarmonicPoint
 
     def __init__(self, parameters: HarmonicParameters) -> None:

@@ -180,13 +180,16 @@ def test_bad_input_is_refused_in_one_line_before_anything_starts(
     assert said in shown.err
 
 
-@pytest.mark.parametrize("name", ["campaign.h5", "gain_spectra.png", "summary.json"])
+RESULTS = ("campaign.h5", "gain_spectra.png", "summary.json")
+
+
+@pytest.mark.parametrize("name", RESULTS)
 def test_no_result_is_overwritten(tmp_path: Path, name: str):
-    check_folder(tmp_path)
-    check_folder(tmp_path / "a" / "b")
+    check_folder(tmp_path, RESULTS)
+    check_folder(tmp_path / "a" / "b", RESULTS)
     (tmp_path / name).touch()
     with pytest.raises(InvalidInput, match=f"holds {name} already"):
-        check_folder(tmp_path)
+        check_folder(tmp_path, RESULTS)
     assert [path.name for path in tmp_path.iterdir()] == [name]
 
 

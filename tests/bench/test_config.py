@@ -5,9 +5,11 @@ from pathlib import Path
 import pytest
 
 from bench.config.declared import at, keys
+from bench.config.dump import as_toml
 from bench.config.model import BenchConfiguration
 from bench.config.toml import problems_of, read_configuration, write_commented
 from bench.config.validation import problems, validated
+from drivers.hardware.parameters import Daq, Hardware, Laser1, Laser2, Lasers, TableForce
 from protocols.harmonic.parameters import HarmonicParameters
 from sim.errors import InvalidInput
 from sim.specimen import Frame, Specimen
@@ -143,3 +145,82 @@ def test_the_words_for_what_a_value_may_be_come_from_its_declaration():
     assert starts is not None
     assert starts.allowed == "a whole number at least 1 and at most 32"
     assert at(HarmonicParameters, ("omega", "x")) is None
+
+
+LABORATORY = """
+backend = "hardware"
+[hardware]
+sample_rate = 5000
+[hardware.daq]
+server = "crio.local:31763"
+watchdog = 1.0
+[hardware.table_force]
+terminal = "cRIO1Mod1/ai2"
+[hardware.lasers]
+delay = 0.0035
+[hardware.laser_1]
+port = "COM5"
+polarity = -1
+[hardware.laser_2]
+port = "COM6"
+"""
+
+
+def test_the_laboratory_is_described_by_its_tables(file: Callable[[str], Path]):
+    configuration = read_configuration(file(LABORATORY))
+    assert configuration.hardware == Hardware(
+        sample_rate=5000.0,
+        daq=Daq(server="crio.local:31763", watchdog=1.0),
+        table_force=TableForce(terminal="cRIO1Mod1/ai2"),
+        lasers=Lasers(delay=0.0035),
+        laser_1=Laser1(port="COM5", polarity=-1),
+        laser_2=Laser2(port="COM6"),
+    )
+    assert (configuration.sample_rate, configuration.seed) == (5000.0, None)
+    assert not configuration.serves_itself
+
+
+def test_a_simulated_bench_keeps_its_own_rate_and_seed_beside_the_hardware(file: Callable[[str], Path]):
+    configuration = read_configuration(file(LABORATORY.replace('"hardware"', '"simulated"')))
+    assert (configuration.sample_rate, configuration.seed) == (2000.0, 1)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[hardware]\nsample_rate = 30000", "hardware.sample_rate = 30000 .* at most 20000"),
+        ("[hardware.laser_1]\nport = 'COM5'\n[hardware.laser_2]\nport = 'COM5'", "laser_1 has this port already"),
+        ("[hardware.table_acceleration]\nterminal = 'dev1/AI0'", "table_displacement has this terminal already"),
+        ("[hardware.lasers]\nconnection = 'usb'", 'hardware.lasers.connection = \'usb\' .* "serial" or "analogue"'),
+        ("[hardware.lasers]\ndelay = 0.2", "hardware.lasers.delay = 0.2 .* at most 0.1 s"),
+        ("[hardware.laser_1]\npolarity = 2", "hardware.laser_1.polarity = 2"),
+        ("[hardware.daq]\nwatch_dog = 1.0", "hardware.daq.watch_dog = 1.0 .* nearest is hardware.daq.watchdog"),
+    ],
+)
+def test_what_is_wrong_with_the_laboratory_is_said(file: Callable[[str], Path], text: str, said: str):
+    assert re.search(said, refusal(file(text)))
+
+
+@pytest.mark.parametrize("text", ["", LABORATORY, "[simulation]\nseed = 7\n[simulation.specimen.frame]\nk2 = 57.5\n"])
+def test_a_configuration_as_text_reads_back_as_the_same(file: Callable[[str], Path], text: str):
+    configuration = read_configuration(file(text))
+    assert read_configuration(file(as_toml(configuration))) == configuration
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        (
+            "[acquisition]\nblock_duration = 0.2\n[hardware.daq]\nwatchdog = 0.5",
+            r"hardware\.daq\.watchdog = 0\.5 .* 3 blocks",
+        ),
+        ("[acquisition]\nblock_duration = 0.01", r"acquisition\.block_duration = 0\.01 .* analogue"),
+    ],
+)
+def test_blocks_suit_the_devices(tmp_path: Path, text: str, named: str) -> None:
+    file = tmp_path / "bench.toml"
+    file.write_text(text)
+    read_configuration(file)
+    file.write_text(f'backend = "hardware"\n{text}')
+    with pytest.raises(InvalidInput, match=named):
+        read_configuration(file)

@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 
 from drivers.clock import VirtualClock, WallClock
-from drivers.rig import DriveUnderflow, Handwork, Rig, RigError
+from drivers.rig import Counts, DriveUnderflow, Handwork, Rig, RigError
 from drivers.simulated import SimulatedRig
 from sim.errors import InvalidInput
 from sim.sensors import Laser
@@ -140,6 +140,17 @@ def test_removing_the_block_leaves_the_bare_frame_and_mounting_a_spring_couples_
     assert rig.bench.specimen == Specimen(beta=0.25)
 
 
+def test_a_locked_frame_moves_with_the_table_until_it_is_unlocked() -> None:
+    rig = simulated(laser_1=Laser(reference="table"), laser_2=Laser(reference="table"))
+    volts = 0.4 * np.sin(6.3 * np.arange(2000) / 2000.0)
+    moved: list[float] = []
+    for work in (Handwork.LOCK_FRAME, Handwork.UNLOCK_FRAME):
+        rig.handwork(work)
+        moved.append(float(np.ptp(measured(started(rig), volts, "laser_2"))))
+        rig.stop()
+    assert moved[0] < 0.05 * moved[1]
+
+
 def test_mounting_a_spring_needs_its_stiffness() -> None:
     with pytest.raises(InvalidInput, match="stiffness"):
         simulated().handwork(Handwork.MOUNT_SPRING)
@@ -147,10 +158,10 @@ def test_mounting_a_spring_needs_its_stiffness() -> None:
 
 def test_the_same_seed_gives_the_same_session_however_it_is_read() -> None:
     volts = 2.0 * np.sin(16.0 * np.arange(3000) / 2000.0)
-    sessions: list[NDArray[np.int16]] = []
+    sessions: list[Counts] = []
     for block, seed in ((100, 3), (37, 3), (100, 4)):
         rig = simulated(COUPLED, seed)
-        runs: list[NDArray[np.int16]] = []
+        runs: list[Counts] = []
         for _ in range(2):
             started(rig)
             runs += [b.counts for b in play(rig, volts, block)]

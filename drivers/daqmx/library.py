@@ -1,0 +1,279 @@
+# pyright: reportUnknownMemberType=false
+"""The part of nidaqmx that is used here, with types: nidaqmx has none of its own.
+
+`options` say where the driver runs: None for the driver of this PC, otherwise a session of a gRPC device server.
+"""
+
+from collections.abc import Sequence
+from typing import Any, Protocol, cast
+
+import nidaqmx
+import nidaqmx.system
+import numpy as np
+from nidaqmx.constants import (
+    AcquisitionType,
+    DataJustification,
+    Level,
+    OutputDataTransferCondition,
+    RegenerationMode,
+    TerminalConfiguration,
+)
+from nidaqmx.grpc_session_options import GrpcSessionOptions
+from nidaqmx.stream_readers import AnalogUnscaledReader
+from nidaqmx.stream_writers import AnalogSingleChannelWriter, DigitalSingleChannelWriter
+from nidaqmx.system.watchdog import WatchdogTask as NiWatchdogTask
+from nidaqmx.types import DOExpirationState
+from numpy.typing import NDArray
+
+Options = GrpcSessionOptions | None
+
+
+class Named(Protocol):
+    """A device or a channel."""
+
+    @property
+    def name(self) -> str: ...
+
+
+class PhysicalInput(Named, Protocol):
+    """An analogue input of a device."""
+
+    @property
+    def ai_term_cfgs(self) -> Sequence[TerminalConfiguration]: ...
+
+
+class Device(Named, Protocol):
+    """A DAQ device; a property that it does not have raises."""
+
+    @property
+    def product_type(self) -> str: ...
+    @property
+    def serial_num(self) -> int: ...
+    @property
+    def is_simulated(self) -> bool: ...
+    @property
+    def ai_physical_chans(self) -> Sequence[PhysicalInput]: ...
+    @property
+    def ao_physical_chans(self) -> Sequence[Named]: ...
+    @property
+    def do_lines(self) -> Sequence[Named]: ...
+    @property
+    def ai_voltage_rngs(self) -> Sequence[float]: ...
+    @property
+    def ao_voltage_rngs(self) -> Sequence[float]: ...
+    @property
+    def ai_max_single_chan_rate(self) -> float: ...
+    @property
+    def ai_max_multi_chan_rate(self) -> float: ...
+    @property
+    def ai_simultaneous_sampling_supported(self) -> bool: ...
+    @property
+    def ao_max_rate(self) -> float: ...
+    def reset_device(self) -> None: ...
+
+
+class Version(Protocol):
+    """Of the driver."""
+
+    @property
+    def major_version(self) -> int: ...
+    @property
+    def minor_version(self) -> int: ...
+    @property
+    def update_version(self) -> int: ...
+
+
+class System(Protocol):
+    """All devices that a driver knows."""
+
+    @property
+    def devices(self) -> Sequence[Device]: ...
+    @property
+    def driver_version(self) -> Version: ...
+
+
+class InputChannel(Protocol):
+    """An analogue input of a task."""
+
+    @property
+    def ai_dev_scaling_coeff(self) -> Sequence[float]: ...
+    @property
+    def ai_raw_samp_size(self) -> int: ...
+    @property
+    def ai_raw_samp_justification(self) -> DataJustification: ...
+    @property
+    def ai_resolution(self) -> float: ...
+
+
+class InputChannels(Protocol):
+    """The analogue inputs of a task."""
+
+    def add_ai_voltage_chan(
+        self,
+        physical_channel: str,
+        name_to_assign_to_channel: str,
+        terminal_config: TerminalConfiguration,
+        min_val: float,
+        max_val: float,
+    ) -> InputChannel: ...
+
+
+class OutputChannel(Protocol):
+    """An analogue output of a task."""
+
+    ao_data_xfer_req_cond: OutputDataTransferCondition
+
+
+class OutputChannels(Protocol):
+    """The analogue outputs of a task."""
+
+    def add_ao_voltage_chan(self, physical_channel: str, *, min_val: float, max_val: float) -> OutputChannel: ...
+
+
+class LineChannels(Protocol):
+    """The digital outputs of a task."""
+
+    def add_do_chan(self, lines: str) -> object: ...
+
+
+class Timing(Protocol):
+    """The sample clock of a task."""
+
+    @property
+    def samp_clk_rate(self) -> float: ...
+    def cfg_samp_clk_timing(self, rate: float, *, sample_mode: AcquisitionType, samps_per_chan: int) -> None: ...
+
+
+class StartTrigger(Protocol):
+    """What starts a task."""
+
+    @property
+    def term(self) -> str: ...
+    def cfg_dig_edge_start_trig(self, trigger_source: str) -> None: ...
+
+
+class Triggers(Protocol):
+    """The triggers of a task."""
+
+    @property
+    def start_trigger(self) -> StartTrigger: ...
+
+
+class InStream(Protocol):
+    """The buffer of an input task, and how far its inputs have come."""
+
+    input_buf_size: int
+
+    @property
+    def total_samp_per_chan_acquired(self) -> int: ...
+
+
+class OutStream(Protocol):
+    """The buffer of an output task."""
+
+    output_buf_size: int
+    regen_mode: RegenerationMode
+
+    @property
+    def curr_write_pos(self) -> int: ...
+
+
+class Task(Named, Protocol):
+    """A task of the driver."""
+
+    @property
+    def channel_names(self) -> Sequence[str]: ...
+    @property
+    def ai_channels(self) -> InputChannels: ...
+    @property
+    def ao_channels(self) -> OutputChannels: ...
+    @property
+    def do_channels(self) -> LineChannels: ...
+    @property
+    def timing(self) -> Timing: ...
+    @property
+    def triggers(self) -> Triggers: ...
+    @property
+    def in_stream(self) -> InStream: ...
+    @property
+    def out_stream(self) -> OutStream: ...
+    def start(self) -> None: ...
+    def stop(self) -> None: ...
+    def close(self) -> None: ...
+
+
+class WatchdogTask(Protocol):
+    """The watchdog of a device."""
+
+    @property
+    def expired(self) -> bool: ...
+    def cfg_watchdog_do_expir_states(self, expiration_states: Sequence[DOExpirationState]) -> object: ...
+    def clear_expiration(self) -> None: ...
+    def reset_timer(self) -> None: ...
+    def start(self) -> None: ...
+    def stop(self) -> None: ...
+    def close(self) -> None: ...
+
+
+class UnscaledReader(Protocol):
+    """Reads counts into an array of shape (channels, n); returns how many per channel."""
+
+    def read_int16(self, data: NDArray[Any], number_of_samples_per_channel: int, timeout: float) -> int: ...
+    def read_int32(self, data: NDArray[Any], number_of_samples_per_channel: int, timeout: float) -> int: ...
+
+
+class AnalogWriter(Protocol):
+    """Writes volts, shape (n,); returns how many."""
+
+    def write_many_sample(self, data: NDArray[np.float64], timeout: float) -> int: ...
+
+
+class LineWriter(Protocol):
+    """Writes the state of one digital line."""
+
+    def write_one_sample_one_line(self, data: bool, timeout: float) -> object: ...
+
+
+def system(options: Options) -> System:
+    """What the driver knows."""
+    return cast(System, nidaqmx.system.System(options))
+
+
+def task(name: str, options: Options) -> Task:
+    """A new task, or what `options` say of an old one."""
+    return cast(Task, nidaqmx.Task(name, grpc_options=options))
+
+
+def watchdog_task(device: str, name: str, timeout: float, options: Options) -> WatchdogTask:
+    """The watchdog of a device; it barks `timeout` seconds after its last reset."""
+    return cast(WatchdogTask, cast(Any, NiWatchdogTask)(device, name, timeout, options))
+
+
+def let_go(task: WatchdogTask) -> None:
+    """Drop a watchdog that is not ours to close any more, or whose device is gone."""
+    # nidaqmx has no public way, and warns of every watchdog that was not closed
+    cast(Any, task)._handle = None
+
+
+def goes_low(line: str) -> DOExpirationState:
+    """A line that goes low when the watchdog barks."""
+    return DOExpirationState(physical_channel=line, expiration_state=Level.LOW)
+
+
+def unscaled_reader(task: Task) -> UnscaledReader:
+    """Reads the inputs of a task; the shape of the array is the caller's affair: asking costs a call each time."""
+    reader = AnalogUnscaledReader(task.in_stream)
+    reader.verify_array_shape = False
+    return cast(UnscaledReader, reader)
+
+
+def analog_writer(task: Task, *, auto_start: bool) -> AnalogWriter:
+    """Writes the output of a task."""
+    writer = cast(Any, AnalogSingleChannelWriter)(task.out_stream, auto_start)
+    writer.verify_array_shape = False
+    return cast(AnalogWriter, writer)
+
+
+def line_writer(task: Task) -> LineWriter:
+    """Writes the line of a task, starting it where it is not running."""
+    return cast(LineWriter, cast(Any, DigitalSingleChannelWriter)(task.out_stream, True))

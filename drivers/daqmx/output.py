@@ -1,0 +1,151 @@
+"""The drive output: a continuous task that plays each sample once."""
+
+import time
+from math import ceil
+from typing import Any, cast
+
+import numpy as np
+from nidaqmx.constants import AcquisitionType, OutputDataTransferCondition, RegenerationMode
+from nidaqmx.error_codes import DAQmxErrors
+from nidaqmx.errors import DaqError, DaqWriteError
+from numpy.typing import NDArray
+
+from drivers.daqmx import library
+from drivers.daqmx.connection import Connection
+from drivers.daqmx.errors import code_of, is_unsupported, translated
+from drivers.daqmx.parameters import Daq, device_name
+from drivers.errors import RigError
+
+NAME = "rockbench_out"
+
+_AHEAD = 2.0
+"""How much more than the lead fits into the buffer [s]."""
+_ZERO_TIME = 0.1
+"""Time for writing a single value, which never has to wait [s]."""
+_FULL = int(DAQmxErrors.SAMPLES_CAN_NOT_YET_BE_WRITTEN)
+
+
+class Output:
+    """One output. Each run has a task of its own: what an old one still held is gone with it."""
+
+    def __init__(self, connection: Connection, daq: Daq, rate: float, lead: int) -> None:
+        self._connection = connection
+        self._daq = daq
+        self._asked = rate
+        self._buffer = lead + ceil(_AHEAD * rate)
+        self._task: library.Task | None = None
+        self._started = False
+        self._prefilled = 0
+        self.zero()
+        try:
+            self._make()
+        except BaseException:
+            self.clear()
+            raise
+
+    def prepare(self, trigger: str) -> None:
+        """A fresh task with the output at zero, which will start with `trigger`."""
+        self.clear()
+        self.zero()
+        task = self._make()
+        with translated(f"arming the output on {trigger}"):
+            task.triggers.start_trigger.cfg_dig_edge_start_trig(trigger)
+
+    def write(self, volts: NDArray[np.float64]) -> None:
+        """Append samples, shape (n,) [V]; waits for room when it plays already.
+
+        Raises DriveUnderflow when the output has run dry, DeviceTimeout when no room comes free in time.
+        """
+        if not self._started and self._prefilled + volts.size > self._buffer:
+            raise RigError(
+                f"{self._prefilled + volts.size} drive samples before the start are refused: the buffer holds"
+                f" {self._buffer}; start first"
+            )
+        rest = np.ascontiguousarray(volts, np.float64)
+        deadline = time.monotonic() + volts.size / self.rate + self._daq.patience
+        while rest.size:
+            rest = rest[self._append(rest, deadline - time.monotonic()) :]
+        self._prefilled += volts.size
+
+    def arm(self) -> None:
+        """Let the task wait for its trigger; some samples must be written."""
+        with translated("arming the output"):
+            if self._task is not None:
+                self._task.start()
+        self._started = True
+
+    def zero(self) -> None:
+        """Put the output to 0 V now; no other task may hold it."""
+        put_to_zero(self._connection, self._daq)
+
+    def reset_device(self) -> None:
+        """Put every output of the device to its state at power-up, 0 V and low lines; its tasks are gone."""
+        with translated("resetting the device of the output"):
+            devices = library.system(self._connection.options()).devices
+            name = device_name(self._daq.output).lower()
+            next(device for device in devices if device.name.lower() == name).reset_device()
+
+    def clear(self) -> None:
+        """Stop playing and forget what waits; the output holds its last value."""
+        # a task is closed once: nidaqmx has let go of it even when the driver did not answer
+        task, self._task = self._task, None
+        self._started, self._prefilled = False, 0
+        if task is not None:
+            with translated("clearing the output task"):
+                task.close()
+
+    def _make(self) -> library.Task:
+        """The task that plays; its rate is read back."""
+        with translated("making the output task"):
+            self._task = task = library.task(NAME, self._connection.options(NAME))
+            channel = _add_channel(task, self._daq)
+            task.timing.cfg_samp_clk_timing(
+                self._asked, sample_mode=AcquisitionType.CONTINUOUS, samps_per_chan=self._buffer
+            )
+            task.out_stream.regen_mode = RegenerationMode.DONT_ALLOW_REGENERATION
+            task.out_stream.output_buf_size = self._buffer
+            self.transfer = _transfer_early(channel)
+            self.rate = float(task.timing.samp_clk_rate)
+            self._writer = library.analog_writer(task, auto_start=False)
+        return task
+
+    def _append(self, volts: NDArray[np.float64], remaining: float) -> int:
+        """How many samples were taken before the buffer was full or the time over."""
+        with translated("writing the drive"):
+            try:
+                return self._writer.write_many_sample(volts, max(remaining, 0.0))
+            except DaqWriteError as error:
+                if code_of(error) != _FULL or remaining <= 0.0:
+                    raise
+                return int(cast(Any, error).samps_per_chan_written)
+
+
+def put_to_zero(connection: Connection, daq: Daq) -> None:
+    """Put the output to 0 V now; no task may hold it."""
+    with translated("putting the output to 0 V"):
+        # without a name: one that a late server still makes must not stand in the way of the next
+        task = library.task("", connection.options())
+        try:
+            _add_channel(task, daq)
+            library.analog_writer(task, auto_start=True).write_many_sample(np.zeros(1), _ZERO_TIME)
+        finally:
+            task.close()
+
+
+def _add_channel(task: library.Task, daq: Daq) -> library.OutputChannel:
+    limit = daq.output_range
+    return task.ao_channels.add_ao_voltage_chan(daq.output, min_val=-limit, max_val=limit)
+
+
+def _transfer_early(channel: library.OutputChannel) -> str:
+    """Let samples go on board as soon as it is half empty; says what became of it.
+
+    A deep memory on board costs no time here: how far ahead is written is up to the caller.
+    """
+    try:
+        channel.ao_data_xfer_req_cond = OutputDataTransferCondition.ON_BOARD_MEMORY_HALF_FULL_OR_LESS
+    except DaqError as error:
+        if not is_unsupported(error):
+            raise
+        return "as the device does it"
+    return "when half empty"

@@ -1,0 +1,103 @@
+"""The tasks of one session: made together, brought to rest together."""
+
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack, suppress
+
+from drivers.daqmx.connection import Connection
+from drivers.daqmx.enable import EnableLine
+from drivers.daqmx.inputs import Inputs
+from drivers.daqmx.output import Output
+from drivers.daqmx.parameters import AnalogInput, Daq
+from drivers.daqmx.watchdog import Watchdog
+from drivers.errors import RigError
+from sim.errors import InvalidInput
+
+_SAME_RATE = 1.0e-9
+"""Relative difference below which two sample rates are one."""
+
+
+class Tasks:
+    """Enable relay, watchdog, output and inputs. When one cannot be made, those that were are cleared.
+
+    After the constructor the relay is open and the output at 0 V. `was_reset` says that the device had to be reset to
+    bring the output to rest: its tasks are gone then. Raises InvalidInput for a sample rate that the
+    device would not make exactly.
+    """
+
+    def __init__(
+        self, connection: Connection, daq: Daq, inputs: Sequence[AnalogInput], sample_rate: float, lead: int
+    ) -> None:
+        self.relay: EnableLine | None = None
+        self.watchdog: Watchdog | None = None
+        self.was_reset = False
+        with ExitStack() as made:
+            if daq.enable_line is not None:
+                self.relay = EnableLine(connection, daq.enable_line)
+                made.callback(_quietly, self.relay.close)
+                if daq.watchdog is not None:
+                    self.watchdog = Watchdog(connection, daq.enable_line, daq.watchdog)
+                    made.callback(_quietly, self.watchdog.close)
+            self.output = Output(connection, daq, sample_rate, lead)
+            made.callback(_quietly, self.output.clear)
+            self.inputs = Inputs(connection, daq, inputs, sample_rate)
+            made.callback(_quietly, self.inputs.close)
+            _require_rate("inputs", self.inputs.rate, sample_rate)
+            _require_rate("output", self.output.rate, sample_rate)
+            self._made = made.pop_all()
+
+    def rest(self) -> None:
+        """Relay open, nothing runs, output at 0 V.
+
+        Every step is tried, whatever happens in another, also an interrupt. Raises what is no error of the rig, or
+        the first failure of relay or output.
+        """
+        failures: list[BaseException] = []
+
+        def attempt(step: Callable[[], None], *, matters: bool = False) -> bool:
+            try:
+                step()
+            except RigError as error:
+                if matters:
+                    failures.append(error)
+                return False
+            except BaseException as error:
+                failures.insert(0, error)
+                return False
+            return True
+
+        if self.relay is not None:
+            attempt(self.relay.open, matters=True)
+        # stopping a task that an error has ended raises that error once more; a task that is not cleared keeps the
+        # output, and then the zero fails
+        cleared = attempt(self.output.clear)
+        zeroed = attempt(self.output.zero, matters=cleared)
+        if not (cleared or zeroed) and attempt(self.output.reset_device, matters=True):
+            self.was_reset = True
+            failures.append(RigError("the output was held by its task: the device was reset; open a new session"))
+        attempt(self.inputs.stop)
+        if self.watchdog is not None:
+            attempt(self.watchdog.stop)
+            if self.relay is not None:
+                # a line that the watchdog held may go back to what was written last
+                attempt(self.relay.open, matters=True)
+        if failures:
+            raise failures[0]
+
+    def clear(self) -> None:
+        """Give everything back to the driver, as far as it still answers and nobody else has it; once."""
+        with suppress(RigError):
+            if not self.inputs.are_ours():
+                self._made.pop_all()
+                if self.watchdog is not None:
+                    self.watchdog.let_go()
+        self._made.close()
+
+
+def _quietly(step: Callable[[], None]) -> None:
+    with suppress(RigError):
+        step()
+
+
+def _require_rate(what: str, made: float, asked: float) -> None:
+    if abs(made - asked) > _SAME_RATE * asked:
+        raise InvalidInput("sample_rate", asked, f"the {what} would make {made!r}/s of it; ask for a rate that it has")

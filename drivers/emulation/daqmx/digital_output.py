@@ -1,0 +1,85 @@
+"""Digital output tasks: lines that are set when they are written."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from nidaqmx.error_codes import DAQmxErrors
+
+from drivers.emulation.daqmx.errors import DaqmxFailure
+from drivers.emulation.daqmx.lines import Lines
+
+
+@dataclass(frozen=True)
+class OutputLine:
+    """One line: the device it belongs to, and its name."""
+
+    device: str
+    name: str
+
+
+@dataclass(frozen=True)
+class LineChannel:
+    """One channel: a line, or several that are written together."""
+
+    name: str
+    lines: tuple[OutputLine, ...]
+
+
+class DigitalOutput:
+    """A `Job` without clock."""
+
+    awaited: str | None = None
+    start_terminal: str | None = None
+
+    def __init__(self, lines: Lines) -> None:
+        self._lines = lines
+        self.outputs: list[LineChannel] = []
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        return tuple(channel.name for channel in self.outputs)
+
+    @property
+    def all_lines(self) -> tuple[OutputLine, ...]:
+        """Its lines, channel after channel."""
+        return tuple(line for channel in self.outputs for line in channel.lines)
+
+    @property
+    def lines_per_channel(self) -> int:
+        """Lines of the channel that has most of them."""
+        return max(len(channel.lines) for channel in self.outputs)
+
+    @property
+    def devices(self) -> frozenset[str]:
+        return frozenset(line.device for line in self.all_lines)
+
+    @property
+    def resources(self) -> frozenset[str]:
+        return frozenset(line.name for line in self.all_lines)
+
+    def check(self) -> None:
+        pass
+
+    def begin(self, tick: int) -> None:
+        pass
+
+    def end(self) -> None:
+        pass
+
+    def verdict(self) -> None:
+        pass
+
+    def write(self, levels: Sequence[bool]) -> None:
+        """Set all lines, in order. Raises DaqmxFailure when there are more or fewer levels, or the watchdog bars it."""
+        if len(levels) != len(self.all_lines):
+            raise DaqmxFailure(
+                DAQmxErrors.NUM_LINES_MISMATCH_IN_READ_OR_WRITE,
+                f"Number of levels does not match the lines.\n\nLevels: {len(levels)}\nLines: {len(self.all_lines)}",
+            )
+        for line, high in zip(self.all_lines, levels, strict=True):
+            self._lines.write(line.device, line.name, high)
+
+    @property
+    def levels(self) -> tuple[bool, ...]:
+        """The lines as they are."""
+        return tuple(self._lines.is_high(line.name) for line in self.all_lines)

@@ -1,0 +1,120 @@
+"""The server: devices on a plant, behind an address."""
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, Self, cast
+
+import grpc
+from nidaqmx._stubs.nidaqmx_pb2_grpc import add_NiDAQmxServicer_to_server
+from session_pb2_grpc import add_SessionUtilitiesServicer_to_server
+
+from drivers.emulation.daqmx.device import DeviceModel
+from drivers.emulation.daqmx.driver import Driver
+from drivers.emulation.daqmx.faults import Boundary, Faults
+from drivers.emulation.daqmx.service.daqmx import NiDaqmx
+from drivers.emulation.daqmx.service.utilities import SessionUtilities
+from drivers.emulation.plant import Plant
+from sim.errors import InvalidInput
+from sim.sensors import Converter
+
+_WORKERS = 32
+"""Calls at the same time; a read that waits holds one."""
+
+
+class DaqServer:
+    """Speaks like NI's gRPC device server, with `devices` whose terminals are those of `plant`.
+
+    `drive` is the analogue output that drives the plant and `enable_line` the digital line of its enable relay; the
+    first that the devices have unless told. `converter` made the plant's counts. Raises InvalidInput when the
+    address cannot be had.
+    """
+
+    def __init__(
+        self,
+        plant: Plant,
+        devices: Sequence[DeviceModel],
+        *,
+        address: str = "127.0.0.1:0",
+        converter: Converter | None = None,
+        drive: str | None = None,
+        enable_line: str | None = None,
+    ) -> None:
+        self._plant = plant
+        outputs = [name for device in devices for name in device.output_names]
+        lines = [name for device in devices for name in device.line_names]
+        self._driver = Driver(
+            plant,
+            devices,
+            converter if converter is not None else Converter(),
+            _chosen("drive", drive, outputs),
+            _chosen("enable_line", enable_line, lines),
+        )
+        self._faults = Faults()
+        self._pool = ThreadPoolExecutor(_WORKERS, thread_name_prefix="emulated-daq")
+        library = cast(Any, grpc)
+        self._server = library.server(
+            self._pool,
+            interceptors=(Boundary(self._faults),),
+            options=[("grpc.so_reuseport", 0), ("grpc.max_receive_message_length", -1)],
+        )
+        # the generated types call every call abstract, while at run time those that are left out are UNIMPLEMENTED
+        daqmx = NiDaqmx(self._driver)  # pyright: ignore[reportAbstractUsage]
+        utilities = SessionUtilities(self._driver)  # pyright: ignore[reportAbstractUsage]
+        add_NiDAQmxServicer_to_server(daqmx, self._server)
+        add_SessionUtilitiesServicer_to_server(utilities, self._server)
+        host = address.rpartition(":")[0]
+        try:
+            port = int(self._server.add_insecure_port(address))
+        except RuntimeError as error:
+            self._pool.shutdown()
+            raise InvalidInput(
+                "address", address, "somebody listens there already, or there is no such address"
+            ) from error
+        self.address = f"{host}:{port}"
+
+    @property
+    def first_sample(self) -> float | None:
+        """Monotonic time of the first sample of the clocked task that was started last [s]; None before the first."""
+        tick = self._driver.first_tick
+        return None if tick is None else self._plant.time_of(tick)
+
+    def start(self) -> None:
+        """Answer from now on."""
+        self._server.start()
+
+    def close(self) -> None:
+        """Switch devices and server off; no thread and no port is left. Allowed any number of times."""
+        self._faults.end()
+        gone = self._server.stop(None)
+        # ends the reads and writes that wait, too
+        self._driver.reset()
+        gone.wait()
+        self._pool.shutdown()
+
+    def fail_next(self, call: str, code: int) -> None:
+        """The next call of this name, such as "StartTask", fails with a code of DAQmx and is not done."""
+        self._faults.fail_next(call, code)
+
+    def stall(self, seconds: float) -> None:
+        """Answer nobody for so long, like a frozen machine; the devices go on."""
+        self._faults.stall(seconds)
+
+    def vanish(self) -> None:
+        """Be gone at once, like a server whose cable is pulled; the devices go on until `close`."""
+        self._server.stop(None).wait()
+
+    def __enter__(self) -> Self:
+        self.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def _chosen(item: str, given: str | None, known: Sequence[str]) -> str | None:
+    """The one that was told, else the first."""
+    if given is None:
+        return known[0] if known else None
+    if given not in known:
+        raise InvalidInput(item, given, f"the devices have: {', '.join(known) or 'none'}")
+    return given

@@ -1,0 +1,54 @@
+"""What all parts of the service share."""
+
+from typing import Protocol
+
+from nidaqmx.error_codes import DAQmxErrors
+
+from drivers.emulation.daqmx.driver import Driver
+from drivers.emulation.daqmx.errors import DaqmxFailure
+from drivers.emulation.daqmx.task import Task
+
+
+class _Session(Protocol):
+    @property
+    def name(self) -> str: ...
+
+
+class AboutTask(Protocol):
+    """A request about a task."""
+
+    @property
+    def task(self) -> _Session: ...
+
+
+class AboutAttribute(Protocol):
+    """A request about an attribute: clients of NI send its number, others may send the enumeration."""
+
+    @property
+    def attribute(self) -> int: ...
+    @property
+    def attribute_raw(self) -> int: ...
+
+
+class Service:
+    """A part of the service: its calls ask the driver."""
+
+    def __init__(self, driver: Driver) -> None:
+        self._driver = driver
+
+    def _task(self, request: AboutTask) -> Task:
+        return self._driver.task(request.task.name)
+
+
+def attribute_of(request: AboutAttribute) -> int:
+    """The number of the attribute that a request is about."""
+    return request.attribute_raw or request.attribute
+
+
+def unsupported(attribute: int) -> DaqmxFailure:
+    """Nobody here has this attribute."""
+    return DaqmxFailure(
+        DAQmxErrors.ATTRIBUTE_NOT_SUPPORTED_IN_TASK_CONTEXT,
+        "Specified property is not supported by the device or is not applicable to the task.\n\n"
+        f"Property Number: {attribute:#x}",
+    )

@@ -1,0 +1,116 @@
+"""Calls that add channels to tasks."""
+
+# ruff: noqa: ARG002 - gRPC gives every call a context, needed or not
+
+from collections.abc import Callable
+from typing import TypeVar
+
+from nidaqmx._stubs import nidaqmx_pb2 as pb
+from nidaqmx.constants import LineGrouping
+from nidaqmx.error_codes import DAQmxErrors
+
+from drivers.emulation.daqmx.analog_input import AnalogInput
+from drivers.emulation.daqmx.analog_output import AnalogOutput, OutputChannel
+from drivers.emulation.daqmx.catalogue import unflattened
+from drivers.emulation.daqmx.converter import InputConverter
+from drivers.emulation.daqmx.digital_output import DigitalOutput, LineChannel, OutputLine
+from drivers.emulation.daqmx.errors import DaqmxFailure
+from drivers.emulation.daqmx.input_channel import InputChannel, require_wiring
+from drivers.emulation.daqmx.job import Job
+from drivers.emulation.daqmx.ranges import covering_range
+from drivers.emulation.daqmx.service.base import Service
+from drivers.emulation.daqmx.task import Task
+
+J = TypeVar("J", bound=Job)
+
+
+class ChannelService(Service):
+    """CreateAIVoltageChan, CreateAOVoltageChan, CreateDOChan"""
+
+    def CreateAIVoltageChan(
+        self, request: pb.CreateAIVoltageChanRequest, context: object
+    ) -> pb.CreateAIVoltageChanResponse:
+        task = self._task(request)
+        added = self._new_inputs(request)
+        with self._driver.changed:
+            job = self._job(task, AnalogInput, lambda: AnalogInput(self._driver.plant, self._driver.changed))
+            job.inputs.extend(added)
+        return pb.CreateAIVoltageChanResponse()
+
+    def CreateAOVoltageChan(
+        self, request: pb.CreateAOVoltageChanRequest, context: object
+    ) -> pb.CreateAOVoltageChanResponse:
+        task = self._task(request)
+        added = self._new_outputs(request)
+        driver = self._driver
+        with driver.changed:
+            job = self._job(task, AnalogOutput, lambda: AnalogOutput(driver.plant, driver.instant, driver.changed))
+            job.outputs.extend(added)
+        return pb.CreateAOVoltageChanResponse()
+
+    def CreateDOChan(self, request: pb.CreateDOChanRequest, context: object) -> pb.CreateDOChanResponse:
+        task = self._task(request)
+        found = [self._driver.catalogue.line(name) for name in unflattened(request.lines)]
+        lines = [OutputLine(device.name, device.line_names[k]) for device, k in found]
+        separate = (request.line_grouping_raw or request.line_grouping) == LineGrouping.CHAN_PER_LINE.value
+        groups = [(line,) for line in lines] if separate else [tuple(lines)]
+        names = unflattened(request.name_to_assign_to_lines) or tuple(
+            group[0].name if len(group) == 1 else request.lines for group in groups
+        )
+        with self._driver.changed:
+            job = self._job(task, DigitalOutput, lambda: DigitalOutput(self._driver.lines))
+            job.outputs.extend(LineChannel(name, group) for name, group in zip(names, groups, strict=False))
+        return pb.CreateDOChanResponse()
+
+    def _new_inputs(self, request: pb.CreateAIVoltageChanRequest) -> list[InputChannel]:
+        added: list[InputChannel] = []
+        physical = unflattened(request.physical_channel)
+        names = unflattened(request.name_to_assign_to_channel) or physical
+        wiring = request.terminal_config_raw or request.terminal_config
+        for name, channel in zip(names, physical, strict=False):
+            device, k = self._driver.catalogue.input(channel)
+            assert device.inputs is not None
+            require_wiring(device.inputs, wiring)
+            span = covering_range(device.inputs.ranges, request.min_val, request.max_val, "AI.Min, AI.Max")
+            converter = InputConverter(device.inputs, k, span, self._driver.converter)
+            terminal = device.inputs.first_terminal + k
+            added.append(
+                InputChannel(name, device, device.inputs, terminal, request.min_val, request.max_val, converter)
+            )
+        return added
+
+    def _new_outputs(self, request: pb.CreateAOVoltageChanRequest) -> list[OutputChannel]:
+        added: list[OutputChannel] = []
+        physical = unflattened(request.physical_channel)
+        names = unflattened(request.name_to_assign_to_channel) or physical
+        for name, channel in zip(names, physical, strict=False):
+            device, k = self._driver.catalogue.output(channel)
+            assert device.outputs is not None
+            span = covering_range(device.outputs.ranges, request.min_val, request.max_val, "AO.Min, AO.Max")
+            terminal = self._driver.terminals[device.output_names[k]]
+            added.append(
+                OutputChannel(
+                    name,
+                    device,
+                    span,
+                    request.min_val,
+                    request.max_val,
+                    device.outputs.memory,
+                    device.outputs.rate,
+                    terminal,
+                )
+            )
+        return added
+
+    def _job(self, task: Task, kind: type[J], make: Callable[[], J]) -> J:
+        """The task's job of this kind, made when the task is still empty."""
+        task.require_stopped()
+        if task.job is None:
+            task.job = make()
+        if not isinstance(task.job, kind):
+            raise DaqmxFailure(
+                DAQmxErrors.MULTI_CHAN_TYPES_IN_TASK,
+                "Specified channel cannot be added to the task, because a channel with a different I/O type is"
+                f" already in the task.\n\nTask Name: {task.name}",
+            )
+        return task.job

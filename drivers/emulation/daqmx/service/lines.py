@@ -1,0 +1,36 @@
+"""Calls that write and read digital output lines."""
+
+# ruff: noqa: ARG002 - gRPC gives every call a context, needed or not
+
+from nidaqmx._stubs import nidaqmx_pb2 as pb
+from nidaqmx.error_codes import DAQmxErrors
+
+from drivers.emulation.daqmx.digital_output import DigitalOutput
+from drivers.emulation.daqmx.errors import DaqmxFailure, NotEmulated
+from drivers.emulation.daqmx.service.base import Service
+
+
+class LineService(Service):
+    """WriteDigitalLines, ReadDigitalLines: one byte per line."""
+
+    def WriteDigitalLines(self, request: pb.WriteDigitalLinesRequest, context: object) -> pb.WriteDigitalLinesResponse:
+        task = self._task(request)
+        job = task.doing(DigitalOutput)
+        if request.num_samps_per_chan != 1:
+            raise NotEmulated("a digital output with a sample clock")
+        with self._driver.changed:
+            if not task.state.started:
+                if not request.auto_start:
+                    raise DaqmxFailure(
+                        DAQmxErrors.CANNOT_WRITE_WHEN_AUTO_START_FALSE_AND_TASK_NOT_RUNNING,
+                        "Write cannot be performed when the auto start input is false and the task is not running.",
+                    )
+                self._driver.start(task)
+            job.write([bool(level) for level in request.write_array])
+        return pb.WriteDigitalLinesResponse(samps_per_chan_written=1)
+
+    def ReadDigitalLines(self, request: pb.ReadDigitalLinesRequest, context: object) -> pb.ReadDigitalLinesResponse:
+        levels = self._task(request).doing(DigitalOutput).levels
+        return pb.ReadDigitalLinesResponse(
+            read_array=bytes(levels), samps_per_chan_read=1, num_bytes_per_samp=len(levels)
+        )

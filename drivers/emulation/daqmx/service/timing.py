@@ -1,0 +1,118 @@
+"""Calls about sample clocks, start triggers and buffers."""
+
+# ruff: noqa: ARG002 - gRPC gives every call a context, needed or not
+
+from nidaqmx._stubs import nidaqmx_pb2 as pb
+from nidaqmx.constants import AcquisitionType, Edge
+
+from drivers.emulation.daqmx.analog_input import AnalogInput
+from drivers.emulation.daqmx.analog_output import AnalogOutput
+from drivers.emulation.daqmx.errors import NotEmulated
+from drivers.emulation.daqmx.service.base import AboutTask, Service, attribute_of, unsupported
+from drivers.emulation.daqmx.task import Task
+from drivers.emulation.daqmx.timing import sample_clock
+
+Sampled = AnalogInput | AnalogOutput
+
+
+def _sampled(task: Task) -> Sampled:
+    """The job of a task that has a sample clock, or could have one."""
+    job = task.required_job
+    return job if isinstance(job, AnalogOutput) else task.doing(AnalogInput)
+
+
+class TimingService(Service):
+    """CfgSampClkTiming, CfgDigEdgeStartTrig, DisableStartTrig, timing, trigger and buffer attributes."""
+
+    def CfgSampClkTiming(self, request: pb.CfgSampClkTimingRequest, context: object) -> pb.CfgSampClkTimingResponse:
+        job = self._changeable(request)
+        if (request.sample_mode_raw or request.sample_mode) != AcquisitionType.CONTINUOUS.value:
+            raise NotEmulated("a clock that stops by itself")
+        if request.source not in ("", "OnboardClock"):
+            raise NotEmulated("a sample clock from elsewhere")
+        tick_rate = self._driver.plant.tick_rate
+        job.clock = sample_clock(request.rate, job.highest_rate, tick_rate, request.samps_per_chan)
+        return pb.CfgSampClkTimingResponse()
+
+    def GetTimingAttributeDouble(
+        self, request: pb.GetTimingAttributeDoubleRequest, context: object
+    ) -> pb.GetTimingAttributeDoubleResponse:
+        job = _sampled(self._task(request))
+        match attribute_of(request):
+            case pb.TIMING_ATTRIBUTE_SAMP_CLK_RATE if job.clock is not None:
+                return pb.GetTimingAttributeDoubleResponse(value=job.clock.rate)
+            case pb.TIMING_ATTRIBUTE_SAMP_CLK_MAX_RATE:
+                return pb.GetTimingAttributeDoubleResponse(value=job.highest_rate)
+            case other:
+                raise unsupported(other)
+
+    def GetTimingAttributeInt32(
+        self, request: pb.GetTimingAttributeInt32Request, context: object
+    ) -> pb.GetTimingAttributeInt32Response:
+        if (attribute := attribute_of(request)) != pb.TIMING_ATTRIBUTE_SAMP_QUANT_SAMP_MODE:
+            raise unsupported(attribute)
+        clocked = _sampled(self._task(request)).clock is not None
+        mode = AcquisitionType.CONTINUOUS if clocked else AcquisitionType.FINITE
+        return pb.GetTimingAttributeInt32Response(value_raw=mode.value)
+
+    def CfgDigEdgeStartTrig(
+        self, request: pb.CfgDigEdgeStartTrigRequest, context: object
+    ) -> pb.CfgDigEdgeStartTrigResponse:
+        if (request.trigger_edge_raw or request.trigger_edge) != Edge.RISING.value:
+            raise NotEmulated("a start trigger on a falling edge")
+        self._changeable(request).awaited = request.trigger_source
+        return pb.CfgDigEdgeStartTrigResponse()
+
+    def DisableStartTrig(self, request: pb.DisableStartTrigRequest, context: object) -> pb.DisableStartTrigResponse:
+        self._changeable(request).awaited = None
+        return pb.DisableStartTrigResponse()
+
+    def GetTrigAttributeString(
+        self, request: pb.GetTrigAttributeStringRequest, context: object
+    ) -> pb.GetTrigAttributeStringResponse:
+        job = _sampled(self._task(request))
+        match attribute_of(request):
+            case pb.TRIGGER_ATTRIBUTE_START_TRIG_TERM:
+                return pb.GetTrigAttributeStringResponse(value=job.start_terminal or "")
+            case pb.TRIGGER_ATTRIBUTE_DIG_EDGE_START_TRIG_SRC:
+                return pb.GetTrigAttributeStringResponse(value=job.awaited or "")
+            case other:
+                raise unsupported(other)
+
+    def GetBufferAttributeUInt32(
+        self, request: pb.GetBufferAttributeUInt32Request, context: object
+    ) -> pb.GetBufferAttributeUInt32Response:
+        return pb.GetBufferAttributeUInt32Response(value=self._buffered(request, attribute_of(request)).buffer)
+
+    def SetBufferAttributeUInt32(
+        self, request: pb.SetBufferAttributeUInt32Request, context: object
+    ) -> pb.SetBufferAttributeUInt32Response:
+        self._task(request).require_stopped()
+        self._buffered(request, attribute_of(request)).buffer = request.value
+        return pb.SetBufferAttributeUInt32Response()
+
+    def CfgInputBuffer(self, request: pb.CfgInputBufferRequest, context: object) -> pb.CfgInputBufferResponse:
+        task = self._task(request)
+        task.require_stopped()
+        task.doing(AnalogInput).buffer = request.num_samps_per_chan
+        return pb.CfgInputBufferResponse()
+
+    def CfgOutputBuffer(self, request: pb.CfgOutputBufferRequest, context: object) -> pb.CfgOutputBufferResponse:
+        task = self._task(request)
+        task.require_stopped()
+        task.doing(AnalogOutput).buffer = request.num_samps_per_chan
+        return pb.CfgOutputBufferResponse()
+
+    def _changeable(self, request: AboutTask) -> Sampled:
+        task = self._task(request)
+        task.require_stopped()
+        return _sampled(task)
+
+    def _buffered(self, request: AboutTask, attribute: int) -> Sampled:
+        match attribute:
+            case pb.BUFFER_ATTRIBUTE_INPUT_BUF_SIZE:
+                return self._task(request).doing(AnalogInput)
+            case pb.BUFFER_ATTRIBUTE_OUTPUT_BUF_SIZE:
+                return self._task(request).doing(AnalogOutput)
+            case other:
+                raise unsupported(other)

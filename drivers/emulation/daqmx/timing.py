@@ -1,0 +1,43 @@
+"""Sample clocks: whole fractions of the plant's tick rate."""
+
+from dataclasses import dataclass
+from math import ceil, floor
+
+from nidaqmx.error_codes import DAQmxErrors
+
+from drivers.emulation.daqmx.errors import DaqmxFailure
+
+_SAME = 1.0e-9
+"""Relative difference below which two rates are one."""
+
+
+@dataclass(frozen=True)
+class SampleClock:
+    """One sample every `divider` ticks: `rate` samples per second. `samples` sizes the buffer, per channel."""
+
+    divider: int
+    rate: float
+    samples: int
+
+    def ticks(self, first: int, samples: int) -> int:
+        """The tick of sample number `samples` when sample 0 is taken at tick `first`."""
+        return first + samples * self.divider
+
+    def passed(self, first: int, tick: int) -> int:
+        """How many samples have their tick at `tick` or before when sample 0 has it at `first`."""
+        return max((tick - first) // self.divider + 1, 0)
+
+
+def sample_clock(asked: float, highest: float, tick_rate: float, samples: int) -> SampleClock:
+    """The clock that a device makes when `asked` samples per second are wanted: the next higher rate that it has.
+
+    All rates are a tick rate over an integer, at most `highest`, as with delta-sigma converters (NI 9239 data sheet).
+    """
+    if not 0.0 < asked <= highest * (1.0 + _SAME):
+        raise DaqmxFailure(
+            DAQmxErrors.INVALID_ATTRIBUTE_VALUE,
+            "Requested value is not a supported value for this property.\n\n"
+            f"Property: SampClk.Rate\nRequested Value: {asked}\nMaximum Value: {highest}",
+        )
+    divider = max(floor(tick_rate / asked * (1.0 + _SAME)), ceil(tick_rate / highest * (1.0 - _SAME)), 1)
+    return SampleClock(divider, tick_rate / divider, samples)

@@ -1,0 +1,88 @@
+"""How much later one sensor shows a motion than another that sees the same: delay, sign and scale.
+
+A pure delay turns the phase by an amount proportional to the frequency, so the slope of the phase over frequency is
+the delay, whatever the shape of the motion. What is left of the phase at frequency zero is the sign.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.errors import InvalidInput
+
+_LEAST = 3
+"""Frequencies without which a scatter about the line says nothing."""
+
+
+@dataclass(frozen=True)
+class CommonMotion:
+    """The second signal is `polarity * scale` times the first, `delay` [s] later.
+
+    `uncertainty` is the standard uncertainty of the delay [s], from the scatter of the phases about a line;
+    `scatter` is that scatter [rad]: it is large when the two did not see the same motion.
+    """
+
+    delay: float
+    uncertainty: float
+    polarity: int
+    scale: float
+    scatter: float
+
+
+def complex_amplitudes(
+    signal: NDArray[np.float64], sample_rate: float, omega: NDArray[np.float64]
+) -> NDArray[np.complex128]:
+    """Amplitudes, shape (m,), of the lines `omega` [rad/s] in a signal, shape (n,), by least squares with its mean.
+
+    An amplitude a is the line Re(a exp(i omega t)), t from the first sample. The lines need not fit the length.
+    Raises InvalidInput for a signal too short for them, or with samples that are not finite.
+    """
+    if signal.size <= 2 * omega.size + 1:
+        raise InvalidInput("samples", signal.size, f"more than {2 * omega.size + 1} for {omega.size} lines")
+    if not np.isfinite(signal).all():
+        raise InvalidInput("signal", "not finite", "measure again without lost samples")
+    phase = np.outer(np.arange(signal.size) / sample_rate, omega)
+    lines = np.hstack((np.cos(phase), -np.sin(phase), np.ones((signal.size, 1))))
+    found = np.linalg.lstsq(lines, signal)[0].astype(np.float64)
+    return found[: omega.size] + 1j * found[omega.size : 2 * omega.size]
+
+
+def common_motion(
+    omega: NDArray[np.float64], first: NDArray[np.complex128], second: NDArray[np.complex128]
+) -> CommonMotion:
+    """Compare the complex amplitudes of two signals at `omega` [rad/s], shape (m,) each.
+
+    Frequencies must be so near to one another, and the lowest to zero, that the delay turns the phase by less than
+    half a turn from each to the next. A frequency counts with the square of the first signal's amplitude.
+    Raises InvalidInput for fewer than three frequencies, or where the first signal has none of them.
+    """
+    if omega.size < _LEAST:
+        raise InvalidInput("frequencies", omega.size, f"at least {_LEAST}")
+    if not (np.abs(first) > 0.0).all() or not (np.abs(second) > 0.0).all():
+        raise InvalidInput("amplitude", 0.0, "both signals must move at every frequency")
+    order = np.argsort(omega)
+    omega, first, second = omega[order], first[order], second[order]
+    weight = np.abs(first) ** 2 / np.sum(np.abs(first) ** 2)
+    ratio = second / first
+    fits = [(_through_origin(omega, sign * ratio, weight), sign) for sign in (1, -1)]
+    (delay, variance), polarity = min(fits, key=lambda fit: fit[0][1])
+    moment = float(weight @ omega**2)
+    return CommonMotion(
+        delay=delay,
+        # weights are relative: the scatter gives their scale
+        uncertainty=float(np.sqrt(variance * (weight**2 @ omega**2)) / moment),
+        polarity=polarity,
+        scale=float(abs(np.sum(weight * ratio * np.exp(1j * omega * delay)))),
+        scatter=float(np.sqrt(variance)),
+    )
+
+
+def _through_origin(
+    omega: NDArray[np.float64], ratio: NDArray[np.complex128], weight: NDArray[np.float64]
+) -> tuple[float, float]:
+    """Delay [s] whose phase line through the origin fits best, and the variance of the phases about it [rad2]."""
+    phase = np.unwrap(np.concatenate(([0.0], np.angle(ratio))))[1:]
+    delay = -float(weight @ (omega * phase)) / float(weight @ omega**2)
+    off = phase + omega * delay
+    return delay, float(weight @ off**2) * omega.size / (omega.size - 1)

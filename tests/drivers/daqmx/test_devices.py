@@ -1,0 +1,74 @@
+"""What there is, as the data sheets of the emulated devices say; and a chassis with modules."""
+
+import numpy as np
+
+from drivers.daqmx.devices import FoundDevice, find_devices
+from drivers.daqmx.parameters import AnalogInput, Daq
+from drivers.daqmx.session import DaqSession
+from drivers.emulation.daqmx.models import compact_rio, x_series
+from drivers.emulation.daqmx.server import DaqServer
+from sim.sensors import Converter
+from tests.drivers.daqmx.conftest import LEAD, RATE
+from tests.drivers.daqmx.loopback import BITS, COUNTS_PER_VOLT, RANGE, Loopback
+
+
+def test_a_multifunction_device_is_found() -> None:
+    with DaqServer(Loopback(RATE), [x_series(simulated=True)]) as server:
+        (found,) = find_devices(server.address)
+    widths = (10.0, 5.0, 2.0, 1.0, 0.5, 0.2, 0.1)
+    assert found == FoundDevice(
+        name="Dev1",
+        product="USB-6363",
+        serial="01C0FFEE",
+        simulated=True,
+        inputs=tuple(f"Dev1/ai{k}" for k in range(32)),
+        outputs=tuple(f"Dev1/ao{k}" for k in range(4)),
+        lines=tuple(f"Dev1/port0/line{k}" for k in range(32)),
+        input_ranges=tuple((-width, width) for width in widths),
+        output_ranges=((-10.0, 10.0), (-5.0, 5.0)),
+        input_rate=2.0e6,
+        total_input_rate=1.0e6,
+        simultaneous=False,
+        output_rate=2.86e6,
+    )
+    assert found.identity == "USB-6363, serial number 01C0FFEE, simulated"
+
+
+def test_a_chassis_and_its_modules_are_found() -> None:
+    with DaqServer(Loopback(RATE), compact_rio()) as server:
+        found = {device.name: device for device in find_devices(server.address)}
+    assert list(found) == ["cRIO1", "cRIO1Mod1", "cRIO1Mod2", "cRIO1Mod3", "cRIO1Mod4"]
+    assert found["cRIO1"].input_rate is None
+    assert found["cRIO1"].output_rate is None
+    assert found["cRIO1Mod1"].simultaneous
+    assert found["cRIO1Mod3"].outputs == tuple(f"cRIO1Mod3/ao{k}" for k in range(4))
+
+
+def test_inputs_that_share_a_converter_share_its_rate() -> None:
+    with DaqServer(Loopback(RATE), [x_series(), *compact_rio()]) as server:
+        found = {device.name: device for device in find_devices(server.address)}
+    assert found["Dev1"].highest_input_rate(1) == 1.0e6
+    assert found["Dev1"].highest_input_rate(4) == 2.5e5
+    assert found["cRIO1Mod1"].highest_input_rate(4) == 5.0e4
+    assert found["cRIO1"].highest_input_rate(1) is None
+
+
+def test_a_controller_with_24_bits_reads_what_it_plays() -> None:
+    plant = Loopback(RATE, 8)
+    inputs = [AnalogInput(terminal=name, wiring="differential") for name in ("cRIO1Mod1/ai0", "cRIO1Mod2/ai3")]
+    volts = np.random.default_rng(3).uniform(-9.0, 9.0, LEAD + 200)
+    with DaqServer(plant, compact_rio(), converter=Converter(bits=BITS, range=RANGE)) as server:
+        daq = Daq(server=server.address, output="cRIO1Mod3/ao0", enable_line="cRIO1Mod4/port0/line0")
+        with DaqSession(daq, inputs, RATE, LEAD) as session:
+            assert session.dtype is np.int32
+            assert session.description["start trigger"] == "/cRIO1/te0/StartTrigger"
+            session.prepare()
+            session.write(volts)
+            session.start()
+            counts = session.read(200)
+    assert counts.dtype == np.int32
+    scaling = session.scalings[0]
+    assert (scaling.lowest, scaling.highest, scaling.bits) == (-(2**23) + 1, 2**23 - 2, 32)
+    # terminals 0 and 7 of the plant, which shows 16 bits with 10 counts more at each
+    expected = (np.round(COUNTS_PER_VOLT * volts[:200])[:, np.newaxis] + [0, 70]) / COUNTS_PER_VOLT
+    np.testing.assert_allclose(counts * scaling.coefficients[1], expected, atol=scaling.coefficients[1])

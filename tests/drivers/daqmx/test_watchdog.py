@@ -1,0 +1,92 @@
+"""A program that no longer says that all is well loses the enable relay."""
+
+import numpy as np
+import pytest
+
+from drivers.daqmx.session import DaqSession
+from drivers.emulation.daqmx.server import DaqServer
+from drivers.errors import ConnectionLost, RigError
+from sim.errors import InvalidInput
+from tests.drivers.daqmx.conftest import RATE, OpenSession, eventually
+from tests.drivers.daqmx.loopback import Loopback
+from tests.drivers.daqmx.runs import BLOCK, driving, is_safe
+
+TIMEOUT = 1.0
+
+
+@pytest.fixture
+def session(open_session: OpenSession) -> DaqSession:
+    return open_session(watchdog=TIMEOUT)
+
+
+def test_a_run_keeps_the_watchdog_quiet(session: DaqSession, plant: Loopback) -> None:
+    driving(session)
+    # one and a half time-outs
+    for _ in range(30):
+        session.write(np.full(BLOCK, 3.0))
+        session.read(BLOCK)
+        assert plant.enabled
+    session.stop()
+    eventually(lambda: is_safe(plant))
+
+
+def test_a_program_that_hangs_loses_the_relay(session: DaqSession, plant: Loopback) -> None:
+    driving(session)
+    eventually(lambda: not plant.enabled)
+    with pytest.raises(RigError) as caught:
+        session.write(np.zeros(BLOCK))
+    assert caught.value.code == -200644
+    eventually(lambda: is_safe(plant))
+    # nothing is resumed by itself; the next run is
+    session.stop()
+    driving(session)
+    assert plant.enabled
+    session.stop()
+    eventually(lambda: is_safe(plant))
+
+
+def test_a_relay_that_the_watchdog_has_opened_counts_as_cut(session: DaqSession, plant: Loopback) -> None:
+    driving(session)
+    eventually(lambda: not plant.enabled)
+    assert session.cut() is True
+
+
+def test_a_cut_ends_the_telling(session: DaqSession, server: DaqServer, plant: Loopback) -> None:
+    driving(session)
+    assert session.cut() is True
+    # it would fail if it were told
+    server.fail_next("ControlWatchdogTask", -200077)
+    begin = plant.tick()
+    while plant.tick() < begin + 1.5 * TIMEOUT * RATE:
+        session.write(np.zeros(BLOCK))
+        session.read(BLOCK)
+    assert not plant.enabled
+
+
+def test_a_device_that_is_gone_is_let_go(open_session: OpenSession, server: DaqServer) -> None:
+    session = driving(open_session(watchdog=5.0))
+    server.vanish()
+    with pytest.raises(ConnectionLost):
+        session.read(BLOCK)
+    with pytest.raises(ConnectionLost):
+        session.close()
+
+
+@pytest.mark.parametrize("call", ["CfgWatchdogDOExpirStates", "CreateDOChan"])
+def test_a_session_that_fails_to_open_leaves_no_watchdog(
+    server: DaqServer, open_session: OpenSession, call: str
+) -> None:
+    server.fail_next(call, -200077)
+    with pytest.raises(RigError):
+        open_session(watchdog=TIMEOUT)
+    assert open_session(watchdog=TIMEOUT).description["tasks left by another client"] == "none"
+
+
+@pytest.mark.parametrize("code", [-200662, -200668])
+def test_a_watchdog_that_the_device_refuses_is_refused_by_name(
+    server: DaqServer, open_session: OpenSession, code: int
+) -> None:
+    server.fail_next("CreateWatchdogTimerTaskEx", code)
+    with pytest.raises(InvalidInput) as caught:
+        open_session(watchdog=TIMEOUT)
+    assert caught.value.item == "hardware.daq.watchdog"

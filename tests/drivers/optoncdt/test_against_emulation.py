@@ -1,0 +1,78 @@
+"""Driver and emulated sensor, each written from the manual alone, on one line in real time."""
+
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from drivers.emulation.optoncdt.laser import EmulatedLaser
+from drivers.emulation.optoncdt.settings import Settings
+from drivers.errors import ConnectionLost
+from drivers.optoncdt.faults import LASER_OFF, OTHER, marked
+from drivers.optoncdt.find import find_lasers
+from drivers.optoncdt.sensor import SerialLaser
+from drivers.optoncdt.stream import Readings
+from sim.sensors import Laser
+from tests.drivers.optoncdt.peer import DEADLINE, no_thread_left
+from tests.drivers.optoncdt.script import joined
+
+PLACE = 0.030
+"""Where the target stands, from mid range [m]."""
+FOUND = Settings(output="RS422", rate=2000.0, average=8, hold=100.0, echo=True, baud=460_800)
+"""As somebody else has left it."""
+
+
+class Still:
+    def displacement(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.full(times.size, PLACE)
+
+
+@pytest.fixture
+def emulated() -> Iterator[EmulatedLaser]:
+    laser = Laser(measuring_range=0.2, noise=0.0, linearity=0.0, clock_error=0.0)
+    with no_thread_left():
+        sensor = EmulatedLaser(Still(), laser, as_found=FOUND, boot_time=0.0)
+        sensor.start()
+        yield sensor
+        sensor.close()
+
+
+def taken_until(laser: SerialLaser, enough: Callable[[NDArray[np.int32]], bool]) -> Readings:
+    """Everything that comes until there is enough, judged by the words."""
+    taken = [laser.take()]
+    deadline = time.monotonic() + DEADLINE
+    while not enough(np.concatenate([one.code for one in taken])):
+        assert time.monotonic() < deadline
+        laser.wait(0.1)
+        taken.append(laser.take())
+    return joined(taken)
+
+
+def test_a_sensor_is_found_as_it_is_and_read(emulated: EmulatedLaser) -> None:
+    (found,) = find_lasers([emulated.port])
+    assert found.problem is None
+    assert found.baud == 460_800
+    assert emulated.settings == FOUND
+    with SerialLaser("laser_1", emulated.port, baud=None, rate=1000.0, measuring_range=0.2) as laser:
+        laser.start()
+        got = taken_until(laser, lambda codes: codes.size > 100)
+        np.testing.assert_allclose(marked(got.code) * (1.02 * 0.2 / 65520), PLACE, atol=2e-6)
+        assert (np.diff(got.index) == 1).all()
+        np.testing.assert_allclose(np.diff(got.time), 1e-3, atol=1.1e-5)
+        # no value arrives before it was taken
+        assert (got.arrival > emulated.epoch + got.time).all()
+        assert laser.lost == laser.resyncs == 0
+
+        laser.laser(False)
+        taken_until(laser, lambda codes: LASER_OFF in marked(codes))
+        laser.laser(True)
+        taken_until(laser, lambda codes: codes.size > 0 and marked(codes[-1:])[0] > OTHER)
+
+        emulated.lose_bytes(40)
+        taken_until(laser, lambda _: laser.lost > 0)
+        emulated.unplug()
+        with pytest.raises(ConnectionLost):
+            taken_until(laser, lambda _: False)
+    assert not emulated.settings.echo

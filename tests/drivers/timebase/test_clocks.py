@@ -1,0 +1,81 @@
+import numpy as np
+import pytest
+
+from drivers.timebase.sample_clock import SampleClock
+from drivers.timebase.sensor_clock import SensorClock
+from tests.drivers.timebase.made_clocks import FLOOR, SWITCHED_ON, Daq, stream
+
+
+def sensor_error(clock: SensorClock, time: float, taken: float) -> float:
+    return clock.offset + clock.rate * time - taken - FLOOR
+
+
+@pytest.mark.parametrize("error", [30e-6, -50e-6])
+def test_a_sensor_is_found_from_values_that_come_late(error: float) -> None:
+    sent, clock = stream(1, 60.0, error), SensorClock()
+    for second in range(60):
+        now = sent.between(SWITCHED_ON + second, SWITCHED_ON + second + 1.0)
+        clock.add(sent.time[now], sent.arrival[now])
+        if second >= 10:
+            last = now.stop - 1
+            assert abs(sensor_error(clock, sent.time[last], sent.taken[last])) < 50e-6
+    assert clock.rate == pytest.approx(1.0 + error, abs=2e-6)
+    assert 0.0 < clock.residual < 1e-3
+
+
+def test_arrivals_without_delay_give_the_clock_exactly() -> None:
+    time = np.arange(20_000) / 1000.0
+    clock = SensorClock()
+    clock.add(time, 7000.0 + 1.00002 * time)
+    assert clock.rate == pytest.approx(1.00002, abs=1e-9)
+    assert clock.offset == pytest.approx(7000.0, abs=1e-6)
+
+
+def test_a_change_of_rate_is_followed() -> None:
+    """From 15 ppm slow to 15 ppm fast: a line through both would be off by 450 us."""
+    sent, clock = stream(2, 150.0, 15e-6, turn=75.0), SensorClock()
+    errors: list[float] = []
+    for second in range(150):
+        now = sent.between(SWITCHED_ON + second, SWITCHED_ON + second + 1.0)
+        clock.add(sent.time[now], sent.arrival[now])
+        errors.append(sensor_error(clock, sent.time[now.stop - 1], sent.taken[now.stop - 1]))
+    assert np.abs(errors[10:75]).max() < 50e-6
+    assert np.abs(errors[75:]).max() < 250e-6
+    assert np.abs(errors[130:]).max() < 50e-6
+
+
+def test_a_sensor_that_was_never_heard_has_no_clock() -> None:
+    clock = SensorClock()
+    clock.add(np.zeros(0), np.zeros(0))
+    assert np.isnan([clock.offset, clock.rate, clock.residual]).all()
+    assert clock.history == 0.0
+
+
+@pytest.mark.parametrize("error", [30e-6, -50e-6])
+def test_the_sample_clock_is_found_between_its_bounds(error: float) -> None:
+    daq, clock = Daq(3, 4000.0, error), SampleClock(2000.0)
+    for _ in range(20):
+        clock.observe(*daq.look())
+    for block in range(1, 600):
+        daq.wait_for(200 * block - 1)
+        for _ in range(3):
+            clock.observe(*daq.look())
+        found = clock.seconds(daq.moment(np.array([200.0 * block])))[0]
+        assert abs(found - block / 10.0) < (50e-6 if block > 100 else 400e-6)
+    assert clock.rate == pytest.approx(1.0 + error, abs=2e-6)
+    assert 0.0 < clock.residual < 1e-3
+
+
+def test_one_look_places_the_sample_clock_between_its_bounds() -> None:
+    """Sample 9 had been taken by 100.002, sample 10 not before 100.0: sample 9.5 is at 100.001."""
+    clock = SampleClock(1000.0)
+    clock.observe(100.0, 10, 100.002)
+    assert clock.seconds(np.array([100.001]))[0] == pytest.approx(9.5e-3, abs=1e-9)
+    assert clock.rate == pytest.approx(1.0, abs=1e-4)
+
+
+def test_a_sample_clock_that_nobody_saw_is_not_known() -> None:
+    clock = SampleClock(1000.0)
+    clock.observe(0.0, 0, 0.1)
+    assert np.isnan(clock.seconds(np.array([1.0]))).all()
+    assert np.isnan([clock.rate, clock.residual]).all()

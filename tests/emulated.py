@@ -1,0 +1,35 @@
+"""An emulated laboratory in a process of its own, as an operator starts it."""
+
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from bench.config.model import BenchConfiguration
+from bench.config.toml import read_configuration
+
+_PATIENCE = 60.0
+"""Longest wait for its configuration [s]: its bench may have to be compiled first."""
+
+
+@contextmanager
+def emulated(*arguments: str) -> Iterator[BenchConfiguration]:
+    """`rockbench emulate` with these arguments, and the configuration that it hands out."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "emulated.toml"
+        command = [sys.executable, "-m", "bench", "emulate", "--write", str(file), *arguments]
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        try:
+            deadline = time.monotonic() + _PATIENCE
+            while not file.exists() or not file.stat().st_size:
+                if process.poll() is not None or time.monotonic() > deadline:
+                    raise RuntimeError(f"no emulated laboratory: its process says {process.poll()}")
+                time.sleep(0.05)
+            yield read_configuration(file)
+        finally:
+            process.send_signal(signal.SIGINT)
+            process.wait(_PATIENCE)

@@ -1,0 +1,164 @@
+"""`rockbench check` from end to end: the simulated bench passes, and what is wrong is named."""
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import bench.session
+from bench.cli.main import main
+from bench.config.model import BenchConfiguration
+from bench.record.reader import open_record
+from bench.rigs import open_rig
+from drivers.rig import Channel, Rig
+
+Check = Callable[..., tuple[int, list[dict[str, Any]]]]
+
+
+@pytest.fixture
+def check(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Check:
+    """Runs a check on a configuration and returns its exit code and lines."""
+
+    def run(configuration: str = "", *flags: str) -> tuple[int, list[dict[str, Any]]]:
+        file = tmp_path / "bench.toml"
+        file.write_text(configuration, encoding="utf-8")
+        code = main(["check", "--config", str(file), "--out", str(tmp_path / "out"), "--json", *flags])
+        return code, json.loads(capsys.readouterr().out)["points"]
+
+    return run
+
+
+def failures(lines: list[dict[str, Any]]) -> list[tuple[str, str]]:
+    return [(line["subject"], line["what"]) for line in lines if line["verdict"] == "failed"]
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_the_simulated_bench_passes_every_line(check: Check, seed: int, tmp_path: Path) -> None:
+    code, lines = check("", "--seed", str(seed))
+    assert failures(lines) == []
+    assert code == 0
+    assert {line["verdict"] for line in lines} == {"passed"}
+    delays = {line["subject"]: line["measured"] for line in lines if line["what"] == "delay against table_displacement"}
+    # two measurements at 4 kHz, and half of one until it is replaced; the filter is the same in every channel
+    assert delays == {name: pytest.approx(2.5 / 4000.0, abs=1.5e-4) for name in ("laser_1", "laser_2")}
+    with open_record(tmp_path / "out" / "campaign.h5") as record:
+        assert [point["verdict"] for point in record.points] == [line["verdict"] for line in lines]
+        done = [event.text for event in record.events if event.kind == "OperatorAnswered"]
+    assert "clamp" in done[0]
+    assert "clamps off" in done[-1]
+
+
+@pytest.mark.parametrize(
+    ("configuration", "line"),
+    [
+        (
+            "[simulation.bench.accelerometer]\nscale_error = 0.06\n",
+            ("table_acceleration", "scale against table_displacement"),
+        ),
+        (
+            "[simulation.bench.displacement_sensor]\nscale_error = -0.06\n",
+            ("table_displacement", "scale against table_acceleration"),
+        ),
+        ("[simulation.bench.laser_1]\nlatency = 4\n", ("laser_1", "delay against table_displacement")),
+        # a storey out of range: all but a few measurements are none
+        ("[simulation.bench.laser_2]\nnoise = 20.0\n", ("laser_2", "valid samples at rest")),
+        ("[simulation.bench.displacement_sensor]\nnoise_density = 5e-5\n", ("table_displacement", "noise at rest")),
+    ],
+)
+def test_what_is_wrong_fails_on_exactly_its_line(check: Check, configuration: str, line: tuple[str, str]) -> None:
+    code, lines = check(configuration)
+    assert failures(lines) == [line]
+    assert code == 1
+
+
+def test_a_laser_of_another_scale_fails_for_itself_and_for_the_difference(check: Check) -> None:
+    code, lines = check("[simulation.bench.laser_1]\nscale_error = 0.06\n")
+    assert failures(lines) == [
+        ("laser_1", "scale against table_displacement"),
+        ("lasers", "scale of laser_2 against laser_1"),
+    ]
+    assert code == 1
+
+
+@pytest.mark.parametrize("name", ["table_acceleration", "laser_1", "laser_2"])
+def test_a_reversed_sensor_fails_on_its_polarity(check: Check, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    monkeypatch.setattr(bench.session, "open_rig", _reversing(name))
+    code, lines = check()
+    assert failures(lines) == [(name, "polarity against table_displacement")]
+    assert code == 1
+
+
+def _reversing(name: str) -> Callable[..., Rig]:
+    """Opens the simulated bench with the sign of one calibration turned round."""
+
+    def turned(channel: Channel) -> Channel:
+        return replace(channel, scale=-channel.scale, offset=-channel.offset) if channel.name == name else channel
+
+    def opened(configuration: BenchConfiguration, *, realtime: bool) -> Rig:
+        rig = open_rig(configuration, realtime=realtime)
+        channels = tuple(turned(channel) for channel in rig.channels)
+        wired = type("Rewired", (type(rig),), {"channels": property(lambda _self: channels)})
+        rig.__class__ = wired
+        return rig
+
+    return opened
+
+
+def test_a_table_that_does_not_answer_is_a_line_and_the_clamps_come_off(check: Check, tmp_path: Path) -> None:
+    code, lines = check("[simulation.bench.shaker]\ngain = 1e-9\n")
+    assert failures(lines) == [("bench", "motion")]
+    assert code == 1
+    with open_record(tmp_path / "out" / "campaign.h5") as record:
+        assert record.status == "completed"
+        asked = [event.text for event in record.events if event.kind == "OperatorAsked"]
+    assert asked[-1] == "Take the clamps off the storeys."
+
+
+def test_lasers_on_the_table_are_not_tested_for_delay(check: Check) -> None:
+    on_table = "".join(f'[simulation.bench.laser_{k}]\nreference = "table"\n' for k in (1, 2))
+    code, lines = check(on_table)
+    assert failures(lines) == []
+    assert [line["subject"] for line in lines if line["verdict"] == "untested"] == ["lasers"]
+    assert code == 0
+
+
+@pytest.mark.parametrize(
+    ("configuration", "flags", "words"),
+    [
+        ("[limits]\nvelocity = 0.05\n", (), ("velocity = 0.06", "limits.velocity = 0.05")),
+        ("", ("--omega", "0.5", "8", "12", "18"), ("omega = 0.5", "120.0 mm", "60.0 mm")),
+        ("[limits]\nacceleration = 2.0\n", (), ("omega = 40", "2.4 m/s2")),
+        ("", ("--omega", "8", "8", "12", "18"), ("once",)),
+    ],
+)
+def test_motions_beyond_the_bench_are_refused(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    configuration: str,
+    flags: tuple[str, ...],
+    words: tuple[str, ...],
+) -> None:
+    file = tmp_path / "bench.toml"
+    file.write_text(configuration, encoding="utf-8")
+    assert main(["check", "--config", str(file), "--out", str(tmp_path / "out"), *flags]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    for word in words:
+        assert word in said
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_text_names_the_remedy_below_a_failed_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "bench.toml"
+    file.write_text("[simulation.bench.laser_2]\nnoise = 20.0\n", encoding="utf-8")
+    assert main(["check", "--config", str(file), "--out", str(tmp_path / "out")]) == 1
+    captured = capsys.readouterr()
+    lines = captured.out.splitlines()
+    at = next(number for number, line in enumerate(lines) if line.startswith("FAILED"))
+    assert "laser_2" in lines[at]
+    assert "-> beyond its" in lines[at + 1]
+    assert "6 passed, 1 failed, 1 untested." in captured.out
+    assert "FAILED: laser_2, valid samples at rest" in captured.err

@@ -1,0 +1,172 @@
+"""The lines of the check from made-up signals whose truth is known."""
+
+import numpy as np
+import pytest
+
+from bench.analysis.gain import SensorAccuracy
+from bench.config.model import BenchConfiguration
+from bench.engine.steps import Heard
+from drivers.hardware.parameters import Hardware, Lasers
+from drivers.rig import Channel
+from protocols.check.delays import allowed_delay, delay_lines
+from protocols.check.drive import dead_time, drive_lines
+from protocols.check.line import CheckLine, Verdict
+from protocols.check.parameters import CheckParameters
+from protocols.check.resting import resting_lines
+from protocols.check.scales import scale_lines, signed_scale
+from protocols.check.sines import Sines
+from sim.specimen import Frame, Specimen
+
+OMEGA = np.array([8.0, 12.0, 18.0, 27.0, 40.0])
+PARAMETERS = CheckParameters()
+SERIAL = BenchConfiguration(backend="hardware", hardware=Hardware(lasers=Lasers(delay=0.002)))
+
+
+def late(amplitudes: np.ndarray, delay: float) -> np.ndarray:
+    """The complex amplitudes of the same signal `delay` later: Re(c exp(-i omega (t - d)))."""
+    return amplitudes * np.exp(1j * OMEGA * delay)
+
+
+def sines(**changed: np.ndarray) -> Sines:
+    """Four sensors that agree about 60 mm/s, with some signals changed."""
+    x = (0.06 / OMEGA) * np.exp(0.7j)
+    signals = {"drive": x, "acceleration": -(OMEGA**2) * x, "displacement": x, "laser_1": x, "laser_2": x}
+    return Sines(omega=OMEGA, **(signals | changed))
+
+
+def failures(lines: list[CheckLine]) -> list[tuple[str, str]]:
+    return [(line.subject, line.what) for line in lines if line.verdict is Verdict.FAILED]
+
+
+def scales(made: Sines) -> list[CheckLine]:
+    return list(scale_lines(made, PARAMETERS, lasers=True))
+
+
+def test_sensors_that_agree_pass() -> None:
+    assert failures(scales(sines())) == []
+    assert len(scales(sines())) == 7
+
+
+@pytest.mark.parametrize(
+    ("signal", "subject", "reference"),
+    [
+        ("acceleration", "table_acceleration", "table_displacement"),
+        ("displacement", "table_displacement", "table_acceleration"),
+        ("laser_1", "laser_1", "table_displacement"),
+        ("laser_2", "laser_2", "table_displacement"),
+    ],
+)
+def test_the_sensor_that_contradicts_the_others_is_named(signal: str, subject: str, reference: str) -> None:
+    true = getattr(sines(), signal)
+    assert failures(scales(sines(**{signal: -true}))) == [(subject, f"polarity against {reference}")]
+    off = failures(scales(sines(**{signal: 1.03 * true})))
+    assert off[0] == (subject, f"scale against {reference}")
+    assert set(off[1:]) <= {("lasers", "scale of laser_2 against laser_1")}
+
+
+def test_a_clamp_that_gives_way_changes_no_scale() -> None:
+    """Ahead of its resonance at omega_c a storey moves by 1 / (1 - (omega / omega_c)^2) times the table."""
+    given = sines().displacement / (1.0 - (OMEGA / 200.0) ** 2)
+    scale, uncertainty = signed_scale(OMEGA, given, sines().displacement)
+    assert scale == pytest.approx(1.0, abs=1e-3)
+    assert uncertainty < 1e-3
+
+
+def test_without_lasers_only_the_table_is_compared() -> None:
+    lines = list(scale_lines(sines(laser_1=np.zeros(5) + 0j), PARAMETERS, lasers=False))
+    assert {line.subject for line in lines} == {"table_acceleration"}
+
+
+def test_a_delay_is_measured_and_the_setting_takes_it_away() -> None:
+    x = sines().displacement
+    lines = list(delay_lines(sines(laser_1=late(x, 0.003), laser_2=late(x, 0.0028)), PARAMETERS, SERIAL))
+    first, second, difference, setting = lines
+    assert (first.measured, second.measured) == (pytest.approx(0.003, abs=1e-9), pytest.approx(0.0028, abs=1e-9))
+    assert difference.measured == pytest.approx(-0.0002, abs=1e-9)
+    assert failures(lines) == [(f"laser_{k}", "delay against table_displacement") for k in (1, 2)]
+    assert setting.verdict is Verdict.STATED
+    # 2 ms are configured; the lasers are still 2.9 ms late, so they must be placed 2.9 ms earlier
+    assert setting.measured == pytest.approx(0.002 - 0.0029, abs=1e-9)
+
+
+def test_where_no_delay_can_be_set_none_is_stated() -> None:
+    lines = list(delay_lines(sines(), PARAMETERS, BenchConfiguration()))
+    assert [line.verdict for line in lines] == 3 * [Verdict.PASSED]
+
+
+def test_lasers_that_differ_in_delay_fail_on_their_difference() -> None:
+    x = sines().displacement
+    lines = list(
+        delay_lines(sines(laser_1=late(x, -3.5e-4), laser_2=late(x, 3.5e-4)), PARAMETERS, BenchConfiguration())
+    )
+    assert failures(lines) == [("lasers", "delay of laser_2 against laser_1")]
+
+
+def test_the_allowed_delay_of_a_single_mass_is_its_closed_form() -> None:
+    """A second storey tied rigidly to the first: u1 = x r^2 / (1 - r^2), so |u1 + x| / |u1| = 1 / r^2."""
+    frame = Frame(k2=1e9, xi1=0.0, xi2=0.0)
+    ratio = 20.0**2 * (frame.m1 + frame.m2) / frame.k1
+    assert allowed_delay(Specimen(frame=frame), 20.0, 0.01) == pytest.approx(0.01 * ratio / 20.0, rel=1e-5)
+
+
+@pytest.mark.parametrize("time", [-0.003, 0.0, 0.0046, 0.018])
+def test_the_dead_time_is_told_from_mass_dashpot_and_spring(time: float) -> None:
+    """exp(+i omega t) convention: a / drive = G s^2 / (m s^2 + c s + k) exp(-s T)."""
+    s = 1j * OMEGA
+    response = 187.5 * s**2 / (52.0 * s**2 + 3155.0 * s + 500.0) * np.exp(-s * time)
+    drive = np.ones(5) + 0j
+    # a cycle's amplitudes belong to exp(-i omega t)
+    assert dead_time(OMEGA, drive, np.conj(response), 0.02) == pytest.approx(time, abs=1.5e-5)
+
+
+def test_inputs_ahead_of_the_drive_fail() -> None:
+    early = sines(drive=late(sines().acceleration, 0.004))
+    lines = list(drive_lines(early, PARAMETERS, SERIAL))
+    assert failures(lines) == [("drive", "dead time to table_acceleration")]
+    assert [line.verdict for line in lines[1:]] == 5 * [Verdict.STATED]
+
+
+CHANNELS = (
+    Channel("table_displacement", "displacement", "m", 1e-5, 0.0, (-8000, 8000), "made up"),
+    Channel("laser_1", "displacement", "m", 1e-5, 0.0, (-8000, 8000), "made up", faults={8191: "no target"}),
+    Channel("coil_current", "current", "A", 1e-3, 0.0, (-8000, 8000), "made up"),
+)
+
+
+def rest(**columns: np.ndarray) -> list[CheckLine]:
+    noise = np.random.default_rng(5).integers(-2, 3, 1000)
+    counts = np.column_stack([columns.get(channel.name, noise) for channel in CHANNELS]).astype(np.int16)
+    return list(resting_lines(Heard(CHANNELS, counts, None), PARAMETERS, SensorAccuracy()))
+
+
+def test_quiet_living_channels_pass_and_others_are_stated() -> None:
+    lines = rest()
+    assert failures(lines) == []
+    assert [(line.subject, line.what) for line in lines if line.verdict is Verdict.STATED] == [
+        ("coil_current", "noise at rest")
+    ]
+    # uniform on -2 .. 2: a standard deviation of the square root of 2
+    assert lines[1].measured == pytest.approx(np.sqrt(2.0) * 1e-5, rel=0.1)
+
+
+def test_a_fault_is_said_in_the_sensors_words() -> None:
+    lines = rest(laser_1=np.full(1000, 8191))
+    assert failures(lines) == [("laser_1", "valid samples at rest")]
+    assert "no target" in next(line.remedy for line in lines if line.verdict is Verdict.FAILED)
+
+
+@pytest.mark.parametrize(("count", "end"), [(-8192, "lower"), (8191, "upper")])
+def test_a_channel_at_its_rail_fails(count: int, end: str) -> None:
+    lines = rest(table_displacement=np.full(1000, count))
+    assert failures(lines) == [("table_displacement", "valid samples at rest")]
+    assert f"beyond its {end} end" in next(line.remedy for line in lines if line.remedy)
+
+
+@pytest.mark.parametrize("name", ["table_displacement", "coil_current"])
+def test_a_channel_that_never_changes_fails(name: str) -> None:
+    assert failures(rest(**{name: np.full(1000, 17)})) == [(name, "noise at rest")]
+
+
+def test_a_loud_channel_fails() -> None:
+    loud = np.random.default_rng(1).integers(-40, 41, 1000)
+    assert failures(rest(table_displacement=loud)) == [("table_displacement", "noise at rest")]
