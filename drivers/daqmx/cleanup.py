@@ -5,6 +5,7 @@ be closed, and nobody else gets the device.
 """
 
 from collections.abc import Iterable
+from contextlib import ExitStack
 
 from nidaqmx.errors import DaqError, RpcError
 
@@ -36,14 +37,22 @@ def clear_stale(connection: Connection, devices: Iterable[str]) -> tuple[str, ..
         found = {name: task for name in _NAMES if (task := _attached(connection, name)) is not None}
         if output.NAME in found and _is_written(found[output.NAME]):
             raise DeviceNotFound(f"another client is driving the shaker through {connection.server}: end its run first")
-        for task in found.values():
-            task.close()
-        if found:
-            known = {device.name.lower(): device for device in library.system(connection.options()).devices}
-            for name in {name.lower() for name in devices}:
-                if name in known:
-                    known[name].reset_device()
+        with ExitStack() as ending:
+            # each is tried, whatever becomes of the others; the reset comes last
+            if found:
+                ending.callback(_reset, connection, devices)
+            for task in found.values():
+                ending.callback(task.close)
     return tuple(found)
+
+
+def _reset(connection: Connection, names: Iterable[str]) -> None:
+    """Reset the devices of these names, as far as they exist."""
+    wanted = {name.lower() for name in names}
+    with ExitStack() as resets:
+        for device in library.system(connection.options()).devices:
+            if device.name.lower() in wanted:
+                resets.callback(device.reset_device)
 
 
 def _attached(connection: Connection, name: str) -> library.Task | None:

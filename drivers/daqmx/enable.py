@@ -6,6 +6,7 @@ from nidaqmx.errors import DaqError, Error
 from drivers.daqmx import library
 from drivers.daqmx.connection import Connection
 from drivers.daqmx.errors import code_of, translated
+from drivers.errors import RigError
 
 NAME = "rockbench_enable"
 
@@ -47,16 +48,24 @@ class EnableLine:
 
     def open(self) -> None:
         """Open the relay, and let go of the line, which keeps its state."""
-        with translated("opening the enable relay"):
-            try:
-                self._writer.write_one_sample_one_line(False, _TIME)
-            except DaqError as error:
-                # the watchdog has opened it already and lets nobody write
-                if code_of(error) != _BARKED:
-                    raise
+        try:
+            with translated("opening the enable relay"):
+                self._write_open()
+        except RigError as error:
+            error.args = (f"{error}; the relay may be closed: press the emergency stop",)
+            raise
+        with translated("letting go of the enable relay, which is open,"):
             self._task.stop()
 
     def close(self) -> None:
         """Clear the task."""
         with translated("clearing the task of the enable line"):
             self._task.close()
+
+    def _write_open(self) -> None:
+        try:
+            self._writer.write_one_sample_one_line(False, _TIME)
+        except DaqError as error:
+            # the watchdog has opened it already and lets nobody write
+            if code_of(error) != _BARKED:
+                raise

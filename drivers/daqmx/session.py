@@ -2,7 +2,7 @@
 
 import threading
 from collections.abc import Generator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from enum import Enum
 from typing import Self
 
@@ -38,8 +38,8 @@ class DaqSession:
     fails in between opens the relay and puts the output to zero before it is raised. One thread at a time may run
     it; `cut`, `stop` and `close` may come from any other.
 
-    Raises InvalidInput for what the device cannot do, before any task is made, and for a sample rate that it would
-    not make exactly; DeviceNotFound when driver, server or device are not there or another program holds them.
+    The bench is safe before anything is checked. Raises InvalidInput for what the device cannot do, and for a sample
+    rate that it would not make exactly; DeviceNotFound when driver, server or device are not there or another program holds them.
     """
 
     def __init__(self, daq: Daq, inputs: Sequence[AnalogInput], sample_rate: float, lead: int) -> None:
@@ -53,14 +53,11 @@ class DaqSession:
             # whatever is wrong with the rest: an earlier program may have died with the shaker enabled
             terminals = (daq.output, daq.enable_line or daq.output, *(given.terminal for given in inputs))
             stale = clear_stale(self._connection, [device_name(terminal) for terminal in terminals])
-            try:
-                with translated("asking the driver for its devices"):
-                    system = library.system(self._connection.options())
-                    used = checked_devices(system, daq, inputs, sample_rate, lead)
-                    version = system.driver_version
-            except BaseException:
-                _make_safe(self._connection, daq)
-                raise
+            _make_safe(self._connection, daq)
+            with translated("asking the driver for its devices"):
+                system = library.system(self._connection.options())
+                used = checked_devices(system, daq, inputs, sample_rate, lead)
+                version = system.driver_version
             self._tasks = Tasks(self._connection, daq, inputs, sample_rate, lead)
         except BaseException:
             self._connection.close()
@@ -116,6 +113,8 @@ class DaqSession:
                 raise ConnectionLost("prepare is refused: the device had to be reset; open a new session")
             if not self._tasks.inputs.are_ours():
                 raise ConnectionLost("prepare is refused: another client has taken the device; open a new session")
+            # what a stop could not bring to rest comes first
+            self._rest()
             self._state, self._at_rest, self._cut = _State.PREPARED, False, False
             with self._resting_on_failure():
                 self._prepare()
@@ -193,11 +192,10 @@ class DaqSession:
             if self._state is _State.CLOSED:
                 return
             self._state = _State.CLOSED
-            try:
+            with ExitStack() as ending:
+                ending.callback(self._connection.close)
+                ending.callback(self._tasks.clear)
                 self._rest()
-            finally:
-                self._tasks.clear()
-                self._connection.close()
 
     def __enter__(self) -> Self:
         return self
@@ -239,7 +237,7 @@ class DaqSession:
                 try:
                     self._rest()
                 except RigError as second:
-                    error.add_note(f"{second}; the relay may be closed: press the emergency stop")
+                    error.add_note(str(second))
                 except BaseException as second:
                     error.add_note(str(second))
                     raise second from error
@@ -252,7 +250,10 @@ class DaqSession:
 
 
 def _make_safe(connection: Connection, daq: Daq) -> None:
-    """Open the relay and put the output to 0 V, as far as their names are right and the device obeys."""
+    """Open the relay and put the output to 0 V, as far as their names are right and the device obeys.
+
+    What it refuses here it refuses again, by name, when the tasks are made.
+    """
     with suppress(RigError):
         if daq.enable_line is not None:
             EnableLine(connection, daq.enable_line).close()

@@ -75,7 +75,9 @@ class Tasks:
             self.was_reset = True
             failures.append(RigError("the output was held by its task: the device was reset; open a new session"))
         attempt(self.inputs.stop)
-        if self.watchdog is not None:
+        # a watchdog is let go only when all is at rest: one that is told no more opens the relay itself, and one that
+        # has barked holds it open
+        if self.watchdog is not None and not failures:
             attempt(self.watchdog.stop)
             if self.relay is not None:
                 # a line that the watchdog held may go back to what was written last
@@ -85,12 +87,11 @@ class Tasks:
 
     def clear(self) -> None:
         """Give everything back to the driver, as far as it still answers and nobody else has it; once."""
-        with suppress(RigError):
+        with self._made, suppress(RigError):
             if not self.inputs.are_ours():
                 self._made.pop_all()
                 if self.watchdog is not None:
                     self.watchdog.let_go()
-        self._made.close()
 
 
 def _quietly(step: Callable[[], None]) -> None:

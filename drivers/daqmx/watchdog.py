@@ -12,6 +12,7 @@ from nidaqmx.errors import DaqError
 from drivers.daqmx import library
 from drivers.daqmx.connection import Connection
 from drivers.daqmx.errors import code_of, translated
+from drivers.daqmx.parameters import device_name
 from drivers.errors import RigError
 from sim.errors import InvalidInput
 
@@ -29,7 +30,7 @@ class Watchdog:
     """Opens `line` when it was not told for `timeout` seconds. Raises InvalidInput when the device cannot do that."""
 
     def __init__(self, connection: Connection, line: str, timeout: float) -> None:
-        device = line.split("/")[0]
+        device = device_name(line)
         self._interval = timeout / _PER_TIMEOUT
         self._told = 0.0
         with translated("making the watchdog task"):

@@ -6,6 +6,7 @@ from typing import Protocol
 from drivers.daqmx.parameters import AnalogInput
 from drivers.hardware.parameters import Hardware
 from drivers.optoncdt.analogue import laser_scaling
+from drivers.optoncdt.codec import MID_RANGE, count_size
 from sim.channel import Channel
 
 _MEASURED = {
@@ -58,7 +59,9 @@ def analogue_channels(
 
 
 def _device(devices: Mapping[str, str], given: AnalogInput) -> str:
-    return devices.get(f"device {given.terminal.split('/')[0]}", "unknown device")
+    # names of devices are the same in capitals
+    wanted = f"device {given.terminal.split('/')[0]}".lower()
+    return next((identity for name, identity in devices.items() if name.lower() == wanted), "unknown device")
 
 
 def _analogue(
@@ -83,6 +86,6 @@ def _analogue(
 
 
 def serial_laser(name: str, measuring_range: float, polarity: int, device: str, faults: Mapping[int, str]) -> Channel:
-    """A laser read serially: counts from mid range, 65520 of them over 102 % of the measuring range (manual, p. 65)."""
-    scale = polarity * 1.02 * measuring_range / 65520
-    return Channel(name, "displacement", "m", scale, 0.0, (-32760, 32760), device, faults=faults)
+    """A laser read serially: counts from mid range; `faults` says what those outside its range mean."""
+    scale, valid = polarity * count_size(measuring_range), (-MID_RANGE, MID_RANGE)
+    return Channel(name, "displacement", "m", scale, 0.0, valid, device, faults=faults)

@@ -62,17 +62,22 @@ class Lasers(Parameters):
     load: float = quantity(500.0, "ohm", "resistor that turns the current of an analogue output into volts", gt=0)
 
 
-class Laser1(AnalogInput):
-    """The laser on the first storey; terminal, wiring and range are for its analogue output."""
+class LaserInput(AnalogInput):
+    """A laser on a storey; terminal, wiring and range are for its analogue output."""
 
-    terminal: str = quantity("Dev1/ai2", "", "physical channel of the input")
     port: str | None = quantity(None, "", "serial port, such as COM5 or /dev/ttyUSB0; needed when it is read serially")
     baud: int | None = quantity(None, "1/s", "baud rate; absent: it is searched for", ge=9600, le=1_000_000)
     measuring_range: float = quantity(0.200, "m", "measuring range; checked with the sensor when read serially", gt=0)
     polarity: Literal[1, -1] = quantity(1, "", "1 when the distance grows with the displacement of the storey")
 
 
-class Laser2(Laser1):
+class Laser1(LaserInput):
+    """The laser on the first storey; terminal, wiring and range are for its analogue output."""
+
+    terminal: str = quantity("Dev1/ai2", "", "physical channel of the input")
+
+
+class Laser2(LaserInput):
     """The laser on the second storey; terminal, wiring and range are for its analogue output."""
 
     terminal: str = quantity("Dev1/ai3", "", "physical channel of the input")
@@ -111,7 +116,7 @@ class Hardware(Parameters):
         return tuple((name, one) for name, one in given if one is not None)
 
     @property
-    def analogue_lasers(self) -> tuple[tuple[str, "Laser1"], ...]:
+    def analogue_lasers(self) -> tuple[tuple[str, LaserInput], ...]:
         """The analogue inputs of the lasers; none when they are read serially."""
         if self.lasers.connection == "serial":
             return ()

@@ -1,6 +1,5 @@
 """The bench in the laboratory behind the interface of every rig: the DAQ is master, lasers are placed on its clock."""
 
-import time
 from collections.abc import Generator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from enum import Enum
@@ -9,7 +8,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.clock import Clock, WallClock
+from drivers.clock import Clock, WallClock, now
 from drivers.daqmx.session import DaqSession
 from drivers.errors import DriveUnderflow, RigError
 from drivers.hands import Person, RemoteHands
@@ -23,7 +22,7 @@ from sim.errors import InvalidInput
 _FIRST_LOOKS = 20
 """How often the sample clock is read when it has just been started: it is then known to a fraction of a call."""
 
-_LOOKS = 3
+_LOOKS = 6
 """How often it is read after each block: the best of a few calls is much better than one."""
 
 
@@ -50,11 +49,12 @@ class HardwareRig:
         for name, given in hardware.analogue_lasers:
             require_input_range(f"hardware.{name}.range", given.range, hardware.lasers.load)
         with ExitStack() as opened:
+            # the DAQ first: opening it makes the bench safe, whatever an earlier program left
+            self._daq = DaqSession(hardware.daq, inputs, hardware.sample_rate, lead)
+            opened.callback(self._daq.close)
             self._lasers = SerialLasers(hardware) if serial else None
             if self._lasers is not None:
                 opened.callback(self._lasers.close)
-            self._daq = DaqSession(hardware.daq, inputs, hardware.sample_rate, lead)
-            opened.callback(self._daq.close)
             analogue = analogue_channels(hardware, self._daq.scalings, self._daq.description)
             self._channels = analogue if self._lasers is None else (*analogue, *self._lasers.channels)
             self._opened = opened.pop_all()
@@ -104,11 +104,8 @@ class HardwareRig:
             raise RigError(f"arm is refused: the rig is {self._state.value}; stop it first, or open a new one")
         if self._lasers is not None:
             self._lasers.begin(self.sample_rate, self._clock)
-        try:
+        with self._ending_on_failure():
             self._daq.prepare()
-        except BaseException:
-            self._daq.stop()
-            raise
         self._written = self._index = 0
         self._failed = False
         self._state = _State.ARMED
@@ -165,8 +162,8 @@ class HardwareRig:
         if self._state is _State.CLOSED:
             return
         self._state = _State.CLOSED
-        with self._told_once():
-            self._opened.close()
+        with self._told_once(), self._opened:
+            self._daq.stop()
 
     def handwork(self, work: Handwork, stiffness: float | None = None) -> None:
         if self._state is not _State.STOPPED:
@@ -188,9 +185,9 @@ class HardwareRig:
     def _look_at_clock(self, lasers: SerialLasers, times: int) -> None:
         """Bound the sample clock between two looks at the machine's clock."""
         for _ in range(times):
-            before = time.monotonic()
+            before = now()
             count = self._daq.acquired()
-            lasers.observe(before, count, time.monotonic())
+            lasers.observe(before, count, now())
 
     def _read_all(self, n: int) -> Counts:
         """Counts of all channels, shape (n, n_channels): from the DAQ, and from the lasers when they are serial."""

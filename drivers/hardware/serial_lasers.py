@@ -1,15 +1,15 @@
 """Both lasers on their serial lines, placed on the sample clock."""
 
-import time
 from contextlib import ExitStack
 
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.clock import Clock
-from drivers.errors import ConnectionLost
+from drivers.clock import Clock, now
+from drivers.errors import RigError
 from drivers.hardware.channels import serial_laser
-from drivers.hardware.parameters import Hardware, Laser1
+from drivers.hardware.parameters import Hardware, LaserInput
+from drivers.optoncdt.codec import MID_RANGE
 from drivers.optoncdt.faults import LOST, MEANINGS, marked
 from drivers.optoncdt.sensor import SerialLaser
 from drivers.rig import Alignment, Channel
@@ -18,7 +18,9 @@ from drivers.timebase.sample_clock import SampleClock
 from sim.errors import InvalidInput
 
 _PATIENCE = 0.05
-"""How long a block waits for the lasers' values to arrive before they count as lost [s]."""
+"""How long a block waits for the lasers' values to arrive before they count as lost [s],"""
+_SHARE = 0.5
+"""and for which part of its own duration at most: the drive must be written meanwhile."""
 
 
 class SerialLasers:
@@ -38,8 +40,8 @@ class SerialLasers:
             for sensor in self._sensors:
                 sensor.start()
             self._opened = opened.pop_all()
-        self._known_from = time.monotonic() + hardware.lasers.listening
-        self._tracks = [LaserTrack(s.name, self._rate, self._delay, marked, LOST) for s in self._sensors]
+        self._known_from = now() + hardware.lasers.listening
+        self._tracks = [LaserTrack(s.name, self._rate, self._delay, marked, MID_RANGE, LOST) for s in self._sensors]
         self._sample_rate = 0.0
         self._clock: SampleClock | None = None
         self.channels: tuple[Channel, ...] = tuple(
@@ -57,16 +59,20 @@ class SerialLasers:
         self._clock = SampleClock(sample_rate)
 
     def observe(self, before: float, count: int, after: float) -> None:
-        """The sample clock stood at `count` between two moments of the machine's clock [s]."""
+        """The sample clock stood at `count` between two moments of the machine's clock [s]. RigError before a run."""
         self._running.observe(before, count, after)
 
     def counts(self, first: int, n: int) -> NDArray[np.int16]:
-        """Counts of both lasers at `n` samples from `first` on, shape (n, 2). Raises ConnectionLost."""
+        """Counts of both lasers at `n` samples from `first` on, shape (n, 2); waits a little for the last of them.
+
+        What a laser has not sent by then is lost, and one that is silent is not waited for. Raises ConnectionLost, and
+        RigError before a run.
+        """
         last = (first + n - 1) / self._sample_rate
-        deadline = time.monotonic() + _PATIENCE
+        deadline = now() + min(_PATIENCE, _SHARE * n / self._sample_rate)
         self._take()
         for sensor, track in zip(self._sensors, self._tracks, strict=True):
-            while track.reach(self._running) < last and (left := deadline - time.monotonic()) > 0.0:
+            while track.reach(self._running) < last and not sensor.silent and (left := deadline - now()) > 0.0:
                 sensor.wait(left)
                 self._take()
         return np.column_stack([track.counts(self._running, first, n, self._sample_rate) for track in self._tracks])
@@ -84,10 +90,10 @@ class SerialLasers:
     @property
     def _running(self) -> SampleClock:
         if self._clock is None:
-            raise ConnectionLost("the lasers have no sample clock: begin a run first")
+            raise RigError("the lasers have no sample clock: arm the rig first")
         return self._clock
 
-    def _open(self, name: str, given: Laser1) -> SerialLaser:
+    def _open(self, name: str, given: LaserInput) -> SerialLaser:
         if given.port is None:
             allowed = "give the serial port of the laser (`rockbench devices` lists them), or lasers.connection"
             raise InvalidInput(f"hardware.{name}.port", given.port, allowed)

@@ -14,7 +14,15 @@ from numpy.typing import NDArray
 FULL_SCALE = 65520
 """Largest word that is a distance, at 101 % of the measuring range (manual, p. 65)."""
 
+MID_RANGE = FULL_SCALE // 2
+"""The word at the middle of the measuring range."""
+
 Number = TypeVar("Number", float, NDArray[np.float64])
+
+
+def count_size(measuring_range: float) -> float:
+    """How far the target moves from one word to the next [m] (manual, p. 65)."""
+    return 1.02 * measuring_range / FULL_SCALE
 
 
 def encode(value: int, first: bool) -> bytes:
@@ -28,12 +36,12 @@ def distance(code: Number, measuring_range: float) -> Number:
 
     Source: manual, p. 65, without mastering: d = (102 code / 65520 - 1) / 100 of the measuring range.
     """
-    return (code * (1.02 / FULL_SCALE) - 0.01) * measuring_range
+    return (code - MID_RANGE) * count_size(measuring_range) + 0.5 * measuring_range
 
 
 def code_of(distance: Number, measuring_range: float) -> Number:
     """The inverse of `distance`, not rounded."""
-    return (distance / measuring_range + 0.01) * (FULL_SCALE / 1.02)
+    return (distance - 0.5 * measuring_range) / count_size(measuring_range) + MID_RANGE
 
 
 @dataclass(frozen=True)
@@ -47,12 +55,10 @@ class Words:
 class Decoder:
     """Finds the words in a stream that may be cut anywhere and may have lost bytes.
 
-    A word is an L-, an M- and an H-byte in a row. `resyncs` counts the L-bytes that interrupt a word and the M- and
-    H-bytes that do not continue one.
+    A word is an L-, an M- and an H-byte in a row; what does not belong to one is dropped.
     """
 
     def __init__(self) -> None:
-        self.resyncs = 0
         self._begun = b""
 
     def restart(self) -> None:
@@ -70,11 +76,6 @@ class Decoder:
         whole = kind >= 2
         whole[1:] &= half[:-1]
         whole[:1] = False
-        interrupting = low[1:] & (low[:-1] | half[:-1])
-        # bytes carried over from the last feed have been counted there
-        old = len(self._begun)
-        dropped = ~(low | half | whole)[old:]
-        self.resyncs += int(np.count_nonzero(dropped) + np.count_nonzero(interrupting[max(old - 1, 0) :]))
         self._begun = data[-1:].tobytes() if low[-1:].any() else data[-2:].tobytes() if half[-1:].any() else b""
         end = np.flatnonzero(whole)
         high = data[end].astype(np.int32)

@@ -74,14 +74,17 @@ class Dialogue:
         except OSError as error:
             raise self.gone(error) from error
 
-    def drain(self, quiet: float, limit: float) -> None:
-        """Drop what arrives until nothing has for `quiet` [s], for `limit` [s] at most."""
+    def drain(self, quiet: float, limit: float) -> bool:
+        """Drop what arrives until nothing has for `quiet` [s]; False when that did not happen within `limit` [s]."""
         begun = last = time.monotonic()
-        while (now := time.monotonic()) - last < quiet and now - begun < limit:
+        while (now := time.monotonic()) - last < quiet:
+            if now - begun > limit:
+                return False
             if self._read():
                 last = time.monotonic()
+        return True
 
-    def gone(self, error: OSError) -> ConnectionLost:
+    def gone(self, error: Exception) -> ConnectionLost:
         """What to raise when the port failed with `error`."""
         return ConnectionLost(f"{self.who} is gone ({error}); plug it in, check its power, and open it anew")
 

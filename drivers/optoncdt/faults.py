@@ -1,7 +1,7 @@
 """What the sensor says when it has no distance, and how that is stored.
 
-A laser's value is stored as counts from mid range, n = code - 32760, so that the value from mid range is
-n * 1.02 * measuring_range / 65520. The eight 16-bit integers below -32760 are left over and say why there is none.
+A laser's value is stored as counts from mid range, n = code - `MID_RANGE`, so that the value from mid range is
+n * `count_size`. The eight 16-bit integers below -`MID_RANGE` are left over and say why there is none.
 """
 
 from collections.abc import Mapping
@@ -10,9 +10,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.optoncdt.codec import FULL_SCALE
-
-MID_RANGE = FULL_SCALE // 2
+from drivers.optoncdt.codec import FULL_SCALE, MID_RANGE
 
 LOST = -32768
 NO_PEAK = -32767

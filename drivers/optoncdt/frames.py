@@ -40,12 +40,11 @@ class Assembler:
     measurement counts only when counter and time stamp follow from the one before it: a gap costs, besides what is
     lost, the first measurement after it. Without time stamp the time is the index over the nominal rate.
 
-    `values` is how many measurements were handed out, `lost` how many were not, between the first and the last.
+    `values` is how many measurements were handed out.
     """
 
     def __init__(self, who: str, layout: Layout, rate: float) -> None:
         self.values = 0
-        self.lost = 0
         self._who = who
         self._layout = layout
         self._rate = rate
@@ -118,7 +117,6 @@ class Assembler:
         steps = self._checked(steps, passed)
         index = self._index + np.cumsum(steps)
         elapsed = self._elapsed + np.cumsum(passed)
-        self.lost += int(steps.sum()) - counter.size
         self.values += counter.size
         self._counter, self._ticks = int(counter[-1]), int(ticks[-1])
         self._index, self._elapsed = int(index[-1]), int(elapsed[-1])

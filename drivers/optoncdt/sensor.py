@@ -1,9 +1,9 @@
 """One sensor on its serial line: opened, identified, set up, read."""
 
-import time
 from contextlib import suppress
 from typing import Self
 
+from drivers.clock import now
 from drivers.errors import ConnectionLost, DeviceTimeout, RigError
 from drivers.optoncdt.dialogue import Dialogue
 from drivers.optoncdt.port import BAUDS, open_port
@@ -55,31 +55,11 @@ class SerialLaser:
         return f"{self.info.identity}, {self._port.name} at {self.baud} baud"
 
     @property
-    def timestamped(self) -> bool:
-        """Whether the sensor's own clock times the values; otherwise they are counted at the nominal rate."""
-        return self._layout.time is not None
-
-    @property
     def silent(self) -> bool:
         """True when no measurement has arrived for 10 periods, and for 0.1 s; also before `start` and after `stop`."""
         if self._stream is None or not self._streaming:
             return True
-        return time.monotonic() - self._stream.last_arrival > max(_SILENT_PERIODS / self._rate, _SILENT_TIME)
-
-    @property
-    def values(self) -> int:
-        """Measurements that came since `start`."""
-        return self._stream.values if self._stream is not None else 0
-
-    @property
-    def lost(self) -> int:
-        """Measurements since `start` that did not come, or came damaged."""
-        return self._stream.lost if self._stream is not None else 0
-
-    @property
-    def resyncs(self) -> int:
-        """Bytes since `start` that did not belong to a word, or cut one off."""
-        return self._stream.resyncs if self._stream is not None else 0
+        return now() - self._stream.last_arrival > max(_SILENT_PERIODS / self._rate, _SILENT_TIME)
 
     def start(self) -> None:
         """Switch the stream on, with index and time at zero, and return when values are trusted.

@@ -3,11 +3,12 @@
 import time
 from collections import deque
 from dataclasses import dataclass
-from threading import Condition, Event, Thread
+from threading import Condition, Thread
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.clock import now
 from drivers.errors import ConnectionLost
 from drivers.optoncdt.codec import Decoder
 from drivers.optoncdt.dialogue import USUAL, Dialogue
@@ -15,8 +16,9 @@ from drivers.optoncdt.frames import Assembler, Frames
 from drivers.optoncdt.layout import Layout
 from drivers.optoncdt.reply import Reply
 
-_PACE = 0.006
-"""How long the line is left alone between two reads [s]: each costs the same, however much there is."""
+_PACE = 0.0025
+"""How long the line is left alone between two reads [s]: each costs the same, however much there is. The more reads,
+the more often one of them comes just when values do, and the clock of the sensor is known by these."""
 _KEPT = 60.0
 """How much is kept when nobody takes it [s]."""
 
@@ -27,7 +29,7 @@ class Readings:
 
     `index` counts them since the stream was started, with gaps where some were lost. `time` is when they were taken,
     on the sensor's own clock [s]. `code` are the words as they came. `arrival` is when the bytes that they came with
-    had been read, on the machine's monotonic clock [s]: they had arrived then, perhaps some time before.
+    had been read, on the machine's clock [s]: they had arrived then, perhaps some time before.
     """
 
     index: NDArray[np.int64]
@@ -49,28 +51,13 @@ class Stream:
         self._most = round(_KEPT * rate)
         self._held: deque[tuple[Frames, float]] = deque()
         self._holding = 0
-        self._last = time.monotonic()
+        self._last = now()
         self._failure: ConnectionLost | None = None
         self._reply: Reply | None = None
         self._changed = Condition()
-        self._over = Event()
+        self._over = False
         self._thread = Thread(target=self._run, name=dialogue.who, daemon=True)
         self._thread.start()
-
-    @property
-    def values(self) -> int:
-        """How many measurements came."""
-        return self._assembler.values
-
-    @property
-    def lost(self) -> int:
-        """How many measurements between the first and the last did not come, or came damaged."""
-        return self._assembler.lost
-
-    @property
-    def resyncs(self) -> int:
-        """How many bytes did not belong to a word, or cut one off."""
-        return self._decoder.resyncs
 
     @property
     def last_arrival(self) -> float:
@@ -114,22 +101,24 @@ class Stream:
 
     def end(self) -> None:
         """Stop reading; no thread is left. Allowed any number of times."""
-        self._over.set()
+        self._over = True
         self._thread.join()
 
     def _run(self) -> None:
         port = self._dialogue.port
         try:
-            while not self._over.wait(_PACE):
+            while not self._over:
+                time.sleep(_PACE)
                 # what has waited may have come long ago; what comes next tells when it came
                 chunk = port.read(port.in_waiting) + port.read(1)
                 chunk += port.read(port.in_waiting)
                 if chunk:
-                    self._accept(chunk, time.monotonic())
-        except OSError as error:
-            self._fail(self._dialogue.gone(error))
+                    self._accept(chunk, now())
         except ConnectionLost as error:
             self._fail(error)
+        except Exception as error:
+            # the library fails in many ways when a port goes, and whatever it is, nobody reads any more
+            self._fail(self._dialogue.gone(error))
 
     def _accept(self, chunk: bytes, arrival: float) -> None:
         with self._changed:
@@ -152,6 +141,7 @@ class Stream:
             self._changed.notify_all()
 
     def _fail(self, error: ConnectionLost) -> None:
+        """Have `error` told by everything that is asked from now on."""
         with self._changed:
             self._failure = error
             self._changed.notify_all()

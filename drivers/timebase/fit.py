@@ -28,6 +28,8 @@ _GRID = 41
 """Slopes over which the mean is taken."""
 _RESOLUTION = 1e-7
 """Mean delay below which readings count as exact [s]."""
+_FAR = 5.0
+"""A delay of so many typical ones is a stall of the machine: it says nothing of the others, and is left out."""
 _QUARTER = 8
 """How many readings a quarter of the history needs to be judged."""
 _CHANCE = 4.0
@@ -50,7 +52,9 @@ def rate_error(sides: Sequence[tuple[Points, float]]) -> float:
 
     Each side has a sign: its delays grow by sign times slope. Two-sided bounds have the signs +1 and -1.
     """
-    given = [_Side(sign, p.seconds - p.seconds.mean(), p.delay, float(p.delay.mean())) for p, sign in sides]
+    given = [_side(points.seconds, points.delay, sign) for points, sign in sides]
+    rough = _most_probable(given)
+    given = [_without_stalls(side, rough) for side in given]
     mode = _most_probable(given)
     steps = np.concatenate((-_STEPS, [0.0], _STEPS))
     level = _log_posterior(given, mode + steps)
@@ -70,6 +74,18 @@ class _Side:
     seconds: NDArray[np.float64]
     delay: NDArray[np.float64]
     mean: float
+
+
+def _side(seconds: NDArray[np.float64], delay: NDArray[np.float64], sign: float) -> _Side:
+    return _Side(sign, seconds - seconds.mean(), delay, float(delay.mean()))
+
+
+def _without_stalls(side: _Side, slope: float) -> _Side:
+    """What is left of a side whose line has about this slope."""
+    above = side.delay - side.sign * slope * side.seconds
+    above -= above.min()
+    kept = above <= _FAR * typical(above) + _RESOLUTION
+    return _side(side.seconds[kept], side.delay[kept], side.sign)
 
 
 def _most_probable(sides: Sequence[_Side]) -> float:
@@ -101,6 +117,11 @@ def floor_below(points: Points, slope: float) -> float:
     return float((points.delay - slope * points.seconds).min(initial=np.inf))
 
 
+def typical(above: NDArray[np.float64]) -> float:
+    """The mean of exponentially distributed delays [s], from their median: stalls of the machine do not move it."""
+    return float(np.median(above)) / np.log(2.0)
+
+
 def bends(points: Points, slope: float, tolerance: float) -> bool:
     """Whether the points keep away from the line by more than `tolerance` [s] and chance: the rate has changed.
 
@@ -111,5 +132,5 @@ def bends(points: Points, slope: float, tolerance: float) -> bool:
         return False
     above = (points.delay - slope * points.seconds)[-3 * size :].reshape(3, size)
     least = above.min(axis=1)
-    chance = _CHANCE * (above.mean(axis=1) - least) / np.sqrt(size)
+    chance = _CHANCE / np.sqrt(size) * np.array([typical(third) for third in above - least[:, None]])
     return bool((least - least.min() > tolerance + chance).any())

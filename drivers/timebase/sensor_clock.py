@@ -4,14 +4,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.timebase.bounds import Bounds
-from drivers.timebase.fit import bends, due, floor_below, rate_error
+from drivers.timebase.fit import bends, due, floor_below, rate_error, typical
 
 _TOLERANCE = 100e-6
 """How far a history may keep away from one line [s] before its older half is forgotten."""
 
 
 class SensorClock:
-    """Second t of the sensor is at second `offset + rate * t` of the machine's monotonic clock.
+    """Second t of the sensor is at second `offset + rate * t` of the machine's clock.
 
     The line is the earliest that the arrivals allow, so the least delay that ever occurs is part of `offset`. What
     changes is followed: the older half of a history that one line does not describe is forgotten. Before the first
@@ -69,5 +69,5 @@ class SensorClock:
         floor = floor_below(points, self._slope)
         delay = points.delay - self._slope * points.seconds - floor
         # two delays that add up, of burst and scheduler, are both short seldom: the least of n is not zero yet
-        self._offset = floor - float(delay.mean()) / np.sqrt(len(points))
+        self._offset = floor - typical(delay) / np.sqrt(len(points))
         self._residual = float(np.sqrt(np.mean(delay**2)))

@@ -18,7 +18,7 @@ import numpy as np
 
 from bench.config.dump import as_toml
 from bench.config.model import BenchConfiguration
-from drivers.hands import ask
+from drivers.laboratory_client import ask
 from drivers.hardware.rig import HardwareRig
 from drivers.rig import Alignment
 from tests.emulated import emulated

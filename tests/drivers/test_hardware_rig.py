@@ -8,8 +8,8 @@ import pytest
 
 from drivers.emulation.laboratory import Connection, Device, Laboratory
 from drivers.errors import ConnectionLost, DeviceNotFound, DeviceTimeout, RigError
-from drivers.hands import ask
 from drivers.hardware.rig import HardwareRig
+from drivers.laboratory_client import ask
 from drivers.rig import Handwork, Rig
 from sim.errors import InvalidInput
 from sim.specimen import Specimen

@@ -18,7 +18,7 @@ class Lines:
         self._relay_line = relay_line
         self._relay = relay
         self._high: set[str] = set()
-        self._expired: set[str] = set()
+        self._expired: dict[str, dict[str, bool]] = {}
         self._lock = threading.Lock()
 
     def is_high(self, line: str) -> bool:
@@ -39,19 +39,20 @@ class Lines:
     def expire(self, device: str, states: dict[str, bool]) -> None:
         """The watchdog of a device has expired: its lines go to `states`, and nobody may write."""
         with self._lock:
-            self._expired.add(device)
+            self._expired[device] = {line: line in self._high for line in states}
             for line, high in states.items():
                 self._set(line, high)
 
     def release(self, device: str) -> None:
-        """Let lines be written again; they stay as they are."""
+        """Let lines be written again; they go back to what was written last, the worst that a client may meet."""
         with self._lock:
-            self._expired.discard(device)
+            for line, high in self._expired.pop(device, {}).items():
+                self._set(line, high)
 
     def reset(self, device: str, names: tuple[str, ...]) -> None:
         """All lines of a device as at power-up."""
         with self._lock:
-            self._expired.discard(device)
+            self._expired.pop(device, None)
             for line in names:
                 self._set(line, False)
 

@@ -122,6 +122,7 @@ def test_a_stop_that_does_not_reach_relay_or_output_says_so_and_can_be_tried_aga
     with pytest.raises(RigError) as caught:
         session.stop()
     assert caught.value.code == -200077
+    assert ("press the emergency stop" in str(caught.value)) is (call == "WriteDigitalLines")
     # the other step was done all the same
     eventually(lambda: plant.present_output() == 0.0 if call == "WriteDigitalLines" else not plant.enabled)
     session.stop()
@@ -133,7 +134,7 @@ def test_a_relay_whose_task_does_not_stop_is_reported_though_it_is_open(
 ) -> None:
     driving(session)
     server.fail_next("StopTask", -200077)
-    with pytest.raises(RigError, match="opening the enable relay"):
+    with pytest.raises(RigError, match="letting go of the enable relay, which is open"):
         session.stop()
     assert not plant.enabled
     session.stop()

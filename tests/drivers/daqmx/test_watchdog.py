@@ -51,6 +51,31 @@ def test_a_relay_that_the_watchdog_has_opened_counts_as_cut(session: DaqSession,
     assert session.cut() is True
 
 
+def test_a_watchdog_that_has_barked_keeps_the_relay_open_as_long_as_the_output_is_not_at_zero(
+    session: DaqSession, server: DaqServer, plant: Loopback
+) -> None:
+    driving(session)
+    eventually(lambda: not plant.enabled)
+    plant.ever_enabled = False
+    server.fail_next("WriteAnalogF64", -200077)
+    with pytest.raises(RigError, match="putting the output to 0 V"):
+        session.stop()
+    assert not plant.ever_enabled
+    # what was left to do is done before the next run
+    driving(session)
+    assert plant.enabled
+
+
+def test_a_relay_that_could_not_be_opened_is_opened_by_the_watchdog(
+    session: DaqSession, server: DaqServer, plant: Loopback
+) -> None:
+    driving(session)
+    server.fail_next("WriteDigitalLines", -200077)
+    with pytest.raises(RigError, match="press the emergency stop"):
+        session.stop()
+    eventually(lambda: is_safe(plant))
+
+
 def test_a_cut_ends_the_telling(session: DaqSession, server: DaqServer, plant: Loopback) -> None:
     driving(session)
     assert session.cut() is True

@@ -11,7 +11,8 @@ import pytest
 
 from drivers.emulation.control import ControlServer
 from drivers.errors import ConnectionLost, DeviceTimeout, RigError
-from drivers.hands import Person, RemoteHands, ask
+from drivers.hands import Person, RemoteHands
+from drivers.laboratory_client import ask
 from drivers.rig import Handwork
 from sim.errors import InvalidInput
 

@@ -44,8 +44,10 @@ def test_it_opens_the_relay_and_bars_the_line_until_it_is_cleared(desk: Desk) ->
     assert not desk.plant.enabled
     watchdog.clear_expiration()
     assert not watchdog.expired
-    line.write(True)
+    # the line is what was written last, and can be written again
     assert desk.plant.enabled
+    line.write(False)
+    assert not desk.plant.enabled
 
 
 def test_it_stays_quiet_as_long_as_it_is_told(desk: Desk) -> None:

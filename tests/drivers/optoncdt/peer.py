@@ -2,6 +2,7 @@
 
 import os
 import select
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -16,6 +17,7 @@ from tests.drivers.optoncdt.script import STARTED, STOPPED, Script
 if os.name == "nt":
     pytest.skip("needs pseudo terminals", allow_module_level=True)
 
+import fcntl
 import termios
 import tty
 
@@ -48,6 +50,11 @@ class Peer:
         """Say something unasked."""
         while data:
             data = data[os.write(self._master, data) :]
+
+    @property
+    def unread(self) -> int:
+        """How many bytes wait at the client's end."""
+        return int.from_bytes(fcntl.ioctl(self._slave, termios.FIONREAD, bytes(4)), sys.byteorder)
 
     def wait_heard(self, commands: int) -> None:
         """Wait until so many commands have come."""

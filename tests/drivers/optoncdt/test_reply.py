@@ -24,8 +24,9 @@ def reply(*chunks: bytes) -> Reply:
 def test_measured_values_between_the_characters_of_an_answer_do_not_matter(seed: int, share: float, cut: int) -> None:
     random = Random(seed)
     mixed = b""
-    for character in INFO:
-        while random.random() < 0.5 * share:
+    for place, character in enumerate(INFO):
+        # within the prompt nothing could tell its second character from a value that begins with the same byte
+        while place < len(INFO) - 1 and random.random() < 0.5 * share:
             mixed += encode(random.randrange(2**18), random.random() < 0.5)
         mixed += bytes((character,))
     heard = reply(*(mixed[place : place + cut] for place in range(0, len(mixed), cut)))

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from drivers.clock import now
 from drivers.errors import ConnectionLost, DeviceTimeout, RigError
 from drivers.optoncdt.faults import LASER_OFF, marked
 from drivers.optoncdt.sensor import SerialLaser
@@ -48,7 +49,7 @@ def until(happened: Callable[[], bool]) -> None:
 
 
 def test_everything_is_handed_out_once_with_its_place_and_time() -> None:
-    begun = time.monotonic()
+    begun = now()
     with no_thread_left(), Peer([*streaming(30), *STOPPED]) as peer, opened(peer) as laser:
         laser.start()
         sent = measurements(CODES[30:], 31)
@@ -59,8 +60,7 @@ def test_everything_is_handed_out_once_with_its_place_and_time() -> None:
         np.testing.assert_array_equal(got.index, np.arange(LOCK + 1, 4001))
         np.testing.assert_allclose(got.time, got.index / 4000.0, rtol=1e-12)
         assert (np.diff(got.arrival) >= 0).all()
-        assert begun < got.arrival[0] <= got.arrival[-1] <= time.monotonic()
-        assert (laser.values, laser.lost, laser.resyncs) == (4000 - LOCK, 0, 0)
+        assert begun < got.arrival[0] <= got.arrival[-1] <= now()
         assert len(laser.take()) == 0
 
 
@@ -73,8 +73,7 @@ def test_lost_bytes_are_counted_and_never_make_a_value() -> None:
         got = eventually(laser, 4000 - LOCK - 2 - 61)
         np.testing.assert_array_equal(got.code, CODES[got.index - 1])
         assert got.index[-1] == 4000
-        assert 2 + 59 <= laser.lost == 4000 - LOCK - len(got) <= 2 + 61
-        assert laser.resyncs > 0
+        assert 2 + 59 <= 4000 - LOCK - len(got) <= 2 + 61
 
 
 def test_error_words_come_through_as_they_are() -> None:
@@ -175,7 +174,6 @@ def test_a_stream_can_be_stopped_and_started_again_and_counts_anew() -> None:
     again = streaming(40)[len(OPENED) :]
     with no_thread_left(), Peer([*streaming(30), *STOPPED, *again, *STOPPED]) as peer, opened(peer) as laser:
         laser.start()
-        until(lambda: laser.values == 30 - LOCK)
         with pytest.raises(RigError, match=r"start is refused: laser_1 on .* streams already"):
             laser.start()
         laser.stop()
@@ -198,14 +196,15 @@ def test_what_is_not_possible_is_refused() -> None:
 
 
 def test_the_last_minute_is_kept_when_nobody_takes_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("drivers.optoncdt.stream._KEPT", 0.05)
+    monkeypatch.setattr("drivers.optoncdt.stream._KEPT", 0.5)
     with Peer([*streaming(30), *STOPPED]) as peer, opened(peer) as laser:
         laser.start()
-        for place in range(30, 4000, 50):
-            peer.send(b"".join(measurements(CODES[place : place + 50], place + 1)))
-            until(lambda end=place + 50: laser.values == min(end, 4000) - LOCK)
+        peer.send(b"".join(measurements(CODES[30:], 31)))
+        until(lambda: peer.unread == 0)
+        until(lambda: laser.silent)
         got = laser.take()
-        assert 100 <= len(got) <= 200
+        # what is read at once is dropped at once: a pseudo-terminal holds 4096 bytes, 341 measurements
+        assert 2000 - 2 * 341 <= len(got) <= 2000
         assert got.index[-1] == 4000
 
 

@@ -44,6 +44,27 @@ def test_a_change_of_rate_is_followed() -> None:
     assert np.abs(errors[130:]).max() < 50e-6
 
 
+def test_a_stall_of_the_machine_does_not_move_a_clock() -> None:
+    """Half a second in which nothing is read, after ten good ones: the mean delay says nothing any more."""
+    sent, quiet, stalled = stream(4, 12.0, 20e-6), SensorClock(), SensorClock()
+    late = sent.arrival.copy()
+    stall = (late > SWITCHED_ON + 11.0) & (late < SWITCHED_ON + 11.5)
+    late[stall] = SWITCHED_ON + 11.5
+    quiet.add(sent.time, sent.arrival)
+    stalled.add(sent.time, late)
+    assert abs(sensor_error(stalled, sent.time[-1], sent.taken[-1])) < 50e-6
+    assert stalled.offset + stalled.rate * sent.time[-1] == pytest.approx(
+        quiet.offset + quiet.rate * sent.time[-1], abs=20e-6
+    )
+
+
+def test_a_coarse_host_clock_is_not_hidden() -> None:
+    """Arrivals on a clock of 15.6 ms: the sensor is placed too early by as much, and the residual says so."""
+    sent, clock = stream(5, 30.0, 30e-6), SensorClock()
+    clock.add(sent.time, np.floor(sent.arrival / 15.6e-3) * 15.6e-3)
+    assert clock.residual > 1e-3
+
+
 def test_a_sensor_that_was_never_heard_has_no_clock() -> None:
     clock = SensorClock()
     clock.add(np.zeros(0), np.zeros(0))
@@ -64,6 +85,26 @@ def test_the_sample_clock_is_found_between_its_bounds(error: float) -> None:
         assert abs(found - block / 10.0) < (50e-6 if block > 100 else 400e-6)
     assert clock.rate == pytest.approx(1.0 + error, abs=2e-6)
     assert 0.0 < clock.residual < 1e-3
+
+
+@pytest.mark.parametrize("packet", [32, 100])
+def test_a_count_that_comes_in_packets_bounds_the_sample_clock_from_one_side(packet: int) -> None:
+    """Looks at any time: samples have been taken that are not counted yet. A transfer takes `WAY` at least."""
+    way, error = 0.4e-3, 20e-6
+    daq, clock = Daq(6, 4000.0, error), SampleClock(2000.0)
+    rng = np.random.default_rng(7)
+    errors: list[float] = []
+    for _ in range(900):
+        daq.now += rng.uniform(0.005, 0.025)
+        before, count, after = daq.look()
+        arrived = int((0.5 * (before + after) - way - daq.started) * 2000.0 * (1.0 + error)) + 1
+        clock.observe(before, max(arrived // packet * packet, 0), after)
+        if count > 6000:
+            errors.append(clock.seconds(np.array([daq.now]))[0] - (daq.now - daq.started) * (1.0 + error))
+    # late by the transfer and the way back, a constant to be calibrated; midway it would be wrong by half a packet
+    assert -2e-3 < np.median(errors) < -way + 0.1e-3
+    assert np.ptp(errors[100:]) < 1e-3
+    assert clock.rate == pytest.approx(1.0 + error, abs=40e-6)
 
 
 def test_one_look_places_the_sample_clock_between_its_bounds() -> None:

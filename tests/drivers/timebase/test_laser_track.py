@@ -31,7 +31,7 @@ def codes(taken: NDArray[np.float64]) -> NDArray[np.int32]:
 
 
 def track(delay: float = 0.0) -> LaserTrack:
-    return LaserTrack("laser_1", 4000.0, delay, marked, LOST)
+    return LaserTrack("laser_1", 4000.0, delay, marked, 32760, LOST)
 
 
 class Bench:

@@ -3,14 +3,15 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.optoncdt.faults import MID_RANGE
 
+class Resampler:
+    """Keeps about the last `capacity` readings: index, second of the sensor's clock, counts or fault mark.
 
-class Readings:
-    """Keeps about the last `capacity` readings: index, second of the sensor's clock, counts or fault mark."""
+    Counts beyond +-`largest` are fault marks, `lost_mark` is the one of values that are not there.
+    """
 
-    def __init__(self, capacity: int, lost_mark: int) -> None:
-        self._capacity, self._lost_mark = capacity, lost_mark
+    def __init__(self, capacity: int, largest: int, lost_mark: int) -> None:
+        self._capacity, self._largest, self._lost_mark = capacity, largest, lost_mark
         self._index = np.zeros(2 * capacity, dtype=np.int64)
         self._time = np.zeros(2 * capacity)
         self._counts = np.zeros(2 * capacity, dtype=np.int16)
@@ -54,6 +55,6 @@ class Readings:
         first, second = counts[before], counts[before + 1]
         place = (times[inside] - time[before]) / (time[before + 1] - time[before])
         between = np.rint(first + place * (second - first.astype(np.float64))).astype(np.int16)
-        values = np.where(np.abs(second.astype(np.int32)) > MID_RANGE, second, between)
-        seen[inside] = np.where(np.abs(first.astype(np.int32)) > MID_RANGE, first, values)
+        values = np.where(np.abs(second.astype(np.int32)) > self._largest, second, between)
+        seen[inside] = np.where(np.abs(first.astype(np.int32)) > self._largest, first, values)
         return seen

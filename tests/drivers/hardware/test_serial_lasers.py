@@ -1,0 +1,108 @@
+"""Both lasers on emulated lines, without a DAQ: how long a block waits for them, and what it gets."""
+
+import sys
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from drivers.clock import WallClock, now
+from drivers.emulation.optoncdt.laser import EmulatedLaser
+from drivers.errors import RigError
+from drivers.hardware.parameters import Hardware, Laser1, Laser2, Lasers
+from drivers.hardware.serial_lasers import SerialLasers
+from drivers.optoncdt.faults import LOST
+from sim.sensors import Laser
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="emulated serial lasers need pseudo-terminals")
+
+RATE = 2000.0
+DEADLINE = 30.0
+
+
+class Still:
+    def displacement(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.zeros(times.size)
+
+
+@pytest.fixture
+def emulated() -> Iterator[tuple[EmulatedLaser, EmulatedLaser]]:
+    pair = tuple(EmulatedLaser(Still(), Laser(), boot_time=0.0, seed=seed) for seed in (1, 2))
+    for one in pair:
+        one.start()
+    yield pair
+    for one in pair:
+        one.close()
+
+
+@pytest.fixture
+def lasers(emulated: tuple[EmulatedLaser, EmulatedLaser]) -> Iterator[SerialLasers]:
+    first, second = (one.port for one in emulated)
+    hardware = Hardware(
+        lasers=Lasers(rate=4000.0, listening=1.5, delay=5e-3),
+        laser_1=Laser1(port=first, baud=921_600),
+        laser_2=Laser2(port=second, baud=921_600),
+    )
+    made = SerialLasers(hardware)
+    yield made
+    made.close()
+
+
+class Run:
+    """A sample clock that is the machine's, in blocks of `n` samples."""
+
+    def __init__(self, lasers: SerialLasers, n: int) -> None:
+        self.lasers, self.n = lasers, n
+        lasers.begin(RATE, WallClock())
+        self.began, self.first = now(), 0
+
+    def block(self) -> tuple[NDArray[np.int16], float]:
+        """The next block, and how long it took after its last sample [s]."""
+        end = self.began + (self.first + self.n - 1) / RATE
+        WallClock().wait_until(end)
+        asked = now()
+        count = int((asked - self.began) * RATE) + 1
+        self.lasers.observe(asked, count, asked)
+        begun = now()
+        counts = self.lasers.counts(self.first, self.n)
+        self.first += self.n
+        return counts, now() - begun
+
+
+def test_a_silent_laser_is_lost_and_soon_not_waited_for(
+    emulated: tuple[EmulatedLaser, EmulatedLaser], lasers: SerialLasers
+) -> None:
+    run = Run(lasers, 200)
+    deadline = now() + DEADLINE
+    while (run.block()[0] == LOST).any():
+        assert now() < deadline
+    emulated[1].silence(60.0)
+    while run.block()[0][:, 1].max() != LOST:
+        assert now() < deadline
+    waits: list[float] = []
+    for _ in range(15):
+        counts, wait = run.block()
+        assert (counts[:, 1] == LOST).all()
+        waits.append(wait)
+    # waiting in vain takes 50 ms of each block
+    assert np.median(waits) < 0.025
+
+
+def test_a_short_block_waits_for_half_its_duration_at_most(
+    emulated: tuple[EmulatedLaser, EmulatedLaser], lasers: SerialLasers, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A laser that has just stopped counts as silent a tenth of a second later only; here it never does."""
+    monkeypatch.setattr("drivers.optoncdt.sensor._SILENT_TIME", 1e9)
+    run = Run(lasers, 40)
+    run.block()
+    for one in emulated:
+        one.silence(60.0)
+    waits = [run.block()[1] for _ in range(25)]
+    # half of 20 ms, and what a busy machine takes; not 50 ms
+    assert 0.009 < np.median(waits) < 0.035
+
+
+def test_blocks_before_a_run_are_refused_as_such(lasers: SerialLasers) -> None:
+    with pytest.raises(RigError, match="arm the rig first"):
+        lasers.observe(0.0, 1, 1.0)
