@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import Clock, VirtualClock
-from drivers.errors import DriveUnderflow, RigError
+from drivers.drive import Drive, ending_by, require_block
+from drivers.errors import RigError
 from drivers.rig import Alignment, Block, Channel, Counts, Handwork
-from sim.errors import InvalidInput
 
 
 class RecordedRun(Protocol):
@@ -75,17 +75,13 @@ class ReplayRig:
     """
 
     def __init__(self, recording: Recording, *, clock: Clock | None = None, lead: int | None = None) -> None:
-        if lead is not None and lead < 0:
-            raise InvalidInput("lead", lead, "it must be a number of samples, 0 or more")
+        self._drive = Drive(recording.drive_range, recording.lead if lead is None else lead)
         self._recording = recording
         self._clock = clock if clock is not None else VirtualClock()
-        self._lead = recording.lead if lead is None else lead
         self._runs = iter(recording.runs)
         self._run: RecordedRun | None = None
         self._rest: list[tuple[int, int]] = []
         self._state = _State.STOPPED
-        self._waiting = 0
-        self._index = 0
         self._started = 0.0
 
     @property
@@ -102,7 +98,7 @@ class ReplayRig:
 
     @property
     def lead(self) -> int:
-        return self._lead
+        return self._drive.lead
 
     @property
     def clock(self) -> Clock:
@@ -126,44 +122,30 @@ class ReplayRig:
         if self._run is None:
             raise RigError(f"arm is refused: all {len(self._recording.runs)} recorded runs were played; open it anew")
         self._rest = list(self._run.stretches)
-        self._waiting = self._index = 0
+        self._drive.begin()
         self._started = self._clock.now()
         self._state = _State.ARMED
 
     def write(self, volts: NDArray[np.float64]) -> None:
         self._require_armed("write")
-        samples = np.array(volts, dtype=np.float64)
-        if samples.ndim != 1:
-            self._refuse(f"a drive of shape {samples.shape} is refused: it must be one row of samples")
-        if samples.size == 0:
-            return
-        if not np.isfinite(samples).all():
-            self._refuse("a drive with samples that are not finite is refused")
-        if (peak := float(np.abs(samples).max())) > self.drive_range:
-            self._refuse(f"a drive of {peak:.6g} V is refused: the range is +-{self.drive_range:g} V")
-        self._waiting += samples.size
+        with ending_by(self.stop):
+            self._drive.append(volts)
 
     def read(self, n: int) -> Block:
         run = self._require_armed("read")
-        if n < 1:
-            raise InvalidInput("samples to read", n, "it must be at least 1")
-        if self._waiting < n + self._lead:
-            waiting, needed = self._waiting, n + self._lead
-            self.stop()
-            raise DriveUnderflow(
-                f"the drive ran out at sample {self._index}: {waiting} samples were waiting and {needed} are needed;"
-                " write earlier or read less at once"
-            )
-        if not self._rest:
-            self._refuse(f"the recording of this run is over at sample {self._index}; stop, and arm for the next run")
+        require_block(n)
+        with ending_by(self.stop):
+            self._drive.require(n)
+            if not self._rest:
+                over = f"the recording of this run is over at sample {self._drive.index}"
+                raise RigError(f"{over}; stop, and arm for the next run")
         first, length = self._rest.pop(0)
         taken = min(n, length)
         if taken < length:
             self._rest.insert(0, (first + taken, length - taken))
-        self._waiting -= taken
-        self._index = first + taken
+        self._drive.advance(taken, gap=first - self._drive.index)
         counts = run.counts(first, taken)
-        self._clock.wait_until(self._started + self._index / self.sample_rate)
+        self._clock.wait_until(self._started + self._drive.index / self.sample_rate)
         return Block(first, counts)
 
     def stop(self) -> None:
@@ -190,7 +172,3 @@ class ReplayRig:
         if self._state is not _State.ARMED or self._run is None:
             raise RigError(f"{what} is refused: the rig is {self._state.value}; arm it first")
         return self._run
-
-    def _refuse(self, why: str) -> None:
-        self.stop()
-        raise RigError(why)

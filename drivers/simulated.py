@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import Clock, VirtualClock
-from drivers.errors import DriveUnderflow, RigError
+from drivers.drive import Drive, ending_by, require_block
+from drivers.errors import RigError
 from drivers.handyman import Handyman
 from drivers.rig import Alignment, Block, Channel, Handwork
-from sim.errors import InvalidInput
 from sim.specimen import Specimen
 from sim.virtual_bench import VirtualBench, VirtualBenchParameters
 
@@ -51,18 +51,15 @@ class SimulatedRig:
         lead: int | None = None,
         spring_factor: float = 1.0,
     ) -> None:
-        if lead is not None and lead < 0:
-            raise InvalidInput("lead", lead, "it must be a number of samples, 0 or more")
+        lead = round(0.05 * parameters.sample_rate) if lead is None else lead
+        self._drive = Drive(parameters.shaker.drive_range, lead)
         self.bench = VirtualBench(parameters, specimen, seed)
         self._clock = clock if clock is not None else VirtualClock()
-        self._lead = round(0.05 * parameters.sample_rate) if lead is None else lead
         self._seed = seed
         self._handyman = Handyman(specimen, spring_factor)
         self._state = _State.STOPPED
         self._moved = False
         self._queue: deque[NDArray[np.float64]] = deque()
-        self._waiting = 0
-        self._index = 0
         self._started = 0.0
 
     @property
@@ -79,7 +76,7 @@ class SimulatedRig:
 
     @property
     def lead(self) -> int:
-        return self._lead
+        return self._drive.lead
 
     @property
     def clock(self) -> Clock:
@@ -109,41 +106,25 @@ class SimulatedRig:
             raise RigError(f"arm is refused: the rig is {self._state.value}; stop it first, or open a new one")
         self._come_to_rest()
         self.bench.run(np.zeros(round(_WARM_UP * self.sample_rate)))
-        self._drop_queue()
-        self._index = 0
+        self._queue.clear()
+        self._drive.begin()
         self._started = self._clock.now()
         self._moved = True
         self._state = _State.ARMED
 
     def write(self, volts: NDArray[np.float64]) -> None:
         self._require_armed("write")
-        samples = np.array(volts, dtype=np.float64)
-        if samples.ndim != 1:
-            self._refuse(f"a drive of shape {samples.shape} is refused: it must be one row of samples")
-        if samples.size == 0:
-            return
-        if not np.isfinite(samples).all():
-            self._refuse("a drive with samples that are not finite is refused: the output is at zero")
-        if (peak := float(np.abs(samples).max())) > self.drive_range:
-            self._refuse(f"a drive of {peak:.6g} V is refused: the range is +-{self.drive_range:g} V")
-        self._queue.append(samples)
-        self._waiting += samples.size
+        with ending_by(self.stop):
+            self._queue.append(self._drive.append(volts))
 
     def read(self, n: int) -> Block:
         self._require_armed("read")
-        if n < 1:
-            raise InvalidInput("samples to read", n, "it must be at least 1")
-        if self._waiting < n + self._lead:
-            waiting, needed = self._waiting, n + self._lead
-            self.stop()
-            raise DriveUnderflow(
-                f"the drive ran out at sample {self._index}: {waiting} samples were waiting and {needed} are needed;"
-                " the output is at zero, write earlier or read less at once"
-            )
-        first = self._index
+        require_block(n)
+        with ending_by(self.stop):
+            self._drive.require(n)
         counts = self.bench.run(self._next_samples(n))
-        self._index += n
-        self._clock.wait_until(self._started + self._index / self.sample_rate)
+        first = self._drive.advance(n)
+        self._clock.wait_until(self._started + self._drive.index / self.sample_rate)
         if self._state is not _State.ARMED:
             raise RigError("the rig was halted while it read a block; the block is lost, arm it again")
         return Block(first, counts)
@@ -151,7 +132,7 @@ class SimulatedRig:
     def stop(self) -> None:
         if self._state is _State.ARMED:
             self._state = _State.STOPPED
-        self._drop_queue()
+        self._queue.clear()
 
     def halt(self) -> None:
         # the enable line and the output are one thing here: what follows is zero drive. Another thread may be taking
@@ -180,10 +161,6 @@ class SimulatedRig:
         if self._state is not _State.ARMED:
             raise RigError(f"{what} is refused: the rig is {self._state.value}; arm it first")
 
-    def _refuse(self, why: str) -> None:
-        self.stop()
-        raise RigError(why)
-
     def _next_samples(self, n: int) -> NDArray[np.float64]:
         """Take `n` samples from the queue."""
         taken: list[NDArray[np.float64]] = []
@@ -195,12 +172,7 @@ class SimulatedRig:
                 head = head[:missing]
             taken.append(head)
             missing -= head.size
-        self._waiting -= n
         return np.concatenate(taken)
-
-    def _drop_queue(self) -> None:
-        self._queue.clear()
-        self._waiting = 0
 
     def _come_to_rest(self) -> None:
         """Let time pass at zero drive until nothing moves to speak of."""

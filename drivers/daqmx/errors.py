@@ -32,6 +32,10 @@ _TIMEOUT = _Meaning(DeviceTimeout, "stop, and check the wiring of clock and trig
 _GONE = _Meaning(ConnectionLost, "check power and cables, then open a new session")
 _ABSENT = _Meaning(DeviceNotFound, "`rockbench devices` lists what is there")
 _BUSY = _Meaning(DeviceNotFound, "another program holds the device: end it first")
+_NO_ROUTE = _Meaning(
+    RigError,
+    "see hardware.daq.start_trigger and hardware.daq.clock; clock = OnboardClock leaves the output a clock of its own",
+)
 _OTHER = _Meaning(RigError, "the run is over")
 
 _CODES: dict[_Meaning, tuple[DAQmxErrors, ...]] = {
@@ -78,6 +82,14 @@ _CODES: dict[_Meaning, tuple[DAQmxErrors, ...]] = {
         DAQmxErrors.PHYSICAL_CHAN_DOES_NOT_EXIST,
         DAQmxErrors.NETWORK_TARGET_NOT_FOUND,
         DAQmxErrors.PAL_DEVICE_NOT_FOUND,
+    ),
+    _NO_ROUTE: (
+        DAQmxErrors.INVALID_ROUTING_SOURCE_TERMINAL_NAME,
+        DAQmxErrors.INVALID_ROUTING_SOURCE_TERMINAL_NAME_ROUTING,
+        DAQmxErrors.ROUTE_NOT_SUPPORTED_BY_HW,
+        DAQmxErrors.ROUTE_NOT_SUPPORTED_BY_HW_ROUTING,
+        DAQmxErrors.ROUTING_PATH_NOT_AVAILABLE,
+        DAQmxErrors.ROUTING_PATH_NOT_AVAILABLE_ROUTING,
     ),
     _BUSY: (
         DAQmxErrors.PAL_RESOURCE_RESERVED,

@@ -28,7 +28,10 @@ TERMINAL_CONFIGURATIONS: dict[Wiring, TerminalConfiguration] = {
 
 
 class Inputs:
-    """All inputs in one task, in the order given; its start trigger starts the output too."""
+    """All inputs in one task, in the order given. The output starts on `trigger` and is clocked from `clock`.
+
+    Both are the terminals that the device gives for its inputs, unless the configuration names others.
+    """
 
     def __init__(self, connection: Connection, daq: Daq, inputs: Sequence[AnalogInput], rate: float) -> None:
         # the device says more of what is wrong than a deadline does, so it comes first
@@ -47,6 +50,7 @@ class Inputs:
                 self._task.in_stream.input_buf_size = buffer
                 self.rate = float(self._task.timing.samp_clk_rate)
                 self.trigger = daq.start_trigger or str(self._task.triggers.start_trigger.term)
+                self.clock = daq.clock or str(self._task.timing.samp_clk_term)
                 self._reader = library.unscaled_reader(self._task)
             self.dtype = _dtype(self.scalings)
         except BaseException:

@@ -26,11 +26,15 @@ _FULL = int(DAQmxErrors.SAMPLES_CAN_NOT_YET_BE_WRITTEN)
 
 
 class Output:
-    """One output. Each run has a task of its own: what an old one still held is gone with it."""
+    """One output on the sample clock at the terminal `clock`.
 
-    def __init__(self, connection: Connection, daq: Daq, rate: float, lead: int) -> None:
+    Each run has a task of its own: what an old one still held is gone with it.
+    """
+
+    def __init__(self, connection: Connection, daq: Daq, clock: str, rate: float, lead: int) -> None:
         self._connection = connection
         self._daq = daq
+        self._clock = clock
         self._asked = rate
         self._buffer = lead + ceil(_AHEAD * rate)
         self._task: library.Task | None = None
@@ -100,7 +104,7 @@ class Output:
             self._task = task = library.task(NAME, self._connection.options(NAME))
             channel = _add_channel(task, self._daq)
             task.timing.cfg_samp_clk_timing(
-                self._asked, sample_mode=AcquisitionType.CONTINUOUS, samps_per_chan=self._buffer
+                self._asked, self._clock, sample_mode=AcquisitionType.CONTINUOUS, samps_per_chan=self._buffer
             )
             task.out_stream.regen_mode = RegenerationMode.DONT_ALLOW_REGENERATION
             task.out_stream.output_buf_size = self._buffer

@@ -29,6 +29,12 @@ class Daq(Parameters):
     start_trigger: str | None = quantity(
         None, "", "terminal of the inputs' start trigger; absent: as the input task says itself"
     )
+    clock: str | None = quantity(
+        None,
+        "",
+        "terminal of the output's sample clock; absent: that of the inputs, as the input task says itself;"
+        " OnboardClock: one of its own, which only starts with the inputs",
+    )
     watchdog: float | None = quantity(
         None, "s", "time-out of the device's watchdog on the enable line; absent when it has none", ge=0.1, le=30
     )

@@ -32,14 +32,19 @@ class _State(Enum):
 
 
 class DaqSession:
-    """Output and inputs share one sample clock: sample i leaves while sample i is taken.
+    """Output and inputs share start trigger and sample clock: sample i leaves while sample i is taken.
+
+    The output is clocked from the terminal of the inputs' sample clock. A device that has no such route refuses the
+    output: then `hardware.daq.clock` may name another terminal, or with OnboardClock leave the output a clock of its
+    own, which starts with the inputs and keeps up with them where both have one timebase. Nothing falls back by itself.
 
     A run is `prepare`, `write` the first samples, `start`, then `write` and `read` in turn, and `stop`. Whatever
     fails in between opens the relay and puts the output to zero before it is raised. One thread at a time may run
     it; `cut`, `stop` and `close` may come from any other.
 
     The bench is safe before anything is checked. Raises InvalidInput for what the device cannot do, and for a sample
-    rate that it would not make exactly; DeviceNotFound when driver, server or device are not there or another program holds them.
+    rate that it would not make exactly; DeviceNotFound when driver, server or device are not there or another program
+    holds them.
     """
 
     def __init__(self, daq: Daq, inputs: Sequence[AnalogInput], sample_rate: float, lead: int) -> None:
@@ -71,6 +76,7 @@ class DaqSession:
             "output": f"{daq.output} (+-{daq.output_range:g} V)",
             "output transfer": self._tasks.output.transfer,
             "start trigger": self._tasks.inputs.trigger,
+            "sample clock of the output": self._tasks.inputs.clock,
             "enable line": daq.enable_line or "none",
             "watchdog": "none: a program that dies leaves the relay as it is"
             if daq.watchdog is None

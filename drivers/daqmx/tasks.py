@@ -37,10 +37,10 @@ class Tasks:
                 if daq.watchdog is not None:
                     self.watchdog = Watchdog(connection, daq.enable_line, daq.watchdog)
                     made.callback(_quietly, self.watchdog.close)
-            self.output = Output(connection, daq, sample_rate, lead)
-            made.callback(_quietly, self.output.clear)
             self.inputs = Inputs(connection, daq, inputs, sample_rate)
             made.callback(_quietly, self.inputs.close)
+            self.output = Output(connection, daq, self.inputs.clock, sample_rate, lead)
+            made.callback(_quietly, self.output.clear)
             _require_rate("inputs", self.inputs.rate, sample_rate)
             _require_rate("output", self.output.rate, sample_rate)
             self._made = made.pop_all()

@@ -79,7 +79,7 @@ class Laboratory:
                     opened.callback(one.close)
                     bench.connect_laser(storey, lambda one=one: one.analogue)
                     self.lasers += (one,)
-            models = (x_series(),) if device == "usb" else compact_rio()
+            models = (x_series(calibrated=True),) if device == "usb" else compact_rio(calibrated=True)
             self.daq = DaqServer(bench, models, converter=parameters.converter)
             opened.callback(self.daq.close)
             self._control = ControlServer(self._handlers())

@@ -1,7 +1,7 @@
 """The bench in the laboratory behind the interface of every rig: the DAQ is master, lasers are placed on its clock."""
 
 from collections.abc import Generator, Mapping
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager
 from enum import Enum
 from typing import Self
 
@@ -10,18 +10,20 @@ from numpy.typing import NDArray
 
 from drivers.clock import Clock, WallClock, now
 from drivers.daqmx.session import DaqSession
-from drivers.errors import DriveUnderflow, RigError
+from drivers.drive import Drive, require_block
+from drivers.errors import RigError
 from drivers.hands import Person, RemoteHands
 from drivers.hardware.channels import analogue_channels
 from drivers.hardware.parameters import Hardware
 from drivers.hardware.serial_lasers import SerialLasers
 from drivers.optoncdt.analogue import require_input_range
 from drivers.rig import Alignment, Block, Channel, Counts, Handwork
-from sim.errors import InvalidInput
 
 _FIRST_LOOKS = 20
 """How often the sample clock is read when it has just been started: it is then known to a fraction of a call."""
 
+_GOLDEN = 0.6180339887498949
+"""Step between the phases of two looks: its multiples fill a period evenly."""
 _LOOKS = 6
 """How often it is read after each block: the best of a few calls is much better than one."""
 
@@ -41,17 +43,17 @@ class HardwareRig:
     """
 
     def __init__(self, hardware: Hardware, *, lead: int) -> None:
-        self._lead = lead
         self._clock = WallClock()
-        self._hands = RemoteHands(hardware.hands) if hardware.hands is not None else Person()
         serial = hardware.lasers.connection == "serial"
         inputs = [given for _, given in (*hardware.transducers, *hardware.analogue_lasers)]
-        for name, given in hardware.analogue_lasers:
-            require_input_range(f"hardware.{name}.range", given.range, hardware.lasers.load)
         with ExitStack() as opened:
-            # the DAQ first: opening it makes the bench safe, whatever an earlier program left
+            # the DAQ before all that can fail: opening it makes the bench safe, whatever an earlier program left
             self._daq = DaqSession(hardware.daq, inputs, hardware.sample_rate, lead)
             opened.callback(self._daq.close)
+            self._drive = Drive(self._daq.drive_range, lead)
+            self._hands = RemoteHands(hardware.hands) if hardware.hands is not None else Person()
+            for name, given in hardware.analogue_lasers:
+                require_input_range(f"hardware.{name}.range", given.range, hardware.lasers.load)
             self._lasers = SerialLasers(hardware) if serial else None
             if self._lasers is not None:
                 opened.callback(self._lasers.close)
@@ -59,9 +61,8 @@ class HardwareRig:
             self._channels = analogue if self._lasers is None else (*analogue, *self._lasers.channels)
             self._opened = opened.pop_all()
         self._state = _State.STOPPED
-        self._written = 0
-        self._index = 0
         self._failed = False
+        self._phase = 0.0
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -77,7 +78,7 @@ class HardwareRig:
 
     @property
     def lead(self) -> int:
-        return self._lead
+        return self._drive.lead
 
     @property
     def clock(self) -> Clock:
@@ -106,42 +107,26 @@ class HardwareRig:
             self._lasers.begin(self.sample_rate, self._clock)
         with self._ending_on_failure():
             self._daq.prepare()
-        self._written = self._index = 0
+        self._drive.begin()
         self._failed = False
         self._state = _State.ARMED
 
     def write(self, volts: NDArray[np.float64]) -> None:
         self._require_armed("write")
-        samples = np.array(volts, dtype=np.float64)
-        if samples.ndim != 1:
-            self._refuse(f"a drive of shape {samples.shape} is refused: it must be one row of samples")
-        if samples.size == 0:
-            return
-        if not np.isfinite(samples).all():
-            self._refuse("a drive with samples that are not finite is refused: the output is at zero")
-        if (peak := float(np.abs(samples).max())) > self.drive_range:
-            self._refuse(f"a drive of {peak:.6g} V is refused: the range is +-{self.drive_range:g} V")
         with self._ending_on_failure():
-            self._daq.write(samples)
-        self._written += samples.size
+            samples = self._drive.append(volts)
+            if samples.size:
+                self._daq.write(samples)
 
     def read(self, n: int) -> Block:
         self._require_armed("read")
-        if n < 1:
-            raise InvalidInput("samples to read", n, "it must be at least 1")
-        if self._written - self._index < n + self._lead:
-            waiting, needed = self._written - self._index, n + self._lead
-            self.stop()
-            raise DriveUnderflow(
-                f"the drive ran out at sample {self._index}: {waiting} samples were waiting and {needed} are needed;"
-                " the output is at zero, write earlier or read less at once"
-            )
+        require_block(n)
         with self._ending_on_failure():
+            self._drive.require(n)
             if self._state is _State.ARMED:
                 self._start()
             counts = self._read_all(n)
-        first, self._index = self._index, self._index + n
-        return Block(first, counts)
+        return Block(self._drive.advance(n), counts)
 
     def stop(self) -> None:
         if self._state is _State.CLOSED:
@@ -183,8 +168,14 @@ class HardwareRig:
             self._look_at_clock(self._lasers, _FIRST_LOOKS)
 
     def _look_at_clock(self, lasers: SerialLasers, times: int) -> None:
-        """Bound the sample clock between two looks at the machine's clock."""
+        """Bound the sample clock between two looks at the machine's clock.
+
+        The looks are spread over the sample period: right after a block they would all fall on one phase of it, and
+        the bounds would be no tighter than a period.
+        """
         for _ in range(times):
+            self._phase = (self._phase + _GOLDEN) % 1.0
+            self._clock.wait_until(now() + self._phase / self.sample_rate)
             before = now()
             count = self._daq.acquired()
             lasers.observe(before, count, now())
@@ -195,15 +186,11 @@ class HardwareRig:
         if self._lasers is None:
             return counts
         self._look_at_clock(self._lasers, _LOOKS)
-        return np.column_stack((counts, self._lasers.counts(self._index, n)))
+        return np.column_stack((counts, self._lasers.counts(self._drive.index, n)))
 
     def _require_armed(self, what: str) -> None:
         if self._state not in (_State.ARMED, _State.RUNNING):
             raise RigError(f"{what} is refused: the rig is {self._state.value}; arm it first")
-
-    def _refuse(self, why: str) -> None:
-        self.stop()
-        raise RigError(why)
 
     @contextmanager
     def _ending_on_failure(self) -> Generator[None]:
@@ -211,12 +198,13 @@ class HardwareRig:
         try:
             yield
         except BaseException as error:
-            self._failed = True
-            with suppress(RigError):
+            try:
                 self.halt()
-            # what the device said of the enable line and the output is part of what failed
-            if notes := getattr(error, "__notes__", None):
-                error.args = ("; ".join((str(error), *notes)), *error.args[1:])
+            except RigError as second:
+                # that relay or output did not obey is part of what failed
+                error.args = (f"{error}; {second}", *error.args[1:])
+            finally:
+                self._failed = True
             raise
 
     @contextmanager

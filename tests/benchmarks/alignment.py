@@ -18,8 +18,8 @@ import numpy as np
 
 from bench.config.dump import as_toml
 from bench.config.model import BenchConfiguration
-from drivers.laboratory_client import ask
 from drivers.hardware.rig import HardwareRig
+from drivers.laboratory_client import ask
 from drivers.rig import Alignment
 from tests.emulated import emulated
 

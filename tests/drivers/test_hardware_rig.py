@@ -1,13 +1,19 @@
 """The hardware backend on the emulated wire: real nidaqmx over gRPC, real pyserial, the virtual bench behind them."""
 
+import subprocess
 import sys
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from drivers.daqmx.session import DaqSession
 from drivers.emulation.laboratory import Connection, Device, Laboratory
 from drivers.errors import ConnectionLost, DeviceNotFound, DeviceTimeout, RigError
+from drivers.hardware.parameters import Hardware
 from drivers.hardware.rig import HardwareRig
 from drivers.laboratory_client import ask
 from drivers.rig import Handwork, Rig
@@ -17,6 +23,9 @@ from sim.virtual_bench import VirtualBenchParameters
 from tests.drivers.conformance import RigConformance, RigFactory, play, started
 
 LEAD = 600
+LONG_LEAD = 2000
+"""A lead that a loaded machine does not use up."""
+OUTPUT = "Dev1/ao0"
 SERIAL = pytest.mark.skipif(sys.platform == "win32", reason="emulated serial lasers need pseudo-terminals")
 
 
@@ -28,16 +37,23 @@ def laboratory(connection: Connection, device: Device = "usb") -> Laboratory:
     return emulated
 
 
-class OnEmulatedWire(RigConformance):
-    """The suite on one laboratory, a fresh client in each test."""
+def eventually(condition: Callable[[], object], seconds: float = 20.0) -> None:
+    """Wait until the condition holds."""
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline, "waited in vain"
+        time.sleep(0.01)
 
-    connection: Connection = "analogue"
-    device: Device = "usb"
+
+class Wired:
+    """One laboratory, a fresh client in each test."""
+
+    connection: Connection
 
     @pytest.fixture(scope="class")
     @classmethod
     def emulated(cls) -> Iterator[Laboratory]:
-        with laboratory(cls.connection, cls.device) as emulated:
+        with laboratory(cls.connection) as emulated:
             yield emulated
 
     @pytest.fixture
@@ -53,13 +69,25 @@ class OnEmulatedWire(RigConformance):
             rig.close()
 
 
-class TestAnalogue(OnEmulatedWire):
-    pass
-
-
 @SERIAL
-class TestSerial(OnEmulatedWire):
+class TestSerial(Wired, RigConformance):
     connection = "serial"
+
+
+class TestAnalogue(Wired):
+    """The part of the suite that the way of reading the lasers makes a difference to."""
+
+    connection = "analogue"
+    suite = RigConformance()
+
+    def test_a_rig_describes_itself(self, make_rig: RigFactory) -> None:
+        self.suite.test_a_rig_describes_itself(make_rig)
+
+    def test_blocks_are_contiguous(self, make_rig: RigFactory) -> None:
+        self.suite.test_blocks_are_contiguous_counted_from_arm_and_wide_enough_for_their_channels(make_rig)
+
+    def test_a_rig_can_be_armed_again(self, make_rig: RigFactory) -> None:
+        self.suite.test_a_rig_can_be_armed_again_and_counts_from_zero(make_rig)
 
 
 @pytest.fixture(scope="module")
@@ -76,6 +104,20 @@ def test_a_controller_with_24_bit_inputs(crio: Laboratory) -> None:
     assert "NI 9239" in rig.channels[0].device
 
 
+def test_an_input_whose_calibration_is_not_straight_gives_the_volts_of_the_bench(crio: Laboratory) -> None:
+    with HardwareRig(crio.hardware, lead=LEAD) as rig:
+        (block,) = play(started(rig), np.zeros(200), 200)
+        seen = crio.daq.first_sample
+        assert seen is not None
+        first = round((seen - crio.bench.time_of(0)) * crio.bench.rate_true)
+    (column,) = [k for k, channel in enumerate(rig.channels) if channel.higher]
+    bent, ideal = rig.channels[column], crio.bench.channels[column]
+    assert bent.name == ideal.name == "laser_1"
+    expected = ideal.to_unit(crio.bench.inputs(first, 200)[:, column])
+    # 24 bits over +-10 V and 200 mm over 8 V: a count is 30 nm; without square and cube 5 um would be missing
+    assert bent.to_unit(block.counts[:, column]) == pytest.approx(expected, abs=100e-9)
+
+
 @pytest.fixture
 def serial() -> Iterator[Laboratory]:
     with laboratory("serial") as emulated:
@@ -85,25 +127,31 @@ def serial() -> Iterator[Laboratory]:
 @SERIAL
 class TestSerialFaults:
     def test_an_unplugged_laser_ends_the_run_and_the_relay_is_open(self, serial: Laboratory) -> None:
-        with HardwareRig(serial.hardware, lead=LEAD) as rig:
+        with HardwareRig(serial.hardware, lead=LONG_LEAD) as rig:
             play(started(rig), np.full(400, 0.2), 200)
             serial.lasers[0].unplug()
             with pytest.raises(ConnectionLost, match="laser_1"):
                 play(rig, np.full(4000, 0.2), 200)
+            assert not serial.bench.enabled
+            assert serial.daq.volts(OUTPUT) == 0.0
             with pytest.raises(RigError):
                 rig.read(1)
-        assert not serial.bench.enabled
 
     def test_a_laser_without_target_says_why_and_the_run_goes_on(self, serial: Laboratory) -> None:
-        with HardwareRig(serial.hardware, lead=LEAD) as rig:
+        with HardwareRig(serial.hardware, lead=LONG_LEAD) as rig:
+            names = [channel.name for channel in rig.channels]
+            one, two = names.index("laser_1"), names.index("laser_2")
+            (mark,) = (count for count, why in rig.channels[two].faults.items() if why == "no reflection is seen")
             play(started(rig), np.zeros(400), 200)
             ask(str(serial.hardware.hands), "laser", storey=2, fault="target", arguments=["none"])
-            blocks = play(rig, np.zeros(1000), 200)
-        names = [channel.name for channel in rig.channels]
-        channel, counts = rig.channels[names.index("laser_2")], blocks[-1].counts[:, names.index("laser_2")]
-        assert np.isnan(channel.to_unit(counts)).all()
-        assert {channel.faults[int(count)] for count in counts} == {"no reflection is seen"}
-        assert not np.isnan(rig.channels[2].to_unit(blocks[-1].counts[:, 2])).any()
+            deadline = time.monotonic() + 20.0
+            while True:
+                (block,) = play(rig, np.zeros(200), 200)
+                if (block.counts[:, two] == mark).all():
+                    break
+                assert time.monotonic() < deadline, "waited in vain"
+        assert np.isnan(rig.channels[two].to_unit(block.counts[:, two])).all()
+        assert not np.isnan(rig.channels[one].to_unit(block.counts[:, one])).any()
 
     def test_a_laser_that_is_not_there_is_named(self, serial: Laboratory) -> None:
         wrong = serial.hardware.laser_1.model_copy(update={"port": "/dev/not-there"})
@@ -124,8 +172,9 @@ class TestDaqFaults:
 
     @pytest.mark.parametrize(("call", "code"), [("ReadBinaryI16", -200279), ("WriteAnalogF64", -200290)])
     def test_an_error_of_the_device_ends_the_run_with_its_code(self, wire: Laboratory, call: str, code: int) -> None:
-        with HardwareRig(wire.hardware, lead=LEAD) as rig:
+        with HardwareRig(wire.hardware, lead=LONG_LEAD) as rig:
             play(started(rig), np.full(400, 0.2), 200)
+            assert wire.bench.enabled
             wire.daq.fail_next(call, code)
             with pytest.raises(RigError) as failed:
                 play(rig, np.full(400, 0.2), 200)
@@ -134,15 +183,56 @@ class TestDaqFaults:
             # the next run begins anew
             assert play(started(rig), np.zeros(100))[0].first == 0
 
+    def test_a_run_that_cannot_be_armed_is_an_error_and_leaves_the_relay_open(self, wire: Laboratory) -> None:
+        with HardwareRig(wire.hardware, lead=LONG_LEAD) as rig:
+            wire.daq.fail_next("CfgDigEdgeStartTrig", -200077)
+            with pytest.raises(RigError, match="arming the output") as failed:
+                rig.arm()
+            assert failed.value.code == -200077
+            assert not wire.bench.enabled
+            assert play(started(rig), np.zeros(100))[0].first == 0
+
+    def test_what_was_wrong_is_told_though_the_relay_does_not_open_and_that_too(self, wire: Laboratory) -> None:
+        with HardwareRig(wire.hardware, lead=LONG_LEAD) as rig:
+            play(started(rig), np.full(400, 0.2), 200)
+            for _ in ("the cut", "the stop"):
+                wire.daq.fail_next("WriteDigitalLines", -200077)
+            with pytest.raises(RigError, match=r"^a drive .* not finite .*press the emergency stop"):
+                rig.write(np.array([np.nan]))
+            assert wire.daq.volts(OUTPUT) == 0.0
+            rig.stop()
+            assert not wire.bench.enabled
+
+    def test_a_halt_cuts_the_relay_before_anything_else(
+        self, wire: Laboratory, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        order: list[tuple[str, bool]] = []
+
+        def noted(name: str) -> None:
+            original = getattr(DaqSession, name)
+
+            def call(session: DaqSession) -> object:
+                order.append((name, wire.bench.enabled))
+                return original(session)
+
+            monkeypatch.setattr(DaqSession, name, call)
+
+        with HardwareRig(wire.hardware, lead=LONG_LEAD) as rig:
+            play(started(rig), np.full(400, 0.2), 200)
+            noted("cut")
+            noted("stop")
+            rig.halt()
+            assert order == [("cut", True), ("stop", False)]
+
     def test_a_server_that_is_gone_ends_the_run(self, wire: Laboratory) -> None:
-        with HardwareRig(wire.hardware, lead=LEAD) as rig:
+        with HardwareRig(wire.hardware, lead=LONG_LEAD) as rig:
             play(started(rig), np.zeros(400), 200)
             wire.daq.vanish()
             with pytest.raises((ConnectionLost, DeviceTimeout)):
                 play(rig, np.zeros(400), 200)
 
     def test_hands_reach_the_specimen_and_stay_off_an_armed_bench(self, wire: Laboratory) -> None:
-        with HardwareRig(wire.hardware, lead=LEAD) as rig:
+        with HardwareRig(wire.hardware, lead=LONG_LEAD) as rig:
             rig.handwork(Handwork.MOUNT_SPRING, 0.4 * 213.44)
             assert wire.bench.specimen.beta == pytest.approx(0.4)
             with pytest.raises(RigError, match="stiffness"):
@@ -156,4 +246,99 @@ def test_the_analogue_output_of_a_laser_must_fit_its_input() -> None:
     with laboratory("analogue") as wire:
         narrow = wire.hardware.laser_1.model_copy(update={"range": 5.0})
         with pytest.raises(InvalidInput, match=r"hardware\.laser_1\.range"):
-            HardwareRig(wire.hardware.model_copy(update={"laser_1": narrow}), lead=LEAD)
+            HardwareRig(wire.hardware.model_copy(update={"laser_1": narrow}), lead=LONG_LEAD)
+
+
+class TestADeadClient:
+    """What a program that died while it drove leaves behind is made safe, whatever the next one meets."""
+
+    @staticmethod
+    def dies(hardware: Hardware) -> HardwareRig:
+        """A client without watchdog that drives with 2 V and then never calls again; its tasks stay on the server."""
+        daq = hardware.daq.model_copy(update={"watchdog": None})
+        rig = HardwareRig(hardware.model_copy(update={"daq": daq}), lead=LEAD)
+        assert "none" in rig.description["watchdog"]
+        play(started(rig), np.full(1000, 2.0), 200)
+        rig._daq._connection.close()
+        return rig
+
+    @pytest.mark.parametrize(
+        ("part", "change"),
+        [
+            (None, {"sample_rate": 1999.0}),
+            (None, {"hands": "nowhere"}),
+            ("daq", {"output": "Dev1/ao9"}),
+            ("laser_1", {"range": 5.0}),
+        ],
+    )
+    def test_is_made_safe_by_an_opening_that_is_refused(self, part: str | None, change: dict[str, object]) -> None:
+        with laboratory("analogue") as wire:
+            dead = self.dies(wire.hardware)
+            assert wire.bench.enabled
+            assert wire.daq.volts(OUTPUT) == 2.0
+            update = change if part is None else {part: getattr(wire.hardware, part).model_copy(update=change)}
+            with pytest.raises(InvalidInput):
+                HardwareRig(wire.hardware.model_copy(update=update), lead=LEAD)
+            assert not wire.bench.enabled
+            assert wire.daq.volts(OUTPUT) == 0.0
+            with suppress(ValueError, RigError):
+                dead.close()
+
+    @SERIAL
+    def test_is_made_safe_though_a_laser_is_not_there(self, serial: Laboratory) -> None:
+        dead = self.dies(serial.hardware)
+        assert serial.bench.enabled
+        wrong = serial.hardware.laser_1.model_copy(update={"port": "/dev/not-there"})
+        with pytest.raises(DeviceNotFound, match="/dev/not-there"):
+            HardwareRig(serial.hardware.model_copy(update={"laser_1": wrong}), lead=LEAD)
+        assert not serial.bench.enabled
+        assert serial.daq.volts(OUTPUT) == 0.0
+        with suppress(ValueError, RigError):
+            dead.close()
+
+
+CLIENT = """
+import sys
+import numpy as np
+from drivers.hardware.parameters import Hardware
+from drivers.hardware.rig import HardwareRig
+
+rig = HardwareRig(Hardware.model_validate_json(sys.stdin.readline()), lead=2000)
+rig.arm()
+rig.write(np.full(rig.lead, 2.0))
+while True:
+    rig.write(np.full(400, 2.0))
+    rig.read(400)
+    print("driving", flush=True)
+"""
+
+
+def test_a_program_that_is_killed_while_it_drives_loses_the_relay_to_the_watchdog() -> None:
+    with laboratory("analogue") as wire:
+        assert wire.hardware.daq.watchdog == 1.0
+        displacement = wire.bench.channels[0]
+
+        def place() -> float:
+            return float(displacement.to_unit(wire.bench.inputs(wire.bench.tick() - 200, 100)[:, 0]).mean())
+
+        root = Path(__file__).parents[2]
+        command = [sys.executable, "-c", CLIENT]
+        with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=root) as client:
+            assert client.stdin is not None
+            assert client.stdout is not None
+            client.stdin.write(wire.hardware.model_dump_json() + "\n")
+            client.stdin.flush()
+            # blocks of 0.2 s for 1.6 times the time-out: it is told often enough
+            for _ in range(8):
+                assert client.stdout.readline() == "driving\n"
+                assert wire.bench.enabled
+            assert place() > 0.9 * wire.hardware.half_stroke
+            client.kill()
+            killed = time.monotonic()
+            client.wait()
+        eventually(lambda: not wire.bench.enabled)
+        assert time.monotonic() - killed < 5.0
+        # the output has run dry and holds its last value, which moves nothing any more
+        eventually(lambda: wire.daq.volts(OUTPUT) == 2.0)
+        # pressed against the end stop by 2 V, the table comes back slowly without
+        eventually(lambda: place() < 0.8 * wire.hardware.half_stroke)

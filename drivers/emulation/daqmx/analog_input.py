@@ -20,15 +20,20 @@ Size Determined?")."""
 
 
 class AnalogInput:
-    """A `Job`. `changed` guards it, and wakes whoever waits for samples."""
+    """A `Job`. `changed` guards it, and wakes whoever waits for samples.
 
-    def __init__(self, plant: Plant, changed: threading.Condition) -> None:
+    The counter of samples that were taken shows whole packets of `packet` samples: what has reached the computer.
+    """
+
+    def __init__(self, plant: Plant, changed: threading.Condition, packet: int = 1) -> None:
         self._plant = plant
+        self._packet = packet
         self._changed = changed
         self._reading = threading.Lock()
         self.inputs: list[InputChannel] = []
         self.clock: SampleClock | None = None
         self.awaited: str | None = None
+        self.source: str | None = None
         self._buffer: int | None = None
         self._first: int | None = None
         self._position = 0
@@ -50,6 +55,10 @@ class AnalogInput:
     @property
     def start_terminal(self) -> str | None:
         return self.inputs[0].device.input_start
+
+    @property
+    def clock_terminal(self) -> str | None:
+        return self.inputs[0].device.input_clock
 
     @property
     def buffer(self) -> int:
@@ -75,9 +84,9 @@ class AnalogInput:
 
     @property
     def acquired(self) -> int:
-        """How many samples per channel have been taken: counted by the clock, whoever reads."""
+        """How many samples per channel have been taken: counted by the clock, whoever reads, in whole packets."""
         self._require_not_overrun()
-        return self._passed(self._plant.tick())
+        return self._passed(self._plant.tick()) // self._packet * self._packet
 
     @property
     def available(self) -> int:

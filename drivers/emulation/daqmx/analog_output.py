@@ -48,6 +48,7 @@ class AnalogOutput:
         self.outputs: list[OutputChannel] = []
         self._clock: SampleClock | None = None
         self.awaited: str | None = None
+        self.source: str | None = None
         self.regeneration = RegenerationMode.ALLOW_REGENERATION.value
         self.transfer = OutputDataTransferCondition.ON_BOARD_MEMORY_LESS_THAN_FULL.value
         self._buffer: int | None = None
@@ -73,6 +74,10 @@ class AnalogOutput:
     @property
     def start_terminal(self) -> str | None:
         return self.outputs[0].device.output_start if self.clock else None
+
+    @property
+    def clock_terminal(self) -> str | None:
+        return self.outputs[0].device.output_clock if self.clock else None
 
     @property
     def highest_rate(self) -> float:

@@ -96,6 +96,21 @@ class DeviceModel:
         return f"/{self.chassis}/te0/StartTrigger" if self.chassis else f"/{self.name}/ai/StartTrigger"
 
     @property
+    def input_clock(self) -> str:
+        """Terminal of the sample clock of the inputs."""
+        return f"/{self.chassis}/te0/SampleClock" if self.chassis else f"/{self.name}/ai/SampleClock"
+
+    @property
+    def output_clock(self) -> str:
+        """Terminal of the sample clock of the outputs."""
+        return f"/{self.chassis}/te1/SampleClock" if self.chassis else f"/{self.name}/ao/SampleClock"
+
+    @property
+    def terminals(self) -> tuple[str, ...]:
+        """Every terminal that others may be started or clocked from."""
+        return self.input_start, self.output_start, self.input_clock, self.output_clock
+
+    @property
     def output_start(self) -> str:
         """Terminal of the start trigger of the outputs."""
         return f"/{self.chassis}/te1/StartTrigger" if self.chassis else f"/{self.name}/ao/StartTrigger"

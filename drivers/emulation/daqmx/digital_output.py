@@ -30,6 +30,8 @@ class DigitalOutput:
 
     awaited: str | None = None
     start_terminal: str | None = None
+    source: str | None = None
+    clock_terminal: str | None = None
 
     def __init__(self, lines: Lines) -> None:
         self._lines = lines

@@ -21,7 +21,7 @@ class Driver:
     """Devices, tasks and reservations; `changed` guards all of it. It outlives every client.
 
     `drive` is the output that is wired to the plant, `enable_line` the line of the plant's enable relay; None leaves
-    it unconnected. `converter` made the plant's counts.
+    it unconnected. `converter` made the plant's counts. `output_clock_error` and `packet` as of `DaqServer`.
     """
 
     def __init__(
@@ -31,8 +31,12 @@ class Driver:
         converter: Converter,
         drive: str | None,
         enable_line: str | None,
+        output_clock_error: float = 0.0,
+        packet: int = 1,
     ) -> None:
         self.plant = plant
+        self.output_clock_error = output_clock_error
+        self.packet = packet
         self.converter = converter
         self.catalogue = Catalogue(devices)
         self.changed = threading.Condition()
@@ -97,10 +101,11 @@ class Driver:
             task.require_stopped()
             job = task.required_job
             job.check()
-            self._require_terminal(job)
+            self._require_terminals(job)
             self.reserve(task)
             task.state = State.ARMED
-            if job.awaited is None:
+            # what follows a clock of another task goes when that does
+            if job.awaited is None and job.source is None:
                 self._fire(task, job)
             self.changed.notify_all()
 
@@ -143,8 +148,7 @@ class Driver:
                 self.first_tick = tick
             _begin(task, job, tick)
             for other in self._tasks.values():
-                waits = other.job is not None and other.state is State.ARMED and other.job.awaited is not None
-                if waits and other.job is not None and _same(other.job.awaited, job.start_terminal):
+                if other.job is not None and other.state is State.ARMED and _goes_with(other.job, job):
                     _begin(other, other.job, tick)
 
     def _end(self, task: Task) -> None:
@@ -163,27 +167,28 @@ class Driver:
                     f"Task Name: {task.name}\nOther Task: {other.name}",
                 )
 
-    def _require_terminal(self, job: Job) -> None:
-        """Raise DaqmxFailure when it would wait for a trigger that no device has."""
-        if job.awaited is None:
-            return
+    def _require_terminals(self, job: Job) -> None:
+        """Raise DaqmxFailure when it would wait for a trigger or follow a clock that no device has."""
         own = {self.catalogue.device(name).clockwork for name in job.devices}
-        known = [
-            terminal
-            for device in self.catalogue.devices
-            if device.clockwork in own
-            for terminal in (device.input_start, device.output_start)
-        ]
-        if not any(_same(job.awaited, terminal) for terminal in known):
-            raise DaqmxFailure(
-                DAQmxErrors.INVALID_ROUTING_SOURCE_TERMINAL_NAME_ROUTING,
-                f"Source terminal to be routed could not be found on the device.\n\nSource Terminal: {job.awaited}",
-            )
+        devices = [device for device in self.catalogue.devices if device.clockwork in own]
+        known = {terminal.lower() for device in devices for terminal in device.terminals}
+        for wanted in (job.awaited, job.source):
+            if wanted is not None and f"/{wanted.strip('/')}".lower() not in known:
+                raise DaqmxFailure(
+                    DAQmxErrors.INVALID_ROUTING_SOURCE_TERMINAL_NAME_ROUTING,
+                    f"Source terminal to be routed could not be found on the device.\n\nSource Terminal: {wanted}",
+                )
 
 
 def _begin(task: Task, job: Job, tick: int) -> None:
     job.begin(tick)
     task.state = State.RUNNING
+
+
+def _goes_with(waiting: Job, fired: Job) -> bool:
+    """Whether a job that waits for trigger or clock, or both, has all of it from the one that starts."""
+    triggered = waiting.awaited is None or _same(waiting.awaited, fired.start_terminal)
+    return triggered and (waiting.source is None or _same(waiting.source, fired.clock_terminal))
 
 
 def _same(one: str | None, other: str | None) -> bool:

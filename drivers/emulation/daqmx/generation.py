@@ -62,7 +62,7 @@ class Generation:
 
         def volts(first: int, n: int) -> NDArray[np.float64]:
             assert self._first is not None
-            numbers = (np.arange(first, first + n) - self._first) // self._clock.divider
+            numbers = self._clock.numbers(self._first, np.arange(first, first + n))
             return self._samples.at(np.minimum(numbers, self.written - 1))[:, channel]
 
         return volts

@@ -31,6 +31,16 @@ class Job(Protocol):
         """The terminal on which its own start can be seen."""
         ...
 
+    @property
+    def source(self) -> str | None:
+        """The terminal of the sample clock that it follows; None when it has its own, or none."""
+        ...
+
+    @property
+    def clock_terminal(self) -> str | None:
+        """The terminal on which its own sample clock can be seen."""
+        ...
+
     def check(self) -> None:
         """Raise DaqmxFailure when it could not start as it is."""
         ...

@@ -25,8 +25,10 @@ class DaqServer:
     """Speaks like NI's gRPC device server, with `devices` whose terminals are those of `plant`.
 
     `drive` is the analogue output that drives the plant and `enable_line` the digital line of its enable relay; the
-    first that the devices have unless told. `converter` made the plant's counts. Raises InvalidInput when the
-    address cannot be had.
+    first that the devices have unless told. `converter` made the plant's counts. `output_clock_error` is by how much an
+    output that does not follow the inputs' sample clock is faster than it, relative; the counter of samples that the
+    inputs have taken goes in steps of `packet`, as where they travel in packets. Raises InvalidInput when the address
+    cannot be had.
     """
 
     def __init__(
@@ -38,6 +40,8 @@ class DaqServer:
         converter: Converter | None = None,
         drive: str | None = None,
         enable_line: str | None = None,
+        output_clock_error: float = 0.0,
+        packet: int = 1,
     ) -> None:
         self._plant = plant
         outputs = [name for device in devices for name in device.output_names]
@@ -48,6 +52,8 @@ class DaqServer:
             converter if converter is not None else Converter(),
             _chosen("drive", drive, outputs),
             _chosen("enable_line", enable_line, lines),
+            output_clock_error,
+            packet,
         )
         self._faults = Faults()
         self._pool = ThreadPoolExecutor(_WORKERS, thread_name_prefix="emulated-daq")
@@ -77,6 +83,11 @@ class DaqServer:
         """Monotonic time of the first sample of the clocked task that was started last [s]; None before the first."""
         tick = self._driver.first_tick
         return None if tick is None else self._plant.time_of(tick)
+
+    def volts(self, output: str) -> float:
+        """Volts at an analogue output at the next tick."""
+        with self._driver.instant.next() as tick:
+            return self._driver.terminals[output].volts_at(tick)
 
     def start(self) -> None:
         """Answer from now on."""

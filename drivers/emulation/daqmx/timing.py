@@ -3,7 +3,9 @@
 from dataclasses import dataclass
 from math import ceil, floor
 
+import numpy as np
 from nidaqmx.error_codes import DAQmxErrors
+from numpy.typing import NDArray
 
 from drivers.emulation.daqmx.errors import DaqmxFailure
 
@@ -13,22 +15,32 @@ _SAME = 1.0e-9
 
 @dataclass(frozen=True)
 class SampleClock:
-    """One sample every `divider` ticks: `rate` samples per second. `samples` sizes the buffer, per channel."""
+    """One sample every `divider` ticks: `rate` samples per second. `samples` sizes the buffer, per channel.
+
+    `error` is by how much the clock is faster than the plant's ticks, relative.
+    """
 
     divider: int
     rate: float
     samples: int
+    error: float = 0.0
 
     def ticks(self, first: int, samples: int) -> int:
         """The tick of sample number `samples` when sample 0 is taken at tick `first`."""
-        return first + samples * self.divider
+        return first + ceil(samples * self.divider / (1.0 + self.error))
 
     def passed(self, first: int, tick: int) -> int:
         """How many samples have their tick at `tick` or before when sample 0 has it at `first`."""
-        return max((tick - first) // self.divider + 1, 0)
+        return max(int(self.numbers(first, np.array([tick]))[0]) + 1, 0)
+
+    def numbers(self, first: int, ticks: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Number of the sample that is the last at each of `ticks`, same shape, when sample 0 has its at `first`."""
+        if self.error == 0.0:
+            return (ticks - first) // self.divider
+        return np.floor((ticks - first) * (1.0 + self.error) / self.divider).astype(np.int64)
 
 
-def sample_clock(asked: float, highest: float, tick_rate: float, samples: int) -> SampleClock:
+def sample_clock(asked: float, highest: float, tick_rate: float, samples: int, error: float = 0.0) -> SampleClock:
     """The clock that a device makes when `asked` samples per second are wanted: the next higher rate that it has.
 
     All rates are a tick rate over an integer, at most `highest`, as with delta-sigma converters (NI 9239 data sheet).
@@ -40,4 +52,4 @@ def sample_clock(asked: float, highest: float, tick_rate: float, samples: int) -
             f"Property: SampClk.Rate\nRequested Value: {asked}\nMaximum Value: {highest}",
         )
     divider = max(floor(tick_rate / asked * (1.0 + _SAME)), ceil(tick_rate / highest * (1.0 - _SAME)), 1)
-    return SampleClock(divider, tick_rate / divider, samples)
+    return SampleClock(divider, tick_rate / divider, samples, error)

@@ -15,6 +15,8 @@ class Watchdog:
 
     awaited: str | None = None
     start_terminal: str | None = None
+    source: str | None = None
+    clock_terminal: str | None = None
 
     def __init__(self, device: DeviceModel, lines: Lines, timeout: float) -> None:
         if device.watchdog is None:

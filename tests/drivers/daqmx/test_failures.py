@@ -105,10 +105,13 @@ def test_a_session_that_cannot_be_started_stays_safe(
     eventually(lambda: is_safe(plant))
 
 
-def test_a_trigger_that_the_device_does_not_have_is_an_error(open_session: OpenSession, plant: Loopback) -> None:
-    session = open_session(start_trigger="/Dev1/PFI99/Nowhere")
-    assert session.description["start trigger"] == "/Dev1/PFI99/Nowhere"
-    with pytest.raises(RigError):
+@pytest.mark.parametrize(("key", "told"), [("start_trigger", "start trigger"), ("clock", "sample clock of the output")])
+def test_a_terminal_that_the_device_does_not_have_is_an_error(
+    open_session: OpenSession, plant: Loopback, key: str, told: str
+) -> None:
+    session = open_session(**{key: "/Dev1/PFI99/Nowhere"})
+    assert session.description[told] == "/Dev1/PFI99/Nowhere"
+    with pytest.raises(RigError, match=r"hardware\.daq\.clock"):
         started(session)
     eventually(lambda: is_safe(plant))
 
@@ -182,6 +185,19 @@ def test_an_opening_that_fails_makes_safe_what_a_dead_client_left(
     assert plant.enabled
     with pytest.raises(refused):
         open_session(**change)
+    eventually(lambda: is_safe(plant))
+
+
+def test_an_opening_that_fails_makes_safe_what_is_left_without_any_task(
+    session: DaqSession, open_session: OpenSession, plant: Loopback
+) -> None:
+    driving(session)
+    # as the driver of this PC does when a process ends: lines and outputs stay as they are
+    session._tasks.clear()
+    assert plant.enabled
+    assert plant.present_output() == 3.0
+    with pytest.raises(InvalidInput):
+        open_session(rate=1.0e9)
     eventually(lambda: is_safe(plant))
 
 

@@ -109,9 +109,17 @@ class Wires:
 class Desk:
     """Plant, server and client; everything that was opened is closed at the end."""
 
-    def __init__(self, devices: Sequence[DeviceModel] = (), speed: float = 1.0) -> None:
+    def __init__(
+        self, devices: Sequence[DeviceModel] = (), speed: float = 1.0, packet: int = 1, output_clock_error: float = 0.0
+    ) -> None:
         self.plant = Wires(speed)
-        self.server = DaqServer(self.plant, devices or [x_series()], converter=CONVERTER)
+        self.server = DaqServer(
+            self.plant,
+            devices or [x_series()],
+            converter=CONVERTER,
+            packet=packet,
+            output_clock_error=output_clock_error,
+        )
         self.server.start()
         self.channel: Any = grpc.insecure_channel(self.server.address)
         self._opened = ExitStack()

@@ -126,6 +126,19 @@ def test_the_counter_follows_the_clock_whoever_reads(desk: Desk) -> None:
     assert task.in_stream.avail_samp_per_chan >= seen[-1] - 2
 
 
+def test_the_counter_goes_in_packets_where_samples_travel_in_packets() -> None:
+    with Desk(speed=4.0, packet=64) as desk:
+        task = desk.inputs()
+        task.start()
+        first = int(counts(task, 1)[0, 1])
+        for _ in range(50):
+            earliest = desk.plant.tick()
+            acquired = task.in_stream.total_samp_per_chan_acquired
+            latest = desk.plant.tick()
+            assert acquired % 64 == 0
+            assert earliest - first + 1 - 63 <= acquired <= latest - first + 1
+
+
 def test_the_server_knows_when_the_first_sample_was_taken(desk: Desk) -> None:
     assert desk.server.first_sample is None
     task = desk.inputs()

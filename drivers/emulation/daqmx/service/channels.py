@@ -33,7 +33,8 @@ class ChannelService(Service):
         task = self._task(request)
         added = self._new_inputs(request)
         with self._driver.changed:
-            job = self._job(task, AnalogInput, lambda: AnalogInput(self._driver.plant, self._driver.changed))
+            driver = self._driver
+            job = self._job(task, AnalogInput, lambda: AnalogInput(driver.plant, driver.changed, driver.packet))
             job.inputs.extend(added)
         return pb.CreateAIVoltageChanResponse()
 

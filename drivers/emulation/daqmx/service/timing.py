@@ -28,10 +28,13 @@ class TimingService(Service):
         job = self._changeable(request)
         if (request.sample_mode_raw or request.sample_mode) != AcquisitionType.CONTINUOUS.value:
             raise NotEmulated("a clock that stops by itself")
-        if request.source not in ("", "OnboardClock"):
-            raise NotEmulated("a sample clock from elsewhere")
+        own = request.source in ("", "OnboardClock")
+        if not own and isinstance(job, AnalogInput):
+            raise NotEmulated("inputs on a sample clock from elsewhere")
+        error = self._driver.output_clock_error if own and isinstance(job, AnalogOutput) else 0.0
         tick_rate = self._driver.plant.tick_rate
-        job.clock = sample_clock(request.rate, job.highest_rate, tick_rate, request.samps_per_chan)
+        job.source = None if own else request.source
+        job.clock = sample_clock(request.rate, job.highest_rate, tick_rate, request.samps_per_chan, error)
         return pb.CfgSampClkTimingResponse()
 
     def GetTimingAttributeDouble(
@@ -43,6 +46,18 @@ class TimingService(Service):
                 return pb.GetTimingAttributeDoubleResponse(value=job.clock.rate)
             case pb.TIMING_ATTRIBUTE_SAMP_CLK_MAX_RATE:
                 return pb.GetTimingAttributeDoubleResponse(value=job.highest_rate)
+            case other:
+                raise unsupported(other)
+
+    def GetTimingAttributeString(
+        self, request: pb.GetTimingAttributeStringRequest, context: object
+    ) -> pb.GetTimingAttributeStringResponse:
+        job = _sampled(self._task(request))
+        match attribute_of(request):
+            case pb.TIMING_ATTRIBUTE_SAMP_CLK_TERM:
+                return pb.GetTimingAttributeStringResponse(value=job.clock_terminal or "")
+            case pb.TIMING_ATTRIBUTE_SAMP_CLK_SRC:
+                return pb.GetTimingAttributeStringResponse(value=job.source or "OnboardClock")
             case other:
                 raise unsupported(other)
 
