@@ -101,9 +101,7 @@ def test_a_device_that_is_gone_is_let_go(open_session: OpenSession, server: DaqS
 def test_a_session_that_fails_to_open_leaves_no_watchdog(
     server: DaqServer, open_session: OpenSession, call: str
 ) -> None:
-    # the relay is made twice: to make safe what another program left, and for this session
-    for _ in range(2):
-        server.fail_next(call, -200077)
+    server.fail_next(call, -200077)
     with pytest.raises(RigError):
         open_session(watchdog=TIMEOUT)
     assert open_session(watchdog=TIMEOUT).description["tasks left by another client"] == "none"
