@@ -26,7 +26,7 @@ from protocols.harmonic.pace import Pace
 from protocols.harmonic.parameters import HarmonicParameters
 from protocols.harmonic.point import HarmonicPoint, PointStatus
 from protocols.harmonic.settle import Look, Settled, settle_and_measure
-from protocols.harmonic.stages import planned_starts
+from protocols.harmonic.stages import BARE_CHANGE, planned_starts
 from sim.gain import predict_gain
 from sim.specimen import Specimen
 from sim.steady import resting_level
@@ -37,9 +37,6 @@ REST = 2.0
 NO_BLOCK = "the first storey is pulled aside although the block was taken off: check lasers and specimen"
 
 FALLEN_REQUEST = "The block has fallen: stand it up again."
-
-CHANGE_TIME = 4.0
-"""Time in which the bare frame goes from one frequency to the next [s]."""
 
 
 class HarmonicSheet:
@@ -80,7 +77,7 @@ class HarmonicSheet:
                 yield Say(Warned(0.0, f"the bare frame is not steady at {omega:g} rad/s: no gain can be stated there"))
             self._bare[omega] = settled
             self._pace.finished(omega)
-            duration = CHANGE_TIME
+            duration = BARE_CHANGE
         yield RampOut()
         return calibration
 
