@@ -7,7 +7,7 @@ from typing import Any
 
 from bench.report.rows import PointLike, plain
 
-WIDTH = 110
+WIDTH = 118
 ABSENT = "-"
 
 
@@ -20,7 +20,7 @@ class _Column:
 
 
 def points_table(points: Sequence[PointLike]) -> str:
-    """A table of harmonic points, at most 110 columns wide, and below it the points that need a look.
+    """A table of harmonic points, at most 118 columns wide, and below it the points that need a look.
 
     "-" stands where a value is absent; a disagreement with the prediction is marked "NO <" in the last column.
     """
@@ -86,6 +86,7 @@ _COLUMNS = (
     _Column("diff.", "%", _difference),
     _Column("orbit", "", _verdict("predicted_stable", "stable", "unstable"), left=True),
     _Column("starts", "1", _number("starts_tried", "d")),
+    _Column("chance", "1", _number("start_chance", ".2f")),
     _Column("settled", "s", _number("settle_time_s", ".1f")),
     _Column("agrees", "", _verdict("agrees", "yes", "NO <"), left=True),
 )

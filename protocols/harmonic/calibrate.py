@@ -30,8 +30,10 @@ def calibrate_drive(
 ) -> Generator[Step, Outcome, DriveCalibration | Fallen]:
     """Measure the table's response to the drive at `omegas` [rad/s] with table accelerations of `level` [m/s2].
 
-    Without a `start` the response is first probed in two steps, from a command too small to do harm.
+    Without a `start` the response is first probed in two steps, from a command too small to do harm, and what was
+    measured at one frequency serves as the start for the next.
     """
+    known = start is not None
     if start is None:
         start = DriveCalibration.flat(1.0)
         for volts in (PROBE, 10.0 * PROBE):
@@ -48,14 +50,24 @@ def calibrate_drive(
         if isinstance(response, Fallen):
             return response
         points[omega] = response
+        if not known:
+            # at rest, or the drive would jump
+            outcome = yield Follow((Leg(CHANGE_TIME, 0.0, omega),))
+            if isinstance(outcome, Fallen):
+                return outcome
+            yield Calibrate(_of(points))
     outcome = yield Follow((Leg(CHANGE_TIME, 0.0, max(omegas)),))
-    return outcome if isinstance(outcome, Fallen) else DriveCalibration(tuple(points), tuple(points.values()))
+    return outcome if isinstance(outcome, Fallen) else _of(points)
 
 
 def harmonic_frequencies(omega: float, highest: int) -> list[float]:
     """Frequencies [rad/s] from `omega` up to its harmonic `highest`, `omega` itself left out, half an octave apart."""
     steps = ceil(2.0 * log2(highest))
     return [omega * highest ** (step / steps) for step in range(1, steps + 1)]
+
+
+def _of(points: dict[float, complex]) -> DriveCalibration:
+    return DriveCalibration(tuple(points), tuple(points.values()))
 
 
 def _measure(omega: float, amplitude: float) -> Generator[Step, Outcome, complex | Fallen]:

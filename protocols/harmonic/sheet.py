@@ -8,8 +8,6 @@
 
 from collections.abc import Generator
 
-import numpy as np
-
 from bench.analysis.cycles import Cycle
 from bench.analysis.gain import gain, steady_peak
 from bench.config.model import BenchConfiguration
@@ -26,10 +24,9 @@ from protocols.harmonic.pace import Pace
 from protocols.harmonic.parameters import HarmonicParameters
 from protocols.harmonic.point import HarmonicPoint, PointStatus
 from protocols.harmonic.settle import Look, Settled, settle_and_measure
-from protocols.harmonic.stages import BARE_CHANGE, planned_starts
+from protocols.harmonic.stages import BARE_CHANGE, planned_starts, spring_calibration
 from sim.gain import predict_gain
 from sim.specimen import Specimen
-from sim.steady import resting_level
 
 REST = 2.0
 """Time at rest before a test, over which the zero of the signals is taken [s]."""
@@ -87,11 +84,8 @@ class HarmonicSheet:
         plans = {omega: self._starts(specimen, omega) for omega in self._parameters.omega}
         yield Arm(REST)
         yield Say(StepStarted(0.0, f"calibrate the drive, beta = {specimen.beta:g}"))
-        omegas = sorted({leg.omega for starts in plans.values() for start in starts for leg in start.legs})
-        grid = np.linspace(omegas[0], omegas[-1], max(round((omegas[-1] - omegas[0]) / 1.5) + 1, 2))
-        wanted = sorted({*(round(float(omega), 2) for omega in grid), *self._parameters.omega})
-        allowed = 0.6 * min(resting_level(specimen, omega) for omega in wanted)
-        level = min(self._parameters.calibration_level * self._amplitude, allowed)
+        starts = [start for each in plans.values() for start in each]
+        wanted, level = spring_calibration(self._parameters, specimen, starts)
         measured = yield from calibrate_drive(wanted, level, calibration)
         yield from self._end_test(specimen, fast=isinstance(measured, Fallen))
         if isinstance(measured, DriveCalibration):

@@ -120,7 +120,7 @@ def spring_calibration(
 
 
 def _bare_calibration(parameters: HarmonicParameters, specimen: Specimen, response: TableResponse | None) -> Trial:
-    """The bare frame's calibration divides by one response, probed at the first frequency, at every other too.
+    """The bare frame's calibration divides by the response at the frequency before, at first by the one probed.
 
     The probe is so small that friction takes a good part of it: what is made of its response moves the table more.
     """
@@ -135,8 +135,11 @@ def _bare_calibration(parameters: HarmonicParameters, specimen: Specimen, respon
         for volts in PROBES:
             legs += [*_measured(first, volts * float(gains[0])), Leg(CHANGE_TIME, 0.0, first)]
         probed = gains[0] * (1.0 - response.friction / PROBES[-1])
-        levels = [(omega, level * float(gain / probed)) for omega, gain in zip(wanted, gains[1:], strict=True)]
-    legs += _calibration_legs(levels)
+        before = [probed, *gains[1:-1]]
+        levels = [(w, level * float(gain / by)) for w, gain, by in zip(wanted, gains[1:], before, strict=True)]
+    for omega, moved in levels:
+        legs += [*_measured(omega, moved), Leg(CHANGE_TIME, 0.0, omega)]
+    legs.append(Leg(CHANGE_TIME, 0.0, wanted[-1]))
     return Trial(Stage("calibration of the drive with the bare frame", tuple(legs)), specimen.bare())
 
 

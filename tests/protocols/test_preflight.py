@@ -169,13 +169,13 @@ def test_a_campaign_beyond_a_limit_is_refused_before_anything_is_opened(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """What only the simulated starts and calibrations show: the closed forms of the table allow it."""
-    (tmp_path / "bench.toml").write_text("[limits]\nacceleration = 2.0\n", encoding="utf-8")
+    (tmp_path / "bench.toml").write_text("[limits]\nacceleration = 1.6\n", encoding="utf-8")
     command = ["run", "harmonic", "--omega", "16", "--beta", "0.4", "--config", str(tmp_path / "bench.toml")]
     out = tmp_path / "run"
     assert main([*command, "--yes", "--out", str(out)]) == 2
     shown = capsys.readouterr()
     assert shown.out == ""
-    assert "limits.acceleration = 2.0 is refused: calibration of the drive with the bare frame takes" in shown.err
+    assert "limits.acceleration = 1.6 is refused: start 1 of beta = 0.4 at omega = 16 rad/s takes" in shown.err
     assert main([*command, "--dry-run", "--json", "--out", str(out)]) == 2
     content = json.loads(capsys.readouterr().out)
     assert content["would_run"] is False
