@@ -63,12 +63,14 @@ class GainPrediction:
 class SeismicGain:
     """Gain coefficients of one stiffness ratio under a record; both None unless the run was completed.
 
-    `motion` says whether and when the block overturned (`motion.overturned`, `motion.end_time`), and has the peaks.
+    `motion` says whether and when the block overturned (`motion.overturned`, `motion.end_time`), and has the peaks;
+    `bare` has those of the frame without block.
     """
 
     beta: float
     alpha_1: float | None
     alpha_2: float | None
+    bare: Peaks
     motion: Motion
 
 
@@ -125,7 +127,7 @@ def seismic_curve(
         known = motion.status is Status.COMPLETED
         alpha_1 = motion.peaks.u1 / bare.peaks.u1 if known else None
         alpha_2 = motion.peaks.drift / bare.peaks.drift if known else None
-        curve.append(SeismicGain(member.beta or 0.0, alpha_1, alpha_2, motion))
+        curve.append(SeismicGain(member.beta or 0.0, alpha_1, alpha_2, bare.peaks, motion))
     return curve
 
 

@@ -13,6 +13,7 @@ from bench.cli.configure import config_app
 from bench.cli.devices import devices_app
 from bench.cli.emulate import emulate_app
 from bench.cli.predict import predict_app
+from bench.cli.records import records_app
 from bench.cli.refusal import tell
 from bench.cli.run import Start, run_app
 from sim.errors import RockbenchError
@@ -48,6 +49,7 @@ def main(argv: Sequence[str] | None = None, start: Start | None = None) -> int:
     app.command(devices_app())
     app.command(emulate_app())
     app.command(predict_app())
+    app.command(records_app())
     app.command(config_app())
     app.command(benchmark_app())
     try:

@@ -1,15 +1,15 @@
 """`rockbench predict`: what the model expects, without a bench."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from inspect import Signature
 from typing import TYPE_CHECKING, Any
 
 from cyclopts import App, Group
 
 from bench.cli import flags
-from bench.cli.predict_options import ResultOptions, SpecimenOptions, arguments_of
-from bench.cli.refusal import tell
+from bench.cli.predict_options import EXIT_CODES, ResultOptions, SpecimenOptions, arguments_of, taken
+from bench.cli.predict_records import RECORDS_PREDICTIONS, records_command
 from bench.prediction.requests import (
     HistoryRequest,
     MapRequest,
@@ -18,16 +18,11 @@ from bench.prediction.requests import (
     SpectrumRequest,
     SteadyRequest,
 )
-from sim.errors import InvalidInput, RockbenchError
+from sim.errors import InvalidInput
 
 if TYPE_CHECKING:
     from bench.cli.predict_output import Result
     from sim.specimen import Specimen
-
-_EXIT_CODES = (
-    "The exit code is 0 when the prediction was made, 1 when it failed, 2 when something was refused before it began. "
-    "Files that exist are never overwritten."
-)
 
 MOST_HISTORIES = 6
 """Points that a figure of histories can show."""
@@ -53,6 +48,8 @@ def predict_app() -> App:
     app = App(name="predict", help="Predict modes, motions and gain coefficients from the model.", version_flags=())
     for prediction in PREDICTIONS:
         app.command(_command(prediction), name=prediction.name)
+    for on_records in RECORDS_PREDICTIONS:
+        app.command(records_command(on_records), name=on_records.name)
     return app
 
 
@@ -64,7 +61,7 @@ def _command(prediction: Prediction) -> Callable[..., int]:
 
     group = Group(f"Parameters of {prediction.name}", sort_key=1)
     asked = flags.arguments_of(prediction.request, group)
-    execute.__doc__ = f"{prediction.summary}\n\n{prediction.details}\n\n{_EXIT_CODES}"
+    execute.__doc__ = f"{prediction.summary}\n\n{prediction.details}\n\n{EXIT_CODES}"
     execute.__dict__["__signature__"] = Signature(
         [*asked, *arguments_of(SpecimenOptions), *arguments_of(ResultOptions)]
     )
@@ -73,10 +70,10 @@ def _command(prediction: Prediction) -> Callable[..., int]:
 
 def _perform(prediction: Prediction, arguments: dict[str, Any]) -> int:
     from bench.cli.predict_inputs import request_from, specimen_from
-    from bench.cli.predict_output import check_files, deliver
+    from bench.cli.predict_output import carried_out, check_files
 
-    options = ResultOptions(**_taken(arguments, ResultOptions))
-    chosen = SpecimenOptions(**_taken(arguments, SpecimenOptions))
+    options = ResultOptions(**taken(arguments, ResultOptions))
+    chosen = SpecimenOptions(**taken(arguments, SpecimenOptions))
     request = request_from(prediction.request, arguments)
     specimen = specimen_from(chosen.specimen, chosen.distance, chosen.restitution_factor)
     if specimen.beta is not None and arguments.get("beta") is None and not isinstance(request, MapRequest):
@@ -87,19 +84,7 @@ def _perform(prediction: Prediction, arguments: dict[str, Any]) -> int:
         if points > prediction.drawable:
             allowed = f"at most {prediction.drawable} points fit in this figure; ask for fewer"
             raise InvalidInput("--plot", f"{points} points", allowed)
-    try:
-        deliver(prediction.make(request, specimen), options)
-    except InvalidInput:
-        raise
-    except (RockbenchError, OSError) as error:
-        tell(error)
-        return 1
-    return 0
-
-
-def _taken(arguments: dict[str, Any], options: type[SpecimenOptions] | type[ResultOptions]) -> dict[str, Any]:
-    names = {field.name for field in fields(options)} & arguments.keys()
-    return {name: arguments.pop(name) for name in names}
+    return carried_out(lambda: prediction.make(request, specimen), options)
 
 
 def _modes(request: ModesRequest, specimen: "Specimen") -> "Result":

@@ -17,6 +17,8 @@ P = TypeVar("P", bound=Parameters)
 MOST_VALUES, MOST_POINTS = 10_000, 1_000_000
 """Of a range, and of all ranges together: more is a slip of the finger."""
 
+_AXES = ("omega", "beta", "corner")
+
 _OF_SPECIMEN: dict[tuple[str | int, ...], str] = {
     ("d",): "--distance",
     ("block", "restitution_factor"): "--restitution-factor",
@@ -27,12 +29,13 @@ def request_from(model: type[P], arguments: Mapping[str, Any]) -> P:
     """The request that the flags make. Raises InvalidInput."""
     flags = dict(arguments)
     points = 1
-    for name in ("omega", "beta"):
+    for name in _AXES:
         if flags.get(name) is not None:
             flags[name] = expanded(flag(name), flags[name])
             points *= len(flags[name])
     if points > MOST_POINTS:
-        raise InvalidInput("--omega times --beta", points, f"at most {MOST_POINTS} points")
+        axes = " times ".join(flag(name) for name in _AXES if flags.get(name) is not None)
+        raise InvalidInput(axes, points, f"at most {MOST_POINTS} points")
     wanted = given(model, flags)
 
     def named(path: tuple[str | int, ...]) -> str:
@@ -42,9 +45,12 @@ def request_from(model: type[P], arguments: Mapping[str, Any]) -> P:
 
 
 def expanded(item: str, tokens: Sequence[str]) -> list[str | float]:
-    """Numbers as they were typed, and in place of each `start:stop:count` its numbers. Raises InvalidInput."""
+    """Numbers as they were typed, commas between them or not, and in place of each `start:stop:count` its numbers.
+
+    Raises InvalidInput.
+    """
     values: list[str | float] = []
-    for token in tokens:
+    for token in (part for word in tokens for part in word.split(",")):
         if ":" in token:
             values += _range(item, token)
         else:
@@ -52,12 +58,16 @@ def expanded(item: str, tokens: Sequence[str]) -> list[str | float]:
     return values
 
 
-def specimen_from(file: Path | None, distance: str | None, restitution_factor: str | None) -> "Specimen":
-    """The specimen: flags win over the file, the file over the paper's values. Raises InvalidInput."""
+def specimen_from(
+    file: Path | None, distance: str | None, restitution_factor: str | None, assumed: "Specimen | None" = None
+) -> "Specimen":
+    """The specimen: flags win over the file, the file over the `assumed` one or the paper's. Raises InvalidInput."""
     from bench.config.toml import read_table
     from sim.specimen import Block, Specimen
 
-    table = read_table(file, "--specimen") if file is not None else {}
+    table = assumed.model_dump(mode="json") if assumed is not None else {}
+    if file is not None:
+        table = read_table(file, "--specimen")
     if distance is not None:
         table["d"] = given(Specimen, {"d": distance})["d"]
     if restitution_factor is not None and isinstance(table.setdefault("block", {}), dict):

@@ -1,12 +1,17 @@
 """The options that every prediction has on the command line."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from inspect import Parameter as Argument
 from inspect import signature
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from cyclopts import Group, Parameter
+
+EXIT_CODES = (
+    "The exit code is 0 when the prediction was made, 1 when it failed, 2 when something was refused before it began. "
+    "Files that exist are never overwritten."
+)
 
 _SPECIMEN = Group("Specimen", sort_key=2)
 _RESULT = Group("Result", sort_key=3)
@@ -83,3 +88,9 @@ class ResultOptions:
 def arguments_of(options: type[SpecimenOptions] | type[ResultOptions]) -> list[Argument]:
     """One keyword-only argument for each option."""
     return list(signature(options).parameters.values())
+
+
+def taken(arguments: dict[str, Any], options: type[SpecimenOptions] | type[ResultOptions]) -> dict[str, Any]:
+    """Those of the `arguments` that belong to `options`, which are no longer among them."""
+    names = {field.name for field in fields(options)} & arguments.keys()
+    return {name: arguments.pop(name) for name in names}

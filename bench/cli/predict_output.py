@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bench.cli.predict_options import ResultOptions
-from sim.errors import InvalidInput
+from bench.cli.refusal import tell
+from sim.errors import InvalidInput, RockbenchError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -57,6 +58,18 @@ def check_files(options: ResultOptions) -> None:
                 pass
         except OSError as error:
             raise InvalidInput(item, str(path), f"{path.parent} cannot be written: {error.strerror}") from None
+
+
+def carried_out(make: Callable[[], Result], options: ResultOptions) -> int:
+    """Compute a prediction and deliver it. Returns 0, or 1 with a line on standard error. Raises InvalidInput."""
+    try:
+        deliver(make(), options)
+    except InvalidInput:
+        raise
+    except (RockbenchError, OSError) as error:
+        tell(error)
+        return 1
+    return 0
 
 
 def deliver(result: Result, options: ResultOptions) -> None:

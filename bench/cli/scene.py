@@ -12,11 +12,14 @@ from bench.events import (
     LimitExceeded,
     OperatorAnswered,
     OperatorAsked,
+    PassFinished,
     PointFinished,
     Progress,
+    RunningGain,
     State,
     StateChanged,
     StepStarted,
+    TableIdentified,
     Warned,
 )
 
@@ -36,7 +39,7 @@ class Notice:
 
 @dataclass(frozen=True)
 class Row:
-    """A point of the campaign, finished or in progress, in words."""
+    """A point of the campaign, finished or in progress, in words; a record's name stands in place of a frequency."""
 
     omega: str
     beta: str
@@ -46,6 +49,7 @@ class Row:
     difference: str
     agrees: str
     effort: str
+    under_record: bool = False
 
     @staticmethod
     def finished(point: Mapping[str, Any]) -> "Row":
@@ -55,7 +59,7 @@ class Row:
         unstable = point.get("predicted_stable") is False
         effort = f"{point.get('cycles_measured', 0)} cycles"
         return Row(
-            omega=setting(point.get("omega_rad_s")),
+            omega=one_line(str(point["record"])) if "record" in point else setting(point.get("omega_rad_s")),
             beta=setting(point.get("beta")),
             status=str(point.get("status", ABSENT)),
             alpha_2=gain(value, point.get("alpha_2_uncertainty")),
@@ -63,6 +67,7 @@ class Row:
             difference=difference(value, predicted),
             agrees=ABSENT if agrees is None else "yes" if agrees else "NO",
             effort=f"{effort}, {starts} starts" if starts and starts > 1 else effort,
+            under_record="record" in point,
         )
 
     @staticmethod
@@ -79,11 +84,31 @@ class Row:
             effort=f"{estimate.cycles} cycles",
         )
 
+    @staticmethod
+    def during_record(running: RunningGain) -> "Row":
+        """From the running gain under the record that is being played."""
+        return Row(
+            omega=one_line(running.record),
+            beta="bare" if running.beta is None else setting(running.beta),
+            status="measuring",
+            alpha_2=number(running.alpha_2),
+            predicted=number(running.predicted),
+            difference=difference(running.alpha_2, running.predicted),
+            agrees=ABSENT,
+            effort=f"{running.seconds:.1f} s",
+            under_record=True,
+        )
+
+    @property
+    def where(self) -> str:
+        """The frequency with its unit, or the record."""
+        return self.omega if self.under_record else f"omega {self.omega} rad/s"
+
     @property
     def sentence(self) -> str:
         """The row as one line of a log."""
         return (
-            f"omega {self.omega} rad/s, beta {self.beta}: {self.status}, alpha_2 {self.alpha_2}, "
+            f"{self.where}, beta {self.beta}: {self.status}, alpha_2 {self.alpha_2}, "
             f"predicted {self.predicted}, difference {self.difference}, agrees: {self.agrees}, {self.effort}"
         )
 
@@ -93,11 +118,15 @@ def notice_of(event: Event) -> Notice | None:
     match event:
         case StepStarted():
             return Notice(event.time, "step", one_line(event.text))
-        case PointFinished():
+        case PointFinished() if "alpha_2" in type(event.point).model_fields:
             point = event.point.model_dump()
             reason = one_line(str(point.get("reason") or ""))
             text = Row.finished(point).sentence + (f" ({reason})" if reason else "")
             return Notice(event.time, "point", text, grave=point.get("status") == "overturned")
+        case PassFinished():
+            return Notice(event.time, "pass", one_line(f"{event.motion}: {event.text}"))
+        case TableIdentified():
+            return Notice(event.time, "table", one_line(event.text))
         case Warned():
             return Notice(event.time, "warning", one_line(event.text), grave=True)
         case LimitExceeded():
@@ -141,7 +170,9 @@ class Scene:
                 self.remaining, self.activity = event.remaining, one_line(event.activity)
             case Estimate():
                 self.running = Row.running(event)
-            case PointFinished():
+            case RunningGain():
+                self.running = Row.during_record(event)
+            case PointFinished() if "alpha_2" in type(event.point).model_fields:
                 self.rows.append(Row.finished(event.point.model_dump()))
                 self.running = None
             case _:

@@ -16,6 +16,8 @@ from sim.virtual_bench import VirtualBenchParameters
 
 _BLOCKS_OF_WATCHDOG = 3
 """How many blocks a device's watchdog must outlast: one that is late is no dead program."""
+_BLOCKS_OF_HEARTBEAT = 4
+"""How many blocks the relay of a heartbeat must outlast: two of its periods."""
 _SHORTEST_WITH_SERIAL_LASERS = 0.02
 """Shortest block with lasers whose values come in bursts of some milliseconds [s]."""
 
@@ -92,6 +94,12 @@ class BenchConfiguration(Parameters):
         return self.simulation.bench.shaker.half_stroke if simulated else self.hardware.half_stroke
 
     @property
+    def table_band(self) -> tuple[float, float]:
+        """The band that the table can make [Hz]: records are limited to it before they are scaled."""
+        table = self.simulation.bench.shaker if self.backend == "simulated" else self.hardware
+        return table.band_low, table.band_high
+
+    @property
     def mover(self) -> Mover | None:
         """What force and current are estimated from, with the assumed specimen on the table; None when unknown."""
         frame, block = self.specimen.frame, self.specimen.block
@@ -135,6 +143,12 @@ class BenchConfiguration(Parameters):
         if watchdog is not None and watchdog < _BLOCKS_OF_WATCHDOG * block:
             allowed = f"it is told once in a block of {block:g} s: give it at least {_BLOCKS_OF_WATCHDOG} blocks"
             raise InvalidInput("hardware.daq.watchdog", watchdog, allowed)
+        heartbeat = self.hardware.daq.heartbeat
+        if heartbeat is not None and heartbeat.timeout < _BLOCKS_OF_HEARTBEAT * block:
+            allowed = (
+                f"it rises every other block of {block:g} s: give its relay at least {_BLOCKS_OF_HEARTBEAT} blocks"
+            )
+            raise InvalidInput("hardware.daq.heartbeat.timeout", heartbeat.timeout, allowed)
         if self.hardware.lasers.connection == "serial" and block < _SHORTEST_WITH_SERIAL_LASERS:
             allowed = f"serial lasers come in bursts: at least {_SHORTEST_WITH_SERIAL_LASERS:g} s, or analogue lasers"
             raise InvalidInput("acquisition.block_duration", block, allowed)

@@ -17,7 +17,7 @@ from math import ceil, hypot, isfinite, sqrt
 
 import numpy as np
 
-from bench.control.stroke.motion import TableMotion
+from bench.analysis.table_motion import TableMotion
 from bench.control.stroke.reach import Reach
 from sim.errors import InvalidInput
 from sim.excitation import SampledRecord

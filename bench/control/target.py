@@ -15,7 +15,7 @@ ORDER = 4
 FLAT, REACH = 1.6, 2.0
 """Factors on the ends of the band: up to the first everything counts in full, beyond the second nothing."""
 
-_REST = 4.0
+REST = 4.0
 """Rest before and after the record, in periods of the band's lower end: the filters have rung out by then."""
 
 
@@ -71,23 +71,35 @@ def band_limited(record: Array, dt: float, sample_rate: float, band: tuple[float
     """
     from scipy.fft import next_fast_len
 
-    low, high = band
-    if not 0.0 < low < high or REACH * high > 0.5 * sample_rate:
-        allowed = f"it must go up from above 0 to {0.5 * sample_rate / REACH:g} Hz at most"
-        raise InvalidInput("band", band, allowed)
+    check_band(band, sample_rate)
     if record.ndim != 1 or record.size < 2 or not np.isfinite(record).all() or not dt > 0.0:
         raise InvalidInput("record", (record.shape, dt), "it must be two finite samples in one row or more, dt > 0")
     times = np.arange(int((record.size - 1) * dt * sample_rate) + 1) / sample_rate
     resampled = np.interp(times, dt * np.arange(record.size), record)
-    rest = round(_REST / low * sample_rate)
+    rest = round(REST / band[0] * sample_rate)
     padded = np.zeros(next_fast_len(times.size + 2 * rest, real=True))
     padded[rest : rest + times.size] = resampled
     frequency = np.fft.rfftfreq(padded.size, 1.0 / sample_rate).astype(np.float64)
-    shape = band_window(frequency, band)
-    inside = shape > 0.0
-    shape[inside] /= 1.0 + (low / frequency[inside]) ** (2 * ORDER)
-    shape[inside] /= 1.0 + (frequency[inside] / high) ** (2 * ORDER)
-    return Target(np.fft.irfft(shape * np.fft.rfft(padded), padded.size), sample_rate, band, rest)
+    filtered = np.fft.irfft(band_gain(frequency, band) * np.fft.rfft(padded), padded.size)
+    return Target(filtered, sample_rate, band, rest)
+
+
+def check_band(band: tuple[float, float], sample_rate: float) -> None:
+    """Raise InvalidInput unless `sample_rate` [1/s] holds all of `band` [Hz] and what lies beside it."""
+    low, high = band
+    if not 0.0 < low < high or REACH * high > 0.5 * sample_rate:
+        allowed = f"it must go up from above 0 to {0.5 * sample_rate / REACH:g} Hz at most"
+        raise InvalidInput("band", band, allowed)
+
+
+def band_gain(frequency: Array, band: tuple[float, float]) -> Array:
+    """What the filters of `band` leave of each of the ascending frequencies [Hz], without phase; 0 to 1, same shape."""
+    low, high = band
+    gain = band_window(frequency, band)
+    inside = gain > 0.0
+    gain[inside] /= 1.0 + (low / frequency[inside]) ** (2 * ORDER)
+    gain[inside] /= 1.0 + (frequency[inside] / high) ** (2 * ORDER)
+    return gain
 
 
 def integrated(acceleration: Array, sample_rate: float) -> tuple[Array, Array]:

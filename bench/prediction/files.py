@@ -8,16 +8,16 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from bench.prediction.requests import ModesRequest, SineRequest
 from bench.provenance import software
 from bench.record.tables import Table
 from bench.report.files import write_new
+from sim.parameters import Parameters
 from sim.specimen import Specimen
 
 FORMAT, FORMAT_VERSION = "rocking-bench prediction", 1
 
 
-def provenance(request: ModesRequest | SineRequest, specimen: Specimen) -> dict[str, Any]:
+def provenance(request: Parameters, specimen: Specimen) -> dict[str, Any]:
     """What a prediction was computed from and with."""
     return {
         "request": request.model_dump(mode="json"),

@@ -10,6 +10,8 @@ from sim.parameters import Parameters, each_once, quantity
 Frequency = Annotated[float, Field(gt=0, le=1000)]
 Stiffness = Annotated[float, Field(ge=0, le=1000)]
 
+Corner = Annotated[float, Field(gt=0, le=50)]
+
 SolverName = Literal["taylor", "paper", "rk4-located", "dop853"]
 
 
@@ -122,3 +124,79 @@ class HistoryRequest(SineRequest):
     steady: bool = quantity(False, "", "show the steady motions instead of a start from rest")
     periods: int = quantity(3, "1", "periods of the drive that a steady history shows", ge=1, le=1000)
     samples_per_period: int = quantity(200, "1", "samples in a period of the drive", ge=8, le=10000)
+
+
+class RecordsRequest(Parameters):
+    """What every prediction of a response to earthquake records is asked for."""
+
+    peak_factor: float = quantity(
+        1.2, "1", "peak of each record, within the band, over the uplift acceleration g/lambda", gt=0, le=1000
+    )
+    table_band: str | None = quantity(
+        None,
+        "",
+        "band of the table LOW:HIGH [Hz] that a record is limited to before it is scaled, or none; absent: that of "
+        "the configured shaker",
+    )
+    trim: float = quantity(
+        0.0005, "1", "share of the Arias intensity left out at either end of a record; 0 keeps all of it", ge=0, lt=0.5
+    )
+    length_ratio: float = quantity(
+        1.0, "1", "model over prototype length: time goes with its root, acceleration is kept", gt=0, le=1
+    )
+
+
+class SeismicRequest(RecordsRequest):
+    """Gain against stiffness under earthquake records."""
+
+    beta: tuple[Stiffness, ...] = quantity(
+        spaced("0.05", "1.2", 40),
+        "1",
+        "stiffness ratios k_C/k1 of the coupling spring: values, or start:stop:count",
+        min_length=1,
+    )
+    stroke_fit: Literal["none", "least-change", "high-pass"] = quantity(
+        "none", "", "how the scaled motions are made to fit the configured bench's stroke"
+    )
+
+    _each_once = field_validator("beta")(each_once)
+
+
+class BandStudyRequest(RecordsRequest):
+    """Gain and overturning under earthquake records, against the lower end of the table's band."""
+
+    corner: tuple[Corner, ...] = quantity(
+        spaced("0.1", "3", 16),
+        "Hz",
+        "lower ends of the table's band: values, or start:stop:count; the upper end stays",
+        min_length=2,
+    )
+    beta: tuple[Stiffness, ...] = quantity(
+        (0.25, 0.64, 0.97),
+        "1",
+        "stiffness ratios k_C/k1 of the coupling spring: values, or start:stop:count",
+        min_length=1,
+    )
+
+    _each_once = field_validator("corner", "beta")(each_once)
+
+
+class StrokeFitRequest(Parameters):
+    """How a record is made to fit the table's stroke."""
+
+    method: Literal["both", "least-change", "high-pass"] = quantity("both", "", "how it is made to fit; both: compared")
+    share: float = quantity(0.9, "1", "share of the bench's stroke and limits that the motion may use", gt=0, le=1)
+    peak_factor: float | None = quantity(
+        None, "1", "peak before the fit over the uplift acceleration g/lambda; absent: as it is", gt=0, le=1000
+    )
+    table_band: str = quantity("none", "", "band LOW:HIGH [Hz] that the record is limited to before, or none")
+    trim: float = quantity(
+        0.0005,
+        "1",
+        "share of the Arias intensity left out at either end of the record; 0 keeps all of it",
+        ge=0,
+        lt=0.5,
+    )
+    length_ratio: float = quantity(
+        1.0, "1", "model over prototype length: time goes with its root, acceleration is kept", gt=0, le=1
+    )

@@ -88,6 +88,8 @@ class Hardware(Parameters):
 
     sample_rate: float = quantity(2000.0, "1/s", "samples per second of drive and inputs", gt=0, le=20_000)
     half_stroke: float = quantity(0.075, "m", "displacement from mid stroke at which the end stops touch", gt=0)
+    band_low: float = quantity(1.0, "Hz", "lower end of the table's usable band", gt=0)
+    band_high: float = quantity(100.0, "Hz", "upper end of the table's usable band", gt=0)
     moving_mass: float | None = quantity(
         None, "kg", "armature, table and fixtures, to estimate force and current; absent: they are not estimated", gt=0
     )

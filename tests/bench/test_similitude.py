@@ -5,8 +5,8 @@ from math import pi, sqrt
 import numpy as np
 import pytest
 
+from bench.analysis.table_motion import table_motion
 from bench.control.similitude import RockingNumbers, largest_length_ratio, resampled, scaled
-from bench.control.stroke.motion import table_motion
 from bench.control.stroke.reach import Reach
 from sim.errors import InvalidInput
 from sim.excitation import SampledRecord

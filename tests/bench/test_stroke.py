@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from bench.analysis.response_spectrum import pseudo_acceleration
+from bench.analysis.table_motion import at_rest_in_the_end, table_motion
 from bench.config.model import BenchConfiguration
 from bench.control.stroke import least_change
 from bench.control.stroke.fit import Method, StrokeFit, fit_stroke, periods_of
 from bench.control.stroke.highpass import high_passed
 from bench.control.stroke.least_distance import Infeasible, shortest
 from bench.control.stroke.modes import SineModes
-from bench.control.stroke.motion import at_rest_in_the_end, table_motion
 from bench.control.stroke.oscillators import oscillator_peak
 from bench.control.stroke.reach import Reach
 from sim.errors import InvalidInput

@@ -78,3 +78,17 @@ def test_bad_input_is_refused() -> None:
         seismic_curve(Specimen(), SampledRecord(np.zeros(10), 0.01), [0.4])
     with pytest.raises(ValueError, match="beta"):
         seismic_curve(Specimen(), noise(1.0), [-0.4])
+
+
+def test_the_bare_frame_goes_the_exact_linear_way_however_strong_the_record() -> None:
+    """Times 128, every rounding is the same: no event, no step of the rocking integrator, one step for each sample."""
+    weak = noise(1.0)
+    strong = SampledRecord(128.0 * weak.acceleration, weak.dt)
+    one, other = simulate(Specimen(), weak), simulate(Specimen(), strong)
+    assert one.steps == other.steps == weak.acceleration.size - 1
+    assert one.impacts == other.impacts == 0
+    assert other.peaks.theta == 0.0
+    assert np.array_equal(other.end.as_array(), 128.0 * one.end.as_array())
+    assert (other.peaks.u1, other.peaks.drift) == (128.0 * one.peaks.u1, 128.0 * one.peaks.drift)
+    # a block lifts under the same record, and steps twice at its events
+    assert simulate(Specimen(beta=0.0), strong).peaks.theta > 0.0

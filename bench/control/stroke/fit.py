@@ -7,9 +7,9 @@ from math import tau
 import numpy as np
 
 from bench.analysis.response_spectrum import DAMPING, pseudo_acceleration
+from bench.analysis.table_motion import Array, TableMotion, table_motion
 from bench.control.stroke.highpass import fit_by_high_pass
 from bench.control.stroke.least_change import fit_by_least_change
-from bench.control.stroke.motion import Array, TableMotion, table_motion
 from bench.control.stroke.reach import Reach
 from sim.errors import InvalidInput
 from sim.excitation import SampledRecord
@@ -28,7 +28,7 @@ ROUNDING = 1e-9
 class Method(StrEnum):
     """How a record is made to fit."""
 
-    LEAST_CHANGE = "least change"
+    LEAST_CHANGE = "least-change"
     HIGH_PASS = "high-pass"
 
 

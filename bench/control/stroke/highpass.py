@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.control.stroke.motion import Array, at_rest_in_the_end, table_motion
+from bench.analysis.table_motion import Array, at_rest_in_the_end, table_motion
 from bench.control.stroke.reach import Reach
 from sim.errors import InvalidInput
 

@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bench.analysis.table_motion import Array, TableMotion, at_rest_in_the_end, table_motion
 from bench.control.stroke.least_distance import Infeasible, shortest
 from bench.control.stroke.modes import SineModes
-from bench.control.stroke.motion import Array, TableMotion, at_rest_in_the_end, table_motion
 from bench.control.stroke.oscillators import Peak, oscillator_peak
 from bench.control.stroke.reach import Reach
 from sim.errors import InvalidInput

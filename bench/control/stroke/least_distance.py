@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bench.control.stroke.motion import Array
+from bench.analysis.table_motion import Array
 
 INFEASIBLE = 1e-10
 """Least squares' residual below which no vector satisfies the inequalities."""

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.control.stroke.motion import Array
+from bench.analysis.table_motion import Array
 
 
 class SineModes:

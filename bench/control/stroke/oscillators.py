@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from bench.control.stroke.motion import Array
+from bench.analysis.table_motion import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from math import isfinite
 
+from bench.analysis.table_motion import TableMotion
 from bench.config.model import BenchConfiguration
-from bench.control.stroke.motion import TableMotion
 from sim.errors import InvalidInput
 
 SHARE = 0.9

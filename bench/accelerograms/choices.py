@@ -1,0 +1,97 @@
+"""What a user says of a file, and what its reader found: brought together, and refused where they disagree."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import isclose, isfinite
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.accelerograms.accelerogram import Accelerogram
+from bench.accelerograms.text import RecordText
+from bench.accelerograms.units import UNITS, unit_of
+from sim.errors import InvalidInput
+
+_SAME_STEP = 1e-6
+"""Relative difference up to which two steps are one, written with different digits."""
+
+
+@dataclass(frozen=True)
+class Choices:
+    """Step [s], unit, channel and column as given for a file; None where nothing was given."""
+
+    dt: float | None = None
+    unit: str | None = None
+    channel: str | None = None
+    column: str | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """What a reader found: `values`, shape (n,), in `unit`, with the step `dt` [s]; None where the file says nothing.
+
+    `part` names the channel or column when the file has several.
+    """
+
+    format: str
+    values: NDArray[np.float64]
+    dt: float | None
+    unit: str | None
+    header: Mapping[str, str] = field(default_factory=dict[str, str])
+    part: str = ""
+
+
+def refuse_choice(text: RecordText, choices: Choices, *names: str) -> None:
+    """Refuse the choice of a part that a file does not have."""
+    remedies = {"channel": "this format has no channels", "column": "only plain columns are chosen by column"}
+    for name in names:
+        value = getattr(choices, name)
+        if value is not None:
+            raise InvalidInput(f"{name} of {text.path.name}", value, f"{remedies[name]}; leave it out")
+
+
+def combine(text: RecordText, choices: Choices, reading: Reading) -> Accelerogram:
+    """The record in m/s2. Raises InvalidInput where choice and file disagree, or neither says it."""
+    name = text.path.name
+    dt = _step(name, choices.dt, reading.dt)
+    unit = _unit(name, choices.unit, reading.unit)
+    values = UNITS[unit] * reading.values
+    if values.size < 2 or not np.isfinite(values).all():
+        raise InvalidInput("record", name, "it must hold two finite samples or more")
+    if not values.any():
+        raise InvalidInput("record", name, "every sample is zero: there is no motion in it")
+    return Accelerogram(
+        name=text.path.stem + (f"-{reading.part}" if reading.part else ""),
+        acceleration=values,
+        dt=dt,
+        source=str(text.path),
+        format=reading.format,
+        unit=unit,
+        sha256=text.sha256,
+        header=dict(reading.header),
+    )
+
+
+def _step(name: str, given: float | None, stated: float | None) -> float:
+    if given is not None and not (isfinite(given) and given > 0.0):
+        raise InvalidInput(f"dt of {name}", given, "it must be positive seconds")
+    if stated is not None and not (isfinite(stated) and stated > 0.0):
+        raise InvalidInput(
+            f"dt of {name}", stated, "the file states a step that is not positive seconds: it is damaged"
+        )
+    if given is None and stated is None:
+        raise InvalidInput(f"dt of {name}", None, "the file does not state its time step; give it as @dt=SECONDS")
+    if given is not None and stated is not None and not isclose(given, stated, rel_tol=_SAME_STEP):
+        raise InvalidInput(f"dt of {name}", given, f"the file states {stated:g} s; leave dt out")
+    # the file's own digits, when it has any
+    return stated if stated is not None else float(given or 0.0)
+
+
+def _unit(name: str, given: str | None, stated: str | None) -> str:
+    chosen = None if given is None else unit_of(given, f"unit of {name}")
+    if chosen is None and stated is None:
+        allowed = f"the file does not state its unit; give it as @unit=UNIT, one of {', '.join(UNITS)}"
+        raise InvalidInput(f"unit of {name}", None, allowed)
+    if chosen is not None and stated is not None and UNITS[chosen] != UNITS[stated]:
+        raise InvalidInput(f"unit of {name}", chosen, f"the file states {stated}; leave the unit out")
+    return stated or chosen or ""

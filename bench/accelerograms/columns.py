@@ -1,0 +1,177 @@
+"""Plain columns, apart by commas, semicolons, tabs or blanks: `t,a`, `a`, or several components side by side.
+
+Above them may stand comments, lines that begin with % or #, and one line of headings like `t [s], NS [cm/s2]`. A first
+column that rises all the way is the time [s] and gives the step. Nothing else is concluded: comments are kept as the
+header, and the unit, the step of columns without time and the column among several must be given.
+"""
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.accelerograms.choices import Choices, Reading, refuse_choice
+from bench.accelerograms.comments import check_comments
+from bench.accelerograms.numbers import NUMBER, place, value_of
+from bench.accelerograms.text import RecordText
+from bench.accelerograms.units import spelled
+from sim.errors import InvalidInput
+
+Array = NDArray[np.float64]
+
+_COMMENT = ("%", "#")
+_HEADING = re.compile(r"^(?P<name>.*?)\s*[\[(]\s*(?P<unit>[^\])]+?)\s*[\])]\s*$")
+_RISING = 0.9
+"""Of the steps of a first column: from there on it is a time, and must be one without a fault."""
+
+_EQUAL = 1e-6
+"""Relative difference of numbers that were written as equal."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Table:
+    """`values` has shape (rows, columns); `first` is the line of its first row."""
+
+    values: Array
+    headings: list[str]
+    first: int
+    separator: str | None
+
+
+def recognise(text: RecordText) -> bool:
+    """Whether numbers begin below comments and at most one line of headings."""
+    first = _first_row(text)
+    return first is not None and first - _comments(text) <= 1
+
+
+def read(text: RecordText, choices: Choices) -> Reading:
+    """Raises InvalidInput."""
+    refuse_choice(text, choices, "channel")
+    table = _table(text)
+    check_comments(text, table.first - bool(table.headings), choices)
+    count = table.values.shape[1]
+    time = _is_time(table.values)
+    column = _column(text, choices, table, time)
+    name, unit = _heading(table.headings[column]) if table.headings else ("", None)
+    if unit is not None and spelled(unit) is None:
+        raise text.refusal(table.first - 1, f"column {column + 1} is in {unit}, no unit of acceleration that is known")
+    comments = {f"line {k}": line.strip() for k, line in enumerate(text.lines[: table.first], 1)}
+    return Reading(
+        format="columns" if count > 1 else "one column",
+        values=np.ascontiguousarray(table.values[:, column]),
+        dt=_step(text, table) if time else None,
+        unit=None if unit is None else spelled(unit),
+        header=comments | ({"column": f"{column + 1} {name}".strip()} if count > 1 else {}),
+        part=f"c{column + 1}" if count - time > 1 else "",
+    )
+
+
+def _comments(text: RecordText) -> int:
+    """Lines of comment, or empty, at the top."""
+    return next((k for k, line in enumerate(text.lines) if line.strip() and not line.startswith(_COMMENT)), 0)
+
+
+def _first_row(text: RecordText) -> int | None:
+    """The first line that begins with a number and has nothing but numbers, comments passed over."""
+    row = re.compile(rf"\s*{NUMBER}(?:[\s,;]+{NUMBER})*[\s,;]*")
+    start = _comments(text)
+    return next((k for k in range(start, min(start + 2, len(text.lines))) if row.fullmatch(text.lines[k])), None)
+
+
+def _table(text: RecordText) -> _Table:
+    first = _first_row(text)
+    assert first is not None
+    line = text.lines[first]
+    separator = ";" if ";" in line else "," if "," in line else None
+    lines = text.lines[first:]
+    if separator == "," and not any("." in line for line in lines):
+        raise text.refusal(first, "its commas may be those of decimals; write decimals with a point")
+    values = _parsed(text, first, separator)
+    above = text.lines[first - 1] if first > _comments(text) else ""
+    headings = [
+        cell.strip() for cell in (above.split(separator) if separator else re.split(r"\t|\s{2,}", above.strip()))
+    ]
+    return _Table(values, headings if len(headings) == values.shape[1] and above else [], first, separator)
+
+
+def _parsed(text: RecordText, first: int, separator: str | None) -> Array:
+    """The rows, shape (rows, columns). Raises InvalidInput naming the first line that is not like the others."""
+    lines = text.lines[first:]
+    try:
+        if "" not in lines:
+            values = np.loadtxt(lines, delimiter=separator, comments=None, ndmin=2, dtype=np.float64)
+            if len(values) == len(lines) and np.isfinite(values).all():
+                return values
+    except ValueError:
+        # numpy does not tell the line in a form to rely on: it is looked for below
+        pass
+    width = len(text.lines[first].split(separator))
+    for index, line in enumerate(lines, first):
+        cells = line.split(separator)
+        if not line.strip():
+            raise text.refusal(index, "it is empty, and samples follow: the record has a gap")
+        if len(cells) != width:
+            raise text.refusal(index, f"it has {len(cells)} columns, those before {width}")
+        for cell in cells:
+            if re.fullmatch(NUMBER, cell.strip()) is None or not np.isfinite(value_of(cell.strip())):
+                raise text.refusal(index, f"{cell.strip()!r} is not a finite decimal number")
+    raise text.refusal(first, "these columns cannot be read; write them like 0.01,-0.0012")
+
+
+def _is_time(values: Array) -> bool:
+    """Whether the first of several columns rises like time; no ground acceleration does."""
+    if values.shape[1] < 2 or len(values) < 3:
+        return False
+    steps = np.diff(values[:, 0])
+    return bool((steps > 0.0).mean() >= _RISING or ((steps >= 0.0).all() and steps.any()))
+
+
+def _step(text: RecordText, table: _Table) -> float:
+    """The constant step of the first column [s], within the rounding of its digits."""
+    if table.headings:
+        name, unit = _heading(table.headings[0])
+        if unit is not None and unit.lower() not in ("s", "sec", "seconds"):
+            raise text.refusal(table.first - 1, f"its first column, {name}, is in {unit}; give the time in s")
+    time = table.values[:, 0]
+    steps = np.diff(time)
+    usual = float(np.median(steps))
+    ends = (table.first, table.first + 1, table.first + steps.size)
+    digit = max(place(text.lines[k].split(table.separator)[0].strip()) for k in ends)
+    # rounded to their last digit, two times may each be half of it off; more than half a step hides a gap
+    rounding = digit * (1.0 + _EQUAL) if digit <= 0.5 * usual else _EQUAL * usual
+    dt = float(time[-1] - time[0]) / steps.size
+    wrong = np.flatnonzero(np.abs(steps - usual) > rounding)
+    drift = np.abs(time - time[0] - dt * np.arange(time.size))
+    if wrong.size or drift.max() > max(rounding, _EQUAL * usual):
+        at = int(wrong[0]) + 1 if wrong.size else int(drift.argmax())
+        problem = f"its time does not follow the one above by the step of the others, {usual:g} s"
+        raise text.refusal(table.first + at, f"{problem}: there is a gap, or the times have too few digits")
+    # the digits of a step that was meant: 0.01 and not 0.00999999999
+    meant = float(f"{dt:.9g}")
+    return meant if abs(meant - dt) * steps.size <= digit else dt
+
+
+def _column(text: RecordText, choices: Choices, table: _Table, time: bool) -> int:
+    """The chosen column, counted from 0."""
+    count = table.values.shape[1]
+    names = [_heading(cell)[0] for cell in table.headings]
+    offered = [f"{k + 1} ({names[k]})" if names else f"{k + 1}" for k in range(int(time), count)]
+    item, wanted = f"column of {text.path.name}", choices.column
+    if wanted is None:
+        if len(offered) > 1:
+            raise InvalidInput(item, None, f"the file has several; give one as @column=NUMBER: {', '.join(offered)}")
+        return int(time)
+    found = [k for k, name in enumerate(names) if name == wanted]
+    if re.fullmatch(r"\d{1,6}", wanted):
+        found = [int(wanted) - 1]
+    if len(found) != 1 or not int(time) <= found[0] < count:
+        allowed = f"it must be one of {', '.join(offered)}"
+        raise InvalidInput(item, wanted, f"{allowed}; 1 is the time" if time else allowed)
+    return found[0]
+
+
+def _heading(cell: str) -> tuple[str, str | None]:
+    """Name and unit of a heading like `NS [cm/s2]`."""
+    match = _HEADING.match(cell.strip().strip('"'))
+    return (cell.strip().strip('"'), None) if match is None else (match["name"].strip(), match["unit"])

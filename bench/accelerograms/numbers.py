@@ -1,0 +1,115 @@
+"""The numbers of a block of lines, apart by blanks or, where they run together, by the width of their columns."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.accelerograms.text import RecordText
+
+Array = NDArray[np.float64]
+
+NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][+-]?\d+)?"
+"""A decimal number as Fortran and C write it; neither NaN nor infinity is one."""
+
+_FOREIGN = re.compile(r"[^0-9EeDd+\-.\s]")
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Numbers in the order of the file, shape (n,), and how each was written."""
+
+    values: Array
+    texts: Sequence[str]
+
+
+def numbers(text: RecordText, first: int, last: int, count: int, width: int | None = None) -> Samples:
+    """The `count` numbers in the lines `first` to `last` - 1, every row but the last one equally long.
+
+    `width` is that of a column, where the format fixes it; without it a width is looked for at which the numbers come
+    apart. Raises InvalidInput naming the line that holds something else, or the count.
+    """
+    lines = [line.rstrip() for line in text.lines[first:last]]
+    while lines and not lines[-1]:
+        lines.pop()
+    _refuse_empty(text, first, lines)
+    rows = [line.split() for line in lines]
+    fields = [field for row in rows for field in row]
+    if _FOREIGN.search("".join(lines)) is None:
+        lengths = [len(row) for row in rows]
+        found = _as_samples(fields) if len(fields) == count else None
+        if found is None:
+            found, lengths = _columns(lines, count, width), [len(line) for line in lines]
+        if found is not None:
+            _refuse_gaps(text, first, lengths)
+            return found
+    _refuse_junk(text, first, lines, width)
+    there = sum(len(re.findall(NUMBER, line)) for line in lines)
+    cause = "the file is cut off: fetch it again" if there < count else "the file is damaged or numbers were added"
+    allowed = f"the header states {count} samples and {there} numbers are there up to this line; {cause}"
+    raise text.refusal(first + max(len(lines) - 1, 0), allowed)
+
+
+def value_of(word: str) -> float:
+    """The value of a number that matches `NUMBER`; Fortran's exponents may begin with D."""
+    return float(word.replace("D", "E").replace("d", "e"))
+
+
+def place(word: str) -> float:
+    """What one unit in the last digit of a number, as it is written, is worth."""
+    mantissa, _, exponent = re.sub("[dD]", "e", word.lower()).partition("e")
+    decimals = len(mantissa.partition(".")[2])
+    return 10.0 ** (int(exponent or 0) - decimals)
+
+
+def _as_samples(fields: list[str]) -> Samples | None:
+    try:
+        values = np.array(list(map(float, fields)))
+    except ValueError:
+        if not any("d" in field or "D" in field for field in fields):
+            return None
+        return _as_samples([field.replace("D", "E").replace("d", "e") for field in fields])
+    return Samples(values, fields) if np.isfinite(values).all() else None
+
+
+def _columns(lines: list[str], count: int, width: int | None) -> Samples | None:
+    """The numbers of columns that may touch: of the one width, or of the widest at which all are numbers."""
+    full = len(lines[0]) if lines else 0
+    for candidate in range(full, 1, -1) if width is None else (width,):
+        if full % candidate or any(len(line) % candidate for line in lines):
+            continue
+        fields = [line[k : k + candidate].strip() for line in lines for k in range(0, len(line), candidate)]
+        # one decimal point in each, at one place: a cut through a number has none, or another
+        decimals = {len(field.partition(".")[2]) if "." in field else None for field in fields}
+        found = _as_samples(fields) if len(fields) == count and len(decimals) == 1 and None not in decimals else None
+        if found is not None:
+            return found
+    return None
+
+
+def _refuse_empty(text: RecordText, first: int, lines: list[str]) -> None:
+    for index, line in enumerate(lines):
+        if not line:
+            raise text.refusal(first + index, "it is empty, and samples follow: the record has a gap; fetch it again")
+
+
+def _refuse_gaps(text: RecordText, first: int, lengths: list[int]) -> None:
+    """Every row but the last must be as long as the first."""
+    for index, length in enumerate(lengths[1:], 1):
+        if length != lengths[0] and (index < len(lengths) - 1 or length > lengths[0]):
+            raise text.refusal(first + index, "its row differs in length from those before: samples are missing")
+
+
+def _refuse_junk(text: RecordText, first: int, lines: list[str], width: int | None) -> None:
+    """Name the first line that is anything but numbers, apart by blanks, by their signs or by the width."""
+    run = re.compile(rf"(?:\s*{NUMBER}(?=[\s+-]|$))+")
+    for index, line in enumerate(lines):
+        fields = [] if width is None else [line[k : k + width].strip() for k in range(0, len(line), width)]
+        in_columns = bool(fields) and all(re.fullmatch(NUMBER, field) for field in fields)
+        if run.fullmatch(line) is None and not in_columns:
+            raise text.refusal(first + index, "it must hold numbers and nothing else; the file is damaged")
+        for word in re.findall(NUMBER, line):
+            if not np.isfinite(value_of(word)):
+                raise text.refusal(first + index, f"{word} is too large to be a number here; the file is damaged")

@@ -1,0 +1,136 @@
+"""How a record is named on a command line: `FILE`, `FILE@KEY=VALUE,...` or `synthetic:NAME[:SEED]`.
+
+The options follow the last @, because a colon or a comma may stand in a path (`C:\\records\\a.AT2@dt=0.005`).
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import isfinite
+from pathlib import Path
+
+from bench.accelerograms.accelerogram import Accelerogram
+from bench.accelerograms.read import read_accelerogram
+from bench.accelerograms.units import unit_of
+from sim.errors import InvalidInput
+
+GRAMMAR = "FILE[@KEY=VALUE,...] with the keys unit, dt, channel, column and name, or synthetic:NAME[:SEED]"
+
+_SYNTHETIC = "synthetic:"
+_KEYS = ("unit", "dt", "channel", "column", "name")
+_OPTIONS = re.compile(r"\w+=[^=]*(,\w+=[^=]*)*")
+
+
+@dataclass(frozen=True)
+class RecordReference:
+    """A record that was asked for: a file, or a synthetic motion and its seed, and what was said of it.
+
+    `text` is how it was written; `seed` is None for the default one.
+    """
+
+    text: str
+    path: Path | None = None
+    synthetic: str | None = None
+    seed: int | None = None
+    unit: str | None = None
+    dt: float | None = None
+    channel: str | None = None
+    column: str | None = None
+    name: str | None = None
+
+    @staticmethod
+    def parse(text: str) -> "RecordReference":
+        """Take a reference apart; nothing is read. Raises InvalidInput."""
+        place, at, tail = text.rpartition("@")
+        if not at or _OPTIONS.fullmatch(tail) is None:
+            place, tail = text, ""
+        options = _options(text, tail)
+        unit, dt = options.get("unit"), options.get("dt")
+        found = RecordReference(
+            text,
+            unit=None if unit is None else unit_of(unit, f"unit in {text}"),
+            dt=None if dt is None else _seconds(text, dt),
+            channel=options.get("channel"),
+            column=options.get("column"),
+            name=options.get("name"),
+        )
+        if not place.startswith(_SYNTHETIC):
+            if not place:
+                raise InvalidInput("record", text, f"it must be {GRAMMAR}")
+            return replace(found, path=Path(place))
+        if set(options) - {"name"}:
+            raise InvalidInput("record", text, "a synthetic motion takes no option but name")
+        name, colon, seed = place.removeprefix(_SYNTHETIC).partition(":")
+        if colon and re.fullmatch(r"\d{1,9}", seed) is None:
+            raise InvalidInput(f"seed in {text}", seed, "it must be a whole number of at most nine digits")
+        _check_synthetic(text, name)
+        return replace(found, synthetic=name, seed=int(seed) if colon else None)
+
+    def or_else(
+        self, *, unit: str | None, dt: float | None, channel: str | None, column: str | None
+    ) -> "RecordReference":
+        """With these where the reference says nothing itself; a synthetic motion needs none of them."""
+        if self.path is None:
+            return self
+        return replace(
+            self,
+            unit=self.unit if self.unit is not None else unit,
+            dt=self.dt if self.dt is not None else dt,
+            channel=self.channel if self.channel is not None else channel,
+            column=self.column if self.column is not None else column,
+        )
+
+    def read(self) -> Accelerogram:
+        """The record. Raises InvalidInput."""
+        if self.path is not None:
+            record = read_accelerogram(self.path, dt=self.dt, unit=self.unit, channel=self.channel, column=self.column)
+        else:
+            from bench.accelerograms.synthetic import DEFAULT_SEED, synthetic_record
+
+            record = synthetic_record(self.synthetic or "", DEFAULT_SEED if self.seed is None else self.seed)
+        return record if self.name is None else replace(record, name=self.name)
+
+
+def read_records(references: Sequence[RecordReference]) -> tuple[Accelerogram, ...]:
+    """The records of a campaign, every one before anything starts. Raises InvalidInput where two share a name."""
+    records: list[Accelerogram] = []
+    owners: dict[str, str] = {}
+    for reference in references:
+        record = reference.read()
+        # names become names of groups and files, and some file systems take A and a for one
+        key = record.name.lower()
+        if key in owners:
+            allowed = f"its name, {record.name}, is taken by {owners[key]}; leave one out, or add name=ANOTHER behind @"
+            raise InvalidInput("record", reference.text, allowed)
+        owners[key] = reference.text
+        records.append(record)
+    return tuple(records)
+
+
+def _options(text: str, tail: str) -> dict[str, str]:
+    options: dict[str, str] = {}
+    for option in tail.split(",") if tail else ():
+        key, _, value = option.partition("=")
+        if key not in _KEYS:
+            raise InvalidInput("record", text, f"{key} is not one of {', '.join(_KEYS)}, which may follow @")
+        if key in options or not value.strip():
+            raise InvalidInput("record", text, f"{key} must be given once and have a value")
+        options[key] = value.strip()
+    return options
+
+
+def _seconds(text: str, value: str) -> float:
+    try:
+        seconds = float(value)
+    except ValueError:
+        seconds = 0.0
+    if not (isfinite(seconds) and seconds > 0.0):
+        raise InvalidInput(f"dt in {text}", value, "it must be positive seconds")
+    return seconds
+
+
+def _check_synthetic(text: str, name: str) -> None:
+    from bench.accelerograms.synthetic import NAMES
+
+    if name not in NAMES:
+        raise InvalidInput("record", text, f"the synthetic motions are {', '.join(NAMES)}")

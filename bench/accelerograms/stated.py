@@ -1,0 +1,56 @@
+"""Checks of what a header states against the samples."""
+
+import re
+
+import numpy as np
+
+from bench.accelerograms.numbers import NUMBER, Samples, place, value_of
+from bench.accelerograms.text import RecordText
+from bench.accelerograms.units import spelled
+from sim.errors import InvalidInput
+
+
+def check_peak(text: RecordText, index: int, stated: str, samples: Samples, resolution: float | None = None) -> None:
+    """Refuse samples whose largest magnitude is not the one that line `index` states, in the unit of the samples.
+
+    Both may be wrong by one in the last digit that is written of them; `resolution` stands for that of the samples
+    where they were not written in this unit.
+    """
+    at = int(np.abs(samples.values).argmax())
+    found = abs(float(samples.values[at]))
+    last_digit = place(samples.texts[at]) if resolution is None else resolution
+    if abs(abs(value_of(stated)) - found) > (place(stated) + last_digit) * (1.0 + 1e-9):
+        raise text.refusal(
+            index, f"its peak is {stated}, but the largest sample is {found:g}: the file is damaged or was changed"
+        )
+
+
+def number_in(text: RecordText, index: int, stated: str, item: str) -> float:
+    """A number that the header states on line `index`. Raises InvalidInput naming `item` and the line."""
+    word = stated.strip()
+    if re.fullmatch(NUMBER, word) is None:
+        raise text.refusal(index, f"{item} must be a number; the header is damaged")
+    return value_of(word)
+
+
+def count_in(text: RecordText, index: int, stated: str, item: str = "the number of samples") -> int:
+    """A whole number above 1 that the header states on line `index`."""
+    word = stated.strip()
+    if re.fullmatch(r"\d+", word) is None or int(word) < 2:
+        raise text.refusal(index, f"{item} must be a whole number of at least 2; the header is damaged")
+    return int(word)
+
+
+def acceleration_unit(text: RecordText, index: int, stated: str) -> str:
+    """The unit that line `index` states. Raises InvalidInput when it is none of acceleration."""
+    unit = spelled(stated)
+    if unit is None:
+        raise text.refusal(index, f"{stated.strip()!r} is not a unit of acceleration that is known here")
+    return unit
+
+
+def not_acceleration(text: RecordText, index: int, quantity: str) -> InvalidInput:
+    """The refusal of a file that holds another quantity, as line `index` says."""
+    return text.refusal(
+        index, f"it is a {quantity.lower()} file; give the acceleration of the same record (of PEER: .AT2)"
+    )

@@ -1,0 +1,46 @@
+"""A record's file as numbered lines, whatever ends them."""
+
+import re
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+
+from sim.errors import InvalidInput
+
+_CONTROL_Z = "\x1a"
+"""DOS fills the end of a text file with it."""
+
+
+@dataclass(frozen=True)
+class RecordText:
+    """The lines of a file, without what ended them (LF, CR LF, CR CR LF, CR), and the hash of its bytes."""
+
+    path: Path
+    lines: tuple[str, ...]
+    sha256: str
+
+    def where(self, index: int) -> str:
+        """How a refusal names the line `index`, counted from 0."""
+        return f"{self.path.name}, line {index + 1}"
+
+    def refusal(self, index: int, allowed: str) -> InvalidInput:
+        """The refusal of a line, quoted."""
+        shown = self.lines[index].strip() if index < len(self.lines) else ""
+        return InvalidInput(self.where(index), shown if len(shown) <= 60 else shown[:57] + "...", allowed)
+
+
+def load(path: Path) -> RecordText:
+    """Read a file. Raises InvalidInput when it cannot be read or is not text."""
+    try:
+        content = path.read_bytes()
+    except FileNotFoundError:
+        raise InvalidInput("record", str(path), "there is no such file") from None
+    except OSError as error:
+        raise InvalidInput("record", str(path), f"it cannot be read: {error.strerror}") from None
+    if b"\0" in content:
+        raise InvalidInput("record", str(path), "it is not a text file of one byte per character; export it as text")
+    # headers hold names of places in any encoding, numbers are ASCII: Latin-1 takes every byte
+    text = content.removeprefix(b"\xef\xbb\xbf").decode("latin-1").rstrip(_CONTROL_Z + " \t\r\n")
+    if not text:
+        raise InvalidInput("record", str(path), "it is empty")
+    return RecordText(path, tuple(re.split(r"\r*\n|\r", text)), sha256(content).hexdigest())

@@ -1,0 +1,151 @@
+"""The predictions on the command line that take earthquake records: `rockbench predict seismic` and `band-study`."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from inspect import Parameter as Argument
+from inspect import Signature
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Group, Parameter
+
+from bench.cli import flags
+from bench.cli.predict_options import EXIT_CODES, ResultOptions, SpecimenOptions, arguments_of, taken
+from bench.prediction.requests import BandStudyRequest, RecordsRequest, SeismicRequest
+from sim.errors import InvalidInput
+
+if TYPE_CHECKING:
+    from bench.accelerograms.accelerogram import Accelerogram
+    from bench.cli.predict_output import Result
+    from bench.config.model import BenchConfiguration
+    from sim.specimen import Specimen
+
+Make = Callable[[Any, "Specimen", "Sequence[Accelerogram]", "BenchConfiguration"], "Result"]
+
+_FILES = Argument(
+    "files",
+    Argument.VAR_POSITIONAL,
+    annotation=Annotated[
+        str,
+        Parameter(
+            name="FILE",
+            metavar="FILE",
+            help="Records, before the flags: FILE, FILE@KEY=VALUE,... with the keys unit, dt, channel, column, name, "
+            "or synthetic:NAME[:SEED]. Without any: the seven synthetic ones.",
+        ),
+    ],
+)
+CONFIG = Argument(
+    "config",
+    Argument.KEYWORD_ONLY,
+    default=None,
+    annotation=Annotated[
+        Path | None,
+        Parameter(
+            name="--config",
+            metavar="FILE",
+            help="Configuration of the bench (TOML): band and stroke of its table, its specimen.",
+            show_default="the paper's specimen on the simulated bench",
+        ),
+    ],
+)
+
+
+@dataclass(frozen=True)
+class RecordsPrediction:
+    """A prediction on the command line: its flags come from `request`, and `make` computes it."""
+
+    name: str
+    request: type[RecordsRequest]
+    make: Make
+    summary: str
+    details: str
+    drawable: int
+    """Records that its figure can show."""
+
+
+def records_command(prediction: RecordsPrediction) -> Callable[..., int]:
+    """The function behind a command; its signature is records, flags of the request, and the common options."""
+
+    # not named as in the signature: cyclopts would take this annotation for that one
+    def execute(*named: str, **arguments: Any) -> int:
+        return _perform(prediction, named, arguments)
+
+    group = Group(f"Parameters of {prediction.name}", sort_key=1)
+    asked = flags.arguments_of(prediction.request, group)
+    execute.__doc__ = f"{prediction.summary}\n\n{prediction.details}\n\n{EXIT_CODES}"
+    execute.__dict__["__signature__"] = Signature(
+        [_FILES, *asked, CONFIG, *arguments_of(SpecimenOptions), *arguments_of(ResultOptions)]
+    )
+    return execute
+
+
+def _perform(prediction: RecordsPrediction, files: Sequence[str], arguments: dict[str, Any]) -> int:
+    from bench.cli.inputs import configuration_from
+    from bench.cli.predict_inputs import request_from, specimen_from
+    from bench.cli.predict_output import carried_out, check_files
+
+    options = ResultOptions(**taken(arguments, ResultOptions))
+    chosen = SpecimenOptions(**taken(arguments, SpecimenOptions))
+    configuration = configuration_from(arguments.pop("config", None), None)
+    request = request_from(prediction.request, arguments)
+    specimen = specimen_from(chosen.specimen, chosen.distance, chosen.restitution_factor, configuration.specimen)
+    check_files(options)
+    records = records_from(files)
+    if options.plot is not None and len(records) > prediction.drawable:
+        allowed = f"at most {prediction.drawable} fit in this figure; give fewer"
+        raise InvalidInput("--plot", f"{len(records)} records", allowed)
+    return carried_out(lambda: prediction.make(request, specimen, records, configuration), options)
+
+
+def records_from(files: Sequence[str]) -> "tuple[Accelerogram, ...]":
+    """The records that were named, or the seven synthetic ones. Raises InvalidInput."""
+    from bench.accelerograms.reference import RecordReference, read_records
+    from bench.accelerograms.synthetic import NAMES
+
+    named = files or [f"synthetic:{name}" for name in NAMES]
+    return read_records([RecordReference.parse(text) for text in named])
+
+
+def _seismic(
+    request: SeismicRequest,
+    specimen: "Specimen",
+    records: "Sequence[Accelerogram]",
+    configuration: "BenchConfiguration",
+) -> "Result":
+    from bench.cli.predict_seismic import seismic
+
+    return seismic(request, specimen, records, configuration)
+
+
+def _band_study(
+    request: BandStudyRequest,
+    specimen: "Specimen",
+    records: "Sequence[Accelerogram]",
+    configuration: "BenchConfiguration",
+) -> "Result":
+    from bench.cli.predict_seismic import study
+
+    return study(request, specimen, records, configuration)
+
+
+RECORDS_PREDICTIONS = (
+    RecordsPrediction(
+        "seismic",
+        SeismicRequest,
+        _seismic,
+        "Gain curves under earthquake records: alpha_1 and alpha_2 against the stiffness.",
+        "Each record is trimmed, limited to the band of the table, scaled to its peak, and on request fitted to the "
+        "stroke; everything starts at rest. A block that topples has no gain but a time. The figure is like the "
+        "paper's Fig. 8(a) and 9(a).",
+        drawable=28,
+    ),
+    RecordsPrediction(
+        "band-study",
+        BandStudyRequest,
+        _band_study,
+        "Gain and toppling under earthquake records, against the lower end of the table's band.",
+        "As `seismic`, each record scaled to its peak at every lower end. The figure has a panel for each record.",
+        drawable=15,
+    ),
+)

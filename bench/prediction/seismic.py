@@ -1,0 +1,96 @@
+"""Gain coefficients under earthquake records: against stiffness, and against the lower end of the table's band."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bench.accelerograms.accelerogram import Accelerogram
+from bench.config.model import BenchConfiguration
+from bench.control.preparation import PreparedMotion, prepare
+from bench.control.stroke.fit import Method, periods_of
+from bench.control.stroke.reach import Reach
+from bench.prediction.requests import BandStudyRequest, RecordsRequest, SeismicRequest
+from sim.errors import InvalidInput
+from sim.gain import SeismicGain, seismic_curve
+from sim.specimen import Specimen
+
+Band = tuple[float, float] | None
+
+
+@dataclass(frozen=True, eq=False)
+class SeismicCurve:
+    """What the model says of one record: the motion of the table that it becomes, and a gain for each stiffness."""
+
+    accelerogram: Accelerogram
+    prepared: PreparedMotion
+    gains: list[SeismicGain]
+
+
+def band_of(text: str | None, configuration: BenchConfiguration) -> Band:
+    """The band [Hz] that `text` asks for: "LOW:HIGH", "none", or None for the configured one. Raises InvalidInput."""
+    if text is None:
+        return configuration.table_band
+    if text == "none":
+        return None
+    try:
+        low, high = (float(part) for part in text.split(":"))
+    except ValueError:
+        low, high = 0.0, 0.0
+    if not 0.0 < low < high < np.inf:
+        raise InvalidInput("--table-band", text, "it must be LOW:HIGH, two frequencies above 0 Hz that ascend, or none")
+    return low, high
+
+
+def seismic_curves(
+    specimen: Specimen, records: Sequence[Accelerogram], request: SeismicRequest, configuration: BenchConfiguration
+) -> list[SeismicCurve]:
+    """A curve for each record. Raises InvalidInput for a record that cannot be prepared."""
+    band, betas = band_of(request.table_band, configuration), sorted(request.beta)
+    reach = None if request.stroke_fit == "none" else Reach.of(configuration)
+    method = Method.HIGH_PASS if request.stroke_fit == "high-pass" else Method.LEAST_CHANGE
+    return [_curve(specimen, record, request, betas, band, reach, method) for record in records]
+
+
+def band_study(
+    specimen: Specimen, records: Sequence[Accelerogram], request: BandStudyRequest, configuration: BenchConfiguration
+) -> list[SeismicCurve]:
+    """A curve for each record at each lower end of the band, ascending; each is scaled to the peak by itself.
+
+    Raises InvalidInput for a band that does not go up, or a record that cannot be prepared.
+    """
+    band, betas = band_of(request.table_band, configuration), sorted(request.beta)
+    if band is None:
+        raise InvalidInput("--table-band", "none", "the study moves the band's lower end: leave it out, or LOW:HIGH")
+    if max(request.corner) >= band[1]:
+        raise InvalidInput("--corner", max(request.corner), f"it must be below the band's upper end, {band[1]:g} Hz")
+    return [
+        _curve(specimen, record, request, betas, (corner, band[1]))
+        for record in records
+        for corner in sorted(request.corner)
+    ]
+
+
+def _curve(
+    specimen: Specimen,
+    record: Accelerogram,
+    request: RecordsRequest,
+    betas: Sequence[float],
+    band: Band,
+    reach: Reach | None = None,
+    method: Method = Method.LEAST_CHANGE,
+) -> SeismicCurve:
+    try:
+        prepared = prepare(
+            record.sampled,
+            band=band,
+            peak=request.peak_factor * specimen.uplift_acceleration,
+            reach=reach,
+            method=method,
+            trim=request.trim or None,
+            length_ratio=request.length_ratio,
+            periods=periods_of(specimen.frame),
+        )
+    except InvalidInput as refused:
+        raise InvalidInput(f"{refused.item} of {record.name}", refused.value, refused.allowed) from None
+    return SeismicCurve(record, prepared, seismic_curve(specimen, prepared.record, betas))

@@ -1,0 +1,74 @@
+# pyright: reportUnknownMemberType=false
+"""Gain curves under earthquake records as in Fig. 8(a) and 9(a) of the paper: gain against stiffness.
+
+matplotlib's keyword arguments have no types, hence the first line.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION, new_figure, set_grid
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK)
+DASHES = ("-", "--", "-.", ":")
+MARKERS = "osD^v<>"
+
+WIDTH, HEIGHT, ROW = 7.5, 6.4, 0.16
+"""Inches: width, height without the strip of the toppled, and what each record adds to that."""
+
+
+@dataclass(frozen=True, eq=False)
+class GainCurve:
+    """One record: `beta`, `alpha_1` and `alpha_2`, shape (n,), ascending in beta; NaN where the run did not end by
+    itself, which `toppled`, shape (n,), explains.
+    """
+
+    name: str
+    beta: NDArray[np.float64]
+    alpha_1: NDArray[np.float64]
+    alpha_2: NDArray[np.float64]
+    toppled: NDArray[np.bool_]
+
+
+def seismic_figure(curves: Sequence[GainCurve], band: str) -> "Figure":
+    """alpha_2 and alpha_1 over the stiffness, and a strip of the stiffnesses at which the block toppled.
+
+    `band` says in words within which band the records are. Returns a figure that belongs to no window.
+    """
+    strip = ROW * len(curves) + 0.25
+    figure = new_figure(WIDTH, HEIGHT + strip)
+    upper, lower, fallen = figure.subplots(3, 1, sharex=True, height_ratios=[4.0, 2.0, strip])
+    for k, curve in enumerate(curves):
+        colour, dash = COLOURS[k % len(COLOURS)], DASHES[k // len(COLOURS) % len(DASHES)]
+        marker = MARKERS[k % len(MARKERS)]
+        for panel, gain in ((upper, curve.alpha_2), (lower, curve.alpha_1)):
+            panel.plot(
+                curve.beta, gain, color=colour, linestyle=dash, linewidth=1.2, marker=marker, ms=2.5, label=curve.name
+            )
+        where = curve.beta[curve.toppled]
+        fallen.plot(where, np.full(where.size, k), color=colour, linestyle="", marker="x", ms=4.0)
+    _finish(upper, r"$\alpha_2$")
+    _finish(lower, r"$\alpha_1$")
+    fallen.set_yticks(range(len(curves)), [curve.name for curve in curves], fontsize=7)
+    fallen.set_ylim(len(curves) - 0.5, -0.5)
+    fallen.set_ylabel("toppled", fontsize=8)
+    fallen.set_xlabel(r"$\beta$")
+    set_grid(fallen)
+    upper.set_title(f"table's band: {band}", loc="right", fontsize=9)
+    figure.legend(handles=upper.lines[: len(curves)], loc="outside lower center", ncols=4, fontsize=8, frameon=False)
+    return figure
+
+
+def _finish(panel: "Axes", label: str) -> None:
+    panel.axhline(1.0, color=GREY, linewidth=0.8, linestyle="--")
+    panel.set_ylabel(label)
+    panel.set_ylim(bottom=0.0)
+    set_grid(panel)
