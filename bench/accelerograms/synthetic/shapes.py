@@ -1,10 +1,10 @@
 """Main numbers of the paper's seven records, and what makes a synthetic motion have them.
 
-Peaks, durations and bands of six were measured on the records themselves. Parkfield's peak is that of its database, its
-pulse, ten inches of displacement within one and a half seconds, that of Housner and Trifunac (Bull. Seism. Soc. Am. 57,
-1967); its duration and band are estimates. The periods and amplitudes of the other pulses are our choice, near the
-velocity pulses that the records show by eye; they were not fitted. Frequencies of the filters and durations of the noise were found so that the mean over seeds has the
-declared numbers.
+Peaks, durations and bands of six were measured on the records themselves. Parkfield's peak is that of its database,
+its pulse, ten inches of displacement within one and a half seconds, that of Housner and Trifunac (Bull. Seism. Soc.
+Am. 57, 1967); its duration and band are estimates. The periods and amplitudes of the other pulses are our choice,
+near the velocity pulses that the records show by eye; they were not fitted. Frequencies of the filters and durations
+of the noise were found so that the mean over seeds has the declared numbers.
 """
 
 from dataclasses import dataclass
