@@ -91,6 +91,7 @@ def _daq_lines(server: str | None, found: "list[FoundDevice]", missing: str | No
             ("inputs", device.inputs, device.input_ranges),
             ("outputs", device.outputs, device.output_ranges),
             ("lines", device.lines, ()),
+            ("input lines", device.input_lines, ()),
         ):
             if channels:
                 lines.append(f"    {kind}: {_channels(channels)}{_volts(ranges)}")

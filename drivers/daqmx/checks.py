@@ -37,9 +37,11 @@ def checked_devices(
     output = device_of("hardware.daq.output", daq.output)
     _require_known("hardware.daq.output", daq.output, output.outputs, "analogue output", output)
     _require_range("hardware.daq.output_range", daq.output_range, output.output_ranges, output)
-    if daq.enable_line is not None:
-        lines = device_of("hardware.daq.enable_line", daq.enable_line)
-        _require_known("hardware.daq.enable_line", daq.enable_line, lines.lines, "digital output line", lines)
+    for item, line in daq.digital_lines.items():
+        lines = device_of(f"hardware.daq.{item}", line)
+        is_output = item in ("enable_line", "heartbeat.line")
+        known, kind = (lines.lines, "output") if is_output else (lines.input_lines, "input")
+        _require_known(f"hardware.daq.{item}", line, known, f"digital {kind} line", lines)
     for given in inputs:
         device = device_of(_TERMINAL, given.terminal)
         _require_known(_TERMINAL, given.terminal, device.inputs, "analogue input", device)
@@ -50,7 +52,7 @@ def checked_devices(
 
 
 def _require_known(item: str, given: str, known: Sequence[str], kind: str, device: FoundDevice) -> None:
-    if given.lower() not in (name.lower() for name in known):
+    if given.strip("/").lower() not in (name.lower() for name in known):
         there = f"it has {known[0]} to {known[-1]}" if known else "it has none"
         raise InvalidInput(item, given, f"{device.name} ({device.product}) has no such {kind}; {there}")
 

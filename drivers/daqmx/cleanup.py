@@ -10,12 +10,12 @@ from contextlib import ExitStack
 from nidaqmx.errors import DaqError, RpcError
 
 from drivers.clock import WallClock
-from drivers.daqmx import enable, inputs, library, output, watchdog
+from drivers.daqmx import enable, heartbeat, inputs, library, output, safety_inputs, watchdog
 from drivers.daqmx.connection import Connection
 from drivers.daqmx.errors import status_of, translated
 from drivers.errors import DeviceNotFound
 
-_NAMES = (enable.NAME, output.NAME, inputs.NAME, watchdog.NAME)
+_NAMES = (enable.NAME, heartbeat.NAME, output.NAME, inputs.NAME, safety_inputs.NAME, watchdog.NAME)
 _WATCH = 0.6
 """How long a running output is watched [s]; a living client writes every 0.2 s."""
 _LOOK = 0.05

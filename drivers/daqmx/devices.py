@@ -20,6 +20,7 @@ T = TypeVar("T")
 class FoundDevice:
     """One device or module. Ranges are (lowest, highest) pairs [V]; rates [1/s] are None where there is no such thing.
 
+    `lines` are those that can be digital outputs, `input_lines` those that can be digital inputs.
     `input_rate` is the most for one channel; `total_input_rate` is shared by all channels unless `simultaneous`.
     """
 
@@ -30,6 +31,7 @@ class FoundDevice:
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     lines: tuple[str, ...]
+    input_lines: tuple[str, ...]
     input_ranges: tuple[tuple[float, float], ...]
     output_ranges: tuple[tuple[float, float], ...]
     input_rate: float | None
@@ -75,6 +77,7 @@ def described(device: library.Device) -> FoundDevice:
         inputs=inputs,
         outputs=outputs,
         lines=tuple(line.name for line in device.do_lines),
+        input_lines=tuple(line.name for line in device.di_lines),
         input_ranges=_pairs(device.ai_voltage_rngs) if inputs else (),
         output_ranges=_pairs(device.ao_voltage_rngs) if outputs else (),
         input_rate=_where_supported(lambda: float(device.ai_max_single_chan_rate)) if inputs else None,

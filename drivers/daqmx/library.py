@@ -19,7 +19,7 @@ from nidaqmx.constants import (
     TerminalConfiguration,
 )
 from nidaqmx.grpc_session_options import GrpcSessionOptions
-from nidaqmx.stream_readers import AnalogUnscaledReader
+from nidaqmx.stream_readers import AnalogUnscaledReader, DigitalMultiChannelReader
 from nidaqmx.stream_writers import AnalogSingleChannelWriter, DigitalSingleChannelWriter
 from nidaqmx.system.watchdog import WatchdogTask as NiWatchdogTask
 from nidaqmx.types import DOExpirationState
@@ -55,6 +55,8 @@ class Device(Named, Protocol):
     def ai_physical_chans(self) -> Sequence[PhysicalInput]: ...
     @property
     def ao_physical_chans(self) -> Sequence[Named]: ...
+    @property
+    def di_lines(self) -> Sequence[Named]: ...
     @property
     def do_lines(self) -> Sequence[Named]: ...
     @property
@@ -136,6 +138,12 @@ class LineChannels(Protocol):
     def add_do_chan(self, lines: str) -> object: ...
 
 
+class InputLineChannels(Protocol):
+    """The digital inputs of a task."""
+
+    def add_di_chan(self, lines: str) -> object: ...
+
+
 class Timing(Protocol):
     """The sample clock of a task."""
 
@@ -192,6 +200,8 @@ class Task(Named, Protocol):
     @property
     def ao_channels(self) -> OutputChannels: ...
     @property
+    def di_channels(self) -> InputLineChannels: ...
+    @property
     def do_channels(self) -> LineChannels: ...
     @property
     def timing(self) -> Timing: ...
@@ -230,6 +240,12 @@ class AnalogWriter(Protocol):
     """Writes volts, shape (n,); returns how many."""
 
     def write_many_sample(self, data: NDArray[np.float64], timeout: float) -> int: ...
+
+
+class LinesReader(Protocol):
+    """Reads the levels of digital lines now into an array of bool, shape (channels,), one line each."""
+
+    def read_one_sample_one_line(self, data: NDArray[np.bool_], timeout: float) -> object: ...
 
 
 class LineWriter(Protocol):
@@ -276,6 +292,13 @@ def analog_writer(task: Task, *, auto_start: bool) -> AnalogWriter:
     writer = cast(Any, AnalogSingleChannelWriter)(task.out_stream, auto_start)
     writer.verify_array_shape = False
     return cast(AnalogWriter, writer)
+
+
+def lines_reader(task: Task) -> LinesReader:
+    """Reads the lines of a task, starting it for that where it is not running."""
+    reader = DigitalMultiChannelReader(task.in_stream)
+    reader.verify_array_shape = False
+    return cast(LinesReader, reader)
 
 
 def line_writer(task: Task) -> LineWriter:

@@ -2,6 +2,9 @@
 
 from typing import Literal
 
+from pydantic import model_validator
+
+from sim.errors import InvalidInput
 from sim.parameters import Parameters, quantity
 
 Wiring = Literal["default", "differential", "pseudodifferential", "RSE", "NRSE"]
@@ -15,8 +18,54 @@ class AnalogInput(Parameters):
     range: float = quantity(10.0, "V", "largest magnitude at the input", gt=0, le=60)
 
 
+class SafetyInput(Parameters):
+    """A contact that the program reads: which digital input line, and its level while all is well."""
+
+    line: str = quantity("Dev1/port0/line1", "", "digital input line")
+    good: Literal["high", "low"] = quantity(
+        "high", "", "level while all is well: the one that a broken wire does not show, high on pulled-down inputs"
+    )
+
+
+class EmergencyStop(SafetyInput):
+    """Second contact of the emergency stop."""
+
+
+class OverTravel(SafetyInput):
+    """Contact of the over-travel switches: of both ends, or of one when over_travel_2 is the other."""
+
+    line: str = quantity("Dev1/port0/line2", "", "digital input line")
+
+
+class OverTravel2(SafetyInput):
+    """Contact of the over-travel switch at the other end, where it has a line of its own."""
+
+    line: str = quantity("Dev1/port0/line3", "", "digital input line")
+
+
+class AmplifierReady(SafetyInput):
+    """Contact of the amplifier that says ready, or no fault."""
+
+    line: str = quantity("Dev1/port0/line4", "", "digital input line")
+    delay: float | None = quantity(
+        None,
+        "s",
+        "it is good only while the amplifier is enabled, and by so long after the enable line closes at the latest;"
+        " absent: it is good before",
+        gt=0,
+        le=10,
+    )
+
+
+class Heartbeat(Parameters):
+    """A line that changes its level once per block, for a relay in the enable chain that opens when it stands still."""
+
+    line: str = quantity("Dev1/port0/line5", "", "digital output line")
+    timeout: float = quantity(1.0, "s", "how long after the last rising edge its relay opens", ge=0.1, le=10)
+
+
 class Daq(Parameters):
-    """The DAQ device: where its driver runs, the drive output, the enable line."""
+    """The DAQ device: where its driver runs, the drive output, the enable line, the safety inputs."""
 
     server: str | None = quantity(
         None, "", "host:port of the gRPC device server on the controller; absent: the NI-DAQmx driver of this PC"
@@ -38,10 +87,58 @@ class Daq(Parameters):
     watchdog: float | None = quantity(
         None, "s", "time-out of the device's watchdog on the enable line; absent when it has none", ge=0.1, le=30
     )
+    emergency_stop: EmergencyStop | None = quantity(None, "", "emergency stop; absent when it is not wired")
+    over_travel: OverTravel | None = quantity(None, "", "over-travel switches; absent when they are not wired")
+    over_travel_2: OverTravel2 | None = quantity(
+        None, "", "over-travel switch at the other end; absent when over_travel is both, or not wired"
+    )
+    amplifier_ready: AmplifierReady | None = quantity(None, "", "amplifier ready; absent when it is not wired")
+    heartbeat: Heartbeat | None = quantity(None, "", "heartbeat; absent when no relay waits for one")
     buffer: float = quantity(10.0, "s", "length of the input buffer: how late a block may be read", ge=1.0, le=60.0)
     patience: float = quantity(2.0, "s", "how long a call may take beyond its own duration", ge=0.1, le=60)
+
+    @property
+    def safety_inputs(self) -> dict[str, SafetyInput]:
+        """The safety inputs that are wired, by the names under which the rig tells of them."""
+        return {name: given for name, given in self._possible_inputs.items() if given is not None}
+
+    @property
+    def missing_inputs(self) -> tuple[str, ...]:
+        """The names of the safety inputs that are not wired; one line may be all there is for both ends."""
+        given = self.safety_inputs
+        return tuple(name for name in self._possible_inputs if name not in given and name != "over-travel 2")
+
+    @property
+    def digital_lines(self) -> dict[str, str]:
+        """Every digital line that is used, by the key that names it."""
+        inputs = {f"{name.replace('-', '_').replace(' ', '_')}.line": g.line for name, g in self.safety_inputs.items()}
+        outputs = {} if self.enable_line is None else {"enable_line": self.enable_line}
+        return {**outputs, **inputs, **({} if self.heartbeat is None else {"heartbeat.line": self.heartbeat.line})}
+
+    @property
+    def _possible_inputs(self) -> dict[str, SafetyInput | None]:
+        return {
+            "emergency stop": self.emergency_stop,
+            "over-travel": self.over_travel,
+            "over-travel 2": self.over_travel_2,
+            "amplifier ready": self.amplifier_ready,
+        }
+
+    @model_validator(mode="after")
+    def _no_line_twice(self) -> "Daq":
+        seen: dict[str, str] = {}
+        for item, line in self.digital_lines.items():
+            if (other := seen.setdefault(line.strip("/").lower(), item)) != item:
+                raise InvalidInput(item, line, f"{other} has this line already; each needs one of its own")
+        return self
+
+    @model_validator(mode="after")
+    def _safety_inputs_need_something_to_open(self) -> "Daq":
+        if self.heartbeat is not None and self.enable_line is None:
+            raise InvalidInput("heartbeat.line", self.heartbeat.line, "it needs enable_line, which it stands beside")
+        return self
 
 
 def device_name(terminal: str) -> str:
     """The device of a physical channel or line, as it is written there; DAQmx does not tell upper from lower case."""
-    return terminal.split("/")[0]
+    return terminal.strip("/").split("/")[0]

@@ -13,6 +13,7 @@ from drivers.daqmx import library
 from drivers.daqmx.checks import checked_devices
 from drivers.daqmx.cleanup import clear_stale
 from drivers.daqmx.connection import Connection
+from drivers.daqmx.description import description_of
 from drivers.daqmx.enable import EnableLine
 from drivers.daqmx.errors import translated
 from drivers.daqmx.output import put_to_zero
@@ -56,7 +57,7 @@ class DaqSession:
         self._connection = Connection(daq.server, daq.patience)
         try:
             # whatever is wrong with the rest: an earlier program may have died with the shaker enabled
-            terminals = (daq.output, daq.enable_line or daq.output, *(given.terminal for given in inputs))
+            terminals = (daq.output, *daq.digital_lines.values(), *(given.terminal for given in inputs))
             stale = clear_stale(self._connection, [device_name(terminal) for terminal in terminals])
             _make_safe(self._connection, daq)
             with translated("asking the driver for its devices"):
@@ -68,21 +69,7 @@ class DaqSession:
             self._connection.close()
             raise
         self._drive_range = daq.output_range
-        self._description = {
-            "driver": f"NI-DAQmx {version.major_version}.{version.minor_version}.{version.update_version}",
-            "server": daq.server or "none: the driver of this PC",
-            **{f"device {device.name}": device.identity for device in used},
-            "inputs": ", ".join(f"{given.terminal} ({given.wiring}, +-{given.range:g} V)" for given in inputs),
-            "output": f"{daq.output} (+-{daq.output_range:g} V)",
-            "output transfer": self._tasks.output.transfer,
-            "start trigger": self._tasks.inputs.trigger,
-            "sample clock of the output": self._tasks.inputs.clock,
-            "enable line": daq.enable_line or "none",
-            "watchdog": "none: a program that dies leaves the relay as it is"
-            if daq.watchdog is None
-            else f"{daq.watchdog:g} s",
-            "tasks left by another client": ", ".join(stale) or "none",
-        }
+        self._description = description_of(daq, inputs, used, version, self._tasks, stale)
 
     @property
     def sample_rate(self) -> float:
@@ -123,7 +110,7 @@ class DaqSession:
             self._rest()
             self._state, self._at_rest, self._cut = _State.PREPARED, False, False
             with self._resting_on_failure():
-                self._prepare()
+                self._tasks.prepare(lambda: self._cut)
 
     def write(self, volts: NDArray[np.float64]) -> None:
         """Append drive samples, shape (n,), finite and in range [V]; before `start` they are what it begins with.
@@ -144,6 +131,7 @@ class DaqSession:
             self._require(_State.PREPARED, "start")
             with self._resting_on_failure():
                 self._tell_watchdog()
+                self._beat()
                 self._tasks.output.arm()
                 self._tasks.inputs.start()
                 self._state = _State.RUNNING
@@ -163,6 +151,7 @@ class DaqSession:
                 self._tasks.inputs.stop()
                 raise RigError("read is refused: the session was stopped meanwhile")
             self._tell_watchdog()
+            self._beat()
         return counts
 
     def acquired(self) -> int:
@@ -170,6 +159,24 @@ class DaqSession:
         self._require(_State.RUNNING, "asking for the sample clock")
         with self._resting_on_failure():
             return self._tasks.inputs.acquired()
+
+    def safety_inputs(self) -> dict[str, bool]:
+        """Whether each safety input that is wired is good now: one call to the device; in every state but closed.
+
+        An amplifier that says ready only while it is enabled is left out when it is not to be enabled. Raises RigError
+        as of `read`.
+        """
+        safety = self._tasks.safety
+        if safety is None:
+            return {}
+        if self._state is _State.CLOSED:
+            raise RigError("reading the safety inputs is refused: the session is closed")
+        enabled = self._is_enabled
+        with self._resting_on_failure():
+            good = safety.read()
+        if self._tasks.ready_delay is not None and not (enabled and self._is_enabled):
+            del good["amplifier ready"]
+        return good
 
     def cut(self) -> bool:
         """Open the enable relay now, in one call; from any thread, while another reads, in every state.
@@ -209,26 +216,24 @@ class DaqSession:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _prepare(self) -> None:
-        tasks = self._tasks
-        if tasks.relay is not None:
-            tasks.relay.open()
-        tasks.output.prepare(tasks.inputs.trigger)
-        # while its watchdog starts nothing may be reserved on the device: that comes with the first samples
-        if tasks.watchdog is not None:
-            tasks.watchdog.start()
-        if tasks.relay is not None:
-            tasks.relay.energise()
-        if self._cut:
-            raise RigError("prepare is refused: the enable line was cut meanwhile")
-
     def _require(self, state: _State, what: str) -> None:
         if self._state is not state:
             raise RigError(f"{what} is refused: the session is {self._state.value}")
 
+    @property
+    def _is_enabled(self) -> bool:
+        """Whether the enable line is meant to be closed."""
+        return self._state in (_State.PREPARED, _State.RUNNING) and not self._cut
+
     def _tell_watchdog(self) -> None:
         if self._tasks.watchdog is not None and not self._cut:
             self._tasks.watchdog.tell()
+
+    def _beat(self) -> None:
+        # under the lock: no edge may come after a stop has put the line to rest
+        with self._lock:
+            if self._tasks.heartbeat is not None and self._is_enabled:
+                self._tasks.heartbeat.beat()
 
     @contextmanager
     def _resting_on_failure(self) -> Generator[None]:

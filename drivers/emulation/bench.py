@@ -50,7 +50,10 @@ class EmulatedBench:
         self._outputs: dict[int, Callable[[], bool]] = {}
         self._output: Output | None = None
         self._enabled = False
-        self._lock = threading.RLock()
+        self._half_stroke = parameters.shaker.half_stroke
+        self._told: Callable[[NDArray[np.float64]], None] | None = None
+        self.lock = threading.RLock()
+        """Guards the bench; whoever is told of the table's motion holds it."""
         # the compiled bench is loaded and has seen a sample before its clock starts
         self._bench.run(np.zeros(1))
         self._started = time.monotonic()
@@ -95,24 +98,34 @@ class EmulatedBench:
         return self._started + tick / self._rate
 
     def inputs(self, first: int, n: int) -> Counts:
-        with self._lock:
+        with self.lock:
             if first + n > self._counts.end:
                 self._advance()
             return self._counts.at(np.arange(first, first + n))
 
     def wire(self, output: Output) -> None:
-        with self._lock:
+        with self.lock:
             self._advance()
             self._output = output
 
     def enable(self, closed: bool) -> None:
-        with self._lock:
+        with self.lock:
             self._advance()
             self._enabled = closed
 
+    @property
+    def half_stroke(self) -> float:
+        """Displacement of the table from mid stroke at which the end stops touch [m]."""
+        return self._half_stroke
+
+    def watch(self, told: Callable[[NDArray[np.float64]], None]) -> None:
+        """Tell somebody of the table's displacement [m] at all ticks, shape (n,), as soon as they are computed."""
+        with self.lock:
+            self._told = told
+
     def connect_laser(self, storey: int, live: Callable[[], bool]) -> None:
         """Let the analogue output of the laser on a storey, 1 or 2, show its error current while it is not `live`."""
-        with self._lock:
+        with self.lock:
             self._outputs[1 + storey] = live
 
     def sight(self, storey: int) -> "Storey":
@@ -122,7 +135,7 @@ class EmulatedBench:
     def seen(self, storey: int, times: NDArray[np.float64]) -> NDArray[np.float64]:
         """Displacement of a storey [m] as its laser sees it at monotonic times [s]: cubic between the ticks."""
         ticks = (times - self._started) * self._rate
-        with self._lock:
+        with self.lock:
             if ticks.size and ticks[-1] > self._seen.end - 1:
                 self._advance()
             ticks = np.clip(ticks, 0.0, self._seen.end - 1)
@@ -137,7 +150,7 @@ class EmulatedBench:
 
     def handwork(self, work: Handwork, stiffness: float | None) -> None:
         """Do to the specimen what a person does. Raises RigError while the amplifier is enabled."""
-        with self._lock:
+        with self.lock:
             if self._enabled:
                 raise RigError(f"{work.value} is refused: the amplifier is enabled; hands belong on a stopped bench")
             self._advance()
@@ -160,7 +173,7 @@ class EmulatedBench:
 
     def _idle(self) -> None:
         while not self._over.wait(_IDLE_TURN):
-            with self._lock:
+            with self.lock:
                 self._advance()
 
     def _advance(self) -> None:
@@ -179,6 +192,8 @@ class EmulatedBench:
         truth = self._bench.truth
         x, v = (truth.x, truth.v) if self._on_ground else (0.0, 0.0)
         self._seen.append(np.column_stack((truth.u1 + x, truth.v1 + v, truth.u2 + x, truth.v2 + v)))
+        if self._told is not None:
+            self._told(truth.x)
 
 
 class Storey:

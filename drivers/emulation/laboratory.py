@@ -3,36 +3,19 @@
 from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
-from typing import Any, Literal, Self
+from typing import Any, Self
 
-from drivers.daqmx.parameters import Daq
 from drivers.emulation.bench import EmulatedBench
 from drivers.emulation.control import ControlServer
+from drivers.emulation.daqmx.lines import Wires
 from drivers.emulation.daqmx.models import compact_rio, x_series
 from drivers.emulation.daqmx.server import DaqServer
 from drivers.emulation.optoncdt.laser import EmulatedLaser
-from drivers.hardware.parameters import (
-    Hardware,
-    Laser1,
-    Laser2,
-    Lasers,
-    TableAcceleration,
-    TableDisplacement,
-)
+from drivers.emulation.safety_chain import INPUTS, SafetyChain
+from drivers.emulation.wiring import HEARTBEAT, LINES, Connection, Device, hardware_of
 from drivers.rig import Handwork
 from sim.specimen import Specimen
 from sim.virtual_bench import VirtualBenchParameters
-
-Connection = Literal["serial", "analogue"]
-Device = Literal["usb", "crio"]
-
-_VALUES = 4
-"""Values of a measurement on the serial line: distance, counter, and the two halves of the time stamp."""
-_BAUD = 921_600
-_WATCHDOG = 1.0
-"""Time-out of the device's watchdog on the enable line [s]."""
-_PIPELINE = 3
-"""Measurements from exposure to output (manual of the optoNCDT 1420, p. 52)."""
 
 
 @dataclass(frozen=True)
@@ -80,11 +63,20 @@ class Laboratory:
                     bench.connect_laser(storey, lambda one=one: one.analogue)
                     self.lasers += (one,)
             models = (x_series(calibrated=True),) if device == "usb" else compact_rio(calibrated=True)
-            self.daq = DaqServer(bench, models, converter=parameters.converter)
+            self.safety = SafetyChain(bench, HEARTBEAT)
+            enable, heartbeat, inputs = LINES[device]
+            wires = Wires(
+                {enable: self.safety.enable_line, heartbeat: self.safety.heartbeat_line},
+                {line: self.safety.inputs[name] for name, line in zip(INPUTS, inputs, strict=True)},
+            )
+            self.daq = DaqServer(bench, models, converter=parameters.converter, wires=wires)
             opened.callback(self.daq.close)
             self._control = ControlServer(self._handlers())
             opened.callback(self._control.close)
-            self.hardware = self._wiring(parameters, device, connection)
+            ports = [laser.port for laser in self.lasers] or [None, None]
+            self.hardware = hardware_of(
+                parameters, device, connection, server=self.daq.address, hands=self._control.address, ports=ports
+            )
             self._opened = opened.pop_all()
 
     def start(self) -> None:
@@ -105,58 +97,15 @@ class Laboratory:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _wiring(self, p: VirtualBenchParameters, device: Device, connection: Connection) -> Hardware:
-        """The configuration of a client, with the calibrations of the virtual bench."""
-        inputs, output, line = (
-            ("Dev1", "Dev1/ao0", "Dev1/port0/line0")
-            if device == "usb"
-            else ("cRIO1Mod1", "cRIO1Mod3/ao0", "cRIO1Mod4/port0/line0")
-        )
-        # what a person reads off the data sheets of filter and laser; what is left, the loop check measures
-        latency = _PIPELINE / p.laser_1.rate + 30.0 * _VALUES / _BAUD
-        delay = p.filter_unit.delay(p.sample_rate) - latency if connection == "serial" else 0.0
-        ports = [laser.port for laser in self.lasers] or [None, None]
-        return Hardware(
-            sample_rate=p.sample_rate,
-            half_stroke=p.shaker.half_stroke,
-            hands=self._control.address,
-            daq=Daq(
-                server=self.daq.address,
-                output=output,
-                output_range=p.shaker.drive_range,
-                enable_line=line,
-                watchdog=_WATCHDOG if device == "usb" else None,
-            ),
-            table_displacement=TableDisplacement(
-                terminal=f"{inputs}/ai0", range=p.converter.range, sensitivity=1.0 / p.displacement_sensor.nominal[0]
-            ),
-            table_acceleration=TableAcceleration(
-                terminal=f"{inputs}/ai1", range=p.converter.range, sensitivity=1.0 / p.accelerometer.nominal[0]
-            ),
-            lasers=Lasers(
-                connection=connection,
-                reference=p.laser_1.reference,
-                rate=p.laser_1.rate,
-                delay=round(delay, 6),
-                load=p.laser_1.load,
-            ),
-            laser_1=Laser1(
-                terminal=f"{inputs}/ai2",
-                range=p.converter.range,
-                port=ports[0],
-                measuring_range=p.laser_1.measuring_range,
-            ),
-            laser_2=Laser2(
-                terminal=f"{inputs}/ai3",
-                range=p.converter.range,
-                port=ports[1],
-                measuring_range=p.laser_2.measuring_range,
-            ),
-        )
-
     def _handlers(self) -> dict[str, Any]:
         """What may be asked for from outside: the work of hands, faults, and the truth that no client could know."""
-        return {"handwork": self._handwork, "laser": self._laser, "daq": self._daq, "truth": self._truth}
+        return {
+            "handwork": self._handwork,
+            "laser": self._laser,
+            "daq": self._daq,
+            "safety": self._safety,
+            "truth": self._truth,
+        }
 
     def _handwork(self, arguments: Mapping[str, Any]) -> None:
         self.bench.handwork(Handwork(arguments["work"]), arguments.get("stiffness"))
@@ -170,9 +119,16 @@ class Laboratory:
         """A fault of the DAQ: the name of a method of DaqServer, and its `arguments`."""
         _FAULTS_OF_DAQ[arguments["fault"]](self.daq, *arguments.get("arguments", ()))
 
+    def _safety(self, arguments: Mapping[str, Any]) -> None:
+        """Something in the enable chain: the name of a method of SafetyChain, and its `arguments`."""
+        _FAULTS_OF_SAFETY[arguments["fault"]](self.safety, *arguments.get("arguments", ()))
+
     def _truth(self, arguments: Mapping[str, Any]) -> dict[str, Any]:  # noqa: ARG002 - the signature of a handler
-        """Host times [s] of the clocks' zeros and their true rates."""
+        """Host times [s] of the clocks' zeros and their true rates; the enable chain; volts at the drive output."""
         return {
+            "enabled": self.bench.enabled,
+            "contacts": self.safety.contacts,
+            "drive": self.daq.volts(self.hardware.daq.output),
             "first_sample": self.daq.first_sample,
             "sample_rate": self.bench.rate_true,
             "lasers": [{"epoch": laser.epoch, "rate": laser.rate_true} for laser in self.lasers],
@@ -192,3 +148,16 @@ _FAULTS_OF_LASER = {
     )
 }
 _FAULTS_OF_DAQ = {method.__name__: method for method in (DaqServer.fail_next, DaqServer.stall, DaqServer.vanish)}
+_FAULTS_OF_SAFETY = {
+    method.__name__: method
+    for method in (
+        SafetyChain.press_emergency_stop,
+        SafetyChain.release_emergency_stop,
+        SafetyChain.trip_over_travel,
+        SafetyChain.reset_over_travel,
+        SafetyChain.trip_amplifier,
+        SafetyChain.reset_amplifier,
+        SafetyChain.break_wire,
+        SafetyChain.mend_wire,
+    )
+}

@@ -97,8 +97,8 @@ class HardwareRig:
         return self._lasers.alignments if self._lasers is not None else ()
 
     def interlocks(self) -> Mapping[str, bool]:
-        # no safety input is wired to this rig: emergency stop and over-travel act on the enable line by themselves
-        return {}
+        with self._ending_on_failure():
+            return self._daq.safety_inputs()
 
     def arm(self) -> None:
         if self._state is not _State.STOPPED:

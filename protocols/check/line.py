@@ -75,6 +75,11 @@ def stated(subject: str, what: str, measured: float, unit: str, *, uncertainty: 
     )
 
 
+def passed(subject: str, what: str) -> CheckLine:
+    """A line that passed without a number."""
+    return CheckLine(subject=subject, what=what, verdict=Verdict.PASSED)
+
+
 def failed(subject: str, what: str, remedy: str) -> CheckLine:
     """A line that failed without a number."""
     return CheckLine(subject=subject, what=what, verdict=Verdict.FAILED, remedy=remedy)

@@ -16,6 +16,7 @@ from protocols.check.drive import drive_lines
 from protocols.check.line import CheckLine, Verdict, failed, untested
 from protocols.check.parameters import CheckParameters
 from protocols.check.resting import resting_lines
+from protocols.check.safety import safety_lines
 from protocols.check.scales import scale_lines
 from protocols.check.sines import measured_sines
 from protocols.harmonic.evidence import Unmeasurable
@@ -35,6 +36,7 @@ def check_plan(parameters: CheckParameters, configuration: BenchConfiguration) -
     heard = yield Listen(parameters.rest)
     if not isinstance(heard, Heard):
         raise TypeError(f"listening came to {heard}")
+    yield from _say(safety_lines(configuration))
     resting = list(resting_lines(heard, parameters, configuration.analysis))
     if heard.violation is not None and all(line.verdict is not Verdict.FAILED for line in resting):
         resting.append(failed("table", "rest", f"{heard.violation} without drive: see to amplifier and limits"))

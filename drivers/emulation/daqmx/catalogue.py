@@ -54,6 +54,10 @@ class Catalogue:
         """The device of a digital output line and the number of the line."""
         return self._find(line, "line_names")
 
+    def input_line(self, line: str) -> tuple[DeviceModel, int]:
+        """The device of a digital input line and the number of the line."""
+        return self._find(line, "input_line_names")
+
     def _find(self, channel: str, kind: str) -> tuple[DeviceModel, int]:
         device = self.device(channel.strip("/").split("/")[0])
         names: tuple[str, ...] = getattr(device, kind)

@@ -54,8 +54,8 @@ class AnalogOutputs:
 class DeviceModel:
     """One device, chassis, or module in a `chassis`.
 
-    `lines` is the number of digital outputs at port 0; `watchdog` the longest time-out [s] of the watchdog on them,
-    None where there is none.
+    `lines` is the number of lines at port 0 that can be outputs, `input_lines` of those that can be inputs; `watchdog`
+    the longest time-out [s] of the watchdog on them, None where there is none.
     """
 
     name: str
@@ -68,6 +68,7 @@ class DeviceModel:
     inputs: AnalogInputs | None = None
     outputs: AnalogOutputs | None = None
     lines: int = 0
+    input_lines: int = 0
     watchdog: float | None = None
 
     @property
@@ -84,6 +85,11 @@ class DeviceModel:
     def line_names(self) -> tuple[str, ...]:
         """Digital output lines."""
         return tuple(f"{self.name}/port0/line{k}" for k in range(self.lines))
+
+    @property
+    def input_line_names(self) -> tuple[str, ...]:
+        """Digital input lines."""
+        return tuple(f"{self.name}/port0/line{k}" for k in range(self.input_lines))
 
     @property
     def clockwork(self) -> str:

@@ -10,7 +10,7 @@ from drivers.emulation.daqmx.lines import Lines
 
 
 @dataclass(frozen=True)
-class OutputLine:
+class Line:
     """One line: the device it belongs to, and its name."""
 
     device: str
@@ -22,7 +22,7 @@ class LineChannel:
     """One channel: a line, or several that are written together."""
 
     name: str
-    lines: tuple[OutputLine, ...]
+    lines: tuple[Line, ...]
 
 
 class DigitalOutput:
@@ -42,7 +42,7 @@ class DigitalOutput:
         return tuple(channel.name for channel in self.outputs)
 
     @property
-    def all_lines(self) -> tuple[OutputLine, ...]:
+    def all_lines(self) -> tuple[Line, ...]:
         """Its lines, channel after channel."""
         return tuple(line for channel in self.outputs for line in channel.lines)
 

@@ -9,7 +9,7 @@ from drivers.emulation.daqmx.catalogue import Catalogue
 from drivers.emulation.daqmx.device import DeviceModel
 from drivers.emulation.daqmx.errors import DaqmxFailure, SessionExists, SessionMissing
 from drivers.emulation.daqmx.job import Job
-from drivers.emulation.daqmx.lines import Lines
+from drivers.emulation.daqmx.lines import Lines, Wires
 from drivers.emulation.daqmx.task import State, Task
 from drivers.emulation.daqmx.terminals import Instant, OutputTerminal
 from drivers.emulation.daqmx.watchdog import Watchdog
@@ -20,8 +20,8 @@ from sim.sensors import Converter
 class Driver:
     """Devices, tasks and reservations; `changed` guards all of it. It outlives every client.
 
-    `drive` is the output that is wired to the plant, `enable_line` the line of the plant's enable relay; None leaves
-    it unconnected. `converter` made the plant's counts. `output_clock_error` and `packet` as of `DaqServer`.
+    `drive` is the output that is wired to the plant; None leaves it unconnected. `wires` are at the digital lines.
+    `converter` made the plant's counts. `output_clock_error` and `packet` as of `DaqServer`.
     """
 
     def __init__(
@@ -30,7 +30,7 @@ class Driver:
         devices: Sequence[DeviceModel],
         converter: Converter,
         drive: str | None,
-        enable_line: str | None,
+        wires: Wires,
         output_clock_error: float = 0.0,
         packet: int = 1,
     ) -> None:
@@ -43,7 +43,7 @@ class Driver:
         self.first_tick: int | None = None
         """Tick of the first sample of the clocked task that was started last."""
         self.instant = Instant(plant.tick)
-        self.lines = Lines(enable_line, plant.enable)
+        self.lines = Lines(wires)
         self.terminals = {name: OutputTerminal(self.instant) for device in devices for name in device.output_names}
         self._tasks: dict[str, Task] = {}
         self._reserved: dict[str, Task] = {}

@@ -1,29 +1,42 @@
-"""The digital output lines of all devices; one of them is the enable relay of the amplifier."""
+"""The digital lines of all devices, and what they are wired to."""
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 from nidaqmx.error_codes import DAQmxErrors
 
 from drivers.emulation.daqmx.errors import DaqmxFailure
 
 
+@dataclass(frozen=True)
+class Wires:
+    """By names of lines: who is `told` of the level of an output line, and what an input line `shows`."""
+
+    told: Mapping[str, Callable[[bool], None]] = field(default_factory=dict[str, Callable[[bool], None]])
+    shown: Mapping[str, Callable[[], bool]] = field(default_factory=dict[str, Callable[[], bool]])
+
+
 class Lines:
-    """Levels by line name; low at power-up. `relay` is told of every change of the line `relay_line`.
+    """Levels by line name; outputs are low at power-up, inputs that nothing is wired to are pulled down.
 
     It has a lock of its own: a watchdog expires whatever else goes on.
     """
 
-    def __init__(self, relay_line: str | None, relay: Callable[[bool], None]) -> None:
-        self._relay_line = relay_line
-        self._relay = relay
+    def __init__(self, wires: Wires) -> None:
+        self._wires = wires
         self._high: set[str] = set()
         self._expired: dict[str, dict[str, bool]] = {}
         self._lock = threading.Lock()
 
     def is_high(self, line: str) -> bool:
-        """The level of a line."""
+        """The level that a line was set to."""
         return line in self._high
+
+    def shows(self, line: str) -> bool:
+        """The level that is seen at a line: what is wired to it, or what it was set to."""
+        shown = self._wires.shown.get(line)
+        return line in self._high if shown is None else shown()
 
     def write(self, device: str, line: str, high: bool) -> None:
         """Set a line. Raises DaqmxFailure while the watchdog of its device has expired."""
@@ -58,5 +71,5 @@ class Lines:
 
     def _set(self, line: str, high: bool) -> None:
         (self._high.add if high else self._high.discard)(line)
-        if line == self._relay_line:
-            self._relay(high)
+        if (told := self._wires.told.get(line)) is not None:
+            told(high)

@@ -34,12 +34,13 @@ def x_series(name: str = "Dev1", *, simulated: bool = False, calibrated: bool = 
         ),
         outputs=AnalogOutputs(count=4, ranges=(10.0, 5.0), rate=2.86e6, memory=8191),
         lines=32,
+        input_lines=32,
         watchdog=34.0,
     )
 
 
 def compact_rio(name: str = "cRIO1", *, simulated: bool = False, calibrated: bool = False) -> tuple[DeviceModel, ...]:
-    """A cRIO-9045 with two NI 9239 (inputs), an NI 9263 (outputs) and an NI 9485 (relays) in its slots.
+    """A cRIO-9045 with two NI 9239 (inputs), NI 9263 (outputs), NI 9485 (relays) and NI 9421 (digital inputs).
 
     Modules are devices of their own: `cRIO1Mod1/ai0`; triggers are the controller's: `/cRIO1/te0/StartTrigger`. A
     CompactRIO has no watchdog that DAQmx could set. `calibrated` as of `x_series`, for the first module.
@@ -50,6 +51,7 @@ def compact_rio(name: str = "cRIO1", *, simulated: bool = False, calibrated: boo
         DeviceModel("", "NI 9239", inputs=_ni_9239(4)),
         DeviceModel("", "NI 9263", outputs=AnalogOutputs(count=4, ranges=(10.0,), rate=1.0e5, memory=127)),
         DeviceModel("", "NI 9485", lines=8),
+        DeviceModel("", "NI 9421", input_lines=8),
     )
     modules = tuple(
         replace(

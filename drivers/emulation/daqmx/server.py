@@ -11,6 +11,7 @@ from session_pb2_grpc import add_SessionUtilitiesServicer_to_server
 from drivers.emulation.daqmx.device import DeviceModel
 from drivers.emulation.daqmx.driver import Driver
 from drivers.emulation.daqmx.faults import Boundary, Faults
+from drivers.emulation.daqmx.lines import Wires
 from drivers.emulation.daqmx.service.daqmx import NiDaqmx
 from drivers.emulation.daqmx.service.utilities import SessionUtilities
 from drivers.emulation.plant import Plant
@@ -25,7 +26,8 @@ class DaqServer:
     """Speaks like NI's gRPC device server, with `devices` whose terminals are those of `plant`.
 
     `drive` is the analogue output that drives the plant and `enable_line` the digital line of its enable relay; the
-    first that the devices have unless told. `converter` made the plant's counts. `output_clock_error` is by how much an
+    first that the devices have unless told. `wires` are the digital lines' instead, when the relay is not all there is
+    on them. `converter` made the plant's counts. `output_clock_error` is by how much an
     output that does not follow the inputs' sample clock is faster than it, relative; the counter of samples that the
     inputs have taken goes in steps of `packet`, as where they travel in packets. Raises InvalidInput when the address
     cannot be had.
@@ -40,18 +42,19 @@ class DaqServer:
         converter: Converter | None = None,
         drive: str | None = None,
         enable_line: str | None = None,
+        wires: Wires | None = None,
         output_clock_error: float = 0.0,
         packet: int = 1,
     ) -> None:
         self._plant = plant
         outputs = [name for device in devices for name in device.output_names]
-        lines = [name for device in devices for name in device.line_names]
+        relay = _chosen("enable_line", enable_line, [name for device in devices for name in device.line_names])
         self._driver = Driver(
             plant,
             devices,
             converter if converter is not None else Converter(),
             _chosen("drive", drive, outputs),
-            _chosen("enable_line", enable_line, lines),
+            wires if wires is not None else Wires({} if relay is None else {relay: plant.enable}),
             output_clock_error,
             packet,
         )

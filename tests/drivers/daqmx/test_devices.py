@@ -24,6 +24,7 @@ def test_a_multifunction_device_is_found() -> None:
         inputs=tuple(f"Dev1/ai{k}" for k in range(32)),
         outputs=tuple(f"Dev1/ao{k}" for k in range(4)),
         lines=tuple(f"Dev1/port0/line{k}" for k in range(32)),
+        input_lines=tuple(f"Dev1/port0/line{k}" for k in range(32)),
         input_ranges=tuple((-width, width) for width in widths),
         output_ranges=((-10.0, 10.0), (-5.0, 5.0)),
         input_rate=2.0e6,
@@ -37,7 +38,7 @@ def test_a_multifunction_device_is_found() -> None:
 def test_a_chassis_and_its_modules_are_found() -> None:
     with DaqServer(Loopback(RATE), compact_rio()) as server:
         found = {device.name: device for device in find_devices(server.address)}
-    assert list(found) == ["cRIO1", "cRIO1Mod1", "cRIO1Mod2", "cRIO1Mod3", "cRIO1Mod4"]
+    assert list(found) == ["cRIO1", "cRIO1Mod1", "cRIO1Mod2", "cRIO1Mod3", "cRIO1Mod4", "cRIO1Mod5"]
     assert found["cRIO1"].input_rate is None
     assert found["cRIO1"].output_rate is None
     assert found["cRIO1Mod1"].simultaneous

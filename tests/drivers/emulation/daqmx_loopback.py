@@ -20,6 +20,7 @@ from nidaqmx.system.watchdog import WatchdogTask
 from numpy.typing import NDArray
 
 from drivers.emulation.daqmx.device import DeviceModel
+from drivers.emulation.daqmx.lines import Wires as LineWires
 from drivers.emulation.daqmx.models import x_series
 from drivers.emulation.daqmx.server import DaqServer
 from drivers.emulation.plant import Output
@@ -110,7 +111,12 @@ class Desk:
     """Plant, server and client; everything that was opened is closed at the end."""
 
     def __init__(
-        self, devices: Sequence[DeviceModel] = (), speed: float = 1.0, packet: int = 1, output_clock_error: float = 0.0
+        self,
+        devices: Sequence[DeviceModel] = (),
+        speed: float = 1.0,
+        packet: int = 1,
+        output_clock_error: float = 0.0,
+        wires: LineWires | None = None,
     ) -> None:
         self.plant = Wires(speed)
         self.server = DaqServer(
@@ -119,6 +125,7 @@ class Desk:
             converter=CONVERTER,
             packet=packet,
             output_clock_error=output_clock_error,
+            wires=wires,
         )
         self.server.start()
         self.channel: Any = grpc.insecure_channel(self.server.address)

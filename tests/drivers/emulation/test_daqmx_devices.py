@@ -24,7 +24,7 @@ def desk() -> Iterator[Desk]:
 
 def test_the_devices_of_the_server_are_listed(desk: Desk) -> None:
     names = [device.name for device in desk.system.devices]
-    assert names == ["Dev1", "cRIO1", "cRIO1Mod1", "cRIO1Mod2", "cRIO1Mod3", "cRIO1Mod4"]
+    assert names == ["Dev1", "cRIO1", "cRIO1Mod1", "cRIO1Mod2", "cRIO1Mod3", "cRIO1Mod4", "cRIO1Mod5"]
     assert desk.system.driver_version >= (23, 8)
 
 

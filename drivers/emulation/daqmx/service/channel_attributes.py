@@ -12,6 +12,7 @@ from nidaqmx.error_codes import DAQmxErrors
 from drivers.emulation.daqmx.analog_input import AnalogInput
 from drivers.emulation.daqmx.analog_output import TRANSFER_CONDITIONS, AnalogOutput, OutputChannel
 from drivers.emulation.daqmx.catalogue import unflattened
+from drivers.emulation.daqmx.digital_input import DigitalInput
 from drivers.emulation.daqmx.digital_output import DigitalOutput
 from drivers.emulation.daqmx.errors import DaqmxFailure
 from drivers.emulation.daqmx.input_channel import InputChannel
@@ -34,6 +35,7 @@ N = TypeVar("N", bound=_Named)
 _CHANNEL_TYPES: Mapping[type[Job], ChannelType] = {
     AnalogInput: ChannelType.ANALOG_INPUT,
     AnalogOutput: ChannelType.ANALOG_OUTPUT,
+    DigitalInput: ChannelType.DIGITAL_INPUT,
     DigitalOutput: ChannelType.DIGITAL_OUTPUT,
 }
 _INPUT_NUMBERS: Mapping[int, Callable[[InputChannel], float]] = {

@@ -2,7 +2,7 @@
 
 # ruff: noqa: ARG002 - gRPC gives every call a context, needed or not
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from typing import TypeVar
 
 from nidaqmx._stubs import nidaqmx_pb2 as pb
@@ -13,7 +13,8 @@ from drivers.emulation.daqmx.analog_input import AnalogInput
 from drivers.emulation.daqmx.analog_output import AnalogOutput, OutputChannel
 from drivers.emulation.daqmx.catalogue import unflattened
 from drivers.emulation.daqmx.converter import InputConverter
-from drivers.emulation.daqmx.digital_output import DigitalOutput, LineChannel, OutputLine
+from drivers.emulation.daqmx.digital_input import DigitalInput
+from drivers.emulation.daqmx.digital_output import DigitalOutput, Line, LineChannel
 from drivers.emulation.daqmx.errors import DaqmxFailure
 from drivers.emulation.daqmx.input_channel import InputChannel, require_wiring
 from drivers.emulation.daqmx.job import Job
@@ -25,7 +26,7 @@ J = TypeVar("J", bound=Job)
 
 
 class ChannelService(Service):
-    """CreateAIVoltageChan, CreateAOVoltageChan, CreateDOChan"""
+    """CreateAIVoltageChan, CreateAOVoltageChan, CreateDIChan, CreateDOChan"""
 
     def CreateAIVoltageChan(
         self, request: pb.CreateAIVoltageChanRequest, context: object
@@ -49,18 +50,20 @@ class ChannelService(Service):
             job.outputs.extend(added)
         return pb.CreateAOVoltageChanResponse()
 
+    def CreateDIChan(self, request: pb.CreateDIChanRequest, context: object) -> pb.CreateDIChanResponse:
+        task = self._task(request)
+        found = [self._driver.catalogue.input_line(name) for name in unflattened(request.lines)]
+        added = _line_channels([Line(device.name, device.input_line_names[k]) for device, k in found], request)
+        with self._driver.changed:
+            self._job(task, DigitalInput, lambda: DigitalInput(self._driver.lines)).inputs.extend(added)
+        return pb.CreateDIChanResponse()
+
     def CreateDOChan(self, request: pb.CreateDOChanRequest, context: object) -> pb.CreateDOChanResponse:
         task = self._task(request)
         found = [self._driver.catalogue.line(name) for name in unflattened(request.lines)]
-        lines = [OutputLine(device.name, device.line_names[k]) for device, k in found]
-        separate = (request.line_grouping_raw or request.line_grouping) == LineGrouping.CHAN_PER_LINE.value
-        groups = [(line,) for line in lines] if separate else [tuple(lines)]
-        names = unflattened(request.name_to_assign_to_lines) or tuple(
-            group[0].name if len(group) == 1 else request.lines for group in groups
-        )
+        added = _line_channels([Line(device.name, device.line_names[k]) for device, k in found], request)
         with self._driver.changed:
-            job = self._job(task, DigitalOutput, lambda: DigitalOutput(self._driver.lines))
-            job.outputs.extend(LineChannel(name, group) for name, group in zip(names, groups, strict=False))
+            self._job(task, DigitalOutput, lambda: DigitalOutput(self._driver.lines)).outputs.extend(added)
         return pb.CreateDOChanResponse()
 
     def _new_inputs(self, request: pb.CreateAIVoltageChanRequest) -> list[InputChannel]:
@@ -115,3 +118,15 @@ class ChannelService(Service):
                 f" already in the task.\n\nTask Name: {task.name}",
             )
         return task.job
+
+
+def _line_channels(
+    lines: Sequence[Line], request: pb.CreateDIChanRequest | pb.CreateDOChanRequest
+) -> Iterator[LineChannel]:
+    """Channels of these lines, grouped and named as the request says."""
+    separate = (request.line_grouping_raw or request.line_grouping) == LineGrouping.CHAN_PER_LINE.value
+    groups = [(line,) for line in lines] if separate else [tuple(lines)]
+    names = unflattened(request.name_to_assign_to_lines) or tuple(
+        group[0].name if len(group) == 1 else request.lines for group in groups
+    )
+    return (LineChannel(name, group) for name, group in zip(names, groups, strict=False))

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from drivers.emulation.daqmx.analog_input import AnalogInput
 from drivers.emulation.daqmx.catalogue import flattened
+from drivers.emulation.daqmx.digital_input import DigitalInput
 from drivers.emulation.daqmx.digital_output import DigitalOutput
 from drivers.emulation.daqmx.errors import DaqmxFailure, NotEmulated
 from drivers.emulation.daqmx.service.base import AboutTask, Service, attribute_of, unsupported
@@ -73,7 +74,7 @@ class ReadingService(Service):
                     return pb.GetReadAttributeUInt32Response(value=len(job.channels))
                 case pb.READ_ATTRIBUTE_AVAIL_SAMP_PER_CHAN if isinstance(job, AnalogInput):
                     return pb.GetReadAttributeUInt32Response(value=job.available)
-                case pb.READ_ATTRIBUTE_DIGITAL_LINES_BYTES_PER_CHAN if isinstance(job, DigitalOutput):
+                case pb.READ_ATTRIBUTE_DIGITAL_LINES_BYTES_PER_CHAN if isinstance(job, DigitalInput | DigitalOutput):
                     return pb.GetReadAttributeUInt32Response(value=job.lines_per_channel)
                 case other:
                     raise unsupported(other)

@@ -1,0 +1,160 @@
+"""The amplifier's enable chain: what must be closed for the drive to move the table, and the contacts that show it.
+
+In series: enable relay, heartbeat relay, emergency stop, over-travel switches; behind them the amplifier, which may
+have tripped. A second contact of each goes to a digital input of the DAQ device.
+"""
+
+import time
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.emulation.bench import EmulatedBench
+from drivers.emulation.pulse_relay import PulseRelay
+from drivers.errors import RigError
+
+INPUTS = ("emergency_stop", "over_travel", "over_travel_2", "amplifier_ready")
+"""The contacts that are wired to inputs."""
+_TRIP = 0.95
+"""Displacement at which an over-travel switch opens, in parts of the half stroke."""
+_HOLD = 1.0
+"""How long the relay behind an over-travel switch stays open after the table has come back [s]."""
+_SOFT_START = 0.05
+"""Time from enable to ready of the amplifier [s]."""
+_ENDS: tuple[int, ...] = (1, 2)
+
+
+class SafetyChain:
+    """Acts on the enable input of `bench`; the relay of the heartbeat opens `heartbeat` seconds after its last edge.
+
+    Contacts and faults may be asked for and set from any thread.
+    """
+
+    def __init__(self, bench: EmulatedBench, heartbeat: float) -> None:
+        self._bench = bench
+        self._lock = bench.lock
+        self._trip = _TRIP * bench.half_stroke
+        self._pulses = PulseRelay(heartbeat)
+        self._enable_relay = False
+        self._emergency_stop = True
+        self._jammed: set[int] = set()
+        self._open_until = dict.fromkeys(_ENDS, 0.0)
+        self._tripped = False
+        self._broken: set[str] = set()
+        self._closed = False
+        self._closed_since = 0.0
+        self._settling = False
+        bench.watch(self._table_at)
+
+    @property
+    def contacts(self) -> dict[str, bool]:
+        """Every contact by name, and whether it is closed."""
+        with self._lock:
+            return {
+                "enable relay": self._enable_relay,
+                "heartbeat relay": self._pulses.closed,
+                "emergency stop": self._emergency_stop,
+                "over-travel": self._within(1),
+                "over-travel 2": self._within(2),
+                "amplifier ready": self._is_ready(),
+            }
+
+    @property
+    def inputs(self) -> Mapping[str, Callable[[], bool]]:
+        """What the wire of each input shows, by name of the contact: high while it is closed."""
+        return {name: lambda name=name: self._level(name) for name in INPUTS}
+
+    def enable_line(self, high: bool) -> None:
+        """The line of the enable relay has this level."""
+        with self._lock:
+            self._enable_relay = high
+            self._settle()
+
+    def heartbeat_line(self, high: bool) -> None:
+        """The heartbeat line has this level."""
+        with self._lock:
+            if "heartbeat" not in self._broken:
+                self._pulses.level(high)
+            self._settle()
+
+    def press_emergency_stop(self) -> None:
+        """It stays pressed."""
+        self._change(lambda: setattr(self, "_emergency_stop", False))
+
+    def release_emergency_stop(self) -> None:
+        """Turn it back."""
+        self._change(lambda: setattr(self, "_emergency_stop", True))
+
+    def trip_over_travel(self, end: int = 1) -> None:
+        """Hold the switch of one end open: 1, where displacements are positive, or 2."""
+        if end not in _ENDS:
+            raise RigError(f"over-travel at end {end!r} is refused: the table has the ends 1 and 2")
+        self._change(lambda: self._jammed.add(end))
+
+    def reset_over_travel(self) -> None:
+        """Let go of the switches; they follow the table."""
+        self._change(self._jammed.clear)
+
+    def trip_amplifier(self) -> None:
+        """The amplifier finds a fault: its output is off until it is reset."""
+        self._change(lambda: setattr(self, "_tripped", True))
+
+    def reset_amplifier(self) -> None:
+        """The fault is gone."""
+        self._change(lambda: setattr(self, "_tripped", False))
+
+    def break_wire(self, name: str) -> None:
+        """The wire of an input, or of the "heartbeat", is broken: its input reads low."""
+        if name not in (*INPUTS, "heartbeat"):
+            raise RigError(f"wire {name!r} is refused: there are {', '.join(INPUTS)} and heartbeat")
+        self._change(lambda: self._broken.add(name))
+
+    def mend_wire(self, name: str) -> None:
+        """The wire is whole again."""
+        self._change(lambda: self._broken.discard(name))
+
+    def _change(self, change: Callable[[], object]) -> None:
+        with self._lock:
+            change()
+            self._settle()
+
+    def _level(self, name: str) -> bool:
+        with self._lock:
+            contacts = {
+                "emergency_stop": self._emergency_stop,
+                "over_travel": self._within(1),
+                "over_travel_2": self._within(2),
+                "amplifier_ready": self._is_ready(),
+            }
+            return contacts[name] and name not in self._broken
+
+    def _within(self, end: int) -> bool:
+        return end not in self._jammed and time.monotonic() >= self._open_until[end]
+
+    def _is_ready(self) -> bool:
+        return self._closed and time.monotonic() >= self._closed_since + _SOFT_START
+
+    def _table_at(self, x: NDArray[np.float64]) -> None:
+        """The table was at displacements `x` [m] since it was last told; called with the bench's lock held."""
+        for end, reach in zip(_ENDS, (x.max(), -x.min()), strict=True):
+            if reach > self._trip:
+                self._open_until[end] = time.monotonic() + _HOLD
+        self._settle()
+
+    def _settle(self) -> None:
+        """Enable the amplifier while everything is closed, and only then."""
+        if self._settling:
+            # enabling moves the bench on, which calls again
+            return
+        self._settling = True
+        try:
+            while (closed := self._is_closed()) is not self._closed:
+                self._closed, self._closed_since = closed, time.monotonic()
+                self._bench.enable(closed)
+        finally:
+            self._settling = False
+
+    def _is_closed(self) -> bool:
+        within = all(self._within(end) for end in _ENDS)
+        return self._enable_relay and self._pulses.closed and self._emergency_stop and within and not self._tripped
