@@ -97,6 +97,56 @@ class Estimate(Event):
 
 
 @dataclass(frozen=True)
+class RunningGain(Event):
+    """The gain under a record so far, `seconds` into it: the ratio of the peaks until now, measured and predicted.
+
+    Peaks are largest magnitudes of the drift [m] since the record began; of the bare frame until the same second.
+    NaN while it is not known; `beta` is None for the bare frame.
+    """
+
+    record: str
+    beta: float | None
+    seconds: float
+    drift_peak: float
+    alpha_2: float
+    predicted: float
+
+
+@dataclass(frozen=True)
+class PassFinished(Event):
+    """A drive was played to make the table follow `motion`: how well it did, pass `number` of a replication.
+
+    `error`, `repeatable`, `peak_error` and `spectrum_error` are relative [1], see `bench.control.passes.Pass`; `text`
+    says all of it.
+    """
+
+    motion: str
+    number: int
+    error: float
+    repeatable: float
+    peak_error: float
+    spectrum_error: float
+    accepted: bool
+    text: str
+
+
+@dataclass(frozen=True, eq=False)
+class TableIdentified(Event):
+    """The response of the table to its drive is known: values at the lines, each of shape (n_lines,), in the units of
+    `bench.control.table_model.TableModel`; `text` says when, with what on the table, and at what level.
+    """
+
+    text: str
+    frequency: NDArray[np.float64]
+    real: NDArray[np.float64]
+    imaginary: NDArray[np.float64]
+    uncertainty: NDArray[np.float64]
+    distortion: NDArray[np.float64]
+    coherence: NDArray[np.float64]
+    noise: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
 class PointFinished(Event):
     """A point of the campaign has its result: an instance of the protocol's `point_type`."""
 

@@ -2,10 +2,10 @@
 
 import json
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from bench.analysis.signals import SignalMap
 from bench.config.model import BenchConfiguration
@@ -17,7 +17,7 @@ from bench.engine.stream import Stream
 from bench.events import Event, PointFinished, Subscriber, Warned
 from bench.guard.guard import Guard
 from bench.preflight.compiled import compile_run
-from bench.provenance import software
+from bench.provenance import revision, software
 from bench.record.recorder import PATIENCE, Recorder
 from bench.record.tables import Table
 from bench.report.summary import Summary, write_summary
@@ -71,6 +71,38 @@ class Experiment(Protocol):
         ...
 
 
+@runtime_checkable
+class Keeping(Protocol):
+    """An experiment that leaves a file of its own beside the others, for other runs to load."""
+
+    @property
+    def kept_name(self) -> str:
+        """Name of the file."""
+        ...
+
+    def keep(self, path: Path) -> None:
+        """Write it, if the run came to something worth keeping."""
+        ...
+
+
+@runtime_checkable
+class Illustrated(Protocol):
+    """An experiment with more to show than one figure, and more to say than its points."""
+
+    @property
+    def further_figures(self) -> tuple[str, ...]:
+        """File names of its other figures."""
+        ...
+
+    def draw_further(self, folder: Path) -> None:
+        """Draw them into `folder`."""
+        ...
+
+    def findings(self, points: Sequence[Parameters]) -> Mapping[str, object]:
+        """What the points come to, ready for JSON."""
+        ...
+
+
 @dataclass(frozen=True)
 class SessionResult:
     """How a campaign ended. `summary` is ready for JSON, `table` for the terminal."""
@@ -102,9 +134,11 @@ def run_session(
     subscribers: Sequence[Subscriber],
     requests: Requests,
     realtime: bool,
+    about: Mapping[str, str] | None = None,
 ) -> SessionResult:
     """Run `protocol` on the configured bench and leave data file, figure and summary in the folder `out`.
 
+    `about` is kept in the data file beside what is known of the run: the operator's name, notes.
     Raises InvalidInput, or KeyboardInterrupt when an end was asked for, before anything moves. Once the rig is armed
     every ending is a result, with its status.
     """
@@ -123,7 +157,8 @@ def run_session(
             channels=rig.channels,
             sample_rate=rig.sample_rate,
             point_type=protocol.point_type,
-            metadata=_metadata(protocol, configuration, rig.description) | {"plan_hash": preflight.plan_hash},
+            metadata=_metadata(protocol, configuration, rig.description)
+            | {"plan_hash": preflight.plan_hash, **(about or {})},
             tables={"prediction": prediction, **preflight.tables},
             # in virtual time nothing moves on while the disk is waited for
             hold_up=PATIENCE if isinstance(rig.clock, VirtualClock) else 0.0,
@@ -149,6 +184,7 @@ def run_session(
             recorder.close(status, reason)
     finally:
         rig.close()
+    more = protocol if isinstance(protocol, Illustrated) else None
     summary = Summary(
         protocol=protocol.name,
         status=ending.status,
@@ -161,9 +197,15 @@ def run_session(
         elapsed=time.monotonic() - started,
         bench_time=stream.now(),
         plan_hash=preflight.plan_hash,
+        further_figures=[out / name for name in more.further_figures] if more else (),
+        findings=more.findings(points.all) if more else {},
     )
     write_summary(out / SUMMARY, summary)
+    if isinstance(protocol, Keeping):
+        protocol.keep(out / protocol.kept_name)
     protocol.figure(points.all, prediction, out / protocol.figure_name)
+    if more:
+        more.draw_further(out)
     return SessionResult(
         status=ending.status,
         reason=ending.reason,
@@ -182,4 +224,5 @@ def _metadata(protocol: Experiment, configuration: BenchConfiguration, devices: 
         **({} if configuration.seed is None else {"seed": str(configuration.seed)}),
         "devices": json.dumps(devices),
         **software(),
+        "git": revision(),
     }

@@ -5,7 +5,9 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TextIO
 
+from protocols.earthquake.parameters import EarthquakeParameters
 from protocols.harmonic.parameters import HarmonicParameters
+from protocols.identify.parameters import IdentifyParameters
 from sim.parameters import Parameters
 
 if TYPE_CHECKING:
@@ -30,7 +32,8 @@ def _always(summary: Mapping[str, Any]) -> bool:  # noqa: ARG001 - whatever was 
 class Entry:
     """A protocol on the command line: its flags come from `parameters`, and `campaign` makes it from an instance.
 
-    `passed` turns the summary of a run that was carried out into its exit code: 0, or 1 when it is False.
+    `passed` turns the summary of a run that was carried out into its exit code: 0, or 1 when it is False. `positional`
+    names the parameter that is given by place.
     """
 
     name: str
@@ -40,12 +43,25 @@ class Entry:
     campaign: Callable[[Any], "Experiment"]
     progress: Progress = _live
     passed: Callable[[Mapping[str, Any]], bool] = _always
+    positional: str | None = None
 
 
 def _harmonic(parameters: HarmonicParameters) -> "Experiment":
     from protocols.harmonic.campaign import HarmonicCampaign
 
     return HarmonicCampaign(parameters)
+
+
+def _identify(parameters: IdentifyParameters) -> "Experiment":
+    from protocols.identify.experiment import Identification
+
+    return Identification(parameters)
+
+
+def _earthquake(parameters: EarthquakeParameters) -> "Experiment":
+    from protocols.earthquake.campaign import EarthquakeCampaign
+
+    return EarthquakeCampaign(parameters)
 
 
 CATALOGUE = (
@@ -59,5 +75,30 @@ CATALOGUE = (
         ),
         parameters=HarmonicParameters,
         campaign=_harmonic,
+    ),
+    Entry(
+        name="identify",
+        summary="Identify the table: what acceleration a volt of drive makes at each frequency.",
+        details=(
+            "Plays multisines with random phases at low level with the specimen on the table, after probes that need "
+            "nothing to be known of it, and tells response, noise and nonlinear distortion apart. The result, "
+            "table_model.json, is what `table_model` in the configuration of other runs names. Without options: the "
+            "bare frame, over the band that replicating records takes."
+        ),
+        parameters=IdentifyParameters,
+        campaign=_identify,
+    ),
+    Entry(
+        name="earthquake",
+        summary="Earthquake records on the bare and the coupled frame: gain coefficient alpha_2 against prediction.",
+        details=(
+            "Each record is limited to a band, scaled, and fitted to the stroke; the table learns it with the bare "
+            "frame, and it is played with every spring. The measured gain of the peak drift is compared with the one "
+            "predicted for the motion that the table really made. A block that topples is a result. Records are files, "
+            "or synthetic:NAME."
+        ),
+        parameters=EarthquakeParameters,
+        campaign=_earthquake,
+        positional="records",
     ),
 )

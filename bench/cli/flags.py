@@ -18,12 +18,15 @@ def flag(name: str) -> str:
     return "--" + name.replace("_", "-")
 
 
-def arguments_of(model: type[Parameters], group: Group) -> list[Argument]:
+def arguments_of(model: type[Parameters], group: Group, positional: str | None = None) -> list[Argument]:
     """One keyword-only argument for each field of `model`; None, the default, stands for "not given".
 
-    Values arrive as text: the model, not the command-line parser, decides what they may be, and says so.
+    The field `positional`, which holds several texts, is given by place and not by flag. Values arrive as text: the
+    model, not the command-line parser, decides what they may be, and says so.
     """
-    return [_argument(entry, group) for entry in declared(model)]
+    fields = list(declared(model))
+    placed = [_by_place(entry, group) for entry in fields if entry.name == positional]
+    return [*placed, *(_argument(entry, group) for entry in fields if entry.name != positional)]
 
 
 def given(model: type[Parameters], arguments: Mapping[str, Any]) -> dict[str, Any]:
@@ -55,6 +58,12 @@ def _several(values: list[object]) -> str:
         if all(isclose(value, place) for value, place in zip(numbers, even, strict=True)):
             return f"{first:g}:{last:g}:{len(numbers)}"
     return " ".join(in_words(value) for value in values)
+
+
+def _by_place(entry: Declared, group: Group) -> Argument:
+    text = f"{entry.description[:1].upper()}{entry.description[1:]}"
+    parameter = Parameter(name="FILE", metavar="FILE", help=text, show_default=False, group=group)
+    return Argument(entry.name, Argument.VAR_POSITIONAL, annotation=Annotated[str, parameter])
 
 
 def _argument(entry: Declared, group: Group) -> Argument:

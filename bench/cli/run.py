@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from contextlib import redirect_stdout
 from dataclasses import fields
 from datetime import datetime
+from functools import partial
 from inspect import Signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -65,14 +66,17 @@ def run_app(start: Start | None = None) -> App:
 def command_of(entry: Entry, start: Start | None) -> Callable[..., int]:
     """The function behind a protocol's command; its signature is the protocol's flags and the common options."""
 
-    def execute(**arguments: Any) -> int:
+    def execute(*values: str, **arguments: Any) -> int:
+        if values and entry.positional is not None:
+            arguments[entry.positional] = values
         common = {field.name for field in fields(Options)} & arguments.keys()
         options = Options(**{name: arguments.pop(name) for name in common})
         return _perform(entry, arguments, options, start)
 
     group = Group(f"Parameters of the {entry.name} protocol", sort_key=1)
     execute.__doc__ = f"{entry.summary}\n\n{entry.details}\n\n{_EXIT_CODES}"
-    execute.__dict__["__signature__"] = Signature([*arguments_of(entry.parameters, group), *arguments_of_options()])
+    asked = arguments_of(entry.parameters, group, entry.positional)
+    execute.__dict__["__signature__"] = Signature([*asked, *arguments_of_options()])
     return execute
 
 
@@ -86,7 +90,9 @@ def _perform(entry: Entry, arguments: dict[str, Any], options: Options, start: S
     experiment = entry.campaign(parameters_from(entry.parameters, arguments, options.protocol_file))
     configuration = configuration_from(options.config, options.seed)
     out = options.out or default_folder(entry.name, datetime.now())
-    check_folder(out, (FILE, experiment.figure_name, SUMMARY))
+    kept = getattr(experiment, "kept_name", None)
+    further = getattr(experiment, "further_figures", ())
+    check_folder(out, (FILE, experiment.figure_name, *further, SUMMARY, *([kept] if kept else [])))
     if options.dry_run:
         from bench.cli.dry_run import dry_run
 
@@ -98,7 +104,7 @@ def _perform(entry: Entry, arguments: dict[str, Any], options: Options, start: S
     if start is None:
         from bench.session import run_session
 
-        start = run_session
+        start = partial(run_session, about=options.about)
     requests = Requests()
     with (
         interruptible(requests, asking=lambda: person is not None and person.asking) as interrupts,

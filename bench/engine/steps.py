@@ -3,8 +3,11 @@
 A step says what the bench does, not how; the same plan can be run, summarised or timed without a device.
 """
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
 
 from bench.analysis.cycles import Cycle
 from bench.control.calibration import DriveCalibration
@@ -74,6 +77,22 @@ class Trim:
     shares: tuple[complex, ...]
 
 
+Watch = Callable[[NDArray[np.float64]], Event | None]
+"""Is shown the signals of each block while a drive is played, shape (n, 6); what it returns is published."""
+
+
+@dataclass(frozen=True, eq=False)
+class Play:
+    """Play prepared `volts`, shape (n,), one per sample, from a drive at zero to a drive at zero, on an armed rig.
+
+    `watch` is shown every block of signals while it is played, counted from the first sample of `volts`. Comes to
+    `Played`, or to `Fallen` as soon as the block has fallen: the drive runs on until the plan ramps it out.
+    """
+
+    volts: NDArray[np.float64]
+    watch: Watch | None = None
+
+
 @dataclass(frozen=True)
 class RampOut:
     """End the test: smooth ramp to zero, or the fast one; the rig is stopped afterwards.
@@ -91,7 +110,7 @@ class Say:
     event: Event
 
 
-Step = Handle | Arm | Listen | Calibrate | Follow | Dwell | Trim | RampOut | Say
+Step = Handle | Arm | Listen | Calibrate | Follow | Dwell | Trim | Play | RampOut | Say
 
 
 @dataclass(frozen=True)
@@ -99,9 +118,26 @@ class Done:
     """The step was carried out."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Fallen:
-    """The block has fallen; the drive still runs until the plan ramps it out."""
+    """The block has fallen; the drive still runs until the plan ramps it out.
+
+    Of a `Play`: `signals`, shape (n, 6), are those until then, as `Played` has them.
+    """
+
+    signals: NDArray[np.float64] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Played:
+    """What a played drive did: `signals`, shape (n, 6), as `bench.analysis.signals` numbers them, and the drive [V]
+    that really went out, shape (n,). Row i was taken while sample i of the volts was played; n is their number.
+
+    Values that a sensor did not give are NaN.
+    """
+
+    signals: NDArray[np.float64]
+    drive: NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -123,5 +159,5 @@ class Heard:
     violation: Violation | None
 
 
-Outcome = Done | Fallen | Measured | Heard
+Outcome = Done | Fallen | Measured | Played | Heard
 Plan = Generator[Step, Outcome, None]

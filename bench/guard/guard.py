@@ -92,7 +92,7 @@ class Guard:
         A command beyond the limits is not sent, nor any after it: the last good value is held and brought to zero
         along the fast ramp.
         """
-        refused = self._refusal(volts) if self._held is None else None
+        refused = self.refusal(volts) if self._held is None else None
         if refused is not None:
             self._held = self._command
             self.abort()
@@ -121,6 +121,20 @@ class Guard:
             self._cut_because(f"{', '.join(opened)} opened")
         runaway = next((violation for violation in exceeded if violation.of_table), None)
         return Exchange(block, values, played, refused or seen, tuple(near), opened, runaway)
+
+    def refusal(self, volts: NDArray[np.float64]) -> Violation | None:
+        """Why commands [V] of shape (n,), sent now, would not be sent to their end; None when they would."""
+        if not np.isfinite(volts).all():
+            return Violation("drive command", float("nan"), self._limits.drive_voltage, "V", 0)
+        peak = float(np.max(np.abs(volts)))
+        if peak > self._limits.drive_voltage:
+            return Violation("drive command", peak, self._limits.drive_voltage, "V", int(np.argmax(np.abs(volts))))
+        change = np.abs(np.diff(volts, prepend=self._command))
+        if float(change.max()) > self._slew:
+            rate = self._rig.sample_rate
+            at = int(np.argmax(change))
+            return Violation("drive slew", float(change[at]) * rate, self._limits.drive_slew, "V/s", at)
+        return None
 
     def tare(self, values: NDArray[np.float64]) -> None:
         """Take a rest, values of shape (n, n_channels), as the zero of the specimen's drift."""
@@ -197,19 +211,6 @@ class Guard:
             last += min(max(target - last, -self._slew), self._slew)
             slowed[i] = last
         return slowed
-
-    def _refusal(self, volts: NDArray[np.float64]) -> Violation | None:
-        if not np.isfinite(volts).all():
-            return Violation("drive command", float("nan"), self._limits.drive_voltage, "V", 0)
-        peak = float(np.max(np.abs(volts)))
-        if peak > self._limits.drive_voltage:
-            return Violation("drive command", peak, self._limits.drive_voltage, "V", int(np.argmax(np.abs(volts))))
-        change = np.abs(np.diff(volts, prepend=self._command))
-        if float(change.max()) > self._slew:
-            rate = self._rig.sample_rate
-            at = int(np.argmax(change))
-            return Violation("drive slew", float(change[at]) * rate, self._limits.drive_slew, "V/s", at)
-        return None
 
     def _values(self, block: Block) -> NDArray[np.float64]:
         values = np.empty(block.counts.shape, order="F")

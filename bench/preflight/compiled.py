@@ -57,7 +57,7 @@ class Preflight:
         kept: dict[str, Table] = {}
         if self.margins:
             kept["preflight"] = margins_table(self.margins)
-        if self.forecast.stages:
+        if any(stage.legs for stage in self.forecast.stages):
             kept["planned_drive"] = drive_table(self.forecast.stages)
         return kept
 

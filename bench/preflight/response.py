@@ -18,8 +18,12 @@ Array = NDArray[np.float64]
 class TableResponse(Protocol):
     """Acceleration of the table per volt of drive."""
 
+    def transfer(self, omega: Array, payload: float) -> NDArray[np.complex128]:
+        """Complex response [m/s2/V] at `omega` [rad/s], same shape, with `payload` [kg] on the table."""
+        ...
+
     def gain(self, omega: Array, payload: float) -> Array:
-        """Magnitude [m/s2/V] at `omega` [rad/s], same shape, with `payload` [kg] on the table."""
+        """Its magnitude."""
         ...
 
     @property
@@ -34,8 +38,11 @@ class SimulatedTable:
 
     shaker: Shaker
 
+    def transfer(self, omega: Array, payload: float) -> NDArray[np.complex128]:
+        return self.shaker.frequency_response(omega, payload)
+
     def gain(self, omega: Array, payload: float) -> Array:
-        return np.abs(self.shaker.frequency_response(omega, payload))
+        return np.abs(self.transfer(omega, payload))
 
     @property
     def friction(self) -> float:
@@ -48,8 +55,11 @@ class IdentifiedTable:
 
     model: TableModel
 
-    def gain(self, omega: Array, payload: float) -> Array:  # noqa: ARG002
-        return np.abs(self.model.response(omega / tau))
+    def transfer(self, omega: Array, payload: float) -> NDArray[np.complex128]:  # noqa: ARG002
+        return self.model.response(omega / tau)
+
+    def gain(self, omega: Array, payload: float) -> Array:
+        return np.abs(self.transfer(omega, payload))
 
     @property
     def friction(self) -> float:
@@ -59,10 +69,13 @@ class IdentifiedTable:
 def response_of(configuration: BenchConfiguration) -> TableResponse | None:
     """What is known of this bench's table; None for a real one that has no stored model.
 
-    Raises InvalidInput when the stored model cannot be read.
+    Raises InvalidInput when the stored model cannot be read or was identified at another sample rate. Its age does not
+    matter here: an old one still tells about how much drive a motion takes.
     """
     if configuration.table_model is not None:
-        return IdentifiedTable(TableModel.read(Path(configuration.table_model)))
+        model = TableModel.read(Path(configuration.table_model))
+        model.require_rate(configuration.sample_rate)
+        return IdentifiedTable(model)
     if configuration.backend == "simulated":
         return SimulatedTable(configuration.simulation.bench.shaker)
     return None

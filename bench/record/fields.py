@@ -86,6 +86,13 @@ def decode(stored: hdf5.Dataset) -> list[Any]:
     return [None if optional and value != value else convert(value) for value in values.tolist()]
 
 
+def field_of(name: str, stored: hdf5.Dataset) -> Field:
+    """The field that a dataset was made for."""
+    attrs = stored.attrs
+    unit, told = str(attrs.get("units", "")), str(attrs["description"])
+    return Field(name, Kind(attrs["kind"]), unit, told, bool(attrs["optional"]))
+
+
 def fields_of(row_type: type[Parameters]) -> tuple[Field, ...]:
     """The fields of a declared group of parameters. Raises InvalidInput for what is no number, switch or text."""
     fields: list[Field] = []

@@ -9,16 +9,19 @@ from bench.events import (
     LimitExceeded,
     OperatorAnswered,
     OperatorAsked,
+    PassFinished,
     Progress,
+    RunningGain,
     SensorsAligned,
     StateChanged,
     StepStarted,
+    TableIdentified,
     Warned,
 )
 from drivers.rig import Alignment
 
-NOT_JOURNALLED = (Acquired, Estimate, Progress)
-"""Too many to read; samples and estimates have their own place in the file."""
+NOT_JOURNALLED = (Acquired, Estimate, Progress, RunningGain)
+"""Too many to read; samples, estimates and running gains have their own place in the file."""
 
 
 def text_of(event: Event) -> str:
@@ -26,8 +29,10 @@ def text_of(event: Event) -> str:
     match event:
         case StateChanged():
             return f"{event.before} -> {event.after}: {event.reason}"
-        case StepStarted() | Warned():
+        case StepStarted() | Warned() | TableIdentified():
             return event.text
+        case PassFinished():
+            return f"{event.motion}: {event.text}"
         case LimitExceeded():
             return f"{event.quantity} reached {event.value:.6g} {event.unit}; limit {event.limit:.6g} {event.unit}"
         case OperatorAsked():

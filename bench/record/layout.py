@@ -12,23 +12,30 @@ from importlib.metadata import PackageNotFoundError, version
 import numpy as np
 
 from bench.record import hdf5, tables
-from bench.record.fields import Field, Kind, fields_of
+from bench.record.checksums import Checksums
+from bench.record.declared import (
+    ALIGNMENTS,
+    BLOCKS,
+    COUNTED,
+    EVENTS,
+    FIXED_ENTRIES,
+    FIXED_GROUPS,
+    FIXED_INSTRUMENTS,
+    OWN_TABLES,
+)
+from bench.record.fields import fields_of
+from bench.record.growing import Growing
+from bench.record.plot import companions, create_plot
 from bench.record.rows import Rows
-from bench.record.samples import Samples
+from bench.record.samples import Samples, chunk_of
 from bench.record.tables import Table
 from drivers.rig import Channel
 from sim.errors import InvalidInput
 from sim.parameters import Parameters
 
 FORMAT = "rocking-bench record"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 STATUS_WIDTH, TIME_WIDTH, SUMMARY_WIDTH = 16, 40, 4096
-FIXED_GROUPS = ("data", "estimates", "events", "instrument", "metadata", "points")
-FIXED_ENTRIES = ("complete", "end_time", "program_name", "start_time", "status", "summary", "title")
-COUNTED = ("samples", "blocks", "events", "estimates", "points", "alignments")
-"""What is counted in the dataset `complete`: rows beyond were still on their way when the disk or the writer failed."""
-
-FIXED_INSTRUMENTS = ("alignments", "blocks", "drive", "sample_rate")
 
 
 class Status(StrEnum):
@@ -40,39 +47,6 @@ class Status(StrEnum):
     ABORTED = "aborted"
     HALTED = "halted"
     FAILED = "failed"
-
-
-BLOCKS = (
-    Field("row", Kind.WHOLE, "1", "row of the samples at which the block begins"),
-    Field("run", Kind.WHOLE, "1", "how many times the rig had been armed"),
-    Field("first", Kind.WHOLE, "1", "index of the block's first sample, counted from 0 in each run"),
-    Field("time", Kind.REAL, "s", "bench time at which the block had been read"),
-)
-ALIGNMENTS = (
-    Field("run", Kind.WHOLE, "1", "how many times the rig had been armed"),
-    Field("sensor", Kind.TEXT, "", "name of the channel"),
-    Field("offset", Kind.REAL, "s", "time of the run at which second 0 of the sensor's clock stands, without delay"),
-    Field("rate", Kind.REAL, "1", "seconds of the sample clock per second of the sensor's clock"),
-    Field("residual", Kind.REAL, "s", "root mean square of what the fit leaves of the readings of the clocks"),
-    Field("delay", Kind.REAL, "s", "fixed delay by which the values were placed later, as configured"),
-    Field("values", Kind.WHOLE, "1", "values that the sensor gave"),
-    Field("lost", Kind.WHOLE, "1", "values that it should have given and that did not arrive"),
-)
-EVENTS = (
-    Field("time", Kind.REAL, "s", "bench time"),
-    Field("kind", Kind.TEXT, "", "what happened: the name of the event"),
-    Field("text", Kind.TEXT, "", "one line for the reader"),
-)
-ESTIMATES = (
-    Field("time", Kind.REAL, "s", "bench time"),
-    Field("omega", Kind.REAL, "rad/s", "circular frequency of the base motion"),
-    Field("beta", Kind.REAL, "1", "stiffness ratio of the coupling spring; absent for the bare frame", optional=True),
-    Field("cycles", Kind.WHOLE, "1", "cycles over which the estimate was made"),
-    Field("drift_peak", Kind.REAL, "m", "peak drift"),
-    Field("alpha_2", Kind.REAL, "1", "running gain of the peak drift, coupled over bare"),
-    Field("uncertainty", Kind.REAL, "1", "expanded uncertainty of alpha_2 (k = 2)"),
-    Field("predicted", Kind.REAL, "1", "predicted alpha_2"),
-)
 
 
 @dataclass(frozen=True)
@@ -92,7 +66,8 @@ class Skeleton:
             raise InvalidInput("channels", 0, "a record needs at least one")
         if not self.sample_rate > 0.0:
             raise InvalidInput("sample_rate", self.sample_rate, "it must be positive samples per second")
-        _check_names("channel", [channel.name for channel in self.channels], FIXED_INSTRUMENTS)
+        names = [channel.name for channel in self.channels]
+        _check_names("channel", names, (*FIXED_INSTRUMENTS, *(each for name in names for each in companions(name))))
         _check_names("metadata entry", list(self.metadata), ())
         _check_names("table", list(self.tables), (*FIXED_GROUPS, *FIXED_ENTRIES))
         for name, table in self.tables.items():
@@ -106,15 +81,13 @@ class Parts:
     """The parts of a new file that grow or change."""
 
     samples: Samples
-    blocks: Rows
-    events: Rows
-    estimates: Rows
-    points: Rows
-    alignments: Rows
+    rows: Mapping[str, Rows]
+    grown: Sequence[Growing]
     complete: hdf5.Dataset
     status: hdf5.Dataset
     summary: hdf5.Dataset
     end_time: hdf5.Dataset
+    checksums: Checksums
 
 
 def build(file: hdf5.File, skeleton: Skeleton) -> Parts:
@@ -130,6 +103,10 @@ def build(file: hdf5.File, skeleton: Skeleton) -> Parts:
     metadata = hdf5.create_group(entry, "metadata", "NXcollection")
     for name, text in skeleton.metadata.items():
         hdf5.write_text(metadata, name, text)
+    if operator := skeleton.metadata.get("operator"):
+        hdf5.write_text(hdf5.create_group(entry, "user", "NXuser"), "name", operator)
+    if notes := skeleton.metadata.get("notes"):
+        hdf5.write_text(hdf5.create_group(entry, "notes", "NXnote"), "data", notes)
     for name, table in skeleton.tables.items():
         tables.write(entry, name, table)
 
@@ -137,21 +114,30 @@ def build(file: hdf5.File, skeleton: Skeleton) -> Parts:
     hdf5.write_numbers(
         instrument, "sample_rate", skeleton.sample_rate, unit="Hz", description="samples per second of every channel"
     )
-    samples = Samples(instrument, skeleton.channels, skeleton.sample_rate)
-    _create_default_plot(entry, [channel.name for channel in skeleton.channels])
-    return Parts(
-        samples=samples,
-        blocks=Rows(instrument, "blocks", BLOCKS),
-        events=Rows(entry, "events", EVENTS),
-        estimates=Rows(entry, "estimates", ESTIMATES),
-        points=Rows(entry, "points", fields_of(skeleton.point_type)),
-        alignments=Rows(instrument, "alignments", ALIGNMENTS),
-        complete=hdf5.write_numbers(
+    time = create_plot(entry, skeleton.channels, chunk_of(skeleton.sample_rate))
+    samples = Samples(instrument, skeleton.channels, skeleton.sample_rate, time)
+    rows = {
+        "blocks": Rows(instrument, "blocks", BLOCKS),
+        "events": Rows(entry, "events", EVENTS),
+        **{name: Rows(entry, name, fields) for name, fields in OWN_TABLES.values()},
+        "points": Rows(entry, "points", fields_of(skeleton.point_type)),
+        "alignments": Rows(instrument, "alignments", ALIGNMENTS),
+    }
+    replaced = create_ends(entry)
+    grown = [*samples.grown, *(each for table in rows.values() for each in table.grown)]
+    checksums = Checksums(entry, [*(each.path for each in grown), *(each.name for each in replaced)])
+    return Parts(samples, rows, grown, *replaced, checksums)
+
+
+def create_ends(entry: hdf5.Group) -> tuple[hdf5.Dataset, hdf5.Dataset, hdf5.Dataset, hdf5.Dataset]:
+    """`complete`, `status`, `summary` and `end_time`, as they are when nothing has been recorded."""
+    return (
+        hdf5.write_numbers(
             entry, "complete", np.zeros(len(COUNTED), dtype=np.int64), unit="1", description=f"rows of {COUNTED}"
         ),
-        status=hdf5.write_text(entry, "status", Status.RUNNING, width=STATUS_WIDTH),
-        summary=hdf5.write_text(entry, "summary", "", width=SUMMARY_WIDTH, description="how the campaign ended"),
-        end_time=hdf5.write_text(
+        hdf5.write_text(entry, "status", Status.RUNNING, width=STATUS_WIDTH),
+        hdf5.write_text(entry, "summary", "", width=SUMMARY_WIDTH, description="how the campaign ended"),
+        hdf5.write_text(
             entry, "end_time", "", width=TIME_WIDTH, description="wall clock at its end, ISO 8601; empty while running"
         ),
     )
@@ -168,17 +154,6 @@ def software_version() -> str:
         return version("rocking-bench")
     except PackageNotFoundError:
         return "unknown"
-
-
-def _create_default_plot(entry: hdf5.Group, names: Sequence[str]) -> None:
-    """All channels against the row number: links only, because a time axis would weigh more than all the counts."""
-    data = hdf5.create_group(entry, "data", "NXdata")
-    data.attrs["signal"], data.attrs["axes"] = names[0], ["."]
-    if len(names) > 1:
-        data.attrs["auxiliary_signals"] = list(names[1:])
-    data.attrs["title"] = "counts of all channels against the row number"
-    for name in names:
-        hdf5.link(data, name, f"/entry/instrument/{name}/counts")
 
 
 def _check_names(item: str, names: Sequence[str], taken: Sequence[str]) -> None:

@@ -1,24 +1,22 @@
 """Reads the file of a campaign: finished, still being written, or left by a killed writer."""
 
-import json
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-import numpy as np
-from numpy.typing import NDArray
-
-from bench.record import hdf5, tables
+from bench.record import checksums, hdf5, tables
+from bench.record.declared import FIXED_GROUPS, OWN_TABLES
 from bench.record.errors import RecordError, reason
 from bench.record.fields import decode
-from bench.record.layout import COUNTED, FIXED_GROUPS, FORMAT, FORMAT_VERSION
+from bench.record.layout import FORMAT, FORMAT_VERSION
+from bench.record.plot import GROUP as PLOT
+from bench.record.plot import TIME
+from bench.record.stored import StoredSamples
 from bench.record.tables import Column
-from drivers.rig import Alignment, Channel, Counts
+from drivers.rig import Alignment
 from sim.errors import InvalidInput
-
-ALL = slice(None)
 
 
 @dataclass(frozen=True)
@@ -30,38 +28,46 @@ class RecordedEvent:
     text: str
 
 
-def open_record(path: Path) -> "Record":
+def open_record(path: Path, *, judging: bool = False) -> "Record":
     """Open the file of a campaign; use it in a `with` statement.
 
+    A file that is being written can be followed, but not when `judging`: then it is read as it lies on the disk, and
+    what is damaged raises an error at once.
     Raises InvalidInput when there is no such file or it is not one of ours, RecordError when it cannot be read.
     """
     if not path.is_file():
         raise InvalidInput("record", str(path), "there is no such file")
     try:
-        file = hdf5.open_to_read(path)
-    except OSError as error:
+        file = hdf5.open_to_judge(path) if judging else hdf5.open_to_read(path)
+    except (OSError, RuntimeError, ValueError) as error:
         if not hdf5.is_hdf5(path):
             raise InvalidInput("record", str(path), "it is not an HDF5 file") from error
         raise RecordError(
-            f"{path} cannot be read ({reason(error)}): another program holds it, or it is damaged"
+            f"{path} cannot be read ({reason(error)}): another program holds it, or it is damaged;"
+            " `rockbench file recover` keeps what it can"
         ) from error
-    if file.attrs.get("format") != FORMAT:
+    try:
+        _check_format(path, file)
+        return Record(file)
+    except BaseException:
         file.close()
+        raise
+
+
+def _check_format(path: Path, file: hdf5.File) -> None:
+    if file.attrs.get("format") != FORMAT or "format_version" not in file.attrs:
         raise InvalidInput("record", str(path), "it is an HDF5 file but no record of rocking-bench")
-    if int(file.attrs["format_version"]) > FORMAT_VERSION:
-        version = int(file.attrs["format_version"])
-        file.close()
+    version = int(file.attrs["format_version"])
+    if version > FORMAT_VERSION:
         raise InvalidInput("record", str(path), f"its format {version} is newer than this software reads: update it")
-    return Record(file)
 
 
-class Record:
-    """What a file holds. Samples are read when asked for; `refresh` looks again at a file that is being written."""
+class Record(StoredSamples):
+    """What a file holds. All is read when asked for; `refresh` looks again at a file that is being written."""
 
     def __init__(self, file: hdf5.File) -> None:
+        super().__init__(hdf5.group(file, "entry"))
         self._file = file
-        self._entry = hdf5.group(file, "entry")
-        self._instrument = hdf5.group(file, "entry/instrument")
 
     def __enter__(self) -> Self:
         return self
@@ -79,6 +85,26 @@ class Record:
         """See what a writer has added since the file was opened."""
         for path in self._growing:
             hdf5.dataset(self._entry, path).refresh()
+
+    @property
+    def format_version(self) -> int:
+        """Version of the layout that the file was written in."""
+        return int(self._file.attrs["format_version"])
+
+    @property
+    def file(self) -> hdf5.File:
+        """The open file itself."""
+        return self._file
+
+    @property
+    def recoveries(self) -> list[str]:
+        """How the file was rebuilt from others, one line each; mostly none."""
+        return hdf5.read_text(self._entry, "recovery/description").splitlines() if "recovery" in self._entry else []
+
+    @property
+    def checksums(self) -> dict[str, tuple[str, str]]:
+        """SHA-256 of values and attributes by dataset; those of values are empty where the file was not closed."""
+        return checksums.read(self._entry) if checksums.GROUP in self._entry else {}
 
     @property
     def status(self) -> str:
@@ -117,53 +143,6 @@ class Record:
         group = hdf5.group(self._entry, "metadata")
         return {name: hdf5.read_text(group, name) for name in group}
 
-    @cached_property
-    def sample_rate(self) -> float:
-        """Samples per second and channel [1/s]."""
-        return float(hdf5.dataset(self._instrument, "sample_rate")[()])
-
-    @cached_property
-    def channels(self) -> tuple[Channel, ...]:
-        """The inputs, in the order of the rig."""
-        return tuple(self._channel(name) for name in self._instrument if f"{name}/counts" in self._instrument)
-
-    @property
-    def rows(self) -> int:
-        """How many samples every channel and the drive have."""
-        stored = [self._counts(channel.name) for channel in self.channels]
-        stored.append(hdf5.dataset(self._instrument, "drive/voltage"))
-        return min(self._complete("samples"), *(data.shape[0] for data in stored))
-
-    def counts(self, name: str, rows: slice = ALL) -> Counts:
-        """Counts of a channel as converted. Raises InvalidInput for an unknown channel."""
-        return self._cut(self._counts(self._channel_named(name).name), rows)
-
-    def values(self, name: str, rows: slice = ALL) -> NDArray[np.float64]:
-        """Values of a channel in its unit; NaN where the counts are not a measurement."""
-        return self._channel_named(name).to_unit(self.counts(name, rows))
-
-    def drive(self, rows: slice = ALL) -> NDArray[np.float32]:
-        """The drive as sent [V]."""
-        return self._cut(hdf5.dataset(self._instrument, "drive/voltage"), rows)
-
-    @property
-    def blocks(self) -> dict[str, NDArray[Any]]:
-        """Where the blocks begin: arrays `row`, `run`, `first` (sample index in the run) and `time` [s] when read."""
-        columns = {
-            name: hdf5.dataset(self._instrument, f"blocks/{name}")[:] for name in ("row", "run", "first", "time")
-        }
-        whole = min(self._complete("blocks"), *(len(values) for values in columns.values()))
-        # the samples of the last blocks may still be to come
-        count = int(np.searchsorted(columns["row"][:whole], self.rows))
-        return {name: values[:count] for name, values in columns.items()}
-
-    def time(self, rows: slice = ALL) -> NDArray[np.float64]:
-        """Seconds since the rig was armed, per row: sample index over sample rate. Runs follow one another."""
-        index = np.arange(*rows.indices(self.rows))
-        blocks = self.blocks
-        block = np.searchsorted(blocks["row"], index, side="right") - 1
-        return (blocks["first"][block] + index - blocks["row"][block]) / self.sample_rate
-
     @property
     def events(self) -> list[RecordedEvent]:
         """The journal."""
@@ -173,13 +152,33 @@ class Record:
     @property
     def points(self) -> list[dict[str, Any]]:
         """The results, one dict per point with the fields of its type; enumerations are texts, absent values None."""
-        columns = self._decoded("points")
-        return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+        return self._rows("points")
+
+    @property
+    def results(self) -> dict[str, Column]:
+        """The results as a table: columns with units, rows as in `points`; absent values as they are stored."""
+        group, whole = hdf5.group(self._entry, "points"), len(self.points)
+        return {name: Column(c.values[:whole], c.unit, c.description) for name, c in tables.read(group).items()}
 
     @property
     def estimates(self) -> dict[str, list[Any]]:
         """The running estimates, one list per column; an absent value is None, an unknown one NaN."""
         return self._decoded("estimates")
+
+    @property
+    def running_gains(self) -> dict[str, list[Any]]:
+        """The running gains under records, one list per column; `beta` is None for the bare frame."""
+        return self._decoded("running_gains") if "running_gains" in self._entry else {}
+
+    @property
+    def passes(self) -> list[dict[str, Any]]:
+        """What the passes of replications achieved, one dict each; none in a file that knows of none."""
+        return self._rows("passes") if "passes" in self._entry else []
+
+    @property
+    def table_response(self) -> dict[str, list[Any]]:
+        """The identified response of the table, one list per column, one row per line; empty where there is none."""
+        return self._decoded("table_response") if "table_response" in self._entry else {}
 
     @property
     def alignments(self) -> dict[int, tuple[Alignment, ...]]:
@@ -194,16 +193,26 @@ class Record:
     @cached_property
     def tables(self) -> dict[str, dict[str, Column]]:
         """The tables that were stored before the run, such as "prediction"."""
-        others = {name: hdf5.group(self._entry, name) for name in self._entry if name not in FIXED_GROUPS}
-        return {name: tables.read(group) for name, group in others.items() if "NX_class" in group.attrs}
+        return {
+            name: tables.read(hdf5.group(self._entry, name))
+            for name, member in hdf5.members(self._entry)
+            if name not in FIXED_GROUPS and not hdf5.is_dataset(member)
+        }
 
     @cached_property
     def _growing(self) -> list[str]:
         """Paths of the datasets that change while the file is written."""
         paths = [f"instrument/{channel.name}/counts" for channel in self.channels]
-        folders = ["instrument/blocks", "events", "estimates", "points"]
-        folders += ["instrument/alignments"] if "alignments" in self._instrument else []
+        folders = [
+            "instrument/blocks",
+            "events",
+            "points",
+            "instrument/alignments",
+            *(name for name, _ in OWN_TABLES.values()),
+        ]
+        folders = [folder for folder in folders if folder in self._entry]
         paths += [f"{folder}/{name}" for folder in folders for name in hdf5.group(self._entry, folder)]
+        paths += [f"{PLOT}/{TIME}"] if self.format_version > 1 else []
         return ["complete", *paths, "instrument/drive/voltage", "status", "summary", "end_time"]
 
     def _decoded(self, name: str, parent: hdf5.Group | None = None) -> dict[str, list[Any]]:
@@ -213,36 +222,6 @@ class Record:
         whole = min(self._complete(name), *(len(values) for values in columns.values()))
         return {column: values[:whole] for column, values in columns.items()}
 
-    def _complete(self, name: str) -> int:
-        """How many rows of a part are whole, whatever the length of its datasets."""
-        return int(hdf5.dataset(self._entry, "complete")[COUNTED.index(name)])
-
-    def _counts(self, name: str) -> hdf5.Dataset:
-        return hdf5.dataset(self._instrument, f"{name}/counts")
-
-    def _cut(self, stored: hdf5.Dataset, rows: slice) -> NDArray[Any]:
-        start, stop, step = rows.indices(self.rows)
-        if step < 1:
-            raise InvalidInput("step of the rows", step, "it must be positive")
-        return stored[start : max(start, stop) : step]
-
-    def _channel_named(self, name: str) -> Channel:
-        for channel in self.channels:
-            if channel.name == name:
-                return channel
-        raise InvalidInput("channel", name, "one of " + ", ".join(channel.name for channel in self.channels))
-
-    def _channel(self, name: str) -> Channel:
-        attrs = self._counts(name).attrs
-        low, high = (int(end) for end in attrs["valid"])
-        return Channel(
-            name=name,
-            quantity=str(attrs["quantity"]),
-            unit=str(attrs["value_units"]),
-            scale=float(attrs["scale"]),
-            offset=float(attrs["offset"]),
-            valid=(low, high),
-            device=str(attrs["device"]),
-            higher=tuple(float(term) for term in attrs.get("higher", ())),
-            faults={int(count): text for count, text in json.loads(attrs.get("faults", "{}")).items()},
-        )
+    def _rows(self, name: str) -> list[dict[str, Any]]:
+        columns = self._decoded(name)
+        return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]

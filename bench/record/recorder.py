@@ -11,9 +11,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.events import Acquired, Estimate, Event, PointFinished, StateChanged
+from bench.events import Acquired, Estimate, Event, PointFinished, Progress, RunningGain, StateChanged
 from bench.record.errors import RecordError, reason
-from bench.record.journal import NOT_JOURNALLED
 from bench.record.layout import Skeleton, Status
 from bench.record.tables import Table
 from bench.record.writer import RecordWriter
@@ -21,10 +20,13 @@ from drivers.rig import Channel, Counts
 from sim.errors import InvalidInput
 from sim.parameters import Parameters
 
-PERIOD = 0.5
-"""Seconds of wall time between two writes while samples come in."""
+PERIOD = 0.4
+"""Longest time between two writes while anything waits [s]; a chunk of samples lasts as long at real time."""
 
-BATCH = 20
+PAUSE = 0.05
+"""Shortest time between two writes of events, so that a slow disk takes many at once [s]."""
+
+BATCH = 100
 """Chunks that are written at once when samples come faster than real time."""
 
 BACKLOG = 4096
@@ -57,9 +59,10 @@ class _End:
 class Recorder:
     """Writes one new HDF5 file; call it with each event of the engine, and `close` it at the end.
 
-    Samples reach the file within a second, journalled events at once. An error of the disk is raised as RecordError
-    by the next call, once; what comes after it is not recorded, and what was written before stays readable. So is a
-    disk that does not keep up: no call waits for it, but for `hold_up` seconds, which only a run in virtual time has.
+    Samples are on the disk within a second, journalled events almost at once. An error of the disk is raised as
+    RecordError by the next call, once; what comes after it is not recorded, and what was written before stays
+    readable. So is a disk that does not keep up: no call waits for it, but for `hold_up` seconds, which only a run in
+    virtual time has.
 
     `metadata` is stored as texts under /entry/metadata, `tables` (such as {"prediction": ...}) under /entry.
     Raises InvalidInput, and creates nothing, when `path` exists or cannot be created, or a name or table is unfit.
@@ -90,7 +93,7 @@ class Recorder:
         self._behind: RecordError | None = None
         self._told = False
         self._closed = False
-        self._committed = time.monotonic()
+        self._committed, self._pressing, self._partial = time.monotonic(), False, False
         # a daemon: a program that dies of an error does not wait for its recorder, and the file is readable anyway
         self._thread = threading.Thread(target=self._work, name="recorder", daemon=True)
         self._thread.start()
@@ -109,7 +112,7 @@ class Recorder:
                 f"point of type {type(event.point).__name__} was not recorded: {self.path} is for"
                 f" {self._point_type.__name__}"
             )
-        elif isinstance(event, Estimate) or not isinstance(event, NOT_JOURNALLED):
+        elif not isinstance(event, Progress):
             self._offer(event)
 
     def sync(self) -> None:
@@ -180,7 +183,7 @@ class Recorder:
         """The thread: take what comes until the end; after a failure, only drain."""
         while self._end is None or not self._queue.empty():
             try:
-                item = self._queue.get(timeout=PERIOD)
+                item = self._queue.get(timeout=PAUSE if self._pressing else PERIOD)
             except queue.Empty:
                 item = None
             self._attempt(partial(self._take, item))
@@ -206,21 +209,20 @@ class Recorder:
         match item:
             case _Block():
                 self._writer.add_block(item.time, item.run, item.first, item.counts, item.drive)
-                self._commit_if_due()
-            case Estimate():
-                self._writer.add_event(item)
-                self._commit_if_due()
             case Event():
                 self._writer.add_event(item)
-                self._commit(partial=isinstance(item, StateChanged))
-            case _:
+                self._pressing |= not isinstance(item, Estimate | RunningGain)
+                self._partial |= isinstance(item, StateChanged)
+            case _Sync():
                 self._commit(partial=True)
-
-    def _commit_if_due(self) -> None:
+            case None:
+                # nothing has come for a while: what waits for its chunk to fill may wait for long
+                self._commit(partial=self._partial or not self._pressing)
         waited, chunks = time.monotonic() - self._committed, self._writer.full_chunks
-        if chunks >= BATCH or (chunks and waited >= PERIOD) or waited >= 2.0 * PERIOD:
-            self._commit(partial=not chunks)
+        at_once = self._pressing and waited >= PAUSE and self._queue.empty()
+        if at_once or chunks >= BATCH or (chunks and waited >= 0.75 * PERIOD) or waited >= 1.25 * PERIOD:
+            self._commit(partial=self._partial or not (chunks or at_once))
 
     def _commit(self, *, partial: bool) -> None:
         self._writer.commit(partial=partial)
-        self._committed = time.monotonic()
+        self._committed, self._pressing, self._partial = time.monotonic(), False, False

@@ -7,6 +7,7 @@ import numpy as np
 
 from bench.record import hdf5
 from bench.record.fields import Field
+from bench.record.growing import Growing
 
 
 class Rows:
@@ -14,7 +15,7 @@ class Rows:
 
     def __init__(self, parent: hdf5.Group, name: str, fields: Sequence[Field]) -> None:
         group = hdf5.create_group(parent, name, "NXcollection")
-        self._columns = [(field, field.create(group)) for field in fields]
+        self._columns = [(field, Growing(field.create(group))) for field in fields]
         self._pending: list[tuple[Any, ...]] = []
         self._written = 0
 
@@ -25,6 +26,11 @@ class Rows:
     def written(self) -> int:
         """Rows that have been given to the file."""
         return self._written
+
+    @property
+    def grown(self) -> list[Growing]:
+        """The datasets."""
+        return [stored for _, stored in self._columns]
 
     def add(self, *values: Any) -> None:
         """Append one row, a value per field in their order; None where a value is absent."""
@@ -37,6 +43,6 @@ class Rows:
         if not self._pending:
             return
         for (field, stored), values in zip(self._columns, zip(*self._pending, strict=True), strict=True):
-            hdf5.append(stored, np.array(values, dtype=field.dtype))
+            stored.append(np.array(values, dtype=field.dtype))
         self._written += len(self._pending)
         self._pending.clear()

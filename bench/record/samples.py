@@ -1,4 +1,4 @@
-"""The samples of all channels and of the drive, appended in whole chunks.
+"""The samples of all channels and of the drive with their times, appended in whole chunks.
 
 A compressed chunk that is written twice leaves its first copy behind as dead space, so rows wait until a chunk is
 full unless they must reach the file now.
@@ -11,20 +11,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.record import hdf5
+from bench.record.growing import Growing
+from bench.record.packing import Packer
 from drivers.rig import Channel, Counts
 
-CHUNK_TIME = 0.5
-"""Seconds of samples in a chunk: what is at risk in a run at real time."""
+CHUNK_TIME = 0.4
+"""Seconds of samples in a chunk: what waits in memory in a run at real time."""
 
 
 class Samples:
-    """One integer dataset of counts per channel and one float32 dataset of the drive, always of one length."""
+    """Counts per channel, the drive as float32 and the time as float64, always of one length.
 
-    def __init__(self, instrument: hdf5.Group, channels: Sequence[Channel], sample_rate: float) -> None:
-        self.chunk = max(1, round(CHUNK_TIME * sample_rate))
-        self._stored = [_create_channel(instrument, channel, self.chunk) for channel in channels]
-        self._stored.append(_create_drive(instrument, self.chunk))
-        self._pending: list[tuple[Counts, NDArray[np.float32]]] = []
+    `time` is the dataset of the times, made with chunks of `chunk_of(sample_rate)` rows.
+    """
+
+    def __init__(
+        self, instrument: hdf5.Group, channels: Sequence[Channel], sample_rate: float, time: hdf5.Dataset
+    ) -> None:
+        self.chunk = chunk_of(sample_rate)
+        stored = [_create_channel(instrument, channel, self.chunk) for channel in channels]
+        stored += [_create_drive(instrument, self.chunk), time]
+        self._packer = Packer()
+        self.grown = [Growing(each, self._packer) for each in stored]
+        self._pending: list[tuple[Counts, NDArray[np.float32], NDArray[np.float64]]] = []
         self._waiting = 0
         self._written = 0
 
@@ -41,9 +50,9 @@ class Samples:
         """How many chunks could be completed with the rows that wait."""
         return len(self) // self.chunk - self._written // self.chunk
 
-    def add(self, counts: Counts, drive: NDArray[np.float32]) -> None:
-        """Append rows: counts of shape (n_channels, n) and drive of shape (n,) [V]."""
-        self._pending.append((counts, drive))
+    def add(self, counts: Counts, drive: NDArray[np.float32], seconds: NDArray[np.float64]) -> None:
+        """Append rows: counts of shape (n_channels, n), drive [V] and bench time [s] of shape (n,)."""
+        self._pending.append((counts, drive, seconds))
         self._waiting += len(drive)
 
     def write(self, *, partial: bool) -> None:
@@ -52,13 +61,39 @@ class Samples:
         count = end - self._written
         if count <= 0:
             return
-        counts = np.concatenate([block for block, _ in self._pending], axis=1)
-        drive = np.concatenate([block for _, block in self._pending])
-        for stored, values in zip(self._stored, (*counts, drive), strict=True):
-            hdf5.append(stored, values[:count])
+        blocks, drives, times = zip(*self._pending, strict=True)
+        counts, drive, seconds = np.concatenate(blocks, axis=1), np.concatenate(drives), np.concatenate(times)
+        for stored, values in zip(self.grown, (*counts, drive, seconds), strict=True):
+            stored.append(values[:count])
         self._written = end
         self._waiting -= count
-        self._pending = [(counts[:, count:], drive[count:])] if self._waiting else []
+        self._pending = [(counts[:, count:], drive[count:], seconds[count:])] if self._waiting else []
+
+    def close(self) -> None:
+        """Let go of the threads that compress."""
+        self._packer.close()
+
+
+def chunk_of(sample_rate: float) -> int:
+    """Rows in a chunk of the samples."""
+    return max(1, round(CHUNK_TIME * sample_rate))
+
+
+def read_channel(instrument: hdf5.Group, name: str) -> Channel:
+    """The channel as it was when its counts were stored."""
+    attrs = hdf5.dataset(instrument, f"{name}/counts").attrs
+    low, high = (int(end) for end in attrs["valid"])
+    return Channel(
+        name=name,
+        quantity=str(attrs["quantity"]),
+        unit=str(attrs["value_units"]),
+        scale=float(attrs["scale"]),
+        offset=float(attrs["offset"]),
+        valid=(low, high),
+        device=str(attrs["device"]),
+        higher=tuple(float(term) for term in attrs.get("higher", ())),
+        faults={int(count): text for count, text in json.loads(attrs.get("faults", "{}")).items()},
+    )
 
 
 def _create_channel(instrument: hdf5.Group, channel: Channel, chunk: int) -> hdf5.Dataset:

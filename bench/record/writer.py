@@ -1,16 +1,30 @@
 """The file of one campaign while it is written: it can be read at any moment and survives the death of the writer."""
 
+import json
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.events import Estimate, Event, PointFinished, SensorsAligned
+from bench.events import Event, PointFinished, SensorsAligned
 from bench.record import hdf5
+from bench.record.declared import COUNTED, OWN_TABLES
+from bench.record.diary import Diary, beside
+from bench.record.disk import Platter
 from bench.record.errors import RecordError, reason
-from bench.record.journal import text_of
-from bench.record.layout import STATUS_WIDTH, SUMMARY_WIDTH, TIME_WIDTH, Skeleton, Status, build, now
+from bench.record.journal import NOT_JOURNALLED, text_of
+from bench.record.layout import (
+    STATUS_WIDTH,
+    SUMMARY_WIDTH,
+    TIME_WIDTH,
+    Skeleton,
+    Status,
+    build,
+    now,
+)
+from bench.record.timeline import Timeline
 from drivers.rig import Counts
 from sim.errors import InvalidInput
 
@@ -38,8 +52,9 @@ class RecordWriter:
 
     def __init__(self, path: Path, skeleton: Skeleton) -> None:
         skeleton.check()
-        if path.exists():
-            raise InvalidInput("record", str(path), _EXISTS)
+        for taken in (path, beside(path)):
+            if taken.exists():
+                raise InvalidInput("record", str(taken), _EXISTS)
         try:
             _try_folder(path.parent)
             self._file = hdf5.create(path)
@@ -55,12 +70,15 @@ class RecordWriter:
             self._parts = build(self._file, skeleton)
             self._file.swmr_mode = True
             self._file.flush()
+            self._diary = Diary(beside(path))
+            self._platter = Platter(path)
+            self._platter.sync()
         except (OSError, RuntimeError) as error:
-            self.abandon()
+            hdf5.let_go(self._file)
             path.unlink(missing_ok=True)
             raise RecordError(f"{path} could not be begun ({reason(error)}): see to the disk") from error
-        parts = self._parts
-        self._tables = (parts.blocks, parts.events, parts.estimates, parts.points, parts.alignments)
+        self._tables = [self._parts.rows[name] for name in COUNTED if name != "samples"]
+        self._timeline = Timeline(skeleton.sample_rate)
         self._complete: list[int] = []
         self._point_fields = tuple(skeleton.point_type.model_fields)
 
@@ -71,41 +89,46 @@ class RecordWriter:
 
     def add_block(self, time: float, run: int, first: int, counts: Counts, drive: NDArray[np.float32]) -> None:
         """Append a block: counts of shape (n_channels, n), drive of shape (n,) [V]."""
-        self._parts.blocks.add(len(self._parts.samples), run, first, time)
-        self._parts.samples.add(counts, drive)
+        self._parts.rows["blocks"].add(len(self._parts.samples), run, first, time)
+        self._parts.samples.add(counts, drive, self._timeline.seconds(time, run, first, len(drive)))
 
     def add_event(self, event: Event) -> None:
         """Append an event that is no block."""
-        parts = self._parts
-        if isinstance(event, Estimate):
-            values = (event.beta, event.cycles, event.drift_peak, event.alpha_2, event.uncertainty, event.predicted)
-            parts.estimates.add(event.time, event.omega, *values)
+        rows = self._parts.rows
+        if (own := OWN_TABLES.get(type(event))) is not None:
+            values = [getattr(event, field.name) for field in own[1]]
+            for row in zip(*values, strict=True) if isinstance(values[0], np.ndarray) else [values]:
+                rows[own[0]].add(*row)
+        if isinstance(event, NOT_JOURNALLED):
             return
         if isinstance(event, SensorsAligned):
             for one in event.alignments:
                 placed = (one.offset, one.rate, one.residual, one.delay, one.values, one.lost)
-                parts.alignments.add(event.run, one.sensor, *placed)
+                rows["alignments"].add(event.run, one.sensor, *placed)
+        kind, text, more = type(event).__name__, text_of(event), dict[str, Any]()
         if isinstance(event, PointFinished):
-            text = f"row {len(parts.points)} of points"
-            parts.points.add(*(getattr(event.point, name) for name in self._point_fields))
-        else:
-            text = text_of(event)
-        parts.events.add(event.time, type(event).__name__, text)
+            text = f"row {len(rows['points'])} of points"
+            rows["points"].add(*(getattr(event.point, name) for name in self._point_fields))
+            more = {"point": json.loads(event.point.model_dump_json())}
+        rows["events"].add(event.time, kind, text)
+        self._diary.add(event.time, kind, text, more)
 
     def commit(self, *, partial: bool) -> None:
-        """Bring what waits into the file, within reach of readers; samples that fill no chunk only if `partial`."""
+        """Bring what waits onto the disk, within reach of readers; samples that fill no chunk only if `partial`."""
         samples, tables = self._parts.samples, self._tables
         samples.write(partial=partial)
         for rows in tables:
             rows.write()
-        self._file.flush()
-        # a failing disk may keep the new length of a dataset without its rows, so what is whole is counted afterwards,
-        # in a place that exists already
         complete = [samples.written, *(rows.written for rows in tables)]
-        if complete != self._complete:
-            self._parts.complete[...] = complete
-            self._file.flush()
-            self._complete = complete
+        if complete == self._complete:
+            return
+        # a failing disk or computer may keep the new length of a dataset without its rows, so what is whole is
+        # counted afterwards, in a place that exists already
+        self._diary.sync()
+        self._flush()
+        self._parts.complete[...] = complete
+        self._flush()
+        self._complete = complete
 
     def finish(self, status: Status, summary: str) -> None:
         """Write everything that waits and the status, and close the file."""
@@ -113,9 +136,22 @@ class RecordWriter:
         hdf5.replace_text(self._parts.summary, summary, SUMMARY_WIDTH)
         hdf5.replace_text(self._parts.end_time, now(), TIME_WIDTH)
         hdf5.replace_text(self._parts.status, status, STATUS_WIDTH)
-        self._file.flush()
+        self._parts.checksums.seal({grown.path: grown.checksum for grown in self._parts.grown})
+        self._flush()
         self._file.close()
+        self._platter.sync()
+        self._let_go()
 
     def abandon(self) -> None:
         """Let go of the file after an error; what was committed stays readable."""
         hdf5.let_go(self._file)
+        self._let_go()
+
+    def _flush(self) -> None:
+        self._file.flush()
+        self._platter.sync()
+
+    def _let_go(self) -> None:
+        self._parts.samples.close()
+        self._platter.close()
+        self._diary.close()

@@ -19,15 +19,19 @@ from bench.events import (
     LimitExceeded,
     OperatorAnswered,
     OperatorAsked,
+    PassFinished,
     PointFinished,
     Progress,
+    RunningGain,
     State,
     StateChanged,
     StepStarted,
+    TableIdentified,
     Warned,
 )
 from drivers.rig import Block
 from protocols.harmonic.point import HarmonicPoint, PointStatus
+from protocols.identify.point import IdentifiedBand
 
 NAN = float("nan")
 STEADY = HarmonicPoint(
@@ -234,3 +238,28 @@ def test_nothing_is_drawn_without_a_change_and_at_most_eight_times_a_second():
 )
 def test_numbers_and_texts_as_the_operator_reads_them(said: str, expected: str):
     assert said == expected
+
+
+def test_passes_and_running_gains_are_shown_and_bands_are_no_points() -> None:
+    running = RunningGain(31.0, "1999 Chi-Chi", 0.25, 12.34, 0.002, 0.8412, 0.8533)
+    passed = PassFinished(20.0, "1999 Chi-Chi", 2, 0.005, 0.003, 0.01, 0.01, True, "pass 2 (gain 1): error 0.50%")
+    found = TableIdentified(9.0, "bare frame, 0.5 to 200 Hz", *[np.zeros(3)] * 7)
+    band = IdentifiedBand(
+        frequency_hz=1.0,
+        gain_m_s2_v=0.3,
+        phase_rad=1.0,
+        uncertainty=0.01,
+        distortion=0.01,
+        noise_m_s2_hz=2e-4,
+        coherence=0.999,
+        lines=3,
+    )
+    lines = rendered(scene_after([found, PointFinished(9.0, band), passed, running]))
+    line_with(lines, "table", "bare frame, 0.5 to 200 Hz")
+    line_with(lines, "pass", "1999 Chi-Chi: pass 2 (gain 1): error 0.50%")
+    line_with(lines, "1999 Chi-Chi", "0.25", "0.8412", "0.8533", "-1.4 %", "12.3 s")
+    out = StringIO()
+    with PlainLines(out) as plain:
+        for event in (found, PointFinished(9.0, band), passed, running):
+            plain(event)
+    assert [line.split()[3] for line in out.getvalue().splitlines()] == ["table", "pass"]

@@ -338,7 +338,7 @@ def test_a_fall_while_the_test_is_ramped_out_is_told_to_the_plan() -> None:
         seen.append((yield RampOut()))
 
     Bench(rig).run(plan())
-    assert seen == [Fallen()]
+    assert [type(outcome) for outcome in seen] == [Fallen]
 
 
 def test_an_exception_in_a_subscriber_cuts_the_output() -> None:

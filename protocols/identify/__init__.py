@@ -1,0 +1,1 @@
+"""The identification of the table: what motion a volt of drive makes at each frequency."""
