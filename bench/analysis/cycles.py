@@ -50,21 +50,26 @@ class Cycle:
     def harmonics(self, column: int) -> NDArray[np.complex128]:
         """Complex amplitudes z_k of one signal, shape (HARMONICS,): it is Im(sum of z_k exp(i k phase)) and its mean.
 
-        Harmonics that were not fitted are zero.
+        Harmonics that were not fitted are zero, higher ones are left out.
         """
         fitted = (self.coefficients.shape[0] - 1) // 2
         found = np.zeros(HARMONICS, dtype=np.complex128)
         cosines, sines = self.coefficients[1 : 1 + fitted, column], self.coefficients[1 + fitted :, column]
-        found[:fitted] = sines + 1j * cosines
+        found[:fitted] = (sines + 1j * cosines)[:HARMONICS]
         return found
 
 
-def fit_cycle(index: int, phase: NDArray[np.float64], values: NDArray[np.float64]) -> Cycle | None:
-    """Fit samples `values`, shape (n, m), at `phase` [rad]; None where too many samples are missing (NaN)."""
+def fit_cycle(
+    index: int, phase: NDArray[np.float64], values: NDArray[np.float64], highest: int = HARMONICS
+) -> Cycle | None:
+    """Fit samples `values`, shape (n, m), at `phase` [rad] up to harmonic `highest`, as far as they tell it apart.
+
+    None where too many samples are missing (NaN).
+    """
     valid = np.isfinite(values).all(axis=1)
     if not valid.all():
         phase, values = phase[valid], values[valid]
-    harmonics = min(HARMONICS, (phase.size - 1) // 4)
+    harmonics = min(highest, (phase.size - 1) // 4)
     if valid.mean() < COMPLETE or harmonics < 1:
         return None
     basis = _basis(phase, harmonics)
@@ -120,7 +125,8 @@ def _peak(waveform: NDArray[np.float64]) -> NDArray[np.float64]:
 class CycleAnalyser:
     """Cuts a stream of samples into cycles of `omega` [rad/s] and fits each as soon as it is complete."""
 
-    def __init__(self, omega: float, sample_rate: float, first: int) -> None:
+    def __init__(self, omega: float, sample_rate: float, first: int, highest: int = HARMONICS) -> None:
+        self._highest = highest
         self._step = omega / sample_rate
         self._first = first
         self._start = first
@@ -144,7 +150,7 @@ class CycleAnalyser:
         while self._start + queue.shape[0] >= self._end():
             n = self._end() - self._start
             phase = self._step * np.arange(self._start, self._start + n, dtype=np.float64)
-            cycle = fit_cycle(self._count, phase, queue[:n])
+            cycle = fit_cycle(self._count, phase, queue[:n], self._highest)
             if cycle is not None:
                 cycles.append(cycle)
             queue = queue[n:]

@@ -27,6 +27,12 @@ class SensorAccuracy(Parameters):
     laser_timing: float = quantity(
         2.5e-4, "s", "how far a laser's delay wanders because it runs free: one of its measurements", ge=0, le=0.01
     )
+    laser_linearity: float = quantity(
+        0.0008, "1", "largest linearity error of a laser over its measuring range, as on its data sheet", ge=0, le=0.05
+    )
+    table_scale: float = quantity(
+        0.005, "1", "relative error of the scales of the table's accelerometer and displacement sensor", ge=0, le=0.1
+    )
 
 
 @dataclass(frozen=True)

@@ -7,14 +7,20 @@ from io import TextIOWrapper
 
 from cyclopts import App, CycloptsError, UnusedCliTokensError
 
+from bench.cli.analyse import analyse_app
 from bench.cli.benchmark import benchmark_app
 from bench.cli.check import check_app
 from bench.cli.configure import config_app
 from bench.cli.devices import devices_app
 from bench.cli.emulate import emulate_app
+from bench.cli.export import export_app
+from bench.cli.file import file_app
+from bench.cli.paper import paper_app
 from bench.cli.predict import predict_app
 from bench.cli.records import records_app
 from bench.cli.refusal import tell
+from bench.cli.replay import replay_app
+from bench.cli.report import report_app
 from bench.cli.run import Start, run_app
 from sim.errors import RockbenchError
 
@@ -50,6 +56,12 @@ def main(argv: Sequence[str] | None = None, start: Start | None = None) -> int:
     app.command(emulate_app())
     app.command(predict_app())
     app.command(records_app())
+    app.command(report_app())
+    app.command(paper_app())
+    app.command(file_app())
+    app.command(replay_app())
+    app.command(analyse_app())
+    app.command(export_app())
     app.command(config_app())
     app.command(benchmark_app())
     try:

@@ -1,4 +1,4 @@
-"""Writes a result under its final name only when it is whole, and never over another."""
+"""Writes a result under its final name only when it is whole, and never over another unless that is asked for."""
 
 import os
 from collections.abc import Callable
@@ -7,12 +7,13 @@ from pathlib import Path
 from sim.errors import InvalidInput, RockbenchError
 
 
-def write_new(path: Path, write: Callable[[Path], None]) -> None:
+def write_new(path: Path, write: Callable[[Path], None], *, overwrite: bool = False) -> None:
     """Let `write` fill a temporary file beside `path`, then give it that name.
 
-    Raises InvalidInput when `path` exists or its folder does not, RockbenchError when the disk fails.
+    Raises InvalidInput when `path` exists, unless it may `overwrite` it, or its folder does not, RockbenchError when
+    the disk fails.
     """
-    if path.exists():
+    if path.exists() and not overwrite:
         raise InvalidInput("file", str(path), "it exists and is never overwritten; name another")
     if not path.parent.is_dir():
         raise InvalidInput("file", str(path), "its folder does not exist; create it first")

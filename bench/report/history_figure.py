@@ -72,7 +72,7 @@ def _draw_drift(panel: "Axes", motion: Motion) -> None:
     time, bare, coupled = (motion.values[name] for name in ("time_s", "bare_drift_m", "drift_m"))
     panel.plot(time, MILLI * bare, color=GREY, linewidth=0.9, linestyle="--", label="drift of the bare frame")
     panel.plot(time, MILLI * coupled, color=BLUE, linewidth=1.4, label="drift of the coupled frame")
-    _centre(panel, MILLI * bare, MILLI * coupled)
+    centre(panel, MILLI * bare, MILLI * coupled)
     panel.set_ylabel(r"$u_2 - u_1$  [mm]")
 
 
@@ -84,8 +84,8 @@ def _draw_block(panel: "Axes", motion: Motion) -> "Axes":
     angle.plot(
         time, MILLI * theta, color=VERMILLION, linewidth=1.2, linestyle=(0, (5, 1.2)), label=r"$\vartheta$, right axis"
     )
-    _centre(panel, MILLI * u1)
-    _centre(angle, MILLI * _before_the_fall(motion))
+    centre(panel, MILLI * u1)
+    centre(angle, MILLI * _before_the_fall(motion))
     panel.set_ylabel(r"$u_1$  [mm]")
     angle.set_ylabel(r"$\vartheta$  [mrad]", color=VERMILLION)
     return angle
@@ -102,7 +102,8 @@ def _before_the_fall(motion: Motion) -> NDArray[np.float64]:
     return 1.6 * settled
 
 
-def _centre(panel: "Axes", *curves: NDArray[np.float64]) -> None:
+def centre(panel: "Axes", *curves: NDArray[np.float64]) -> None:
+    """Put zero in the middle and leave some room above the greatest value."""
     finite = np.concatenate([curve[np.isfinite(curve)] for curve in curves])
     reach = HEADROOM * float(np.abs(finite).max(initial=0.0)) or 1.0
     panel.set_ylim(-reach, reach)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.report.style import BLACK, GREEN, PURPLE, VERMILLION, new_figure
+from bench.report.style import BLACK, BLUE, GREEN, PURPLE, VERMILLION, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,6 +32,16 @@ GAINING, LOSING = "#DCEBF5", "#B9B9B9"
 
 JUMP = 0.1
 """Of the range of frequencies: a step of the least gain that is no slope but a jump."""
+
+FOUND, LOST = "o", "X"
+MARK: Mapping[str, Any] = {
+    "linestyle": "none",
+    "markersize": 6,
+    "markerfacecolor": "white",
+    "markeredgecolor": BLUE,
+    "markeredgewidth": 1.6,
+}
+"""How measured points look: with a gain, without one, and in common."""
 
 FLOOR, CEILING = 0.01, 100.0
 """Gains beyond are cut off in the surfaces."""
@@ -55,11 +65,29 @@ class Layer:
         return int(np.isfinite(self.multiplier).sum()) >= 4
 
 
-def map_figure(omegas: Floats, betas: Floats, rocking: Layer, resting: Layer, resting_margin: Floats) -> "Figure":
+@dataclass(frozen=True)
+class MapPoint:
+    """A measured point on the map: `omega` [rad/s]; `alpha_2` is None where no gain was measured."""
+
+    omega: float
+    beta: float
+    layer: str
+    alpha_2: float | None
+
+
+def map_figure(
+    omegas: Floats,
+    betas: Floats,
+    rocking: Layer,
+    resting: Layer,
+    resting_margin: Floats,
+    measured: Sequence[MapPoint] = (),
+) -> "Figure":
     """Draw surfaces (a), the map of the rocking motion (b) and that of the resting one (c), alpha_1 beside alpha_2.
 
     `omegas` [rad/s], shape (m,), and `betas`, shape (n,), ascend. `resting_margin`, shape (n, m), is positive where
-    the block may rest. Returns a figure that belongs to no window.
+    the block may rest. `measured` points stand in the maps of alpha_2, each on the layer where it was found. Returns a
+    figure that belongs to no window.
     """
     layers = [("b", "block rocking", rocking)]
     if resting.exists:
@@ -76,14 +104,44 @@ def map_figure(omegas: Floats, betas: Floats, rocking: Layer, resting: Layer, re
         for row, (letter, words, layer) in enumerate(layers, start=1):
             panel = figure.add_subplot(grid[row, column])
             _draw_map(panel, omegas, betas, layer, name, resting_margin)
+            if name == "alpha_2":
+                _draw_measured(panel, [point for point in measured if (point.layer == "resting") == (letter == "c")])
             panel.set_title(f"({letter})  {symbol}, {words}", fontsize=10, loc="left")
             panel.set_xlabel(r"$\Omega$  [rad/s]")
             if column == 0:
                 panel.set_ylabel(r"stiffness ratio  $\beta$")
             else:
                 panel.tick_params(labelleft=False)
-    _add_legend(figure, bool((rocking.multiplier > 1.0).any()), _crosses_zero(resting_margin))
+    _add_legend(figure, bool((rocking.multiplier > 1.0).any()), _crosses_zero(resting_margin), measured)
     return figure
+
+
+def _draw_measured(panel: "Axes", points: Sequence[MapPoint]) -> None:
+    """Each point with its gain beside it; below it, where the upper edge of the map is near."""
+    top = panel.get_ylim()[1]
+    for point in points:
+        lost = point.alpha_2 is None
+        panel.plot(point.omega, point.beta, marker=LOST if lost else FOUND, zorder=6, **MARK)
+        text = panel.annotate(
+            "no gain" if lost else f"{point.alpha_2:.3g}",
+            (point.omega, point.beta),
+            xytext=(0, -7 if point.beta > 0.9 * top else 6),
+            textcoords="offset points",
+            ha="center",
+            va="top" if point.beta > 0.9 * top else "bottom",
+            fontsize=7,
+            fontweight="bold",
+            color=BLUE,
+            zorder=7,
+        )
+        text.set_path_effects([_halo()])
+
+
+def _halo() -> Any:
+    """What keeps numbers readable on lines."""
+    from matplotlib.patheffects import withStroke
+
+    return withStroke(linewidth=2.0, foreground="white")
 
 
 def _draw_map(panel: "Axes", omegas: Floats, betas: Floats, layer: Layer, name: str, resting_margin: Floats) -> None:
@@ -181,7 +239,7 @@ def _draw_surface(panel: Any, omegas: Floats, betas: Floats, gain: Floats) -> No
     panel.set_box_aspect((1.3, 1.0, 0.8), zoom=1.05)
 
 
-def _add_legend(figure: "Figure", unstable: bool, boundary: bool) -> None:
+def _add_legend(figure: "Figure", unstable: bool, boundary: bool, measured: Sequence[MapPoint]) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -199,4 +257,10 @@ def _add_legend(figure: "Figure", unstable: bool, boundary: bool) -> None:
         entries.append(
             Line2D([], [], color=GREEN, linewidth=1.6, linestyle=(0, (6, 1.5)), label="right of it the block may rest")
         )
+    for marker, words, gainless in (
+        (FOUND, r"measured, with its $\alpha_2$", False),
+        (LOST, "tested, no gain measured", True),
+    ):
+        if any((point.alpha_2 is None) == gainless for point in measured):
+            entries.append(Line2D([], [], marker=marker, label=words, **MARK))
     figure.legend(handles=entries, loc="outside lower center", ncols=3, fontsize=8, frameon=False)

@@ -76,9 +76,10 @@ def _draw(part: "SubFigure", record: RecordPicture) -> None:
     spectrum.plot(record.periods, record.spectrum, color=VERMILLION, linewidth=1.3)
     spectrum.set_xscale("log")
     ticks_1_2_5(spectrum.xaxis)
+    spectrum.tick_params(axis="x", labelsize=7)
     spectrum.set_xlim(float(record.periods[0]), float(record.periods[-1]))
     spectrum.set_ylim(0.0, HEADROOM * float(record.spectrum.max()))
-    spectrum.set_title(f"pseudo-acceleration, {100.0 * record.damping:g} % damping", loc="left", fontsize=9)
+    spectrum.set_title(f"pseudo-acceleration, {100.0 * record.damping:g} % damping", loc="right", fontsize=8)
     spectrum.set_xlabel(r"$T$  [s]", fontsize=9)
     spectrum.set_ylabel(r"$S_a$  [m/s$^2$]", fontsize=9)
     set_grid(spectrum)
@@ -95,7 +96,7 @@ def _draw_history(panel: "Axes", values: Array, dt: float, colour: str) -> None:
         (dt * at, float(values[at])),
         xytext=(6, 0),
         textcoords="offset points",
-        verticalalignment="center",
+        verticalalignment="top" if values[at] > 0.0 else "bottom",
         fontsize=8,
         color=GREY,
     )

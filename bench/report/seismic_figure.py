@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+LETTERS = 100
+"""That fit in a line of the legend, its samples of lines counted as eight."""
+
 COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK)
 DASHES = ("-", "--", "-.", ":")
 MARKERS = "osD^v<>"
@@ -63,7 +66,11 @@ def seismic_figure(curves: Sequence[GainCurve], band: str) -> "Figure":
     fallen.set_xlabel(r"$\beta$")
     set_grid(fallen)
     upper.set_title(f"table's band: {band}", loc="right", fontsize=9)
-    figure.legend(handles=upper.lines[: len(curves)], loc="outside lower center", ncols=4, fontsize=8, frameon=False)
+    # long names take fewer columns
+    columns = min(4, max(1, LETTERS // (max(len(curve.name) for curve in curves) + 8)))
+    figure.legend(
+        handles=upper.lines[: len(curves)], loc="outside lower center", ncols=columns, fontsize=8, frameon=False
+    )
     return figure
 
 

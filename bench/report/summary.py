@@ -2,8 +2,8 @@
 
 import json
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
 from typing import Any, cast
@@ -16,7 +16,7 @@ from bench.report.rows import PointLike, plain
 class Summary:
     """What the summary says. Times are seconds: `elapsed` on the wall, `bench_time` on the bench's clock.
 
-    `plan_hash` is that of the preflight (docs/preflight.md).
+    `plan_hash` is that of the preflight (docs/preflight.md). `findings` is what a protocol makes of its points.
     """
 
     protocol: str
@@ -30,10 +30,12 @@ class Summary:
     elapsed: float
     bench_time: float
     plan_hash: str | None = None
+    further_figures: Sequence[Path] = ()
+    findings: Mapping[str, object] = field(default_factory=dict[str, object])
 
     def as_dict(self) -> dict[str, Any]:
         """Ready for JSON: enumerations as their text, NaN and infinity as null, paths with forward slashes."""
-        content = {
+        content: dict[str, Any] = {
             "protocol": self.protocol,
             "status": self.status,
             "reason": self.reason,
@@ -47,6 +49,9 @@ class Summary:
         }
         if self.plan_hash is not None:
             content["plan_hash"] = self.plan_hash
+        if self.further_figures:
+            content["further_figures"] = [path.as_posix() for path in self.further_figures]
+        content |= self.findings
         return {key: _clean(value) for key, value in content.items()}
 
 

@@ -1,0 +1,199 @@
+"""The peak of a noisy transient, without the bias of picking the largest sample.
+
+The largest of many noisy samples is too large by some standard deviations, and the smaller the motion, the more it
+matters. Here a polynomial of degree four is fitted by least squares around each maximum that may be the greatest, and
+its turning point is the peak. The window follows from the signal's bandwidth: of the terms that the polynomial leaves
+out, the sixth derivative is the first that shifts the middle of the window. The residual of x^6 over a window of half
+width h is the monic Legendre polynomial P_6 there, so the shift is
+
+    (5 / 231) h^6 s^(6) / 720,    s^(6) ~ A omega_6^6,    omega_6^12 = sum omega^12 |S|^2 / sum |S|^2,
+
+and h balances it against the noise of the fit, 225/64 sigma^2 over the number of samples.
+"""
+
+from dataclasses import dataclass
+from math import pi, sqrt
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.analysis.transient_noise import noise_density
+from sim.errors import InvalidInput
+
+Array = NDArray[np.float64]
+
+DEGREE = 4
+_REMAINDER = 5.0 / 231.0 / 720.0
+"""Shift of the fitted value in the middle per h^6 s^(6)."""
+_VARIANCE = 225.0 / 64.0
+"""Variance of the fitted value in the middle, over sigma^2 / samples."""
+_NARROWEST = 6
+"""Least half width of the window in samples."""
+_WIDEST = 0.5 * pi
+"""Largest omega_6 h: a quarter of a period to either side."""
+_BAND = (4.0, 50.0)
+"""Frequencies [Hz] at which the noise of a fit is looked at: below them a frame may still swing at rest."""
+_STANDS_OUT, _SMOOTHED = 4.0, 0.5
+"""Power over that of the noise from which a frequency counts as signal; width over which it is averaged before [Hz]."""
+_RIVALS = 6.0
+"""Standard deviations below the greatest maximum within which another one may really be the greatest."""
+_RAISED = 0.5
+_DRAWS, _SEED, _HALVINGS = 2000, 20, 30
+_MISSING = 0.25
+"""Share of a window's samples that may be missing."""
+
+
+@dataclass(frozen=True)
+class TransientPeak:
+    """The greatest magnitude of a signal, in its unit.
+
+    `value` is free of the bias of choosing the greatest; `uncertainty` is standard and of noise alone; `bias` is the
+    largest shift that the fit's degree may leave. `time` [s] since the first sample is that of the greatest maximum,
+    `sign` its side, `window` [s] the half width of the fit, and `rivals` how many other maxima may be the greatest.
+    """
+
+    value: float
+    uncertainty: float
+    bias: float
+    time: float
+    sign: int
+    window: float
+    rivals: int
+
+
+def transient_peak(signal: Array, rest: Array, sample_rate: float) -> TransientPeak:
+    """The peak of |`signal`|, shape (n,), zero at rest; `rest`, shape (m,), shows its noise without motion.
+
+    NaN stands for a missing sample. Raises InvalidInput when there is no motion above the noise, or when samples are
+    missing where it is greatest.
+    """
+    known = np.isfinite(signal)
+    if rest.size < 16 * _NARROWEST or not np.isfinite(rest).all():
+        raise InvalidInput("rest before the transient", rest.size, "it must have samples, and all of them")
+    if not known.any():
+        raise InvalidInput("transient", signal.size, "no sample of it has a value")
+    whole = np.interp(np.arange(signal.size), np.flatnonzero(known), signal[known])
+    density = noise_density(rest, sample_rate)
+    sigma = _equivalent_noise(density, sample_rate)
+    omega = _sixth_moment(whole, density, sample_rate)
+    half = _half_width(float(np.abs(whole).max()), sigma, omega / sample_rate, min(signal.size, rest.size))
+    smooth = _smoothed(whole, half)
+    spread = sigma * sqrt(_VARIANCE / (2.0 * half))
+    if not np.abs(smooth).max() > _RIVALS * max(spread, 1e-300):
+        raise InvalidInput("transient", float(np.abs(smooth).max()), "it does not stand out of the noise")
+    found = [_maximum(whole, known, int(place), half, sigma) for place in _candidates(smooth, _RIVALS * spread)]
+    greatest = max(found, key=lambda each: each.value)
+    value, uncertainty = _greatest(np.array([[each.value, each.uncertainty] for each in found]))
+    return TransientPeak(
+        value=value,
+        uncertainty=uncertainty,
+        bias=_REMAINDER * greatest.value * (omega * half / sample_rate) ** 6,
+        time=greatest.place / sample_rate,
+        sign=greatest.sign,
+        window=half / sample_rate,
+        rivals=len(found) - 1,
+    )
+
+
+@dataclass(frozen=True)
+class _Maximum:
+    value: float
+    uncertainty: float
+    place: float
+    sign: int
+
+
+def _equivalent_noise(density: tuple[Array, Array], sample_rate: float) -> float:
+    """Standard deviation of the white noise that has the density of the slow part of the true one.
+
+    A fit sees that part alone; behind a filter the samples themselves scatter less, but are not independent.
+    """
+    frequency, power = density
+    slow = (frequency > _BAND[0]) & (frequency < _BAND[1])
+    return sqrt(float(np.mean(power[slow])) * 0.5 * sample_rate)
+
+
+def _sixth_moment(signal: Array, density: tuple[Array, Array], sample_rate: float) -> float:
+    """omega_6 [rad/s] of what stands out of the noise."""
+    from scipy.signal.windows import tukey
+
+    # a transient begins at rest, but may still swing at its end: without a taper its step there is at all frequencies
+    taper: Any = tukey(signal.size, 0.1)
+    frequency = np.fft.rfftfreq(signal.size, 1.0 / sample_rate)
+    power = np.abs(np.fft.rfft(signal * taper)) ** 2 * (2.0 / (sample_rate * signal.size))
+    floor = np.interp(frequency, density[0], density[1])
+    count = max(round(_SMOOTHED * signal.size / sample_rate), 1)
+    mean = np.convolve(power, np.full(count, 1.0 / count), mode="same")
+    seen = (mean > _STANDS_OUT * floor) & (frequency > 0.0) & (frequency < _BAND[1])
+    seen[max(int(power.argmax()), 1)] = True
+    power, place = power[seen], frequency[seen] / frequency[seen].max()
+    return 2.0 * pi * float(frequency[seen].max() * (np.sum(place**12 * power) / power.sum()) ** (1.0 / 12.0))
+
+
+def _half_width(amplitude: float, sigma: float, omega: float, samples: int) -> int:
+    """Half width of the window in samples; `omega` is omega_6 in rad per sample."""
+    # the derivative of squared shift and variance: 12 c^2 h^11 = 225/64 sigma^2 / (2 h^2)
+    best = (_VARIANCE * sigma**2 / (24.0 * (_REMAINDER * amplitude * omega**6) ** 2)) ** (1.0 / 13.0)
+    return max(int(min(best, _WIDEST / omega, (samples - 1) // 8)), _NARROWEST)
+
+
+def _smoothed(signal: Array, half: int) -> Array:
+    from scipy.signal import savgol_filter
+
+    return np.asarray(savgol_filter(signal, 2 * half + 1, DEGREE))
+
+
+def _candidates(smooth: Array, near: float) -> NDArray[np.intp]:
+    """Samples at local maxima of |smooth| that are less than `near` below the greatest."""
+    size = np.abs(smooth)
+    inner = np.flatnonzero((size[1:-1] >= size[:-2]) & (size[1:-1] > size[2:])) + 1
+    places = np.append(inner, size.argmax())
+    return np.unique(places[size[places] >= size.max() - near])
+
+
+def _maximum(signal: Array, known: NDArray[np.bool_], place: int, half: int, sigma: float) -> _Maximum:
+    """The turning point of the polynomial that is fitted around sample `place`."""
+    low, high = max(place - half, 0), min(place + half + 1, signal.size)
+    used = known[low:high]
+    if np.count_nonzero(used) < (1.0 - _MISSING) * (2 * half + 1):
+        raise InvalidInput("transient", f"sample {place}", "too few samples around its peak have a value")
+    powers = np.vander((np.arange(low, high)[used] - place) / half, DEGREE + 1, increasing=True)
+    inverse = np.linalg.pinv(powers)
+    polynomial = np.polynomial.Polynomial(inverse @ signal[low:high][used])
+    sign = 1 if polynomial(0.0) >= 0.0 else -1
+    slope, bend = polynomial.deriv(1), polynomial.deriv(2)
+    top = 0.0
+    if bend(0.0) * sign < 0.0:
+        for _ in range(3):
+            top = float(np.clip(top - slope(top) / bend(top), -0.5, 0.5))
+    order = np.arange(DEGREE + 1)
+    at, along = top**order @ inverse, (order * top ** np.maximum(order - 1, 0)) @ inverse
+    value = sign * float(polynomial(top))
+    if bend(top) * sign < 0.0:
+        # a turning point that noise has moved is higher than the true one
+        value -= 0.5 * sigma**2 * float(along @ along) / abs(float(bend(top)))
+    return _Maximum(value, sigma * float(np.linalg.norm(at)), place + top * half, sign)
+
+
+def _greatest(maxima: Array) -> tuple[float, float]:
+    """The greatest of maxima that are known but for their noise, and its standard uncertainty.
+
+    `maxima`: (value, uncertainty), shape (n, 2). The largest of several noisy values is too large. The true greatest mu
+    is the one at which what was seen is what is expected, no true value being above it. The others are taken half a
+    standard deviation higher than measured: near mu they look lower than they are because the greatest was chosen.
+    Of a bias of 2 standard deviations, for 24 equal maxima, less than a half of one is left, as of any fewer. The
+    uncertainty is that of one maximum: rivals do not make it better known.
+    """
+    values, spreads = maxima.T
+    top, widest = float(values.max()), float(spreads.max())
+    if values.size == 1:
+        return top, widest
+    noise = spreads * np.random.default_rng(_SEED).standard_normal((_DRAWS, values.size))
+    low, high = top - _RIVALS * widest, top
+    mu = top
+    for _ in range(_HALVINGS):
+        mu = 0.5 * (low + high)
+        seen = float((np.minimum(values + _RAISED * spreads, mu) + noise).max(axis=1).mean())
+        low, high = (low, mu) if seen > top else (mu, high)
+    return mu, widest

@@ -1,0 +1,96 @@
+"""`rockbench report FILE`: a page about a campaign that a researcher can attach to a paper."""
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import App, Parameter
+
+from bench.cli.refusal import tell
+from sim.errors import InvalidInput, RockbenchError
+
+if TYPE_CHECKING:
+    from bench.report.page.document import Document
+
+HTML = Annotated[Path | None, Parameter(name="--html", metavar="OUT", help="Write the report as one HTML file.")]
+PDF = Annotated[Path | None, Parameter(name="--pdf", metavar="OUT", help="Write the report as PDF, A4.")]
+OVERWRITE = Annotated[
+    bool,
+    Parameter(name="--overwrite", negative=(), show_default=False, help="Replace files that are there already."),
+]
+
+
+def report_app() -> App:
+    """`rockbench report`, a command of its own."""
+    app = App(name="report", help="Make a report of a campaign from its data file.", version_flags=())
+    app.default(report)
+    return app
+
+
+def report(
+    file: Annotated[Path, Parameter(metavar="FILE", help="Data file of a campaign (campaign.h5).")],
+    /,
+    *,
+    html: HTML = None,
+    pdf: PDF = None,
+    overwrite: OVERWRITE = False,
+) -> int:
+    """Make a report of a campaign from its data file.
+
+    One self-contained page: what was tested on what, figures like the paper's Fig. 3 to 9 from this file's data, tables
+    with uncertainties, measured against predicted, limits and warnings, provenance. Without --html and --pdf: HTML
+    beside FILE, with the ending .report.html. The exit code is 0 when it was made, 1 when it could not be written, 2
+    when something was refused before. Files that exist are kept unless --overwrite is given.
+    """
+    from bench.publication.campaign import Campaign
+    from bench.publication.report import campaign_report
+    from bench.record.reader import open_record
+
+    if html is None and pdf is None:
+        html = file.with_suffix(".report.html")
+    check_outputs(html, pdf, overwrite=overwrite)
+    with open_record(file) as record:
+        document = campaign_report(Campaign(file, record))
+    return written(document, html, pdf, overwrite=overwrite)
+
+
+def check_outputs(html: Path | None, pdf: Path | None, *, overwrite: bool) -> None:
+    """Refuse places where nothing can be written. Raises InvalidInput naming the option."""
+    for item, path in (("--html", html), ("--pdf", pdf)):
+        if path is None:
+            continue
+        if path.is_dir():
+            raise InvalidInput(item, str(path), "it is a folder; name a file in it")
+        if path.exists() and not overwrite:
+            raise InvalidInput(item, str(path), "it exists; name another, or give --overwrite")
+        if not path.parent.is_dir():
+            raise InvalidInput(item, str(path), "its folder does not exist; create it first")
+    if html is not None and pdf is not None and html.resolve() == pdf.resolve():
+        raise InvalidInput("--pdf", str(pdf), "--html goes there already; name another")
+
+
+def written(document: "Document", html: Path | None, pdf: Path | None, *, overwrite: bool) -> int:
+    """Write a report in the forms that are asked for; returns 0, or 1 with a line on standard error."""
+    from bench.report.files import write_new
+    from bench.report.page.html import html_page
+    from bench.report.page.pdf import write_pdf
+
+    try:
+        if html is not None:
+            text = html_page(document).encode("utf-8")
+            write_new(html, lambda unfinished: _write(unfinished, text), overwrite=overwrite)
+        if pdf is not None:
+            write_new(pdf, lambda unfinished: write_pdf(unfinished, document), overwrite=overwrite)
+    except InvalidInput:
+        raise
+    except (RockbenchError, OSError) as error:
+        tell(error)
+        return 1
+    for path in (html, pdf):
+        if path is not None:
+            print(f"report: {path}", file=sys.stdout)
+    return 0
+
+
+def _write(path: Path, content: bytes) -> None:
+    path.write_bytes(content)

@@ -1,0 +1,200 @@
+"""The paper's statements on harmonic motion, 1 to 7, as checks of what the model does.
+
+The claims are those of sections 3.3.1, 4.2 and 4.3. Steady motions are the rocking orbits, whose sections along the
+frequency are followed; nothing is waited for. Statement 8 is in `bench.prediction.seismic_statement`.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.prediction.verdicts import Check, Statement
+from sim.errors import RockbenchError
+from sim.gain import Layer, gain_spectrum, predict_gain
+from sim.linear import bare_modes
+from sim.specimen import Specimen
+
+Floats = NDArray[np.float64]
+
+LOW, HIGH, STEP = 12.5, 22.5, 0.05
+"""Frequencies of a section [rad/s]."""
+
+PAPER_HIGH = 20.0
+"""Highest frequency of the paper's spectra [rad/s]."""
+
+SECTIONS = (0.25, 0.64, 0.97)
+"""beta of the paper's sections S1, S2 and S3."""
+
+BETAS = (0.10, *SECTIONS[:1], 0.40, *SECTIONS[1:], 1.20)
+RIDGE = (0.10, 0.30, 0.50, 0.70, 0.90)
+
+POINTS = {"A": 16.0, "B": 14.0, "C": 17.5}
+"""Frequencies [rad/s] of the points of Fig. 4(b), all at beta 0.4."""
+
+POINTS_BETA = 0.4
+
+HERTZ = 0.05
+"""How near a frequency must be that is given to one decimal [Hz]."""
+
+NEAR = 0.5
+"""How near the least gain must be to the second mode [rad/s]: 3 %."""
+
+CLOSE = 0.3
+"""How near point C must be to the boundary of the gain region [rad/s]: 2 %."""
+
+PEAK = 0.1
+"""How near the peak of a spectrum must be to the frequency that the paper gives [rad/s]."""
+
+ALMOST = 30.0
+"""Degrees from phase or counter-phase that still are "almost"."""
+
+MUCH = 10.0
+"""A ratio that is "much": the factor by which the paper enlarges u1 beside theta."""
+
+
+def harmonic_statements(specimen: Specimen, amplitude: float) -> list[Statement]:
+    """Statements 1 to 7 under a sine of `amplitude` [m/s2]. Raises RockbenchError where there is no orbit."""
+    omegas = np.linspace(LOW, HIGH, round((HIGH - LOW) / STEP) + 1)
+    gains = {beta: _section(specimen, beta, omegas, amplitude) for beta in sorted({*BETAS, *RIDGE})}
+    points = {name: _rocking(specimen, omega, amplitude) for name, omega in POINTS.items()}
+    return [
+        _bare_frequencies(specimen),
+        _least_gain(specimen, omegas, gains),
+        _best_reduction(omegas, gains),
+        _points(specimen, amplitude, points),
+        _phases(points),
+        _peaks(omegas, gains),
+        _ridge(omegas, gains),
+    ]
+
+
+def lead_of_u1(layer: Layer) -> float:
+    """Phase [degrees] by which u1 leads theta, in the fundamental of the drive and the paper's positive directions."""
+    table = layer.orbit.samples(720)
+    wave = np.exp(-1j * table[:, 0])
+    return float(np.degrees(np.angle((table[:, 1] @ wave) / (table[:, 3] @ wave))))
+
+
+def _section(specimen: Specimen, beta: float, omegas: Floats, amplitude: float) -> Floats:
+    """alpha_2 of the rocking motion along the frequency, shape of `omegas`; NaN where none was found."""
+    spectrum = gain_spectrum(specimen.coupled(beta), omegas, amplitude)
+    return np.array([np.nan if each.rocking is None else each.rocking.alpha_2 for each in spectrum])
+
+
+def _rocking(specimen: Specimen, omega: float, amplitude: float) -> Layer:
+    layer = predict_gain(specimen.coupled(POINTS_BETA), omega, amplitude).rocking
+    if layer is None:
+        raise RockbenchError(f"no rocking motion at {omega:g} rad/s and beta {POINTS_BETA:g}: nothing to check there")
+    return layer
+
+
+def _bare_frequencies(specimen: Specimen) -> Statement:
+    first, second = (float(value) for value in bare_modes(specimen.frame).hertz)
+    found = f"{first:.3f} Hz and {second:.3f} Hz"
+    holds = abs(first - 1.0) <= HERTZ and 2.5 - HERTZ <= second <= 2.6 + HERTZ
+    check = Check("f₁ is 1.0 Hz, f₂ 2.5 to 2.6 Hz", found, holds, {"f1": first, "f2": second})
+    return Statement(1, "Frequencies of the bare frame", [check])
+
+
+def _least_gain(specimen: Specimen, omegas: Floats, gains: Mapping[float, Floats]) -> Statement:
+    mode = float(bare_modes(specimen.frame).omega[1])
+    places = {beta: float(omegas[np.nanargmin(gains[beta])]) for beta in BETAS}
+    found = _listed(places, "{:.2f}") + " rad/s"
+    holds = all(abs(place - mode) <= NEAR for place in places.values())
+    claim = f"α₂ is least within {NEAR:g} rad/s of the second bare mode, {mode:.2f} rad/s, for every β"
+    check = Check(claim, found, holds, {f"least at {beta:g}": place for beta, place in places.items()})
+    return Statement(2, "Least drift near the second mode of the bare frame", [check])
+
+
+def _best_reduction(omegas: Floats, gains: Mapping[float, Floats]) -> Statement:
+    least = {beta: float(np.nanmin(gains[beta])) for beta in BETAS}
+    best = min(least, key=lambda beta: least[beta])
+    place = float(omegas[np.nanargmin(gains[best])])
+    found = (
+        f"least α₂ {least[best]:.4f} (reduction {100.0 * (1.0 - least[best]):.0f} %) at β {best:g}, {place:.2f} rad/s"
+    )
+    values = {f"alpha_2 at {beta:g}": value for beta, value in least.items()}
+    check = Check("the drift is reduced by 80 % and more at best", found, least[best] <= 0.2, values)
+    return Statement(3, "Best reduction of the drift", [check])
+
+
+def _points(specimen: Specimen, amplitude: float, points: Mapping[str, Layer]) -> Statement:
+    a, b, c = (points[name].alpha_2 for name in "ABC")
+    order = Check("α₂(A) < α₂(B) < 1", f"α₂ is {a:.4f} at A and {b:.4f} at B", a < b < 1.0, {"A": a, "B": b})
+    omegas = np.linspace(16.5, 19.0, 251)
+    section = _section(specimen, POINTS_BETA, omegas, amplitude)
+    above = np.flatnonzero(section > 1.0)
+    boundary = float(omegas[above[0]]) if above.size else float("nan")
+    near = Check(
+        f"C lies within {CLOSE:g} rad/s of the boundary α₂ = 1",
+        f"α₂ is {c:.4f} at C (17.5 rad/s) and passes 1 at {boundary:.2f} rad/s",
+        abs(boundary - POINTS["C"]) <= CLOSE,
+        {"C": c, "boundary": boundary},
+    )
+    return Statement(4, "Points A, B and C of the gain map", [order, near])
+
+
+def _phases(points: Mapping[str, Layer]) -> Statement:
+    """u1 > 0 is towards the block, theta > 0 turns it towards the frame: equal signs are opposite motions."""
+    apart = {name: abs(lead_of_u1(layer)) for name, layer in points.items()}
+    ratio = {name: layer.orbit.peaks.theta / layer.orbit.peaks.u1 for name, layer in points.items()}
+    at_a = Check(
+        f"at A, u₁ and ϑ move within {ALMOST:g}° of counter-phase",
+        f"{apart['A']:.1f}° from counter-phase",
+        apart["A"] <= ALMOST,
+        {"A": apart["A"]},
+    )
+    at_c = Check(
+        f"at C, u₁ and ϑ move within {ALMOST:g}° of phase",
+        f"{180.0 - apart['C']:.1f}° from phase, {apart['C']:.1f}° from counter-phase",
+        180.0 - apart["C"] <= ALMOST,
+        {"C": apart["C"]},
+        expected=False,
+    )
+    small = Check(
+        f"at A and B the largest |ϑ| [rad] is {MUCH:g} times the largest |u₁| [m] and more",
+        f"{ratio['A']:.1f} rad/m at A, {ratio['B']:.0f} rad/m at B, {ratio['C']:.1f} rad/m at C",
+        min(ratio["A"], ratio["B"]) >= MUCH,
+        {f"ratio {name}": value for name, value in ratio.items()},
+    )
+    return Statement(5, "First storey and block at A, B and C", [at_a, at_c, small])
+
+
+def _peaks(omegas: Floats, gains: Mapping[float, Floats]) -> Statement:
+    first = gains[SECTIONS[0]]
+    place, height = float(omegas[np.nanargmax(first)]), float(np.nanmax(first))
+    peak = Check(
+        f"at β {SECTIONS[0]:g} the spectrum peaks within {PEAK:g} rad/s of 18.0 rad/s",
+        f"α₂ {height:.2f} at {place:.2f} rad/s",
+        abs(place - 18.0) <= PEAK + 1e-9,
+        {"peak": place, "height": height},
+    )
+    inside = omegas <= PAPER_HIGH + 1e-9
+    interior = {beta: _peaks_inside(gains[beta][inside]) for beta in SECTIONS[1:]}
+    beyond = {beta: float(omegas[np.nanargmax(gains[beta])]) for beta in SECTIONS[1:]}
+    none = Check(
+        f"at β {SECTIONS[1]:g} and {SECTIONS[2]:g} there is no peak from {LOW:g} to {PAPER_HIGH:g} rad/s",
+        "none; the largest gains lie at " + _listed(beyond, "{:.2f}") + " rad/s"
+        if not any(interior.values())
+        else f"peaks inside: {_listed(interior, '{:.0f}')}",
+        not any(interior.values()),
+        {f"largest at {beta:g}": place for beta, place in beyond.items()},
+    )
+    return Statement(6, "Peaks of the gain spectra", [peak, none])
+
+
+def _peaks_inside(gain: Floats) -> int:
+    return int(((gain[1:-1] > gain[:-2]) & (gain[1:-1] > gain[2:])).sum())
+
+
+def _ridge(omegas: Floats, gains: Mapping[float, Floats]) -> Statement:
+    ridge = {beta: float(omegas[np.nanargmax(gains[beta])]) for beta in RIDGE}
+    holds = bool((np.diff(list(ridge.values())) > 0.0).all())
+    values = {f"ridge at {beta:g}": place for beta, place in ridge.items()}
+    check = Check("the frequency of the largest α₂ grows with β", _listed(ridge, "{:.2f}") + " rad/s", holds, values)
+    return Statement(7, "Ridge of the gain map", [check])
+
+
+def _listed(values: Mapping[float, float], form: str) -> str:
+    return ", ".join(f"{form.format(value)} (β {beta:g})" for beta, value in values.items())

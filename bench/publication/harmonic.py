@@ -1,0 +1,205 @@
+"""Steady tests under a sine: measured against predicted, spectra as in Fig. 6, cycles as in Fig. 5 of the paper."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from bench.analysis.signals import SignalMap
+from bench.prediction.model_uncertainty import expanded_uncertainty
+from bench.publication.campaign import Campaign
+from bench.publication.cycles import Dwells
+from bench.publication.numbers import ABSENT, percent, plain, with_uncertainty, yes_or_no
+from bench.record.tables import arrays
+from bench.report.figure import gain_spectra
+from bench.report.map_figure import MapPoint
+from bench.report.measured_figure import MeasuredMotion, measured_figure
+from bench.report.page.document import Column, Listing, Notice, Part, Picture, Section, Table
+from sim.errors import InvalidInput
+from sim.gain import Layer, predict_gain
+
+ROWS = 4
+"""Points in a figure of cycles."""
+
+NONE = "There is no harmonic test in this file."
+
+LAYERS = "rocking", "resting"
+
+
+def results_section(campaign: Campaign) -> Section:
+    """Every point: measured and predicted gain with their uncertainties, and how it was reached."""
+    points = campaign.harmonic_points
+    parts: list[Part] = [NONE]
+    if points:
+        compared = [row["agrees"] for row in points if row["agrees"] is not None]
+        parts = [
+            f"{len(points)} points were tested; {len(compared)} have a steady motion to compare, and {sum(compared)} "
+            "of those agree with the prediction: within 2 % or the measurement's uncertainty, whichever is larger. "
+            "Both gains are for the achieved amplitudes of the table and for the layer on which the point lies. The "
+            "uncertainty of a measured gain is expanded (k = 2) and holds sensors and scatter; that of a predicted one "
+            "(k = 2, to first order) is what the half widths of the specimen's parameters leave open.",
+            _gains(campaign, points),
+            _conditions(points),
+        ]
+        remarks = [
+            f"β {row['beta']:g}, Ω {row['omega_rad_s']:g} rad/s: {row['reason']}" for row in points if row["reason"]
+        ]
+        if remarks:
+            parts += ["What was noticed at single points:", Listing(remarks)]
+    return Section("results", "Harmonic tests: measured against predicted", parts)
+
+
+def spectra_section(campaign: Campaign) -> Section:
+    """Gain spectra: the prediction that the file holds, and the points."""
+    points, table = campaign.harmonic_points, campaign.record.tables.get("prediction", {})
+    drawn = {"omega", "beta", "alpha_2", "stable", "layer"} <= table.keys()
+    parts: list[Part] = [NONE]
+    if points and drawn:
+        figure = gain_spectra(points, arrays(table))
+        text = (
+            "Gain spectra: measured points with expanded uncertainty (k = 2), and the prediction made before the test."
+        )
+        description = "Gain of the peak drift over frequency, logarithmic, a panel for each stiffness ratio."
+        parts = [Picture(figure, text, description)]
+    elif points:
+        parts = ["The file holds no predicted spectra."]
+    return Section("spectra", "Gain spectra (as Fig. 6 of the paper)", parts)
+
+
+def histories_section(campaign: Campaign) -> Section:
+    """The last measured cycles of every point beside the predicted motion."""
+    points = [row for row in campaign.harmonic_points if row["drift_peak_m"] is not None]
+    parts: list[Part] = [NONE]
+    if points:
+        parts = _histories(campaign, points)
+    return Section("histories", "Time histories (as Fig. 5 of the paper)", parts)
+
+
+def map_points(campaign: Campaign) -> list[MapPoint]:
+    """The measured points for the gain map."""
+    return [MapPoint(row["omega_rad_s"], row["beta"], row["layer"], row["alpha_2"]) for row in campaign.harmonic_points]
+
+
+def _histories(campaign: Campaign, points: Sequence[Mapping[str, Any]]) -> list[Part]:
+    configuration = campaign.configuration
+    if configuration is None:
+        return [Notice("Not drawn: the configuration in this file is not one that this version of the software knows.")]
+    try:
+        dwells = Dwells(campaign, SignalMap(campaign.record.channels, configuration.laser_reference))
+    except InvalidInput as refused:
+        return [Notice(f"Not drawn: {refused}.")]
+    drawn: list[MeasuredMotion] = []
+    missing: list[str] = []
+    for row in points:
+        motion = dwells.motion(row, _layer(campaign, row))
+        if motion is None:
+            missing.append(f"β {row['beta']:g}, Ω {row['omega_rad_s']:g} rad/s")
+        else:
+            drawn.append(motion)
+    parts: list[Part] = [
+        "The last measured cycles from the raw channels, counted from the zero taken at rest, in the phase of the "
+        "measured table acceleration; the delays of the sensors are in them. u₁ is relative to the table. ϑ is not "
+        "measured: it is the predicted one, and so are the thin dotted curves, for the achieved amplitude."
+    ]
+    for beta in sorted({motion.beta for motion in drawn}):
+        of_spring = [motion for motion in drawn if motion.beta == beta]
+        parts += [
+            Picture(
+                measured_figure(of_spring[first : first + ROWS]),
+                f"Measured cycles at β = {beta:g}: drift of the coupled and the bare frame (left), u₁ and the "
+                "predicted ϑ (right).",
+                "Curves of drift, first storey displacement and predicted rocking angle over three periods.",
+            )
+            for first in range(0, len(of_spring), ROWS)
+        ]
+    if missing:
+        parts.append(f"The file does not hold the cycles of {'; '.join(missing)}.")
+    return parts
+
+
+def _layer(campaign: Campaign, row: Mapping[str, Any]) -> Layer | None:
+    """The steady motion of the model at the achieved amplitudes."""
+    if row["amplitude_m_s2"] is None or row["layer"] not in LAYERS:
+        return None
+    specimen = campaign.specimen.coupled(row["beta"])
+    return predict_gain(specimen, row["omega_rad_s"], row["amplitude_m_s2"], row["bare_amplitude_m_s2"]).layers.get(
+        row["layer"]
+    )
+
+
+def _gains(campaign: Campaign, points: Sequence[Mapping[str, Any]]) -> Table:
+    columns = [
+        Column("β", "1"),
+        Column("Ω", "rad/s"),
+        Column("status", words=True),
+        Column("layer", words=True),
+        Column("α₂ measured", "1"),
+        Column("α₂ predicted", "1"),
+        Column("difference", "%"),
+        Column("agrees", words=True),
+        Column("orbit", words=True),
+    ]
+    rows: list[list[str]] = []
+    for row in points:
+        measured, predicted = row["alpha_2"], row["alpha_2_predicted"]
+        layer = _layer(campaign, row)
+        open_ = None if layer is None else expanded_uncertainty(layer, campaign.uncertainty)
+        stable = row["predicted_stable"]
+        rows.append(
+            [
+                f"{row['beta']:g}",
+                f"{row['omega_rad_s']:g}",
+                row["status"],
+                row["layer"],
+                with_uncertainty(measured, row["alpha_2_uncertainty"]),
+                with_uncertainty(predicted, open_),
+                percent(measured / predicted - 1.0) if measured is not None and predicted else ABSENT,
+                yes_or_no(row["agrees"]),
+                ABSENT if stable is None else "stable" if stable else "unstable",
+            ]
+        )
+    return Table("Gain coefficient α₂, measured and predicted (expanded uncertainties, k = 2)", columns, rows)
+
+
+def _conditions(points: Sequence[Mapping[str, Any]]) -> Table:
+    columns = [
+        Column("β", "1"),
+        Column("Ω", "rad/s"),
+        Column("peak drift, coupled", "mm"),
+        Column("peak drift, bare", "mm"),
+        Column("table, coupled", "m/s²"),
+        Column("table, bare", "m/s²"),
+        Column("amplitude error", "%"),
+        Column("phase error", "°"),
+        Column("table's THD", "%"),
+        Column("cycles"),
+        Column("settled", "s"),
+        Column("starts"),
+    ]
+    rows: list[list[str]] = []
+    for row in points:
+        phase = row.get("phase_error_rad")
+        distortion = row.get("table_harmonics")
+        rows.append(
+            [
+                f"{row['beta']:g}",
+                f"{row['omega_rad_s']:g}",
+                plain(_times(row["drift_peak_m"], 1e3)),
+                plain(_times(row["bare_drift_peak_m"], 1e3)),
+                plain(row["amplitude_m_s2"], 5),
+                plain(row["bare_amplitude_m_s2"], 5),
+                percent(row["amplitude_error"], 3),
+                plain(_times(phase, 57.29577951308232), 2),
+                plain(_times(distortion, 100.0), 2),
+                plain(row["cycles_measured"]),
+                plain(row["settle_time_s"], 3),
+                plain(row["starts_tried"]),
+            ]
+        )
+    caption = (
+        "How the points were reached. The scales of the lasers cancel in α₂, and with them most of the uncertainty of "
+        "the peaks; the accelerometer's is common to both tests"
+    )
+    return Table(caption, columns, rows)
+
+
+def _times(value: float | None, factor: float) -> float | None:
+    return None if value is None else factor * value

@@ -1,0 +1,1 @@
+"""A report as data, and its two forms: one HTML file without references to others, and PDF pages."""

@@ -1,0 +1,1 @@
+"""The seismic campaign of the paper, section 5."""

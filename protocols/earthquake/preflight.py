@@ -1,0 +1,117 @@
+"""What a seismic campaign will ask of the bench: every record with every specimen, over what is not known of it."""
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from importlib import import_module
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.config.model import BenchConfiguration
+from bench.preflight.bounds import bounds
+from bench.preflight.forecast import Demand, Forecast, Stage
+from bench.preflight.response import response_of
+from protocols.earthquake.asked import Travel, load, travel
+from protocols.earthquake.pace import Pace
+from protocols.earthquake.parameters import EarthquakeParameters
+from protocols.earthquake.records import Shaking, shakings
+from sim.specimen import Specimen
+
+Array = NDArray[np.float64]
+
+DRAWS, SEED, LIKELY = 32, 8, 0.95
+"""Specimens that are drawn besides the assumed one, their seed, and the share of them that a likely demand covers."""
+
+OFF = 0.03
+"""Share by which the table's motion may be off, and every quantity of it above what was asked: noise, friction."""
+
+IMPACTS = 0.15
+"""The same for what is fast where a block rocks, for what its impacts raise: no drive cancels them."""
+
+OFF_MIDDLE = 0.015
+"""Share of half its range by which a storey may rest off the laser's middle."""
+
+_RAISED = ("acceleration", "force", "current")
+
+_UNKNOWN = {
+    "drive_voltage": "nothing is known of this table yet: it is identified first",
+    "drive_slew": "nothing is known of this table yet: it is identified first",
+    "force": "the moving mass is not known: give hardware.moving_mass and hardware.force_constant",
+    "current": "the force constant is not known: give hardware.moving_mass and hardware.force_constant",
+    "heating": "the force constant is not known: give hardware.moving_mass and hardware.force_constant",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class _Asked:
+    """What one record asks of each quantity, shape (1 + DRAWS,), as assumed first; `chance` that the block stands."""
+
+    name: str
+    values: dict[str, Array]
+    chance: float | None
+
+
+def forecast(parameters: EarthquakeParameters, configuration: BenchConfiguration) -> Forecast:
+    """The demands of every record with the bare frame and with every spring, and the chance that the block stands.
+
+    Raises InvalidInput for a record that cannot be read or prepared, or a table model that cannot be used.
+    """
+    found = shakings(parameters, configuration)
+    specimens = [configuration.specimen.bare(), *map(configuration.specimen.coupled, parameters.beta)]
+    asked = [_asked(shaking, specimen, configuration) for shaking in found for specimen in specimens]
+    return Forecast(
+        demands=tuple(_demand(quantity, asked) for quantity in bounds(configuration)),
+        stages=tuple(Stage(each.name, (), each.chance) for each in asked),
+        duration=Pace(parameters, found).total,
+    )
+
+
+def _asked(shaking: Shaking, specimen: Specimen, configuration: BenchConfiguration) -> _Asked:
+    block = specimen.block.mass if specimen.beta is not None else 0.0
+    payload = specimen.frame.m1 + specimen.frame.m2 + block
+    loads = load(shaking, payload, configuration, response_of(configuration))
+    raised = _RAISED if specimen.beta is not None else ()
+    factors = np.concatenate(([1.0], 1.0 + OFF * np.random.default_rng(SEED).uniform(-1.0, 1.0, DRAWS)))
+    values = {
+        quantity: factors * value * (1.0 + (IMPACTS if quantity in raised else OFF))
+        for quantity, value in loads.items()
+    }
+    travels = _travels(shaking, specimen, factors, configuration)
+    halves = [0.5 * whole for whole in configuration.laser_ranges]
+    values |= {
+        "laser_1": np.array([each.storey_1 for each in travels]) / halves[0] + OFF_MIDDLE,
+        "laser_2": np.array([each.storey_2 for each in travels]) / halves[1] + OFF_MIDDLE,
+        "drift": np.array([each.drift for each in travels]),
+    }
+    mounted = "the bare frame" if specimen.beta is None else f"beta = {specimen.beta:g}"
+    stood = sum(each.toppled is None for each in travels[1:])
+    chance = None if specimen.beta is None else (stood + 1) / (DRAWS + 2)
+    return _Asked(f"{shaking.name} with {mounted}", values, chance)
+
+
+def _travels(
+    shaking: Shaking, specimen: Specimen, factors: Array, configuration: BenchConfiguration
+) -> Sequence[Travel]:
+    """Motion of the specimen as assumed and as drawn, on all processors."""
+    import_module("sim.kernel.rocking")  # compiled once, before the threads start
+    drawn = [specimen, *configuration.uncertainty.draws(specimen, DRAWS, np.random.default_rng(SEED))]
+    grounded = configuration.laser_reference == "ground"
+
+    def one(k: int) -> Travel:
+        return travel(drawn[k], shaking, float(factors[k]), grounded)
+
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        return list(pool.map(one, range(len(drawn))))
+
+
+def _demand(quantity: str, asked: Sequence[_Asked]) -> Demand:
+    known = [each for each in asked if quantity in each.values]
+    if not known:
+        return Demand(quantity, None, None, _UNKNOWN[quantity])
+    values = np.array([each.values[quantity] for each in known])
+    where, most = int(values[:, 0].argmax()), values.max(axis=0)
+    likely = max(float(np.quantile(most[1:], LIKELY)), float(most[0]))
+    storey = {"laser_1": "storey 1 in ", "laser_2": "storey 2 in "}.get(quantity, "")
+    return Demand(quantity, float(most[0]), likely, f"{storey}{known[where].name}")

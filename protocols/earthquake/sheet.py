@@ -1,0 +1,166 @@
+"""The lab sheet of the seismic campaign (section 5 of the paper).
+
+1. The bare frame: identify the table unless it is known, then for every record learn the drive that makes the table
+   follow it, and play that drive once more to measure.
+2. For each spring: mount it, and play every record with the drive that was learned with the bare frame. A record that
+   topples the block is ended there, and the block is stood up for the next one.
+
+The springs are the outer loop: changing one is hand work.
+"""
+
+from collections.abc import Generator
+
+import numpy as np
+
+from bench.analysis.signals import DRIFT
+from bench.config.model import BenchConfiguration
+from bench.control.replication import ReplicationParameters
+from bench.control.table_model import TableModel
+from bench.engine.steps import Arm, Fallen, Handle, Outcome, Plan, Play, Played, RampOut, Say, Step
+from bench.events import PointFinished, StepStarted, Warned
+from drivers.rig import Handwork, RigError
+from protocols.earthquake.histories import Histories
+from protocols.earthquake.judge import BareTest, measured, not_played, overturned
+from protocols.earthquake.live import History, Watch
+from protocols.earthquake.observed import observe
+from protocols.earthquake.pace import Pace
+from protocols.earthquake.parameters import EarthquakeParameters
+from protocols.earthquake.point import EarthquakePoint
+from protocols.earthquake.prediction import target_gains
+from protocols.earthquake.records import Shaking, shakings
+from protocols.earthquake.shaken import tracking
+from protocols.earthquake.table import table_for
+from protocols.replicate import Replicated, replicate
+from sim.errors import InvalidInput
+from sim.specimen import Specimen
+
+NO_BLOCK = "the first storey is pulled aside although the block was taken off: check lasers and specimen"
+
+FALLEN_REQUEST = "The block has fallen: stand it up again."
+
+SEED = 5
+"""Of the Monte Carlo behind the first point; each further one has the next."""
+
+
+class EarthquakeSheet:
+    """One campaign on one bench: what the plan knows and gathers while it runs."""
+
+    def __init__(
+        self, parameters: EarthquakeParameters, configuration: BenchConfiguration, histories: Histories
+    ) -> None:
+        self._parameters, self._configuration, self._histories = parameters, configuration, histories
+        self._specimen = configuration.specimen
+        self._shakings = shakings(parameters, configuration)
+        self._targets = target_gains(parameters, configuration)
+        self._pace = Pace(parameters, self._shakings)
+        self._bare: dict[str, BareTest | str] = {}
+        self._points = 0
+
+    def plan(self) -> Plan:
+        """The whole campaign as steps."""
+        model = yield from table_for(self._parameters, self._configuration)
+        self._pace.identified()
+        for shaking in self._shakings:
+            self._bare[shaking.name] = yield from self._bare_frame(shaking, model)
+            self._pace.finished(shaking.name, self._parameters.passes + 1)
+            yield Say(self._pace.progress(f"finished {shaking.name}, bare frame"))
+        for beta in self._parameters.beta:
+            yield from self._spring(self._specimen.coupled(beta))
+
+    def _bare_frame(self, shaking: Shaking, model: TableModel) -> Generator[Step, Outcome, BareTest | str]:
+        """The bare frame's test, or why there is none."""
+        p = self._parameters
+        learning = ReplicationParameters(passes=p.passes, tolerance=p.tolerance)
+        try:
+            learned = yield from replicate(shaking.target, model, self._configuration.limits, learning, shaking.name)
+        except InvalidInput as refused:
+            # what one record asks beyond the limits does not keep the others from being played
+            yield Say(Warned(0.0, f"{shaking.name} is not played: {refused}"))
+            return f"the table cannot make it: {refused}"
+        if learned.fell:
+            raise RigError(NO_BLOCK)
+        if learned.status == "limited":
+            yield Say(Warned(0.0, f"{shaking.name} is not played: {_limit(learned)}"))
+            return f"the table cannot make it: {_limit(learned)}"
+        yield Say(StepStarted(0.0, f"{shaking.name}, bare frame"))
+        watch = Watch(shaking.name, None, shaking.target.sample_rate)
+        outcome = yield from self._play(shaking, learned.drive, watch)
+        if not isinstance(outcome, Played):
+            raise RigError(NO_BLOCK)
+        rate = shaking.target.sample_rate
+        try:
+            observed = observe(outcome.signals, shaking.target.rest, rate)
+        except InvalidInput as lost:
+            yield Say(Warned(0.0, f"{shaking.name}, bare frame, shows no peak: {lost}"))
+            return f"the bare frame shows no peak: {lost}"
+        self._histories.bare(shaking, outcome.signals, History.of(self._specimen.bare(), observed.base).drift)
+        return BareTest(
+            learned.drive,
+            learned.passes,
+            learned.status,
+            observed,
+            outcome.signals,
+            tracking(shaking, outcome.signals),
+        )
+
+    def _spring(self, specimen: Specimen) -> Generator[Step, Outcome, None]:
+        request = f"Stand the block on its base and mount the spring of beta = {specimen.beta:g}."
+        yield Handle(Handwork.MOUNT_SPRING, specimen, request)
+        for shaking in self._shakings:
+            bare = self._bare[shaking.name]
+            if isinstance(bare, BareTest):
+                point = yield from self._point(shaking, specimen, bare)
+            else:
+                point = not_played(shaking, specimen.beta or 0.0, self._target(shaking, specimen), None, bare)
+            self._pace.finished(shaking.name)
+            yield Say(self._pace.progress(f"finished {shaking.name}, beta = {specimen.beta:g}"))
+            yield Say(PointFinished(0.0, point))
+
+    def _point(self, shaking: Shaking, specimen: Specimen, bare: BareTest) -> Generator[Step, Outcome, EarthquakePoint]:
+        yield Say(StepStarted(0.0, f"{shaking.name}, beta = {specimen.beta:g}"))
+        outcome = yield from self._play(shaking, bare.drive, self._watch(shaking, specimen, bare))
+        if isinstance(outcome, Fallen):
+            yield Handle(Handwork.STAND_BLOCK_UP, specimen, FALLEN_REQUEST)
+        self._points += 1
+        target, p = self._target(shaking, specimen), self._parameters
+        seed = SEED + self._points
+        if isinstance(outcome, Played):
+            rate = shaking.target.sample_rate
+            try:
+                observed = observe(outcome.signals, shaking.target.rest, rate)
+            except InvalidInput as lost:
+                return not_played(shaking, specimen.beta or 0.0, target, bare, f"no peak is to be seen: {lost}")
+            expected = History.of(specimen, observed.base).drift
+            self._histories.coupled(shaking, specimen.beta or 0.0, outcome.signals, expected)
+            return measured(
+                shaking, specimen, bare, outcome.signals, observed, target, self._configuration, p.draws, seed
+            )
+        signals = bare.signals[:0] if outcome.signals is None else outcome.signals
+        return overturned(shaking, specimen, bare, signals, target, self._configuration, p.draws, seed)
+
+    def _play(
+        self, shaking: Shaking, drive: np.ndarray[tuple[int], np.dtype[np.float64]], watch: Watch
+    ) -> Generator[Step, Outcome, Played | Fallen]:
+        """Play a drive and its decay, and ramp out; a block that falls on the way out has fallen under the record."""
+        yield Arm(self._parameters.rest)
+        outcome = yield Play(shaking.volts(drive, self._parameters.decay), watch)
+        ended = yield RampOut(fast=isinstance(outcome, Fallen))
+        if isinstance(outcome, Played):
+            return Fallen(outcome.signals) if isinstance(ended, Fallen) else outcome
+        if isinstance(outcome, Fallen):
+            return outcome
+        raise RigError("a drive was played and nothing came of it")
+
+    def _watch(self, shaking: Shaking, specimen: Specimen, bare: BareTest) -> Watch:
+        """The running gain; its prediction is for the motion that this drive made with the bare frame."""
+        base = bare.observed.base
+        expected = (History.of(specimen.bare(), base), History.of(specimen, base))
+        noise = bare.observed.drift.peak.uncertainty
+        return Watch(shaking.name, specimen.beta, shaking.target.sample_rate, bare.signals[:, DRIFT], noise, expected)
+
+    def _target(self, shaking: Shaking, specimen: Specimen) -> float | None:
+        return self._targets[shaking.name, specimen.beta or 0.0]
+
+
+def _limit(learned: Replicated) -> str:
+    return str(learned.passes[-1].verdict) if learned.passes else "its drive is beyond a limit"
