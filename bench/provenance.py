@@ -1,13 +1,44 @@
 """What software made a result."""
 
+import json
 import platform
-from importlib.metadata import PackageNotFoundError, version
+import subprocess
+from importlib.metadata import PackageNotFoundError, distribution, version
+from pathlib import Path
 
 
 def software() -> dict[str, str]:
     """Versions of this program, of Python and of the libraries that numbers depend on."""
     found = {"rocking-bench": _version("rocking-bench"), "python": platform.python_version()}
     return found | {name: _version(name) for name in ("numpy", "scipy", "numba", "h5py")}
+
+
+def revision() -> str:
+    """Git hash of this program, with "+" where its files were changed since; "unknown" when neither tells it."""
+    here = Path(__file__).parent
+    try:
+        found = subprocess.run(
+            ["git", "describe", "--always", "--abbrev=40", "--exclude=*", "--dirty=+"],
+            cwd=here,
+            capture_output=True,
+            text=True,
+            timeout=10.0,
+            check=True,
+        )
+        # a program that was installed into some other project's checkout is no part of it
+        subprocess.run(["git", "ls-files", "--error-unmatch", __file__], cwd=here, capture_output=True, check=True)
+        return found.stdout.strip()
+    except (OSError, subprocess.SubprocessError):
+        return _installed_revision()
+
+
+def _installed_revision() -> str:
+    """The hash that the installer noted when it took the program from a repository."""
+    try:
+        noted = json.loads(distribution("rocking-bench").read_text("direct_url.json") or "{}")
+    except (PackageNotFoundError, OSError, json.JSONDecodeError):
+        return "unknown"
+    return str(noted.get("vcs_info", {}).get("commit_id", "unknown"))
 
 
 def _version(name: str) -> str:

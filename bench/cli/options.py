@@ -50,6 +50,20 @@ class Options:
             name="--seed", metavar="INT", group=_RUN, help="Seed of the simulation, in place of the configuration's."
         ),
     ] = None
+    operator: Annotated[
+        str, Parameter(name="--operator", metavar="NAME", group=_RUN, help="Who runs it; kept in the data file.")
+    ] = ""
+    note: Annotated[
+        tuple[str, ...],
+        Parameter(
+            name="--note",
+            metavar="TEXT",
+            group=_RUN,
+            negative=(),
+            show_default=False,
+            help="Something to remember; kept in the data file. May be given several times.",
+        ),
+    ] = ()
     dry_run: Annotated[
         bool,
         Parameter(
@@ -100,6 +114,12 @@ class Options:
             help="Print one JSON object, the summary of the run or its margins, on standard output, and nothing else.",
         ),
     ] = False
+
+    @property
+    def about(self) -> dict[str, str]:
+        """What is kept in the data file about the run and changes nothing in it."""
+        told = {"operator": self.operator, "notes": "\n".join(self.note)}
+        return {name: text for name, text in told.items() if text}
 
 
 def arguments_of_options() -> list[Argument]:

@@ -57,7 +57,8 @@ class Row:
         value, predicted = point.get("alpha_2"), point.get("alpha_2_predicted")
         agrees, starts = point.get("agrees"), point.get("starts_tried")
         unstable = point.get("predicted_stable") is False
-        effort = f"{point.get('cycles_measured', 0)} cycles"
+        passes = f"{point.get('passes', 0)} passes"
+        effort = f"{point['cycles_measured']} cycles" if "cycles_measured" in point else passes
         return Row(
             omega=one_line(str(point["record"])) if "record" in point else setting(point.get("omega_rad_s")),
             beta=setting(point.get("beta")),

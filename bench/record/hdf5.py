@@ -8,87 +8,31 @@ import os
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, Protocol, TypeGuard, cast
+from typing import Any, TypeGuard, cast
 
 import h5py
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from bench.record.errors import RecordError
+from bench.record.hdf5_types import Dataset as Dataset
+from bench.record.hdf5_types import File as File
+from bench.record.hdf5_types import Group as Group
 from bench.record.superblock import Quiet, is_let_go
 
 # The oldest format that can be read while it is written; it is also fixed, so older tools keep up with newer writers.
 VERSIONS = ("v110", "v110")
 # Shares in a laboratory may not offer locks; mode "x" and the single-writer mode protect the file without them.
 LOCKING = "best-effort"
-PAGE = 4096
+PAGE = 1024
 # Filters that every HDF5 library has, so that MATLAB and web viewers read the file; measured in decision 10.
 FILTERS: dict[str, Any] = {"shuffle": True, "compression": "gzip", "compression_opts": 1}
-
-
-class Attributes(Protocol):
-    """The attributes of a group or dataset."""
-
-    def __getitem__(self, name: str) -> Any: ...
-    def __setitem__(self, name: str, value: object) -> None: ...
-    def __contains__(self, name: object) -> bool: ...
-    def __iter__(self) -> Iterator[str]: ...
-    def get(self, name: str, default: object = None) -> Any: ...
-
-
-class Dataset(Protocol):
-    """An array in the file, or a scalar (shape ())."""
-
-    @property
-    def name(self) -> str: ...
-    @property
-    def attrs(self) -> Attributes: ...
-    @property
-    def dtype(self) -> np.dtype[Any]: ...
-    @property
-    def shape(self) -> tuple[int, ...]: ...
-    @property
-    def maxshape(self) -> tuple[int | None, ...]: ...
-    @property
-    def chunks(self) -> tuple[int, ...] | None: ...
-    @property
-    def compression(self) -> str | None: ...
-    def __getitem__(self, key: object) -> Any: ...
-    def __setitem__(self, key: object, value: object) -> None: ...
-    def resize(self, size: tuple[int, ...]) -> None: ...
-    def refresh(self) -> None: ...
-
-
-class Group(Protocol):
-    """A folder in the file."""
-
-    @property
-    def name(self) -> str: ...
-    @property
-    def attrs(self) -> Attributes: ...
-    def create_group(self, name: str, track_order: bool) -> "Group": ...
-    def create_dataset(self, name: str, **options: Any) -> Dataset: ...
-    def __getitem__(self, name: str) -> object: ...
-    def __setitem__(self, name: str, value: object) -> None: ...
-    def __contains__(self, name: object) -> bool: ...
-    def __iter__(self) -> Iterator[str]: ...
-
-
-class File(Group, Protocol):
-    """An open file."""
-
-    swmr_mode: bool
-
-    def flush(self) -> None: ...
-    def close(self) -> None: ...
 
 
 def create(path: Path) -> File:
     """A new file; FileExistsError if there is one."""
     # metadata in pages of the disk's sectors: a power failure tears no piece of it in two (measured in decision 10)
-    return cast(
-        File, h5py.File(path, "x", libver=VERSIONS, locking=LOCKING, fs_strategy="page", fs_page_size=PAGE)
-    )
+    return cast(File, h5py.File(path, "x", libver=VERSIONS, locking=LOCKING, fs_strategy="page", fs_page_size=PAGE))
 
 
 def let_go(file: File) -> None:

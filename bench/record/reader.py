@@ -83,6 +83,7 @@ class Record(StoredSamples):
 
     def refresh(self) -> None:
         """See what a writer has added since the file was opened."""
+        self._count_again()
         for path in self._growing:
             hdf5.dataset(self._entry, path).refresh()
 
@@ -213,7 +214,7 @@ class Record(StoredSamples):
         folders = [folder for folder in folders if folder in self._entry]
         paths += [f"{folder}/{name}" for folder in folders for name in hdf5.group(self._entry, folder)]
         paths += [f"{PLOT}/{TIME}"] if self.format_version > 1 else []
-        return ["complete", *paths, "instrument/drive/voltage", "status", "summary", "end_time"]
+        return [*paths, "instrument/drive/voltage", "status", "summary", "end_time"]
 
     def _decoded(self, name: str, parent: hdf5.Group | None = None) -> dict[str, list[Any]]:
         """The columns of a table that grew, in the order in which they were declared."""

@@ -20,7 +20,7 @@ from drivers.rig import Channel, Counts
 from sim.errors import InvalidInput
 from sim.parameters import Parameters
 
-PERIOD = 0.4
+PERIOD = 0.5
 """Longest time between two writes while anything waits [s]; a chunk of samples lasts as long at real time."""
 
 PAUSE = 0.05
@@ -220,7 +220,7 @@ class Recorder:
                 self._commit(partial=self._partial or not self._pressing)
         waited, chunks = time.monotonic() - self._committed, self._writer.full_chunks
         at_once = self._pressing and waited >= PAUSE and self._queue.empty()
-        if at_once or chunks >= BATCH or (chunks and waited >= 0.75 * PERIOD) or waited >= 1.25 * PERIOD:
+        if at_once or chunks >= BATCH or (chunks and waited >= 0.75 * PERIOD) or waited >= PERIOD:
             self._commit(partial=self._partial or not (chunks or at_once))
 
     def _commit(self, *, partial: bool) -> None:

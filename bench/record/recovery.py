@@ -106,7 +106,7 @@ def _cut(entry: hdf5.Group, counted: Mapping[str, int]) -> int:
 def _fill_plot(record: Record, entry: hdf5.Group, rows: int) -> None:
     time = create_plot(entry, record.channels, chunk_of(record.sample_rate))
     columns = [hdf5.dataset(entry, f"instrument/blocks/{name}")[:] for name in ("time", "run", "first", "row")]
-    timeline, ends = Timeline(record.sample_rate), np.append(columns[-1][1:], rows)
+    timeline, ends = Timeline(record.sample_rate), np.append(columns[-1][1:], rows)[: len(columns[-1])]
     waiting: list[NDArray[np.float64]] = []
     for read, run, first, begin, end in zip(*columns, ends, strict=True):
         waiting.append(timeline.seconds(float(read), int(run), int(first), int(end - begin)))

@@ -15,7 +15,7 @@ from bench.record.growing import Growing
 from bench.record.packing import Packer
 from drivers.rig import Channel, Counts
 
-CHUNK_TIME = 0.4
+CHUNK_TIME = 0.5
 """Seconds of samples in a chunk: what waits in memory in a run at real time."""
 
 

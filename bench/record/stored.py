@@ -22,6 +22,7 @@ class StoredSamples:
     def __init__(self, entry: hdf5.Group) -> None:
         self._entry = entry
         self._instrument = hdf5.group(entry, "instrument")
+        self._count_again()
 
     @cached_property
     def sample_rate(self) -> float:
@@ -97,11 +98,19 @@ class StoredSamples:
         drive = Series("drive", "drive as sent", "V", self.drive, rows)
         return RecordedRun(number, rows, series, drive, Series("time", "time since arming", "s", self.time, rows))
 
-    @property
+    @cached_property
     def counted(self) -> dict[str, int]:
-        """How many rows of every part are whole, whatever the length of its datasets; older files have fewer parts."""
+        """How many rows of every part are whole, whatever the length of its datasets; older files have fewer parts.
+
+        It is read once and ahead of what it counts, so that all that is read of a living file is of one moment.
+        """
         counts = hdf5.dataset(self._entry, "complete")[:].tolist()
         return dict(zip(COUNTED, [*counts, *[0] * (len(COUNTED) - len(counts))], strict=True))
+
+    def _count_again(self) -> None:
+        hdf5.dataset(self._entry, "complete").refresh()
+        self.__dict__.pop("counted", None)
+        _ = self.counted
 
     def _complete(self, name: str) -> int:
         return self.counted[name]

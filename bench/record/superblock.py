@@ -11,6 +11,10 @@ Source: HDF5 File Format Specification 3.0, section II.A (superblock versions 2 
 import io
 import struct
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from _typeshed import WriteableBuffer
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _LAYOUT = struct.Struct("<8s4B4QI")
@@ -49,12 +53,13 @@ class Quiet(io.RawIOBase):
     def tell(self) -> int:
         return self._place
 
-    def readinto(self, buffer: memoryview, /) -> int:
+    def readinto(self, buffer: "WriteableBuffer", /) -> int:
+        target = memoryview(buffer).cast("B")
         self._file.seek(self._place)
-        wanted = min(len(buffer), max(0, self._size - self._place))
+        wanted = min(len(target), max(0, self._size - self._place))
         found = self._file.read(wanted).ljust(wanted, b"\0")
         covered = self._head[self._place :][:wanted]
-        buffer[:wanted] = covered + found[len(covered) :]
+        target[:wanted] = covered + found[len(covered) :]
         self._place += wanted
         return wanted
 
@@ -85,7 +90,7 @@ def _turned(value: int, bits: int) -> int:
     return ((value << bits) | (value >> (32 - bits))) & _MASK
 
 
-def _head(path: Path) -> tuple[object, ...] | None:
+def _head(path: Path) -> tuple[Any, ...] | None:
     with path.open("rb") as file:
         head = file.read(_LAYOUT.size)
     if len(head) < _LAYOUT.size or not head.startswith(_SIGNATURE) or head[8] not in (2, 3):

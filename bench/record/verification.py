@@ -30,7 +30,7 @@ def verify(path: Path) -> Verdict:
 
     Raises InvalidInput for what is no record of ours, RecordError for one that cannot be opened.
     """
-    with open_record(path, judging=not is_let_go(path)) as record:
+    with open_record(path, judging=path.is_file() and not is_let_go(path)) as record:
         try:
             return _judge(record)
         except RecordError as error:

@@ -249,7 +249,7 @@ def test_every_numeric_dataset_has_units_and_the_default_plot_resolves(path: Pat
         data = entry[entry.attrs["default"]]
         assert data.attrs["NX_class"] == "NXdata"
         assert data[data.attrs["signal"]].shape == (3000,)
-        assert [data[name].shape for name in data.attrs["auxiliary_signals"]] == [(3000,), (3000,)]
+        assert [data[name].shape for name in data.attrs["auxiliary_signals"]] == [(3000,)]
 
 
 def test_a_plain_reader_needs_three_lines(path: Path) -> None:
@@ -299,7 +299,8 @@ def test_absent_whole_numbers_are_not_zero(path: Path) -> None:
 
 
 def test_a_laser_signal_takes_less_room_than_raw_and_samples_are_not_stored_twice(path: Path) -> None:
-    """200 s of a sine with noise of some counts: raw, 3 channels of int16 and a float32 drive are 10 bytes a row."""
+    """200 s of a sine with noise of some counts: raw, 3 channels of int16, a float32 drive and a float64 time are 18
+    bytes a row."""
     t = np.arange(400_000) / RATE
     rng = np.random.default_rng(1)
     signals = 3000.0 * np.sin(15.0 * t[:, None] + np.arange(3)) + rng.normal(0.0, 3.0, (t.size, 3))
@@ -310,4 +311,4 @@ def test_a_laser_signal_takes_less_room_than_raw_and_samples_are_not_stored_twic
         recorder(Acquired(t[first], 1, Block(first, counts[part]), drive[part]))
     recorder.close("completed")
     # the blocks' table adds 32 bytes per 200 rows, and the empty tables some kB
-    assert path.stat().st_size < 10 * t.size
+    assert path.stat().st_size < 0.7 * 18 * t.size

@@ -115,7 +115,7 @@ def test_alpha_2_can_be_recomputed_from_the_raw_channels(done: Path) -> None:
 
 def test_the_figure_is_there_and_nothing_is_overwritten(done: Path, capsys: pytest.CaptureFixture[str]) -> None:
     before = {path.name: path.read_bytes()[:64] for path in done.iterdir()}
-    assert set(before) == {"campaign.h5", "gain_spectra.png", "summary.json"}
+    assert set(before) == {"campaign.events.jsonl", "campaign.h5", "gain_spectra.png", "summary.json"}
     assert before["gain_spectra.png"].startswith(b"\x89PNG")
     code, _ = _run(done)
     captured = capsys.readouterr()
