@@ -1,6 +1,6 @@
 """A recorded file behind the interface of every rig: what was measured is measured again, run by run."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from enum import Enum
 from typing import Protocol, Self
 
@@ -60,6 +60,22 @@ class Recording(Protocol):
         ...
 
 
+class Course(Protocol):
+    """What is known of the recorded runs besides their samples; runs are counted from 0, in their order."""
+
+    def in_hand(self, run: int, samples: int) -> float:
+        """Bench time [s] at which the samples of `run` before number `samples` had been read."""
+        ...
+
+    def opened(self, run: int, samples: int) -> Collection[str]:
+        """The safety inputs that were not good then."""
+        ...
+
+    def alignments(self, run: int) -> tuple[Alignment, ...]:
+        """How sensors with clocks of their own were placed in `run`."""
+        ...
+
+
 class _State(Enum):
     STOPPED = "not armed"
     ARMED = "armed"
@@ -70,16 +86,26 @@ class ReplayRig:
     """Each arming plays the next recorded run. The drive is held to the rules of every rig and moves nothing.
 
     A block ends early where the recording has a gap or ends; after a gap the next one begins at a later sample, and
-    the samples of the gap use up no drive. `lead` is that of the recording unless told. The recording is the
-    caller's to close, after the rig.
+    the samples of the gap use up no drive. `lead` is that of the recording unless told. With a `course`, it says
+    when blocks come, on a `clock` that begins at 0 with the recording, and when safety inputs open. The recording
+    is the caller's to close, after the rig.
     """
 
-    def __init__(self, recording: Recording, *, clock: Clock | None = None, lead: int | None = None) -> None:
+    def __init__(
+        self,
+        recording: Recording,
+        *,
+        clock: Clock | None = None,
+        lead: int | None = None,
+        course: Course | None = None,
+    ) -> None:
         self._drive = Drive(recording.drive_range, recording.lead if lead is None else lead)
         self._recording = recording
         self._clock = clock if clock is not None else VirtualClock()
-        self._runs = iter(recording.runs)
+        self._course = course
+        self._number = -1
         self._run: RecordedRun | None = None
+        self._over: str | None = None
         self._rest: list[tuple[int, int]] = []
         self._state = _State.STOPPED
         self._started = 0.0
@@ -110,17 +136,27 @@ class ReplayRig:
 
     @property
     def alignments(self) -> tuple[Alignment, ...]:
-        return ()
+        return () if self._course is None or self._run is None else self._course.alignments(self._number)
+
+    @property
+    def over(self) -> str | None:
+        """What was asked for and is not recorded, in words; None while there was nothing."""
+        return self._over
 
     def interlocks(self) -> Mapping[str, bool]:
-        return {}
+        if self._course is None or self._state is not _State.ARMED:
+            return {}
+        return dict.fromkeys(self._course.opened(self._number, self._drive.index), False)
 
     def arm(self) -> None:
         if self._state is not _State.STOPPED:
             raise RigError(f"arm is refused: the rig is {self._state.value}; stop it first, or open a new one")
-        self._run = next(self._runs, None)
-        if self._run is None:
-            raise RigError(f"arm is refused: all {len(self._recording.runs)} recorded runs were played; open it anew")
+        runs = self._recording.runs
+        if self._number + 1 >= len(runs):
+            self._over = f"all {len(runs)} recorded runs were played"
+            raise RigError(f"arm is refused: {self._over}; open it anew")
+        self._number += 1
+        self._run = runs[self._number]
         self._rest = list(self._run.stretches)
         self._drive.begin()
         self._started = self._clock.now()
@@ -137,15 +173,19 @@ class ReplayRig:
         with ending_by(self.stop):
             self._drive.require(n)
             if not self._rest:
-                over = f"the recording of this run is over at sample {self._drive.index}"
-                raise RigError(f"{over}; stop, and arm for the next run")
+                self._over = f"the recording of this run is over at sample {self._drive.index}"
+                raise RigError(f"{self._over}; stop, and arm for the next run")
         first, length = self._rest.pop(0)
         taken = min(n, length)
         if taken < length:
             self._rest.insert(0, (first + taken, length - taken))
         self._drive.advance(taken, gap=first - self._drive.index)
+        if taken < n and not self._rest:
+            self._over = f"the recording of this run ends within a block, at sample {self._drive.index}"
         counts = run.counts(first, taken)
-        self._clock.wait_until(self._started + self._drive.index / self.sample_rate)
+        end = self._drive.index
+        due = self._started + end / self.sample_rate
+        self._clock.wait_until(due if self._course is None else self._course.in_hand(self._number, end))
         return Block(first, counts)
 
     def stop(self) -> None:

@@ -1,0 +1,130 @@
+"""What a re-analysis is asked for: settings from the command line and from a file, checked against the record."""
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import reduce
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
+
+from sim.errors import InvalidInput
+from sim.parameters import Parameters
+
+if TYPE_CHECKING:
+    from bench.analysis.signals import SignalMap
+    from bench.cli.catalogue import Entry
+    from bench.config.model import BenchConfiguration
+    from bench.record.reader import Record
+    from bench.replaying.analysis import Follower
+
+SECTIONS = ("analysis", "specimen", "uncertainty")
+"""Parts of the configuration that say how the measurement is understood, not how the bench is driven."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What is analysed with.
+
+    `asked` is what the campaign was asked for, `settings` what the analysis is; `changed` is the `recorded`
+    configuration with other settings, and `given` are those by name. A protocol with an analysis of its own has a
+    `follower`; another is carried out again with the settings as its parameters.
+    """
+
+    entry: "Entry"
+    recorded: "BenchConfiguration"
+    changed: "BenchConfiguration"
+    asked: Parameters
+    settings: Parameters
+    given: Mapping[str, Any]
+    follower: "Callable[[SignalMap], Follower] | None" = None
+
+
+def choice_of(record: "Record", changes: Sequence[str], config: Path | None) -> Choice:
+    """The settings for an open file: the recorded ones, those of a file, and `changes`, KEY=VALUE, each over the last.
+
+    Raises InvalidInput for what there is not, or what may not be changed after a measurement.
+    """
+    from bench.cli.recorded import entry_of, parameters_of
+    from bench.config.model import BenchConfiguration
+    from bench.config.validation import dotted, validated
+    from bench.replaying.session import stored_configuration
+
+    entry, recorded = entry_of(record), stored_configuration(record)
+    asked = parameters_of(record, entry)
+    data: dict[str, Any] = recorded.model_dump(mode="json")
+    given = _from_file(config, data) if config is not None else {}
+    data |= given
+    own: dict[str, Any] = {}
+    for change in changes:
+        key, equals, text = change.partition("=")
+        if not (key and equals):
+            raise InvalidInput("--set", change, "KEY=VALUE")
+        value = given[key] = _value(text)
+        section, *path = key.split(".")
+        if section in SECTIONS and path:
+            _put(data, [section, *path], value)
+        elif path:
+            raise InvalidInput("--set", key, f"of the configuration only {', '.join(SECTIONS)} can be changed here")
+        else:
+            own[key] = value
+
+    def named(path: tuple[str | int, ...]) -> str:
+        return f"--set {dotted(path)}"
+
+    changed = validated(BenchConfiguration, data, named)
+    if entry.name != "harmonic":
+        return Choice(entry, recorded, changed, asked, parameters_of(record, entry, own), given)
+    from protocols.harmonic.parameters import HarmonicParameters
+    from protocols.harmonic.reanalysis import HarmonicFollower, HarmonicSettings
+
+    settings = validated(HarmonicSettings, own, named)
+    parameters = HarmonicParameters.model_validate(asked.model_dump())
+
+    def follower(signals: "SignalMap") -> "Follower":
+        return HarmonicFollower(settings, parameters, changed, signals, record.channels, record.sample_rate)
+
+    return Choice(entry, recorded, changed, asked, settings, given, follower)
+
+
+def listed(choice: Choice) -> str:
+    """Every setting that can be changed, with its value and unit."""
+    from bench.cli.predict_text import aligned
+    from bench.config.declared import at, keys
+
+    rows = [["KEY", "NOW", "UNIT"], ["", "", ""]]
+    groups: list[tuple[str, Parameters]] = [("", choice.settings)]
+    groups += [(f"{name}.", getattr(choice.changed, name)) for name in SECTIONS]
+    for prefix, group in groups:
+        for key in keys(type(group)):
+            path = key.split(".")
+            entry = at(type(group), tuple(path))
+            if entry is not None and entry.group is None:
+                value = reduce(getattr, path, group)
+                rows.append([f"{prefix}{key}", json.dumps(value, default=str), entry.unit])
+    return aligned([[row[k] for row in rows] for k in range(3)])
+
+
+def _from_file(config: Path, data: Mapping[str, Any]) -> dict[str, Any]:
+    """The sections of a configuration file that differ from the recorded ones."""
+    from bench.config.toml import read_configuration
+
+    other = read_configuration(config).model_dump(mode="json")
+    return {name: other[name] for name in SECTIONS if other[name] != data[name]}
+
+
+def _value(text: str) -> Any:
+    """A number, a list, true, null or the like as JSON has it, else the text itself."""
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError:
+        return text
+
+
+def _put(data: dict[str, Any], path: Sequence[str], value: Any) -> None:
+    *groups, last = path
+    for name in groups:
+        inner: Any = data.get(name)
+        if not isinstance(inner, dict):
+            raise InvalidInput("--set", ".".join(path), f"there is no table {name} in the configuration")
+        data = cast(dict[str, Any], inner)
+    data[last] = value

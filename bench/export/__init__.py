@@ -1,0 +1,1 @@
+"""Recorded campaigns for other programs: MATLAB, text, Universal File Format, Parquet."""

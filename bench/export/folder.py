@@ -1,0 +1,41 @@
+"""A whole export: a new folder, complete or not there at all."""
+
+import shutil
+from pathlib import Path
+from typing import Literal
+from uuid import uuid4
+
+from bench.export import matlab, parquet, text, uff
+from bench.export.content import content_of
+from bench.record.reader import Record
+from sim.errors import InvalidInput
+
+Format = Literal["mat", "csv", "uff", "parquet"]
+
+_WRITERS = {"mat": matlab.write, "csv": text.write, "uff": uff.write, "parquet": parquet.write}
+
+
+def export(record: Record, path: Path, to: Format, out: Path, *, raw: bool = False) -> list[Path]:
+    """Write an open file, read from `path`, into the new folder `out`; the files that are in it then.
+
+    Physical values are float64; with `raw` the counts are written with the way to values beside them. Raises
+    InvalidInput when `out` exists or cannot be made, or when the format cannot hold what there is.
+    """
+    if out.exists():
+        raise InvalidInput("--out", str(out), "it exists, and nothing is ever overwritten; name another folder")
+    content = content_of(record, path, raw=raw)
+    if to == "mat":
+        matlab.check(content)
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        unfinished = out.with_name(f".{out.name}-{uuid4().hex[:8]}")
+        unfinished.mkdir()
+    except OSError as error:
+        raise InvalidInput("--out", str(out), f"the folder cannot be made: {error.strerror}") from None
+    try:
+        _WRITERS[to](content, unfinished)
+        unfinished.rename(out)
+    except BaseException:
+        shutil.rmtree(unfinished, ignore_errors=True)
+        raise
+    return sorted(out.iterdir())

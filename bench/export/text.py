@@ -1,0 +1,67 @@
+"""Comma-separated values: one file per run, one per table of results, units in the headings."""
+
+import csv
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from bench.export.content import ROWS_AT_ONCE, Content, Signal, TableColumn
+
+DIGITS = 12
+"""Significant digits of a value: the counts of a 24 bit converter can be had back from them."""
+
+CHANNELS = "channels.csv"
+
+
+def headed(name: str, unit: str) -> str:
+    """A name with its unit in brackets; nothing is added to a text, a switch or a pure number."""
+    return f"{name} [{unit}]" if unit not in ("", "1") else name
+
+
+def write(content: Content, folder: Path) -> None:
+    """Write every run and table as text: point for decimals, comma between, `nan` where there is no measurement."""
+    write_channels(content.signals, folder / CHANNELS)
+    headings = [headed("time", "s"), *(headed(signal.name, signal.unit) for signal in content.signals)]
+    formats = [f"%.{DIGITS}g", *("%d" if signal.dtype.kind == "i" else f"%.{DIGITS}g" for signal in content.signals)]
+    for run in content.runs:
+        with (folder / f"run-{run.number}.csv").open("w", encoding="utf-8", newline="\n") as file:
+            csv.writer(file, lineterminator="\n").writerow(headings)
+            signals = (signal.pieces(run) for signal in content.signals)
+            for piece in zip(run.time.pieces(ROWS_AT_ONCE), *signals, strict=True):
+                np.savetxt(file, np.column_stack(piece), fmt=formats, delimiter=",", newline="\n")
+    for name, columns in content.tables.items():
+        write_table(columns, folder / f"{name}.csv")
+
+
+def write_table(columns: Sequence[TableColumn], path: Path) -> None:
+    """One table; nothing between the commas where a value is absent, `yes` and `no` for switches."""
+    with path.open("w", encoding="utf-8", newline="\n") as file:
+        rows = csv.writer(file, lineterminator="\n")
+        rows.writerow(headed(column.name, column.unit) for column in columns)
+        rows.writerows(zip(*(_cells(column) for column in columns), strict=True))
+
+
+def write_channels(signals: Sequence[Signal], path: Path) -> None:
+    """What the columns of the runs are, with the way from counts to values where they are raw."""
+    conversions = [name for signal in signals for name in signal.conversion or ()]
+    names = list(dict.fromkeys(conversions))
+    with path.open("w", encoding="utf-8", newline="\n") as file:
+        rows = csv.writer(file, lineterminator="\n")
+        rows.writerow(["name", "unit", "quantity", "device", *names])
+        for signal in signals:
+            known = signal.conversion or {}
+            cells = [_cell(known.get(name)) for name in names]
+            rows.writerow([signal.name, signal.unit, signal.quantity, signal.device, *cells])
+
+
+def _cells(column: TableColumn) -> list[str]:
+    return [_cell(value) for value in column.values]
+
+
+def _cell(value: object) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return repr(value) if isinstance(value, float) else str(value)

@@ -1,0 +1,1 @@
+"""Recorded campaigns once more: played through the same engine, and analysed anew."""
