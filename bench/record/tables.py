@@ -57,7 +57,7 @@ def write(parent: "hdf5.Group", name: str, table: Table) -> None:
 
 
 def read(group: "hdf5.Group") -> dict[str, Column]:
-    """The table as it was given to `write`."""
+    """The table as it was given to `write`; truth values of which some are absent (-1) come as numbers, NaN there."""
     from bench.record import hdf5
 
     table: dict[str, Column] = {}
@@ -67,7 +67,7 @@ def read(group: "hdf5.Group") -> dict[str, Column]:
         if values.dtype.kind == "S":
             values = np.array(hdf5.read_texts(values), dtype=np.str_)
         elif stored.attrs.get("kind") == "switch":
-            values = values.astype(np.bool_)
+            values = np.where(values < 0, np.nan, values) if (values < 0).any() else values.astype(np.bool_)
         table[key] = Column(values, str(stored.attrs.get("units", "")), str(stored.attrs["description"]))
     return table
 
