@@ -2,5 +2,30 @@
 
 import os
 
+import pytest
+
 # a test needs no screen; a person who wants to see the windows sets the variable himself
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+
+REAL_TIME = (
+    "tests/drivers/daqmx/",
+    "tests/drivers/emulation/",
+    "tests/drivers/hardware/",
+    "tests/drivers/optoncdt/",
+    "tests/drivers/test_hardware_rig.py",
+    "tests/faults/emulated/",
+    "tests/bench/test_devices.py",
+    "tests/bench/test_emulate.py",
+    "tests/protocols/check/",
+    "tests/link/",
+    "tests/gui/",
+)
+"""Tests that emulated instruments or a person's clock pace: one after the other, or they hold each other up."""
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """A file stays in one process, so that what its fixtures made is made once; all of REAL_TIME stays in one."""
+    for item in items:
+        file = item.nodeid.split("::")[0]
+        item.add_marker(pytest.mark.xdist_group("real time" if file.startswith(REAL_TIME) else file))
