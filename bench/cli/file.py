@@ -76,9 +76,12 @@ def recover(
     found = rebuild(file, out or file.with_name(f"{file.stem}-recovered.h5"))
     if as_json:
         told = {"file": str(found.target), "samples": found.rows, "unreadable": found.unreadable}
+        told |= {"damage": list(found.damage)}
         print(json.dumps(told | {"events_from_journal": found.from_journal}))
         return 0
     print(f"{found.target}: {found.rows} samples per channel, {found.from_journal} events from the journal")
+    for each in found.damage:
+        tell(f"damaged in the original, and not mended by the copy: {each}")
     if found.unreadable:
         tell(f"{found.unreadable} samples per channel could not be read and are left out")
     return 0

@@ -1,7 +1,7 @@
 """Where in a file an earthquake record was played, and what the bench showed."""
 
 from bisect import bisect_left, bisect_right
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,7 +46,8 @@ def played_records(record: Record) -> list[Played]:
         )
         # one play grows block by block; another one begins elsewhere
         if found and (found[-1].run, found[-1].name, found[-1].beta) == (one.run, one.name, one.beta):
-            found.pop()
+            # the last gain ends within a block, the first one at the end of one: only that tells where the play begins
+            one = replace(one, start=found.pop().start)
         found.append(one)
     return [one for one in found if one.start >= one.run]
 

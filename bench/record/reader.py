@@ -57,7 +57,13 @@ def open_record(path: Path, *, judging: bool = False) -> "Record":
 def _check_format(path: Path, file: hdf5.File) -> None:
     if file.attrs.get("format") != FORMAT or "format_version" not in file.attrs:
         raise InvalidInput("record", str(path), "it is an HDF5 file but no record of rocking-bench")
-    version = int(file.attrs["format_version"])
+    try:
+        version = int(file.attrs["format_version"])
+    except (TypeError, ValueError):
+        version = 0
+    if version < 1:
+        given = file.attrs["format_version"]
+        raise InvalidInput("record", str(path), f"its format {given!r} is no version: the file is damaged")
     if version > FORMAT_VERSION:
         raise InvalidInput("record", str(path), f"its format {version} is newer than this software reads: update it")
 

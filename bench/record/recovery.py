@@ -5,6 +5,7 @@ The original is only read. The copy holds what was whole, in today's layout, wit
 
 import os
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -25,6 +26,7 @@ from bench.record.plot import create_plot
 from bench.record.reader import Record, open_record
 from bench.record.samples import chunk_of
 from bench.record.timeline import Timeline
+from bench.record.verification import damage
 from sim.errors import InvalidInput
 
 _NOTE = "recovery"
@@ -37,12 +39,14 @@ _ROWS_TOGETHER = 2**18
 @dataclass(frozen=True)
 class Recovery:
     """What came of it: the new file, its rows of samples, the rows that were counted but cannot be read, and how many
-    events were taken from the journal beside the file."""
+    events were taken from the journal beside the file. `damage` names what differs from its checksum or is gone: it was
+    copied as it is, or not at all."""
 
     target: Path
     rows: int
     unreadable: int
     from_journal: int
+    damage: tuple[str, ...] = ()
 
 
 def recover(path: Path, target: Path) -> Recovery:
@@ -58,10 +62,12 @@ def recover(path: Path, target: Path) -> Recovery:
         try:
             result = _rebuild(record, path, unfinished, target)
             os.rename(unfinished, target)
-        except (OSError, RuntimeError, KeyError, ValueError) as error:
+        except (OSError, RuntimeError, KeyError, ValueError, IndexError) as error:
             raise RecordError(f"{path} could not be recovered into {target} ({reason(error)})") from error
         finally:
-            unfinished.unlink(missing_ok=True)
+            with suppress(OSError):
+                # where nothing can be written nothing was left behind
+                unfinished.unlink(missing_ok=True)
     return result
 
 
@@ -76,7 +82,7 @@ def _rebuild(record: Record, path: Path, unfinished: Path, target: Path) -> Reco
         rows = _cut(entry, counted)
         _fill_plot(record, entry, rows)
         from_journal = add_lost_events(entry, list(diary.read(diary.beside(path))))
-        result = Recovery(target, rows, counted["samples"] - rows, from_journal)
+        result = Recovery(target, rows, counted["samples"] - rows, from_journal, damage(record))
         _write_ends(record, path, entry)
         _write_note(record, path, entry, result)
         Checksums(entry, ())
@@ -136,6 +142,7 @@ def _write_note(record: Record, path: Path, entry: hdf5.Group, result: Recovery)
         f"from {path.name} of format {record.format_version}: {result.rows} rows kept, {result.unreadable} unreadable,"
         f" {result.from_journal} events from the journal"
     )
+    told = "\n".join([told, *(f"damaged before: {each}" for each in result.damage)])
     note = hdf5.create_group(entry, _NOTE, "NXnote")
     hdf5.write_text(note, "date", now())
     hdf5.write_text(note, "description", "\n".join([*record.recoveries, told]))

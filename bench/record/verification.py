@@ -48,12 +48,22 @@ def _judge(record: Record) -> Verdict:
     if record.format_version > 1:
         problems += [f"{path} is missing" for path in known if path not in stored]
         problems += [f"{path} has no checksum: it was added later" for path in stored if path not in known]
-    compared = 0
-    for path, (values, attributes) in known.items():
-        if path in stored:
-            problems += _compared(stored[path], values, attributes)
-            compared += bool(values)
+    problems += _changed(record, stored)
+    compared = sum(bool(values) for path, (values, _) in known.items() if path in stored)
     return Verdict(len(stored), compared, tuple(problems))
+
+
+def damage(record: Record) -> tuple[str, ...]:
+    """What has a checksum and is no longer there, or no longer as it was when that was made."""
+    entry = hdf5.group(record.file, "entry")
+    stored = {each.name: each for each in hdf5.datasets(entry)}
+    return (*(f"{path} is missing" for path in record.checksums if path not in stored), *_changed(record, stored))
+
+
+def _changed(record: Record, stored: dict[str, hdf5.Dataset]) -> Iterator[str]:
+    for path, (values, attributes) in record.checksums.items():
+        if path in stored:
+            yield from _compared(stored[path], values, attributes)
 
 
 def _ending(record: Record) -> Iterator[str]:

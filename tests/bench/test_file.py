@@ -261,3 +261,19 @@ def test_runs_and_channels_are_arrays_that_are_read_when_asked_for(tmp_path: Pat
         time: Any = file["entry/data/time"][:]
         assert np.all(np.diff(time) > 0.0)
         np.testing.assert_allclose(time[[0, 299, 300, 500]], [0.85, 0.9995, 1.05, 8.95], atol=1e-6)
+
+
+def test_recovery_tells_what_it_could_not_mend(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A copy has checksums of its own: what was wrong before must be said, or damage would turn into truth."""
+    edited(path, change_sample)
+    assert main(["file", "recover", str(path)]) == 0
+    assert "not mended by the copy: " in capsys.readouterr().err
+    with bench.record.open(path.with_name(f"{path.stem}-recovered.h5")) as record:
+        assert any("damaged before: " in told for told in record.recoveries)
+
+
+@pytest.mark.parametrize("version", ["two", 0])
+def test_a_version_that_is_none_is_refused(version: object, path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    edited(path, lambda file: file.attrs.__setitem__("format_version", version))
+    assert main(["file", "info", str(path)]) == 2
+    assert "is no version" in capsys.readouterr().err
