@@ -1,6 +1,7 @@
 """What every test shares."""
 
 import os
+from typing import Any
 
 import pytest
 
@@ -23,9 +24,13 @@ REAL_TIME = (
 """Tests that emulated instruments or a person's clock pace: one after the other, or they hold each other up."""
 
 
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> object:
     """A file stays in one process, so that what its fixtures made is made once; all of REAL_TIME stays in one."""
-    for item in items:
-        file = item.nodeid.split("::")[0]
-        item.add_marker(pytest.mark.xdist_group("real time" if file.startswith(REAL_TIME) else file))
+    from xdist.scheduler import LoadScopeScheduling
+
+    class Together(LoadScopeScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            return "real time" if nodeid.startswith(REAL_TIME) else nodeid.split("::")[0]
+
+    return Together(config, log)
