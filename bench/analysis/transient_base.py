@@ -8,6 +8,10 @@ worse: its noise counts omega^2. Each frequency takes both, weighted by their no
 with X brought to the accelerometer's delay first, over the frequencies at which both show the motion. The ratio of
 their scales comes out of that as well. It is a check and not a correction: calibrations know the scales better than one
 motion does. The noise that is left has the density S_a omega^4 S_x / (S_a + omega^4 S_x).
+
+A sensor quieter than its steps shows nothing at rest, and yet is off by up to half a step as soon as it moves. Its
+error has the variance step^2 / 12, spread over as many frequencies as steps are passed in a second, at most up to half
+the rate (Bennett, Bell Syst. Tech. J. 27, 1948): slow motions leave it at low ones. No sensor counts for more.
 """
 
 from dataclasses import dataclass
@@ -30,6 +34,8 @@ _TOP = 0.4
 """Share of that rate up to which the motion is kept."""
 _NOISE_BAND = (2.0, 60.0)
 """Frequencies [Hz] between which the sensors' noise is white."""
+_PASSING = 0.05
+"""Time over which the passed steps of a sensor are counted [s]: a fraction of the periods that matter."""
 _CLEAR = 100.0
 """Power over its noise at which a sensor shows the motion."""
 ALIKE = 0.02
@@ -81,8 +87,8 @@ def base_motion(signals: Array, rest: Array, sample_rate: float) -> BaseMotion:
     frequency = np.fft.rfftfreq(size, 1.0 / sample_rate).astype(np.float64)
     a = np.fft.rfft(_levelled(sensors[:, 0], still))
     x = -((2.0 * np.pi * frequency) ** 2) * np.fft.rfft(_closed(sensors[:, 1], still))
-    noise_a = np.full(frequency.size, _density(rest[:, ACCELERATION], sample_rate))
-    noise_x = _density(rest[:, DISPLACEMENT], sample_rate) * (2.0 * np.pi * frequency) ** 4
+    noise_a = np.full(frequency.size, _density(rest[:, ACCELERATION], sensors[:, 0], sample_rate))
+    noise_x = _density(rest[:, DISPLACEMENT], sensors[:, 1], sample_rate) * (2.0 * np.pi * frequency) ** 4
     share = np.zeros(frequency.size)
     agreement, lead = _alignment(frequency, a, x, noise_a, noise_x, size / sample_rate)
     if agreement is not None and abs(agreement - 1.0) <= ALIKE:
@@ -98,11 +104,23 @@ def base_motion(signals: Array, rest: Array, sample_rate: float) -> BaseMotion:
     return BaseMotion(np.ascontiguousarray(whole), dt, agreement, left)
 
 
-def _density(rest: Array, sample_rate: float) -> float:
-    """Spectral density of a sensor's white noise [unit^2/Hz]."""
+def _density(rest: Array, values: Array, sample_rate: float) -> float:
+    """Spectral density of a sensor's white noise [unit^2/Hz]: as at `rest`, or that of the steps of its `values`."""
     frequency, power = noise_density(rest, sample_rate)
     inside = (frequency >= _NOISE_BAND[0]) & (frequency <= _NOISE_BAND[1])
-    return max(float(np.mean(power[inside])), 1e-30)
+    return max(float(np.mean(power[inside])), _of_steps(values, sample_rate), 1e-30)
+
+
+def _of_steps(values: Array, sample_rate: float) -> float:
+    """Density [unit^2/Hz] of the rounding of `values` to the steps that they show; none of steps without motion."""
+    apart: Array = np.diff(np.unique(values))
+    if not apart.size:
+        return 0.0
+    step, turn = float(np.min(apart)), max(round(_PASSING * sample_rate), 1)
+    whole = (values.size - 1) // turn * turn
+    path: Array = np.abs(np.diff(values[: whole + 1])).reshape(-1, turn).sum(axis=1)
+    rate = np.clip(path / step, 1.0, turn) * (sample_rate / turn)
+    return step**2 / 12.0 * 2.0 * float(np.mean(1.0 / rate))
 
 
 def _levelled(values: Array, still: int) -> Array:

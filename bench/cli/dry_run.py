@@ -2,6 +2,7 @@
 
 import json
 import sys
+import textwrap
 from contextlib import redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +16,9 @@ if TYPE_CHECKING:
     from bench.preflight.compiled import Preflight
     from bench.preflight.margins import Margin
     from bench.session import Experiment
+
+
+WIDTH = 120
 
 
 def dry_run(experiment: "Experiment", configuration: "BenchConfiguration", out: Path, *, as_json: bool) -> int:
@@ -56,6 +60,7 @@ def _content(found: "Preflight") -> dict[str, Any]:
         "starts": [
             {"name": stage.name, "chance": stage.chance} for stage in found.forecast.stages if stage.chance is not None
         ],
+        "notes": list(found.forecast.notes),
         "duration_s": found.forecast.duration,
         "disk": None if room is None else {"needed_bytes": room.needed, "free_bytes": room.free},
         "plan_hash": found.plan_hash,
@@ -73,6 +78,8 @@ def _text(found: "Preflight") -> str:
         names, stated = zip(*chances, strict=True)
         table = aligned([["start", "", *names], ["chance", "", *(f"{chance:.0%}" for chance in stated)]])
         lines += ["", table, ""]
+    for note in found.forecast.notes:
+        lines += textwrap.wrap(note, WIDTH, subsequent_indent="    ")
     if found.forecast.duration is not None:
         lines.append(f"Expected duration: {clock(found.forecast.duration)}")
     if found.room is not None:

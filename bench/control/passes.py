@@ -10,6 +10,9 @@ from bench.control.envelope import Verdict
 
 Array = NDArray[np.float64]
 
+CLEAR = 2.0
+"""How many times what noise makes of it a deviation of the response spectrum must be to count."""
+
 
 @dataclass(frozen=True)
 class Pass:
@@ -61,6 +64,21 @@ class SpectrumCheck:
     def error(self, achieved: Array) -> float:
         """Largest relative deviation of the response spectrum."""
         return float(np.abs(self._spectrum(achieved) / self._wanted - 1.0).max())
+
+    def clear_error(self, achieved: Array, frequency: Array, noise: Array) -> tuple[float, float]:
+        """Largest relative deviation that noise does not explain, and its period [s]; zero where there is none.
+
+        `noise`, shape (n_lines,), is the expected |numpy.fft.rfft|^2 of what does not repeat in `achieved`, at
+        `frequency` [Hz], above zero. A peak is moved by about the noise of the oscillator's answer: a deviation of more
+        than `CLEAR` times its standard deviation counts, and in full.
+        """
+        natural = 1.0 / self._periods[:, None]
+        answer = natural**2 / np.abs(natural**2 - frequency**2 + 2j * DAMPING * natural * frequency)
+        noisy = np.sqrt(2.0 * (answer**2 @ noise)) / achieved.size
+        off = np.abs(self._spectrum(achieved) - self._wanted)
+        deviation = np.where(off > CLEAR * noisy, off, 0.0) / self._wanted
+        worst = int(deviation.argmax())
+        return float(deviation[worst]), float(self._periods[worst])
 
     def _spectrum(self, acceleration: Array) -> Array:
         return pseudo_acceleration(acceleration, self._dt, self._periods, DAMPING)

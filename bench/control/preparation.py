@@ -11,9 +11,9 @@ import numpy as np
 
 from bench.analysis.table_motion import Array, TableMotion, at_rest_in_the_end, table_motion
 from bench.control.similitude import resampled, scaled
-from bench.control.stroke.fit import PERIODS, Method, StrokeFit, fit_stroke
+from bench.control.stroke.fit import NOT_BOTH, PERIODS, Method, StrokeFit, fit_stroke
 from bench.control.stroke.reach import Reach
-from bench.control.target import ORDER, REST, Target, band_gain, band_window, check_band
+from bench.control.target import ORDER, REST, Target, band_gain, check_band, windowed
 from sim.errors import InvalidInput
 from sim.excitation import SampledRecord
 
@@ -23,6 +23,9 @@ TRIM = 0.0005
 TAPER = 0.5
 """Time [s] over which a trimmed record is let down to zero, outside of what is kept: half a cosine."""
 
+BETWEEN = 0.02
+"""Share of the reach by which a motion may pass it between the samples of its record: `reach.SHARE` leaves more."""
+
 
 @dataclass(frozen=True, eq=False)
 class PreparedMotion:
@@ -31,7 +34,7 @@ class PreparedMotion:
     `record` begins `begin` [s] on the clock of the record that was given; before that the table rests. All of its
     accelerations were multiplied by `factor`. `peak_before` and `peak` are the greatest accelerations [m/s2] of the
     given record and of the motion; `motion` is the table's velocity and displacement. `band` [Hz] is None where no
-    filter was asked for, `fit` None where no stroke was; `steps` says in words what was done, in order.
+    filter was asked for, `reach` and `fit` None where no stroke was; `steps` says in words what was done, in order.
     """
 
     record: SampledRecord
@@ -41,26 +44,29 @@ class PreparedMotion:
     peak_before: float
     peak: float
     motion: TableMotion
+    reach: Reach | None
     fit: StrokeFit | None
     steps: tuple[str, ...]
 
     def target(self, sample_rate: float) -> Target:
         """The motion at `sample_rate` [1/s], for its replication on the table.
 
-        Raises InvalidInput without a band, for one that goes beyond the rate, or a rate below the record's own.
+        Raises InvalidInput without a band, for one that goes beyond the rate, a rate below the record's own, and a
+        motion that would leave `reach` by more than `BETWEEN`.
         """
-        from scipy.fft import next_fast_len
-
         if self.band is None:
             raise InvalidInput("band", None, "a table has one: name its ends")
         check_band(self.band, sample_rate)
         wave = resampled(self.record, 1.0 / sample_rate).acceleration
-        whole = np.zeros(next_fast_len(wave.size, real=True))
-        whole[: wave.size] = wave
-        frequency = np.fft.rfftfreq(whole.size, 1.0 / sample_rate).astype(np.float64)
         # the straight lines between the record's samples have a trace above the band
-        within = np.fft.irfft(band_window(frequency, self.band) * np.fft.rfft(whole), whole.size)
-        return Target(within, sample_rate, self.band, round(REST / self.band[0] * sample_rate))
+        within = windowed(wave, 1.0 / sample_rate, self.band)
+        target = Target(within, sample_rate, self.band, round(REST / self.band[0] * sample_rate))
+        if self.reach is not None:
+            far, fast, reach = target.peaks["displacement"], target.peaks["velocity"], self.reach
+            if max(far / reach.displacement, fast / reach.velocity) > 1.0 + BETWEEN:
+                allowed = f"{1e3 * reach.displacement:.3g} mm and {reach.velocity:.3g} m/s are allowed; {NOT_BOTH}"
+                raise InvalidInput("record", f"{1e3 * far:.4g} mm and {fast:.3g} m/s", allowed)
+        return target
 
 
 def prepare(
@@ -104,7 +110,7 @@ def prepare(
         steps.append(f"scaled by {factor:.4g} to a peak of {peak:.4g} m/s2")
     fit = None
     if reach is not None:
-        fit = fit_stroke(made, reach, method, periods)
+        fit = fit_stroke(made, reach, method, periods, band=band)
         made, begin = fit.record, begin - fit.lead
         steps.append(f"fitted to {1e3 * reach.displacement:.3g} mm and {reach.velocity:.3g} m/s: {fit.done}")
     return PreparedMotion(
@@ -115,6 +121,7 @@ def prepare(
         peak_before=peak_before,
         peak=float(np.abs(made.acceleration).max()),
         motion=table_motion(made.acceleration, made.dt),
+        reach=reach,
         fit=fit,
         steps=tuple(steps),
     )

@@ -9,6 +9,9 @@ that is far off, H is corrected by what that pass has shown. A pass that comes o
 back; the best drive is played once more, which tells what does not repeat, and the correction is halved. So the
 accepted error never grows, and neither noise nor a motion that is different every time is learned
 (De Cuyper, Linear feedback control for durability test rigs in the automotive industry, thesis, KU Leuven 2006).
+
+The passes end when the error that repeats is small enough both as root mean square and in the response spectrum: the
+first is that of the whole record, the second sees the few cycles that a structure answers.
 """
 
 from typing import Literal
@@ -43,6 +46,9 @@ class ReplicationParameters(Parameters):
     passes: int = quantity(8, "1", "passes at most", ge=1, le=50)
     tolerance: float = quantity(
         0.003, "1", "root mean square error over that of the target, without its noise, that is good enough", gt=0, lt=1
+    )
+    spectrum_tolerance: float = quantity(
+        0.01, "1", "deviation of the response spectrum that is good enough, where noise does not explain it", gt=0, lt=1
     )
     gains: tuple[float, ...] = quantity(
         (1.0, 1.0, 1.0, 0.7),
@@ -126,6 +132,27 @@ class Replication:
         return self._status
 
     @property
+    def verdict(self) -> Verdict:
+        """What the limits say of `drive`; where the status is "limited", of the correction that is not played."""
+        return self._verdict
+
+    @property
+    def repeatable(self) -> float:
+        """Root mean square error of the best drive over that of the target, without its noise; 1 before any pass."""
+        power = self._size(np.abs(self._missing) ** 2) ** 2 - self._size(self._noise) ** 2 / self._plays
+        return max(power, 0.0) ** 0.5 / self._norm
+
+    @property
+    def spectrum_error(self) -> tuple[float, float]:
+        """Largest deviation of the response spectrum with the best drive that noise does not explain; its period [s].
+
+        Zero where there is none.
+        """
+        table = self._table
+        seen = table.record(table.window * (self._wanted - self._missing))
+        return self._spectrum.clear_error(seen, table.frequency, table.window**2 * self._noise / self._plays)
+
+    @property
     def finished(self) -> bool:
         """Whether no further pass is asked for."""
         return self._status != "running"
@@ -198,16 +225,16 @@ class Replication:
 
     def _go_on(self) -> None:
         """Decide whether another pass follows, and with which drive."""
-        repeatable = self._size(np.abs(self._missing) ** 2) ** 2 - self._size(self._noise) ** 2 / self._plays
-        if repeatable <= (self.parameters.tolerance * self._norm) ** 2:
+        p = self.parameters
+        if self.repeatable <= p.tolerance and self.spectrum_error[0] <= p.spectrum_tolerance:
             self._status = "converged"
-        elif len(self._passes) >= self.parameters.passes:
+        elif len(self._passes) >= p.passes:
             self._status = "out of passes"
         elif self._replaying:
             self._drive = self._best
         else:
             self._drive, self._gain, self._verdict = self._next()
-            refused = self._verdict.binds is not None and self.parameters.beyond == "refuse"
+            refused = self._verdict.binds is not None and p.beyond == "refuse"
             if refused or self._verdict.share < _LEAST_SHARE:
                 self._status = "limited"
             elif np.array_equal(self._drive, self._best):

@@ -84,6 +84,15 @@ def band_limited(record: Array, dt: float, sample_rate: float, band: tuple[float
     return Target(filtered, sample_rate, band, rest)
 
 
+def windowed(acceleration: Array, dt: float, band: tuple[float, float]) -> Array:
+    """`acceleration`, shape (n,), through the window of `band` [Hz] and without phase; zeros are put after it."""
+    from scipy.fft import next_fast_len
+
+    size = int(next_fast_len(acceleration.size, real=True))
+    window = band_window(np.fft.rfftfreq(size, dt).astype(np.float64), band)
+    return np.fft.irfft(window * np.fft.rfft(acceleration, size), size)
+
+
 def check_band(band: tuple[float, float], sample_rate: float) -> None:
     """Raise InvalidInput unless `sample_rate` [1/s] holds all of `band` [Hz] and what lies beside it."""
     low, high = band

@@ -7,8 +7,8 @@ from bench.guard.violation import Violation
 
 _SETTLED = 20.0
 """Time after which two clocks can be compared [s]: a block's delay is small against it."""
-_COMPARED = 100
-"""Blocks among which the earliest is looked for."""
+_STRETCH = 5.0
+"""How long, at the beginning and now, the earliest block is looked for [s]: it tells the clocks apart."""
 
 
 class TimeWatch:
@@ -19,7 +19,8 @@ class TimeWatch:
         self._limits = limits
         self._origin: float | None = None
         self._first_end = 0
-        self._recent: deque[float] = deque(maxlen=_COMPARED)
+        self._early = (0.0, 0.0)
+        self._recent: deque[tuple[float, float]] = deque()
 
     def check(self, now: float, end: int) -> list[Violation]:
         """What is wrong with a block that was in hand at `now` [s] and ends before sample `end`."""
@@ -28,12 +29,19 @@ class TimeWatch:
             return []
         sampled = (end - self._first_end) / self._rate
         late = now - self._origin - sampled
-        self._recent.append(late)
+        # single blocks come late for many reasons, the first one of a run too
+        if sampled <= _STRETCH:
+            self._early = min(self._early, (late, sampled))
+        self._recent.append((late, sampled))
+        while self._recent[0][1] < sampled - _STRETCH:
+            self._recent.popleft()
         limits = self._limits
         if late > limits.late:
             return [Violation("delay of a block of samples", late, limits.late, "s", end - 1)]
-        # single blocks come late for many reasons; the earliest of many tells the clocks apart
-        difference = abs(min(self._recent)) / sampled if sampled > _SETTLED else 0.0
+        if sampled <= _SETTLED:
+            return []
+        (before, then), (after, since) = self._early, min(self._recent)
+        difference = abs(after - before) / (since - then)
         if difference > limits.clock:
             return [Violation("difference of the clocks", difference, limits.clock, "1", end - 1)]
         return []

@@ -49,7 +49,7 @@ class Preflight:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What the operator should know although the run may begin."""
-        return warnings(self.margins)
+        return (*self.forecast.warnings, *warnings(self.margins))
 
     @property
     def tables(self) -> Mapping[str, Table]:

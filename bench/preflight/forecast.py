@@ -34,11 +34,15 @@ class Stage:
 class Forecast:
     """All that is known of a run beforehand; `duration` is its expected length [s]. Empty for an experiment that
     predicts nothing.
+
+    `warnings` are what the operator should know although the run may begin; `notes` say what was made of the input.
     """
 
     demands: tuple[Demand, ...] = ()
     stages: tuple[Stage, ...] = ()
     duration: float | None = None
+    warnings: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 @runtime_checkable

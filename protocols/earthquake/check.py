@@ -1,12 +1,14 @@
-"""What is refused at once: records, a band or a table model that cannot be used on this bench."""
+"""What is refused at once: records, a band, a table model or an identification that cannot be on this bench."""
 
 from bench.config.model import BenchConfiguration
 from protocols.earthquake.parameters import EarthquakeParameters
 from protocols.earthquake.records import shakings
-from protocols.earthquake.table import stored_table
+from protocols.earthquake.table import identification, stored_table
+from protocols.identify.level import planned
 
 
 def check(parameters: EarthquakeParameters, configuration: BenchConfiguration) -> None:
     """Raise InvalidInput; the records are read here, and everything about them is known afterwards."""
-    stored_table(parameters, configuration)
+    if stored_table(parameters, configuration) is None:
+        planned(identification(parameters, configuration), configuration)
     shakings(parameters, configuration)

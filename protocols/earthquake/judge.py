@@ -112,7 +112,8 @@ def overturned(
     base = bare.observed.base
     scale = configuration.analysis.table_scale
     predicted = predict_draws(base, base, specimen, configuration.uncertainty, draws, seed, table_scale=scale)
-    said = f"the block overturned {time:.2f} s after the drive began; predicted chance {predicted.chance:.0%}"
+    when = "at a time that the first storey does not show" if time is None else f"{time:.2f} s after the drive began"
+    said = f"the block overturned {when}; predicted chance {predicted.chance:.0%}"
     return EarthquakePoint.model_validate(
         {
             **common(shaking, specimen.beta or 0.0, target_gain, bare),
@@ -141,6 +142,8 @@ def _remarks(found: Compared, observed: Observed) -> Iterator[str]:
         yield f"the block stood; {found.chance:.0%} of the draws topple it"
     if found.agrees is False:
         yield "differs from the prediction by more than the uncertainty"
+    if found.chaotic:
+        yield "the response is chaotic here: the parts of the uncertainty cannot be told apart"
     agreement = observed.base.agreement
     if agreement is not None and abs(agreement - 1.0) > ALIKE:
         yield f"the table's displacement sensor shows {agreement:.3f} times what its accelerometer does: not used"

@@ -52,12 +52,28 @@ class EarthquakeParameters(Parameters):
     tolerance: float = quantity(
         0.005, "1", "rms error of the table without its noise, over the record's rms, that ends the passes", gt=0, lt=1
     )
+    spectrum_tolerance: float = quantity(
+        0.01,
+        "1",
+        "error of the table's response spectrum, 0.1 to 1 s and at the periods of the frame, without its noise, below "
+        "which the passes end as well",
+        gt=0,
+        lt=1,
+    )
+    usable: float = quantity(
+        0.05,
+        "1",
+        "rms error without its noise, over the record's rms, up to which the best drive is used although the passes "
+        "ended before the tolerance: at a limit, at their number, or for want of samples",
+        gt=0,
+        lt=1,
+    )
     decay: float = quantity(5.0, "s", "free vibration that is measured after a record", ge=0, le=120)
     rest: float = quantity(2.0, "s", "time at rest before a record, once the storeys are still", ge=0.5, le=60)
     draws: int = quantity(
         200,
         "1",
-        "draws of the Monte Carlo behind each prediction; a quarter for each part of its uncertainty",
+        "draws of the Monte Carlo behind each prediction; half of them for the bench alone, a quarter for each part",
         ge=40,
         le=5000,
     )

@@ -37,7 +37,9 @@ class EarthquakePoint(Parameters):
         None, "1", "predicted gain for the motion that the table was asked for; absent where the block would topple"
     )
     alpha_2_bench_uncertainty: float | None = quantity(
-        None, "1", "expanded uncertainty (k = 2) of measured minus predicted alpha_2 for an exactly known specimen"
+        None,
+        "1",
+        "95 % of measured minus predicted alpha_2 lie within, were the specimen known exactly; by Monte Carlo",
     )
     agrees: bool | None = quantity(None, "1", "whether alpha_2 lies between alpha_2_low and alpha_2_high")
     dominating: str = quantity("", "", "part of the uncertainty that is the largest")

@@ -17,6 +17,9 @@ from protocols.earthquake.asked import Travel, load, travel
 from protocols.earthquake.pace import Pace
 from protocols.earthquake.parameters import EarthquakeParameters
 from protocols.earthquake.records import Shaking, shakings
+from protocols.earthquake.table import identification, stored_table, table_warnings
+from protocols.identify.level import planned
+from protocols.identify.sheet import expected_duration
 from sim.specimen import Specimen
 
 Array = NDArray[np.float64]
@@ -54,18 +57,34 @@ class _Asked:
 
 
 def forecast(parameters: EarthquakeParameters, configuration: BenchConfiguration) -> Forecast:
-    """The demands of every record with the bare frame and with every spring, and the chance that the block stands.
+    """The demands of the identification and of every record with the bare frame and with every spring, and the chance
+    that the block stands.
 
-    Raises InvalidInput for a record that cannot be read or prepared, or a table model that cannot be used.
+    Raises InvalidInput for a record that cannot be read or prepared, a table model that cannot be used or a table that
+    cannot be identified.
     """
     found = shakings(parameters, configuration)
+    first, duration = _identification(parameters, configuration)
     specimens = [configuration.specimen.bare(), *map(configuration.specimen.coupled, parameters.beta)]
-    asked = [_asked(shaking, specimen, configuration) for shaking in found for specimen in specimens]
+    asked = [*first, *(_asked(shaking, specimen, configuration) for shaking in found for specimen in specimens)]
     return Forecast(
         demands=tuple(_demand(quantity, asked) for quantity in bounds(configuration)),
         stages=tuple(Stage(each.name, (), each.chance) for each in asked),
-        duration=Pace(parameters, found).total,
+        duration=Pace(parameters, found, duration).total,
+        warnings=table_warnings(parameters, configuration),
+        notes=tuple(f"{shaking.name}: {'; '.join(shaking.prepared.steps)}" for shaking in found),
     )
+
+
+def _identification(parameters: EarthquakeParameters, configuration: BenchConfiguration) -> tuple[list[_Asked], float]:
+    """What the identification at the campaign's begin asks, and how long it takes [s]: nothing with a stored model."""
+    if stored_table(parameters, configuration) is not None:
+        return [], 0.0
+    wanted = identification(parameters, configuration)
+    found = planned(wanted, configuration)
+    # linear and at a level that keeps its distance: no specimen within its uncertainty changes much of it
+    values = {quantity: np.full(1 + DRAWS, value) for quantity, value in found.asked.items()}
+    return [_Asked("the identification of the table", values, None)], expected_duration(wanted, found)
 
 
 def _asked(shaking: Shaking, specimen: Specimen, configuration: BenchConfiguration) -> _Asked:

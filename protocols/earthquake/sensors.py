@@ -9,6 +9,7 @@ off alike: in their ratio most of it cancels.
 from math import pi, sqrt
 
 import numpy as np
+from numpy.random import SeedSequence
 from numpy.typing import NDArray
 
 from bench.analysis.gain import SensorAccuracy
@@ -21,7 +22,11 @@ WAVES = (0.5, 2.0)
 
 
 def drift_errors(
-    peaks: tuple[PeakSeen, PeakSeen], accuracy: SensorAccuracy, ranges: tuple[float, float], n: int, seed: int
+    peaks: tuple[PeakSeen, PeakSeen],
+    accuracy: SensorAccuracy,
+    ranges: tuple[float, float],
+    n: int,
+    seed: int | SeedSequence,
 ) -> tuple[Array, Array]:
     """Relative errors of the drift's peaks, bare and coupled, each drawn `n` times: by noise, and by the lasers.
 
@@ -49,7 +54,7 @@ def u1_errors(
     ranges: tuple[float, float],
     grounded: bool,
     n: int,
-    seed: int,
+    seed: int | SeedSequence,
 ) -> Array:
     """Relative errors of the peaks of u1, shape (2, n); a laser on the ground needs the displacement sensor too."""
     random = np.random.default_rng(seed)

@@ -9,6 +9,7 @@ The springs are the outer loop: changing one is hand work.
 """
 
 from collections.abc import Generator
+from math import tau
 
 import numpy as np
 
@@ -17,10 +18,11 @@ from bench.config.model import BenchConfiguration
 from bench.control.replication import ReplicationParameters
 from bench.control.table_model import TableModel
 from bench.engine.steps import Arm, Fallen, Handle, Outcome, Plan, Play, Played, RampOut, Say, Step
-from bench.events import PointFinished, StepStarted, Warned
+from bench.events import PointFinished, Progress, StepStarted, Warned
 from drivers.rig import Handwork, RigError
 from protocols.earthquake.histories import Histories
 from protocols.earthquake.judge import BareTest, measured, not_played, overturned
+from protocols.earthquake.learned import refused, shortfall
 from protocols.earthquake.live import History, Watch
 from protocols.earthquake.observed import observe
 from protocols.earthquake.pace import Pace
@@ -29,8 +31,8 @@ from protocols.earthquake.point import EarthquakePoint
 from protocols.earthquake.prediction import target_gains
 from protocols.earthquake.records import Shaking, shakings
 from protocols.earthquake.shaken import tracking
-from protocols.earthquake.table import table_for
-from protocols.replicate import Replicated, replicate
+from protocols.earthquake.table import identification_time, table_for
+from protocols.replicate import replicate
 from sim.errors import InvalidInput
 from sim.specimen import Specimen
 
@@ -52,36 +54,43 @@ class EarthquakeSheet:
         self._specimen = configuration.specimen
         self._shakings = shakings(parameters, configuration)
         self._targets = target_gains(parameters, configuration)
-        self._pace = Pace(parameters, self._shakings)
+        self._pace = Pace(parameters, self._shakings, identification_time(parameters, configuration))
         self._bare: dict[str, BareTest | str] = {}
+        self._shortfalls: dict[str, str] = {}
         self._points = 0
 
     def plan(self) -> Plan:
         """The whole campaign as steps."""
-        model = yield from table_for(self._parameters, self._configuration)
-        self._pace.identified()
+        model = yield from table_for(self._parameters, self._configuration, self._pace)
         for shaking in self._shakings:
             self._bare[shaking.name] = yield from self._bare_frame(shaking, model)
-            self._pace.finished(shaking.name, self._parameters.passes + 1)
+            self._pace.learned(shaking.name)
             yield Say(self._pace.progress(f"finished {shaking.name}, bare frame"))
         for beta in self._parameters.beta:
             yield from self._spring(self._specimen.coupled(beta))
 
     def _bare_frame(self, shaking: Shaking, model: TableModel) -> Generator[Step, Outcome, BareTest | str]:
         """The bare frame's test, or why there is none."""
-        p = self._parameters
-        learning = ReplicationParameters(passes=p.passes, tolerance=p.tolerance)
+        p, limits = self._parameters, self._configuration.limits
+
+        def passed() -> Progress:
+            self._pace.played(shaking.name)
+            return self._pace.progress(f"the table learns {shaking.name}")
+
         try:
-            learned = yield from replicate(shaking.target, model, self._configuration.limits, learning, shaking.name)
-        except InvalidInput as refused:
+            learned = yield from replicate(shaking.target, model, limits, self._learning(), shaking.name, passed)
+        except InvalidInput as beyond:
             # what one record asks beyond the limits does not keep the others from being played
-            yield Say(Warned(0.0, f"{shaking.name} is not played: {refused}"))
-            return f"the table cannot make it: {refused}"
+            yield Say(Warned(0.0, f"{shaking.name} is not played: {beyond}"))
+            return f"the table cannot make it: {beyond}"
         if learned.fell:
             raise RigError(NO_BLOCK)
-        if learned.status == "limited":
-            yield Say(Warned(0.0, f"{shaking.name} is not played: {_limit(learned)}"))
-            return f"the table cannot make it: {_limit(learned)}"
+        if (reason := refused(learned, p)) is not None:
+            yield Say(Warned(0.0, f"{shaking.name} is not played: {reason}"))
+            return reason
+        if lacking := shortfall(learned, p, shaking.target.band[0]):
+            self._shortfalls[shaking.name] = lacking
+            yield Say(Warned(0.0, f"{shaking.name} is played with the best drive so far: {lacking}"))
         yield Say(StepStarted(0.0, f"{shaking.name}, bare frame"))
         watch = Watch(shaking.name, None, shaking.target.sample_rate)
         outcome = yield from self._play(shaking, learned.drive, watch)
@@ -103,16 +112,25 @@ class EarthquakeSheet:
             tracking(shaking, outcome.signals),
         )
 
+    def _learning(self) -> ReplicationParameters:
+        p, modes = self._parameters, self._specimen.frame.natural_frequencies
+        return ReplicationParameters(
+            passes=p.passes,
+            tolerance=p.tolerance,
+            spectrum_tolerance=p.spectrum_tolerance,
+            spectrum_periods=tuple(tau / omega for omega in modes),
+        )
+
     def _spring(self, specimen: Specimen) -> Generator[Step, Outcome, None]:
         request = f"Stand the block on its base and mount the spring of beta = {specimen.beta:g}."
         yield Handle(Handwork.MOUNT_SPRING, specimen, request)
         for shaking in self._shakings:
             bare = self._bare[shaking.name]
             if isinstance(bare, BareTest):
-                point = yield from self._point(shaking, specimen, bare)
+                point = self._noted(shaking, (yield from self._point(shaking, specimen, bare)))
             else:
                 point = not_played(shaking, specimen.beta or 0.0, self._target(shaking, specimen), None, bare)
-            self._pace.finished(shaking.name)
+            self._pace.played(shaking.name)
             yield Say(self._pace.progress(f"finished {shaking.name}, beta = {specimen.beta:g}"))
             yield Say(PointFinished(0.0, point))
 
@@ -158,9 +176,10 @@ class EarthquakeSheet:
         noise = bare.observed.drift.peak.uncertainty
         return Watch(shaking.name, specimen.beta, shaking.target.sample_rate, bare.signals[:, DRIFT], noise, expected)
 
+    def _noted(self, shaking: Shaking, point: EarthquakePoint) -> EarthquakePoint:
+        """With what the drive lacks that it was played with."""
+        said = filter(None, (point.reason, self._shortfalls.get(shaking.name)))
+        return point.model_copy(update={"reason": "; ".join(said)})
+
     def _target(self, shaking: Shaking, specimen: Specimen) -> float | None:
         return self._targets[shaking.name, specimen.beta or 0.0]
-
-
-def _limit(learned: Replicated) -> str:
-    return str(learned.passes[-1].verdict) if learned.passes else "its drive is beyond a limit"

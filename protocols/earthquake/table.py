@@ -3,19 +3,31 @@
 from collections.abc import Generator
 from dataclasses import replace
 from datetime import UTC, datetime
+from math import ceil, tau
 from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
 
 from bench.config.model import BenchConfiguration
 from bench.control.table_model import TableModel
-from bench.control.target import REACH
-from bench.engine.steps import Done, Handle, Outcome, Play, Say, Step
-from bench.events import PointFinished
+from bench.control.target import FLAT, REACH
+from bench.engine.steps import Done, Handle, Outcome, Play, Say, Step, Watch
+from bench.events import Event, PointFinished, Progress
 from drivers.rig import Handwork
+from protocols.earthquake.pace import Pace
 from protocols.earthquake.parameters import EarthquakeParameters
 from protocols.earthquake.records import band_used
+from protocols.identify.level import mounted_name, planned
 from protocols.identify.parameters import IdentifyParameters
-from protocols.identify.sheet import identify_plan
+from protocols.identify.sheet import expected_duration, identify_plan
 from sim.errors import InvalidInput, RockbenchError
+
+PERIOD, LONGEST = 8.0, 120.0
+"""Period of the identification unless its lowest octave needs a longer one, and the longest that is tried [s]."""
+
+OCTAVE_LINES = 4
+"""Lines in the lowest octave of the identification, where an octave holds the fewest."""
 
 
 def stored_table(parameters: EarthquakeParameters, configuration: BenchConfiguration) -> TableModel | None:
@@ -37,8 +49,53 @@ def stored_table(parameters: EarthquakeParameters, configuration: BenchConfigura
     return model
 
 
+def table_warnings(parameters: EarthquakeParameters, configuration: BenchConfiguration) -> tuple[str, ...]:
+    """What the operator should know: a stored model of something else than what the drives are learned with, a mode of
+    the frame at which nothing tells how well the table follows.
+    """
+    said: list[str] = []
+    model, bare = stored_table(parameters, configuration), mounted_name(configuration.specimen.bare())
+    if model is not None and model.specimen != bare:
+        said.append(
+            f"table_model was identified with {model.specimen!r} on the table, the drives are learned with the {bare}:"
+            " more passes may be needed; `rockbench run identify` without --beta identifies the table for it"
+        )
+    mode, low = min(configuration.specimen.frame.natural_frequencies) / tau, band_used(parameters, configuration)[0]
+    if mode * FLAT < low:
+        said.append(
+            f"the frame's first mode at {mode:.3g} Hz lies below the band from {low:g} Hz on: what the table does there"
+            " is not compared in full, and its response spectrum may be missed"
+        )
+    return tuple(said)
+
+
+def identification(parameters: EarthquakeParameters, configuration: BenchConfiguration) -> IdentifyParameters:
+    """How the table is identified for these records where no model is named.
+
+    Raises InvalidInput for a band that reaches too low for it.
+    """
+    low, high = band_used(parameters, configuration)
+    first = low / REACH
+    period = max(PERIOD, float(ceil(OCTAVE_LINES / first)))
+    if period > LONGEST:
+        lowest = REACH * OCTAVE_LINES / LONGEST
+        allowed = (
+            f"the identification of the table reaches down to records from {lowest:.3g} Hz on: raise the lower end"
+        )
+        raise InvalidInput("--table-band", f"{low:g}:{high:g}", f"{allowed}, or name a table_model that covers it")
+    return IdentifyParameters(band_low=first, band_high=high * REACH, period=period)
+
+
+def identification_time(parameters: EarthquakeParameters, configuration: BenchConfiguration) -> float:
+    """Expected length of the identification [s]; zero with a stored model. Raises InvalidInput as both do."""
+    if stored_table(parameters, configuration) is not None:
+        return 0.0
+    wanted = identification(parameters, configuration)
+    return expected_duration(wanted, planned(wanted, configuration))
+
+
 def table_for(
-    parameters: EarthquakeParameters, configuration: BenchConfiguration
+    parameters: EarthquakeParameters, configuration: BenchConfiguration, pace: Pace
 ) -> Generator[Step, Outcome, TableModel]:
     """The stored table, or it is identified now; afterwards the bare frame stands on it."""
     model = stored_table(parameters, configuration)
@@ -47,20 +104,34 @@ def table_for(
         yield Handle(Handwork.REMOVE_BLOCK, bare, "Take the spring and the block off the table.")
         return model
     found: list[TableModel] = []
-    low, high = band_used(parameters, configuration)
-    wanted = IdentifyParameters(band_low=low / REACH, band_high=high * REACH)
-    plan = identify_plan(wanted, configuration, found.append)
+    plan = identify_plan(identification(parameters, configuration), configuration, found.append)
     step = next(plan)
     while True:
-        # its thirds of an octave are no points of this campaign, nor is its progress that of the campaign
+        # its thirds of an octave are no points of this campaign, and its progress is a part of the campaign's
         if isinstance(step, Say) and isinstance(step.event, PointFinished):
             outcome = Done()
         else:
-            outcome = yield replace(step, watch=None) if isinstance(step, Play) else step
+            outcome = yield replace(step, watch=_counted(step.watch, pace)) if isinstance(step, Play) else step
         try:
             step = plan.send(outcome)
         except StopIteration:
             break
     if not found:
         raise RockbenchError("the identification of the table ended without a result")
+    pace.identified()
     return found[0]
+
+
+def _counted(watch: Watch | None, pace: Pace) -> Watch | None:
+    """The watch of an identification, with its progress as a part of the campaign's."""
+    if watch is None:
+        return None
+
+    def look(signals: NDArray[np.float64]) -> Event | None:
+        event = watch(signals)
+        if not isinstance(event, Progress):
+            return event
+        pace.identified(event.fraction)
+        return pace.progress("the table is identified")
+
+    return look

@@ -3,6 +3,10 @@
 Both tests share the sensors and the specimen, so each draw has one specimen, one scale of the table's sensors and one
 pair of lasers for both; the noise is drawn for each. A draw of the measurement, coupled over bare, times a draw of the
 prediction over the predicted gain is what may be measured where the model holds (GUM Supplement 1).
+
+The same is drawn with the specimen taken as exactly known: what the bench alone leaves open. Parts that are drawn one
+by one say which counts most, and no more: where the response is chaotic each of them alone moves the gain as far as all
+together do.
 """
 
 import json
@@ -14,6 +18,7 @@ from importlib import import_module
 from math import nan
 
 import numpy as np
+from numpy.random import SeedSequence
 from numpy.typing import NDArray
 
 from bench.analysis.gain import COVERAGE
@@ -33,6 +38,15 @@ TOLERANCE = 1e-8
 """Of the drawn simulations."""
 
 INTERVAL = (0.025, 0.975)
+
+HELD = 0.95
+"""Share of the draws that an expanded uncertainty holds."""
+
+CHAOTIC = 2.0
+"""Variance of all parts drawn one by one over that of one joint draw from which on they do not add up."""
+
+NONE = SpecimenUncertainty(**dict.fromkeys(SpecimenUncertainty.model_fields, 0.0))
+"""A specimen that is exactly known."""
 
 _KEPT = {
     "stiffness and damping of the frame": ("stiffness", "damping"),
@@ -64,7 +78,9 @@ class Predicted:
 class Compared:
     """A measured gain beside its prediction; `low` and `high` hold 95 % of what may be measured.
 
-    `parts` are standard uncertainties of alpha_2, the largest first.
+    `bench` holds 95 % of the magnitudes of measured minus predicted alpha_2 that the bench leaves open, were the
+    specimen known exactly; None where that specimen topples. `parts` are standard uncertainties of alpha_2, each drawn
+    alone, the largest first; `chaotic` says that they do not add up.
     """
 
     alpha_1: float
@@ -76,18 +92,15 @@ class Compared:
     low: float | None
     high: float | None
     agrees: bool | None
+    bench: float | None
     parts: dict[str, float]
+    chaotic: bool
     chance: float
 
     @property
     def dominating(self) -> str:
         """The largest part."""
         return next(iter(self.parts), "")
-
-    @property
-    def bench(self) -> float:
-        """Expanded uncertainty of measured minus predicted as far as the bench leaves it open, not the specimen."""
-        return COVERAGE * sum(value**2 for name, value in self.parts.items() if name not in _KEPT) ** 0.5
 
     @property
     def parts_as_json(self) -> str:
@@ -101,16 +114,17 @@ def predict_draws(
     specimen: Specimen,
     uncertainty: SpecimenUncertainty,
     n: int,
-    seed: int,
+    seed: int | SeedSequence,
     *,
     table_scale: float = 0.0,
     noisy: bool = True,
 ) -> Predicted:
     """Gains of `n` specimens that `specimen` may be, under motions that the measured ones may be."""
     import_module("sim.kernel.rocking")  # compiled once, before the threads start
-    drawn = uncertainty.draws(specimen, n, np.random.default_rng(seed))
-    scales = 1.0 + table_scale * np.random.default_rng(seed + 1).standard_normal(n)
-    seeds = np.random.SeedSequence(seed).spawn(n)
+    root = seed if isinstance(seed, SeedSequence) else SeedSequence(seed)
+    specimens, scale, *seeds = root.spawn(2 + n)
+    drawn = uncertainty.draws(specimen, n, np.random.default_rng(specimens))
+    scales = 1.0 + table_scale * np.random.default_rng(scale).standard_normal(n)
 
     def motion(base: BaseMotion, k: int, random: np.random.Generator) -> SampledRecord:
         return base.draw(random, scales[k]) if noisy else SampledRecord(scales[k] * base.acceleration, base.dt)
@@ -140,27 +154,32 @@ def compare(
     """The gains of two tests with one specimen, which has its spring in the second."""
     accuracy, ranges = configuration.analysis, configuration.laser_ranges
     drifts, firsts = (bare.drift, coupled.drift), (bare.u1, coupled.u1)
-    noise, lasers = drift_errors(drifts, accuracy, ranges, n, seed)
+    of_drift, of_u1, of_all, of_bench, of_parts = SeedSequence(seed).spawn(5)
+    noise, lasers = drift_errors(drifts, accuracy, ranges, n, of_drift)
     grounded = configuration.laser_reference == "ground"
     measured_2 = _ratio(noise + lasers)
-    measured_1 = _ratio(u1_errors(firsts, accuracy, ranges, grounded, n, seed + 1))
+    measured_1 = _ratio(u1_errors(firsts, accuracy, ranges, grounded, n, of_u1))
     alpha_2 = coupled.drift.peak.value / bare.drift.peak.value
     alpha_1 = coupled.u1.peak.value / bare.u1.peak.value
 
-    def predicted(uncertainty: SpecimenUncertainty, count: int, scale: float, noisy: bool) -> Predicted:
+    def predicted(
+        uncertainty: SpecimenUncertainty, count: int, scale: float, noisy: bool, stream: SeedSequence
+    ) -> Predicted:
         return predict_draws(
-            bare.base, coupled.base, specimen, uncertainty, count, seed, table_scale=scale, noisy=noisy
+            bare.base, coupled.base, specimen, uncertainty, count, stream, table_scale=scale, noisy=noisy
         )
 
-    everything = predicted(configuration.uncertainty, n, accuracy.table_scale, True)
-    may_be = everything.alpha_2 * measured_2
-    stood = may_be[np.isfinite(may_be)]
+    everything = predicted(configuration.uncertainty, n, accuracy.table_scale, True, of_all)
+    stood = _stood(everything.alpha_2 * measured_2)
+    known = predicted(NONE, n // 2, accuracy.table_scale, True, of_bench)
+    off = np.abs(_stood(known.alpha_2 * measured_2[: n // 2]) - known.nominal[1])
     low, high = (float(np.quantile(stood, q)) for q in INTERVAL) if stood.size else (None, None)
     parts = {
         "noise of the peaks": alpha_2 * float(_ratio(noise).std()),
         "lasers": alpha_2 * float(_ratio(lasers).std()),
     }
-    parts |= _parts(predicted, configuration.uncertainty, n // 4, accuracy.table_scale)
+    parts |= _parts(predicted, configuration.uncertainty, n // 4, accuracy.table_scale, of_parts)
+    apart = sum(value**2 for value in parts.values())
     return Compared(
         alpha_1=alpha_1,
         alpha_1_uncertainty=COVERAGE * alpha_1 * float(measured_1.std()),
@@ -171,32 +190,40 @@ def compare(
         low=low,
         high=high,
         agrees=None if low is None or high is None else low <= alpha_2 <= high,
+        bench=_known(float(np.quantile(off, HELD))) if off.size else None,
         parts=dict(sorted(parts.items(), key=lambda part: -part[1])),
+        chaotic=bool(stood.size) and apart > CHAOTIC * float(np.var(stood)),
         chance=everything.chance,
     )
 
 
 def _parts(
-    predicted: Callable[[SpecimenUncertainty, int, float, bool], Predicted],
+    predicted: Callable[[SpecimenUncertainty, int, float, bool, SeedSequence], Predicted],
     uncertainty: SpecimenUncertainty,
     n: int,
     table_scale: float,
+    seed: SeedSequence,
 ) -> dict[str, float]:
     """Standard deviation of the predicted alpha_2 by each part of the model's inputs alone."""
-    none = SpecimenUncertainty(**dict.fromkeys(SpecimenUncertainty.model_fields, 0.0))
+    of_noise, of_scale, *streams = seed.spawn(2 + len(_KEPT))
     runs = {
-        "noise of the table's motion": predicted(none, n, 0.0, True),
-        "scale of the table's sensors": predicted(none, n, table_scale, False),
+        "noise of the table's motion": predicted(NONE, n, 0.0, True, of_noise),
+        "scale of the table's sensors": predicted(NONE, n, table_scale, False, of_scale),
     }
-    for name, kept in _KEPT.items():
-        only = none.model_copy(update={width: getattr(uncertainty, width) for width in kept})
-        runs[name] = predicted(only, n, 0.0, False)
+    for (name, kept), stream in zip(_KEPT.items(), streams, strict=True):
+        only = NONE.model_copy(update={width: getattr(uncertainty, width) for width in kept})
+        runs[name] = predicted(only, n, 0.0, False, stream)
     return {name: float(np.nanstd(run.alpha_2)) if run.chance < 1.0 else 0.0 for name, run in runs.items()}
 
 
 def _ratio(errors: Array) -> Array:
     """Coupled over bare, from relative errors of both, shape (2, n)."""
     return (1.0 + errors[1]) / (1.0 + errors[0])
+
+
+def _stood(gains: Array) -> Array:
+    """Without the draws that toppled."""
+    return gains[np.isfinite(gains)]
 
 
 def _known(value: float) -> float | None:

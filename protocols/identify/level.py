@@ -41,6 +41,11 @@ def specimen_of(parameters: IdentifyParameters, configuration: BenchConfiguratio
     return specimen.bare() if parameters.beta is None else specimen.coupled(parameters.beta)
 
 
+def mounted_name(specimen: Specimen) -> str:
+    """What stands on the table, as a table model calls it."""
+    return "bare frame" if specimen.beta is None else f"block with the spring of beta = {specimen.beta:g}"
+
+
 def planned(parameters: IdentifyParameters, configuration: BenchConfiguration) -> Planned:
     """The motions at the level that is allowed. Raises InvalidInput for a band that cannot be made.
 

@@ -19,7 +19,7 @@ from bench.engine.steps import Fallen, Handle, Outcome, Plan, Played, Say, Step
 from bench.events import PointFinished, StepStarted, TableIdentified, Warned
 from drivers.rig import Handwork
 from protocols.harmonic.evidence import Unmeasurable
-from protocols.identify.level import Planned, planned, specimen_of
+from protocols.identify.level import Planned, mounted_name, planned, specimen_of
 from protocols.identify.motion import RESTING, largest
 from protocols.identify.parameters import IdentifyParameters
 from protocols.identify.playing import OVERHEAD, Rules, played
@@ -111,9 +111,8 @@ def _identified(
     grid = found.grid
     drive = np.array([grid.used(record.drive) for record in records])
     moved = [np.array([grid.used(record.signals[:, at]) for record in records]) for at in (ACCELERATION, DISPLACEMENT)]
-    what = "bare frame" if specimen.beta is None else f"block with the spring of beta = {specimen.beta:g}"
     date = datetime.now(UTC).replace(microsecond=0)
-    model = identify_table(drive, moved[0], grid.lines, grid.sample_rate, date=date, specimen=what)
+    model = identify_table(drive, moved[0], grid.lines, grid.sample_rate, date=date, specimen=mounted_name(specimen))
     spacing = grid.sample_rate / grid.samples
     volts = line_amplitudes(drive, grid.lines)
     each = [line_response(volts, line_amplitudes(of, grid.lines), grid.frequency, spacing) for of in moved]

@@ -361,6 +361,11 @@ class TestTime:
         late = [0.0, 0.1, 0.2, 0.3]
         assert not any(watch.check(0.1 * k + late[k % 4], 100 * (k + 1)) for k in range(1000))
 
+    def test_a_first_block_that_comes_late_is_no_clock(self) -> None:
+        """On a busy machine it does: all others are early against it."""
+        watch = TimeWatch(1000.0, self.LIMITS)
+        assert not any(watch.check(0.1 * k + (0.07 if k == 0 else 0.0), 100 * (k + 1)) for k in range(1000))
+
 
 def test_an_open_safety_input_cuts_the_enable_line() -> None:
     guard, rig = _armed()

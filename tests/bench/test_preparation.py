@@ -1,5 +1,7 @@
 """From a record to a table motion: each step against another way to do it, and their order."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -10,7 +12,7 @@ from bench.config.model import BenchConfiguration
 from bench.control.preparation import TAPER, TRIM, PreparedMotion, prepare
 from bench.control.stroke.fit import Method
 from bench.control.stroke.reach import Reach
-from bench.control.target import band_limited
+from bench.control.target import band_limited, integrated
 from bench.prediction.requests import BandStudyRequest, SeismicRequest, StrokeFitRequest
 from sim.errors import InvalidInput
 from sim.excitation import SampledRecord
@@ -145,6 +147,34 @@ def test_the_target_of_the_table_is_the_motion_of_the_prediction() -> None:
     size = min(other.acceleration.size, target.acceleration.size)
     assert other.rest == target.rest
     assert target.acceleration[:size] == pytest.approx(other.acceleration[:size], abs=0.02 * 1.4715)
+
+
+@pytest.mark.parametrize("method", list(Method))
+def test_the_target_of_a_fitted_record_keeps_its_stroke_and_is_the_motion_of_the_prediction(method: Method) -> None:
+    """A band that begins low: what the fit adds must lie where the table's band keeps it."""
+    reach, slow = Reach(0.03, 0.9), (0.25, 25.0)
+    free = prepare(record(), band=slow, peak=1.4715)
+    assert free.motion.peak_displacement > 1.3 * reach.displacement
+    fitted = prepare(record(), band=slow, peak=1.4715, reach=reach, method=method)
+    target = fitted.target(2000.0)
+    assert target.peaks["displacement"] <= 1.002 * reach.displacement
+    assert target.peaks["displacement"] > 0.95 * reach.displacement
+    assert target.peaks["velocity"] <= reach.velocity
+    # by integration in time, at the table's rate, from rest
+    _, asked = integrated(target.acceleration, 2000.0)
+    t = np.arange(asked.size) / 2000.0
+    made = np.interp(t, np.arange(fitted.record.acceleration.size) * fitted.record.dt, fitted.motion.displacement)
+    assert asked == pytest.approx(made, abs=0.02 * reach.displacement)
+    spectrum, frequency = np.abs(np.fft.rfft(target.acceleration)), target.frequency
+    assert spectrum[frequency <= slow[0] / 2.0].max() < 1e-9 * spectrum.max()
+
+
+def test_a_band_that_takes_away_what_the_stroke_needs_is_refused() -> None:
+    fitted = prepare(record(), band=(0.25, 25.0), peak=1.4715, reach=Reach(0.03, 0.9), method=Method.HIGH_PASS)
+    with pytest.raises(InvalidInput, match="cannot both be had"):
+        replace(fitted, reach=Reach(0.025, 0.9)).target(2000.0)
+    with pytest.raises(InvalidInput, match="scale"):
+        prepare(record(), band=(8.0, 25.0), peak=9.0, reach=Reach(1e-5, 0.01))
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,10 @@ import pytest
 from numpy.typing import NDArray
 from scipy import signal
 
+from bench.analysis.response_spectrum import pseudo_acceleration
 from bench.control.envelope import UNITS, Envelope, fitting
+from bench.control.inverse import TableInverse
+from bench.control.passes import SpectrumCheck
 from bench.control.replication import Replication, ReplicationParameters
 from bench.control.table_model import TableModel
 from bench.control.target import Target, band_limited
@@ -204,6 +207,55 @@ def test_the_first_drive_can_be_played_twice() -> None:
     assert np.array_equal(replication.drive, first)
     assert replication.learn(plant.measured(first)).replayed
     assert not np.array_equal(replication.drive, first)
+
+
+def test_the_passes_go_on_until_the_response_spectrum_is_met_too() -> None:
+    """The table's motion is 3 % too large: good enough as root mean square, not as a spectrum."""
+    plant, target = Plant(), target_of(2, 1.0)
+    for tolerance, status in ((0.01, "running"), (0.04, "converged")):
+        parameters = ReplicationParameters(tolerance=0.05, spectrum_tolerance=tolerance, spectrum_periods=(1.3,))
+        replication = Replication(target, plant.model, GENEROUS, parameters)
+        replication.learn(1.03 * target.acceleration)
+        assert replication.status == status
+        assert replication.repeatable == pytest.approx(0.03, rel=1e-6)
+        assert replication.spectrum_error[0] == pytest.approx(0.03, rel=1e-6)
+        assert replication.verdict.binds is None
+
+
+def test_only_what_noise_does_not_explain_of_a_spectrum_counts() -> None:
+    """White noise moves a peak by more than twice its standard deviation once in 22 times, by more than one in 3."""
+    rate, period, size = 200.0, 0.5, 2000
+    t = np.arange(size) / rate
+    record = np.sin(4.0 * np.pi * t) * np.sin(np.pi * t / t[-1]) ** 2
+    check, random = SpectrumCheck(record, rate, (period, period), ()), np.random.default_rng(3)
+    frequency = np.fft.rfftfreq(size, 1.0 / rate)[1:]
+    scatter, counted = 0.05, np.zeros(2)
+    for _ in range(400):
+        achieved = record + scatter * random.standard_normal(size)
+        for k, assumed in enumerate((scatter, 0.5 * scatter)):
+            off, at = check.clear_error(achieved, frequency, np.full(frequency.size, size * assumed**2))
+            counted[k] += off > 0.0
+            assert at == period
+            if off > 0.0:
+                wanted = pseudo_acceleration(record, 1.0 / rate, np.array([period]))
+                found = pseudo_acceleration(achieved, 1.0 / rate, np.array([period]))
+                assert off == pytest.approx(float(np.abs(found / wanted - 1.0)[0]))
+    assert counted / 400 == pytest.approx([0.0455, 0.317], abs=0.06)
+
+
+def test_a_line_counts_by_its_coherence() -> None:
+    plant, target = Plant(), target_of(2, 1.0)
+    f = np.array(plant.model.frequency)
+    coherence = np.interp(f, (2.0, 10.0), (1.0, 0.3))
+    doubted = plant.model.model_copy(update={"coherence": tuple(coherence)})
+    drives: list[NDArray[np.complex128]] = []
+    for model in (plant.model, doubted):
+        table = TableInverse(model, target)
+        drives.append(table.spectrum(table.correction(table.spectrum(target.acceleration), 0.0 * table.noise)))
+    strong = np.abs(drives[0]) > 1e-6 * np.abs(drives[0]).max()
+    np.testing.assert_allclose(
+        drives[1][strong], (np.interp(table.frequency, f, coherence) * drives[0])[strong], rtol=1e-6
+    )
 
 
 def test_a_smaller_first_gain_is_a_smaller_first_drive() -> None:

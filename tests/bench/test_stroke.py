@@ -63,18 +63,20 @@ def test_a_record_is_brought_to_rest_by_its_two_slowest_sines() -> None:
     assert np.linalg.lstsq(shapes.T, change)[0] @ shapes == pytest.approx(change, abs=1e-12)
 
 
-def test_the_modes_move_the_table_as_the_integration_says() -> None:
-    modes = SineModes(501, 0.01, 2.0)
+@pytest.mark.parametrize(("lowest", "first"), [(0.0, 1), (0.55, 6)])
+def test_the_modes_move_the_table_as_the_integration_says(lowest: float, first: int) -> None:
+    modes = SineModes(501, 0.01, 2.0, lowest)
+    assert modes.frequencies[0] == pytest.approx(0.1 * first)
     assert modes.frequencies[-1] == pytest.approx(2.0)
     samples = np.array([0, 1, 2, 77, 499, 500])
     velocity, displacement = modes.motions(samples)
     weights = np.random.default_rng(1).standard_normal(501)
     products = modes.products(weights)
-    for k in (0, 1, 19):
+    for k in (0, 1, modes.frequencies.size - 1):
         size = np.zeros(modes.frequencies.size)
         size[k] = 1.0
         mode = modes.sum(size)
-        assert mode == pytest.approx(np.sin((k + 1) * pi * np.arange(501) / 500), abs=1e-12)
+        assert mode == pytest.approx(np.sin((k + first) * pi * np.arange(501) / 500), abs=1e-12)
         motion = table_motion(mode, 0.01)
         assert velocity[:, k] == pytest.approx(motion.velocity[samples], abs=1e-12)
         assert displacement[:, k] == pytest.approx(motion.displacement[samples], abs=1e-12)

@@ -93,6 +93,45 @@ def test_sensors_that_disagree_leave_the_accelerometer_alone(scale: float) -> No
     assert found.acceleration.size == SIZE // 2
 
 
+@pytest.mark.parametrize("step", [4e-6, 2e-5])
+@pytest.mark.parametrize("noise", [0.0, 1e-7, 1.0])
+@pytest.mark.parametrize("size", [1.0, 0.1])
+def test_a_sensor_that_is_quieter_than_its_steps_counts_for_no_better(step: float, noise: float, size: float) -> None:
+    """Half a step of error that is not to be seen at rest, at every place within a step; a noise of 1 is one step."""
+    random = np.random.default_rng(6)
+    errors, wide, alone, stated = [], [], [], []
+    for place in np.linspace(-0.5, 0.5, 6, endpoint=False):
+        signals = np.zeros((SIZE, 6))
+        signals[:, 0] = size * A + 2e-4 * np.sqrt(RATE / 2.0) * random.standard_normal(SIZE)
+        seen = size * X + max(noise * (step if noise == 1.0 else 1.0), 1e-12) * random.standard_normal(SIZE)
+        signals[:, 1] = step * np.round(seen / step + place)
+        found = base_motion(signals, signals[:REST], RATE)
+        every = round(found.dt * RATE)
+        errors.append(low(found.acceleration - size * A[::every], found.dt))
+        wide.append(np.std(found.acceleration - size * A[::every]))
+        alone.append(low(signals[:, 0] - size * A, 1.0 / RATE))
+        stated.append(low(found.draw(random).acceleration - found.acceleration, found.dt))
+    together, apart, drawn = (np.sqrt(np.mean(np.square(each))) for each in (errors, alone, stated))
+    assert together < 0.6 * apart
+    # the accelerometer's own: 2e-4 (m/s2)/Hz^(1/2) up to 400 Hz
+    assert np.mean(wide) == pytest.approx(2e-4 * np.sqrt(400.0), rel=0.03)
+    # never better than it is, and at most twice as bad
+    assert 0.85 * together < drawn < 2.0 * together
+
+
+def test_a_coarse_accelerometer_is_not_believed_more_than_its_steps() -> None:
+    """A step of 0.02 m/s2 without any noise: the displacement sensor is the better one where the frame answers."""
+    random = np.random.default_rng(7)
+    signals, _ = measured(random)
+    signals[:, 0] = 0.02 * np.round(A / 0.02 + 0.3)
+    found = base_motion(signals, signals[:REST], RATE)
+    every = round(found.dt * RATE)
+    error = low(found.acceleration - A[::every], found.dt)
+    assert error < 0.2 * low(signals[:, 0] - signals[0, 0] - A, 1.0 / RATE)
+    drawn = [low(found.draw(random).acceleration - found.acceleration, found.dt) for _ in range(8)]
+    assert np.mean(drawn) == pytest.approx(error, rel=0.6)
+
+
 def test_missing_samples_are_refused() -> None:
     signals, rest = measured(np.random.default_rng(5))
     signals[20_000, 1] = np.nan

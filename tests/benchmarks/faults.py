@@ -1,15 +1,22 @@
-"""Every fault at every place of a short campaign, and how fast the guard reacts.
+"""Every fault at every place of a short campaign, on the simulated and on the emulated bench, and how fast the guard
+reacts.
 
-    python -m tests.benchmarks.faults                all of it, two minutes
-    python -m tests.benchmarks.faults --only sensor  faults whose name contains a text
-    python -m tests.benchmarks.faults --reaction     the table of reaction times only
+    python -m tests.benchmarks.faults                     all of it, half an hour on two cores
+    python -m tests.benchmarks.faults --bench simulated   the virtual bench only, three minutes
+    python -m tests.benchmarks.faults --only laser        faults whose name contains a text
+    python -m tests.benchmarks.faults --reaction          the table of reaction times only
 
-Prints, for every fault, at how many places it was put in, how the runs ended, and how many broke a rule of
-`tests.faults.audit`; each offender with all that it takes to look at it again. Ends with exit status 1 if there was
-one, if a fault was lost, or if a reaction took longer than promised.
+Prints, for every fault and for every state of the engine, at how many places it was put in, how often it struck, how
+the runs ended, and how many broke a rule of `tests.faults.audit` or `tests.faults.emulated.truth`; each offender with
+all that it takes to look at it again. Ends with exit status 1 if there was one, if a fault was lost, or if a reaction
+took longer than promised.
+
+On the simulated bench every fault is put everywhere, also where nothing is left that it could strike; on the emulated
+one only where it must strike, and one that does not is lost.
 """
 
 import argparse
+import os
 import sys
 from collections import Counter
 from collections.abc import Iterator
@@ -30,8 +37,11 @@ BLOCKS, LEADS = (0.02, 0.05, 0.1, 0.2), (0.0, 0.05, 0.1)
 PHASES = np.linspace(0.0, 1.0, 24, endpoint=False)
 
 
-def verdicts(only: str) -> Iterator[Verdict]:
-    """Every fault whose name contains `only`, at every place."""
+STATES = {place.name: str(place.state) for place in PLACES}
+
+
+def simulated(only: str) -> Iterator[Verdict]:
+    """Every fault whose name contains `only`, at every place of the virtual bench."""
     with TemporaryDirectory() as folder:
         for fault in catalogue():
             if only in fault.name:
@@ -39,19 +49,45 @@ def verdicts(only: str) -> Iterator[Verdict]:
                     yield judge(fault, place, Path(folder))
 
 
+def emulated(only: str) -> Iterator[Verdict]:
+    """The same on the emulated bench, many at once, wherever it can strike."""
+    from tests.faults.emulated.pool import Campaigns, cases
+
+    asked = [case for case in cases() if only in case.fault]
+    with Campaigns(asked) as begun:
+        for case in asked:
+            yield begun.verdict(case)
+        print(f"{begun.void} campaigns were repeated because the machine was too late for real time")
+
+
 def table(found: list[Verdict]) -> str:
-    """One line for each fault and one for all: injected, noticed, endings, rules broken."""
-    heads = ["injected", "lost", "noticed", *SEVERITY, "offenders"]
-    lines = [f"{'fault':42}" + "".join(f"{head:>10}" for head in heads)]
-    names = list(dict.fromkeys(verdict.fault.name for verdict in found))
-    for name in (*names, "all"):
-        mine = [verdict for verdict in found if name in (verdict.fault.name, "all")]
+    """A line for each fault, for each state and for all: put in, struck, lost, noticed, endings, rules broken."""
+    heads = ["put in", "struck", "lost", "noticed", *SEVERITY, "offenders"]
+    lines = [f"{'':42}" + "".join(f"{head:>10}" for head in heads)]
+    groups = {verdict.fault: [one for one in found if one.fault == verdict.fault] for verdict in found}
+    for state in dict.fromkeys(STATES.values()):
+        groups[f"state: {state}"] = [verdict for verdict in found if STATES[verdict.place] == state]
+    groups["all"] = found
+    for name, mine in groups.items():
         ends = Counter(verdict.status for verdict in mine)
-        injected, noticed = (sum(of) for of in zip(*((v.injected, v.noticed) for v in mine), strict=True))
-        numbers = [injected, len(mine) - injected, noticed, *(ends[status] for status in SEVERITY)]
+        numbers = [len(mine), sum(verdict.fired for verdict in mine), sum(verdict.lost for verdict in mine)]
+        numbers += [sum(verdict.noticed for verdict in mine), *(ends[status] for status in SEVERITY)]
         numbers.append(sum(bool(verdict.broken) for verdict in mine))
         lines.append(f"{name:42}" + "".join(f"{number:10d}" for number in numbers))
     return "\n".join(lines)
+
+
+def report(bench: str, found: list[Verdict]) -> bool:
+    """Print what one bench gave; whether all was as it should be."""
+    offenders = [verdict for verdict in found if verdict.broken or verdict.lost]
+    print(f"The {bench} bench:\n{table(found)}")
+    print("\n".join(str(verdict) for verdict in offenders), flush=True)
+    return bool(found) and not offenders
+
+
+def matrix(bench: str, only: str) -> bool:
+    """Put all that goes wrong into one bench; whether all was as it should be."""
+    return report(bench, list({"simulated": simulated, "emulated": emulated}[bench](only)))
 
 
 def reactions() -> list[list[Reaction]]:
@@ -78,19 +114,17 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--only", default="")
     parser.add_argument("--reaction", action="store_true")
+    parser.add_argument("--bench", choices=("simulated", "emulated", "both"), default="both")
     options = parser.parse_args()
-    begin, wrong = perf_counter(), False
-    if not options.reaction:
-        found = list(verdicts(options.only))
-        offenders = [verdict for verdict in found if verdict.broken or not verdict.injected]
-        print(table(found))
-        print("\n".join(str(verdict) for verdict in offenders))
-        wrong = bool(offenders) or not found
+    begin = perf_counter()
+    both = ("simulated", "emulated") if os.name == "posix" else ("simulated",)
+    benches = both if options.bench == "both" else (options.bench,)
+    good = all([] if options.reaction else [matrix(bench, options.only) for bench in benches])
     times = reactions()
     print(f"From the first sample beyond a limit to the first changed sample of the output, at {RATE:g} samples/s:")
     print(reaction_table(times))
     print(f"{perf_counter() - begin:.0f} s")
-    return int(wrong or any(one.measured > one.promised for group in times for one in group))
+    return int(not good or any(one.measured > one.promised for group in times for one in group))
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from bench.engine.machine import LEGAL
 from bench.events import LimitExceeded, State, StateChanged
 from bench.record import recorder as recording
 from bench.record.reader import Record, open_record
+from sim.virtual_bench import VirtualBench
 from tests.faults.bench import FaultyBench, Story, released, run
 from tests.faults.fault import Fault
 from tests.faults.places import Place
@@ -35,45 +37,57 @@ SMALL_BACKLOG, SHORT_PATIENCE = 8, 0.05
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a fault at a place came to: how the run ended, whether it was noticed, and every rule that was broken."""
+    """What a fault at a place came to, by their names: whether it struck at all, whether it should have, how the run
+    ended, whether it was noticed, and every rule that was broken."""
 
-    fault: Fault
-    place: Place
-    injected: bool
+    fault: str
+    place: str
+    fired: bool
+    lost: bool
     noticed: bool
     status: str
     reason: str
     broken: tuple[str, ...]
 
     def __str__(self) -> str:
-        return f"{self.fault.name} at {self.place.name!r}: {'; '.join(self.broken)} [{self.status}: {self.reason}]"
+        return f"{self.fault} at {self.place!r}: {'; '.join(self.broken)} [{self.status}: {self.reason}]"
 
 
 def judge(fault: Fault, place: Place, folder: Path) -> Verdict:
-    """Put `fault` into a campaign at `place`, and hold what came of it against the rules."""
+    """Put `fault` into a campaign at `place`, and hold what came of it against the rules; `folder` is left empty."""
+    with TemporaryDirectory(dir=folder) as own:
+        return _judged(fault, place, Path(own) / "campaign.h5")
+
+
+def _judged(fault: Fault, place: Place, path: Path) -> Verdict:
     before = set(threading.enumerate())
-    path = folder / "campaign.h5"
-    path.unlink(missing_ok=True)
-    with _disk_of(fault):
+    with disk_of(fault):
         bench = FaultyBench(path, place, fault.begin)
         with released(bench):
             story = run(bench)
-            noticed = _noticed(story, fault)
+            noticed = was_noticed(story, fault)
             broken = [*ending_rules(story, fault, place, noticed), *output_rules(story, fault)]
             if fault.disk == "hung" and noticed:
-                # the bytes that are on the disk: the file itself is still held
-                copy = folder / "copy.h5"
-                shutil.copy(path, copy)
-                with open_record(copy) as record:
+                with on_disk(path) as record:
                     broken += [*sample_rules(record, story)]
-        broken += [f"a thread is left: {name}" for name in _left(before)]
+        broken += [f"a thread is left: {name}" for name in left_since(before)]
     with open_record(path) as record:
         broken += [*sample_rules(record, story), *record_rules(record, story, fault)]
-    return Verdict(fault, place, bench.begun, noticed, story.status, story.reason, tuple(broken))
+    fired = bench.begun and (bool(bench.rig.struck) or not fault.recorded)
+    return Verdict(fault.name, place.name, fired, not bench.begun, noticed, story.status, story.reason, tuple(broken))
 
 
 @contextmanager
-def _disk_of(fault: Fault) -> Iterator[None]:
+def on_disk(path: Path) -> Iterator[Record]:
+    """The bytes that are on the disk, read elsewhere: the file itself is still held."""
+    with TemporaryDirectory() as elsewhere:
+        shutil.copytree(path.parent, elsewhere, dirs_exist_ok=True)
+        with open_record(Path(elsewhere) / path.name) as record:
+            yield record
+
+
+@contextmanager
+def disk_of(fault: Fault) -> Iterator[None]:
     """A recorder that gives up soon, where that is what is tried."""
     with pytest.MonkeyPatch.context() as patch:
         if fault.disk in ("hung", "slow"):
@@ -82,18 +96,19 @@ def _disk_of(fault: Fault) -> Iterator[None]:
         yield
 
 
-def _left(before: set[threading.Thread]) -> list[str]:
+def left_since(before: set[threading.Thread]) -> list[str]:
+    """Names of the threads that came since and do not end."""
     new = set(threading.enumerate()) - before
     for thread in new:
         thread.join(20.0)
     return [thread.name for thread in new if thread.is_alive()]
 
 
-def _noticed(story: Story, fault: Fault) -> bool:
+def was_noticed(story: Story, fault: Fault) -> bool:
     """Whether the run's end, its journal or the closing of its file names the fault."""
     told = [story.reason, *story_notes(story), str(story.close_error or "")]
     told += [event.quantity for event in story.bench.events if isinstance(event, LimitExceeded)]
-    return bool(fault.says) and any(fault.says in text for text in told)
+    return bool(fault.says) and any(says in text for text in told for says in fault.says.split("|"))
 
 
 def story_notes(story: Story) -> list[str]:
@@ -154,19 +169,17 @@ def output_rules(story: Story, fault: Fault) -> Iterator[str]:
     rig.close()
     if rig.armed:
         yield "the rig is armed after it was closed"
-    yield from _unrest(story.bench)
+    if rig.runs:
+        yield from unrest(rig.inner.bench, within=rig.gain == 1.0)
 
 
-def _unrest(bench: FaultyBench) -> Iterator[str]:
-    """Let time pass at zero drive; the virtual bench must come to rest, its table within the limits on the way."""
-    virtual = bench.rig.inner.bench
-    if not bench.rig.runs:
-        return
+def unrest(virtual: VirtualBench, *, within: bool = True) -> Iterator[str]:
+    """Let time pass at zero drive; the virtual bench must come to rest, its table `within` the limits on the way."""
     speed = np.inf
     for _ in range(REST):
         virtual.coast(1.0)
         truth = virtual.truth
-        if bench.rig.gain == 1.0 and not (_within(truth.x, LIMITS.displacement) and _within(truth.v, LIMITS.velocity)):
+        if within and not (_within(truth.x, LIMITS.displacement) and _within(truth.v, LIMITS.velocity)):
             yield "the table went beyond a limit after the end"
         rest = slice(-round(0.1 * RATE), None)
         speed = max(float(np.abs(part[rest]).max()) for part in (truth.v, truth.v1, truth.v2, truth.x))

@@ -1,4 +1,4 @@
-"""A short real campaign on the virtual bench, into which a fault is put at a chosen place."""
+"""A short real campaign, on the virtual bench unless told, into which a fault is put at a chosen place."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -20,21 +20,7 @@ from drivers.simulated import SimulatedRig
 from tests.faults.disk import Disk, spoil, wait_until_broken
 from tests.faults.places import Place
 from tests.faults.rig import FaultyRig
-from tests.faults.setup import (
-    AMPLITUDE,
-    BARE,
-    BLOCK,
-    CALIBRATION,
-    COUPLED,
-    LEAD,
-    LIMITS,
-    MOVER,
-    OMEGA,
-    PARAMETERS,
-    RAMPS,
-    RATE,
-    NoPoint,
-)
+from tests.faults.setup import BARE, COUPLED, MOVER, PARAMETERS, NoPoint, Setting
 
 
 class Person:
@@ -67,13 +53,17 @@ class FaultyBench:
         place: Place | None = None,
         begin: "Begin | None" = None,
         requests: Requests | None = None,
+        *,
+        setting: Setting | None = None,
+        rig: FaultyRig | None = None,
     ) -> None:
         self.place, self._begin = place, begin
+        self.setting = setting or Setting()
         self.begun = False
         self.recovers = False
         """Whether a disk that hangs comes back when the run is over."""
         self.state, self.visits, self.turn = State.IDLE, dict.fromkeys(State, 0), 0
-        self.rig = FaultyRig(SimulatedRig(PARAMETERS, BARE, seed=1, lead=LEAD))
+        self.rig = rig or FaultyRig(SimulatedRig(PARAMETERS, BARE, seed=1, lead=self.setting.lead))
         self.rig.before_read = self._next_turn
         self.person, self.requests, self.disk = Person(self.rig.struck), requests or Requests(), Disk()
         self.raising: BaseException | None = None
@@ -90,17 +80,23 @@ class FaultyBench:
             self.recorder = recorder = Recorder(
                 path,
                 channels=self.rig.channels,
-                sample_rate=RATE,
+                sample_rate=self.setting.rate,
                 point_type=NoPoint,
                 metadata={},
-                hold_up=PATIENCE,
+                hold_up=PATIENCE if isinstance(self.rig.inner, SimulatedRig) else 0.0,
             )
             spoil(recorder, self.disk)
             subscribers.append(recorder)
         self.stream = Stream(self.rig.clock, [*subscribers, self._fail])
-        self.guard = Guard(self.rig, LIMITS, RAMPS, MOVER)
+        self.guard = Guard(self.rig, self.setting.limits, self.setting.ramps, MOVER)
         self.engine = Engine(
-            self.rig, self.guard, SignalMap(self.rig.channels, "ground"), self.stream, self.requests, self.person, BLOCK
+            self.rig,
+            self.guard,
+            SignalMap(self.rig.channels, "ground"),
+            self.stream,
+            self.requests,
+            self.person,
+            self.setting.block,
         )
 
     def start(self) -> None:
@@ -110,12 +106,13 @@ class FaultyBench:
 
     def plan(self) -> Plan:
         """Two tests; between any two steps `extra` comes first."""
+        of = self.setting
         tests: list[list[Step]] = [
             [
                 Handle(work, specimen, work.value),
-                Arm(0.2, patience=0.4),
-                Calibrate(CALIBRATION),
-                Follow((Leg(0.25, AMPLITUDE, OMEGA),)),
+                Arm(of.rest, patience=2.0 * of.rest),
+                Calibrate(of.calibration),
+                Follow((Leg(of.glide, of.amplitude, of.omega),)),
                 *dwells,
                 RampOut(fast=fast),
             ]
@@ -160,10 +157,10 @@ class FaultyBench:
         place = self.place
         if place is None:
             return
-        if place.asked is not None and (self.state, self.visits[self.state], self.turn) == (State.RUNNING, 1, 3):
+        here = (self.state, self.visits[self.state])
+        if place.asked is not None and (*here, self.turn) == (State.RUNNING, 1, place.asked_in):
             getattr(self.requests, place.asked)()
-        here = (self.state, self.visits[self.state]) == (place.state, place.visit) and self.turn >= place.turn
-        if here and not self.begun:
+        if here == (place.state, place.visit) and self.turn >= place.turn and not self.begun:
             self._begin_now()
 
     def _begin_now(self) -> None:

@@ -47,8 +47,8 @@ def never(place: Place, bench: FaultyBench) -> bool:  # noqa: ARG001
 class Fault:
     """`begin` brings it about. Noticed, the run ends as `status`, and `says` is in the reason.
 
-    Where several endings are right, `status` names them with bars between. `must` tells where the fault must be
-    noticed; elsewhere it may be if `may`, and otherwise the run ends as if nothing had been.
+    Where several endings or words are right, `status` and `says` name them with bars between. `must` tells where the
+    fault must be noticed; elsewhere it may be if `may`, and otherwise the run ends as if nothing had been.
     """
 
     name: str
@@ -62,13 +62,15 @@ class Fault:
     """Nothing brings this rig to a stop but closing it."""
     moves: bool = False
     """The table moves more than it is told to."""
+    recorded: bool = False
+    """Whether the rig's list `struck` says that it struck."""
     disk: str = ""
     """What is the matter with the disk: "full", "hung" or "slow"."""
 
 
 def of_samples(name: str, making: Making, status: str, says: str, must: Must, may: bool = False) -> Fault:
     """A fault of what is read, from its beginning on."""
-    return Fault(name, lambda bench: bench.rig.falsify.append(making(bench)), status, says, must, may)
+    return Fault(name, lambda bench: bench.rig.falsify.append(making(bench)), status, says, must, may, recorded=True)
 
 
 def borne(name: str, making: Making) -> Fault:
@@ -91,7 +93,7 @@ def fails(
     def begin(bench: FaultyBench) -> None:
         bench.rig.failures[call] = Failure(error, times, obeys)
 
-    return Fault(name, begin, "failed", str(error), must, may)
+    return Fault(name, begin, "failed", str(error), must, may, recorded=True)
 
 
 def asks(*requests: str, status: str, says: str = "was asked for", must: Must = heeded) -> Fault:

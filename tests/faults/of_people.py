@@ -1,6 +1,7 @@
 """Faults of plans, of those who listen, of the disk and of the operator; and the requests of a person."""
 
 import errno
+from functools import partial
 from threading import Thread
 
 from bench.control.calibration import DriveCalibration
@@ -10,6 +11,8 @@ from sim.errors import RockbenchError
 from tests.faults.bench import Begin, FaultyBench
 from tests.faults.fault import Fault, answered, asks, heeded, never, reads, strikes
 from tests.faults.setup import GAIN
+
+_strikes = partial(Fault, must=strikes, recorded=True)
 
 
 def _does(step: Step | Exception) -> Begin:
@@ -24,20 +27,13 @@ def plans() -> list[Fault]:
     bad: dict[str, Step] = {
         "nan": Trim((complex("nan"),)),
         "over-range": Calibrate(DriveCalibration.flat(GAIN / 10.0)),
-        # 1.4 V at 500 rad/s change by 680 V/s
-        "slewing": Follow((Leg(0.05, 2.0, 500.0),)),
+        # 1.6 V and more at 500 rad/s change by 800 V/s and more
+        "slewing": Follow((Leg(0.02, 4.0, 500.0),)),
     }
     return [
-        *(Fault(f"{name} drive", _does(step), "aborted", "drive", strikes) for name, step in bad.items()),
-        Fault(
-            "mistake in the plan",
-            _does(ZeroDivisionError("sheet")),
-            "failed",
-            "sheet",
-            strikes,
-            raises=ZeroDivisionError,
-        ),
-        Fault("the plan gives up", _does(RockbenchError("no steady state")), "failed", "no steady state", strikes),
+        *(_strikes(f"{name} drive", _does(step), "aborted", "drive") for name, step in bad.items()),
+        _strikes("mistake in the plan", _does(ZeroDivisionError("sheet")), "failed", "sheet", raises=ZeroDivisionError),
+        _strikes("the plan gives up", _does(RockbenchError("no steady state")), "failed", "no steady state"),
     ]
 
 
@@ -51,26 +47,15 @@ def _raises(error: BaseException, *, always: bool = False) -> Begin:
 def subscribers() -> list[Fault]:
     """Whoever listens breaks down."""
     return [
-        Fault("OSError in a subscriber", _raises(OSError("pipe")), "failed", "pipe", strikes, raises=OSError),
-        Fault(
-            "OSError in a subscriber, always",
-            _raises(OSError("pipe"), always=True),
-            "failed",
-            "pipe",
-            strikes,
-            raises=OSError,
+        _strikes("OSError in a subscriber", _raises(OSError("pipe")), "failed", "pipe", raises=OSError),
+        _strikes(
+            "OSError in a subscriber, always", _raises(OSError("pipe"), always=True), "failed", "pipe", raises=OSError
         ),
-        Fault("an analysis gives up", _raises(RockbenchError("no cycles")), "failed", "no cycles", strikes),
-        Fault(
-            "an analysis gives up, always",
-            _raises(RockbenchError("no cycles"), always=True),
-            "failed",
-            "no cycles",
-            strikes,
+        _strikes("an analysis gives up", _raises(RockbenchError("no cycles")), "failed", "no cycles"),
+        _strikes(
+            "an analysis gives up, always", _raises(RockbenchError("no cycles"), always=True), "failed", "no cycles"
         ),
-        Fault(
-            "KeyboardInterrupt", _raises(KeyboardInterrupt("key")), "failed", "key", strikes, raises=KeyboardInterrupt
-        ),
+        _strikes("KeyboardInterrupt", _raises(KeyboardInterrupt("key")), "failed", "key", raises=KeyboardInterrupt),
     ]
 
 
@@ -115,13 +100,12 @@ def operators() -> list[Fault]:
     gone = RockbenchError("nobody can answer")
     return [
         Fault("operator declines", _declines, "aborted", "declined", answered),
-        Fault("operator cannot be asked", _operator(gone), "failed", "nobody can answer", strikes),
-        Fault(
+        _strikes("operator cannot be asked", _operator(gone), "failed", "nobody can answer"),
+        _strikes(
             "KeyboardInterrupt at the question",
             _operator(KeyboardInterrupt("key")),
             "failed",
             "key",
-            strikes,
             raises=KeyboardInterrupt,
         ),
     ]

@@ -10,7 +10,7 @@ from bench.events import State
 class Place:
     """Before read `turn` of the `visit`-th time that the engine is in `state`; turn 0 is the change of state itself.
 
-    `asked` is what a person asks for in the third turn of the first drive, where only that leads to the state.
+    `asked` is what a person asks for in turn `asked_in` of the first drive, where only that leads to the state.
     """
 
     name: str
@@ -18,6 +18,7 @@ class Place:
     visit: int = 1
     turn: int = 0
     asked: str | None = None
+    asked_in: int = 3
     core: bool = True
     """Whether the test suite goes there; the others are left to the benchmark, which goes everywhere."""
 

@@ -1,4 +1,4 @@
-"""A rig around the simulated one that does as it is told: false samples, late blocks, calls that fail."""
+"""A rig around another that does as it is told: false samples, late blocks, calls that fail."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.clock import Clock, VirtualClock
-from drivers.rig import Alignment, Block, Channel, Handwork, RigError
+from drivers.clock import Clock
+from drivers.rig import Alignment, Block, Channel, Handwork, Rig, RigError
 from drivers.simulated import SimulatedRig
 
 Array = NDArray[np.float64]
@@ -15,7 +15,7 @@ SAFETY_INPUTS = ("emergency stop", "over-travel", "amplifier ready")
 
 
 class FaultyClock:
-    """A virtual clock that can jump, and run fast from some moment on."""
+    """A clock that can jump, and run fast from some moment on."""
 
     def __init__(self, inner: Clock) -> None:
         self._inner = inner
@@ -64,14 +64,13 @@ class Run:
 
 
 class FaultyRig:
-    """The surface of `drivers.rig.Rig`. Without a fault it is the simulated rig, with safety inputs added.
+    """The surface of `drivers.rig.Rig`. Without a fault it is the rig that it wraps, with safety inputs added.
 
     `before_read` is called ahead of each read; `falsify` changes the blocks that are read; `gain` is what stands
     between the output and the amplifier; `failures` says which calls raise what.
     """
 
-    def __init__(self, inner: SimulatedRig) -> None:
-        assert isinstance(inner.clock, VirtualClock)
+    def __init__(self, inner: Rig) -> None:
         self.inner = inner
         self.faulty_clock = FaultyClock(inner.clock)
         self.safety = dict.fromkeys(SAFETY_INPUTS, True)
@@ -124,7 +123,7 @@ class FaultyRig:
 
     def interlocks(self) -> Mapping[str, bool]:
         self._fail("interlocks")
-        return dict(self.safety)
+        return {**self.inner.interlocks(), **self.safety}
 
     def arm(self) -> None:
         self._fail("arm", self.inner.arm)
@@ -140,9 +139,7 @@ class FaultyRig:
     def read(self, n: int) -> Block:
         self.before_read()
         block = self.inner.read(n)
-        run, truth = self.runs[-1], self.inner.bench.truth
-        run.moved(truth.x, truth.v, truth.a)
-        run.read += n
+        self._played(n)
         self._fail("read", self.inner.stop)
         for change in self.falsify:
             changed = change(block)
@@ -166,6 +163,14 @@ class FaultyRig:
     def handwork(self, work: Handwork, stiffness: float | None = None) -> None:
         self._fail("handwork")
         self.inner.handwork(work, stiffness)
+
+    def _played(self, n: int) -> None:
+        """Count samples that were played, and how the table moved meanwhile."""
+        run = self.runs[-1]
+        run.read += n
+        if isinstance(self.inner, SimulatedRig):
+            truth = self.inner.bench.truth
+            run.moved(truth.x, truth.v, truth.a)
 
     def _fail(self, call: str, work: Callable[[], object] = lambda: None) -> None:
         failure = self.failures.get(call)

@@ -1,5 +1,7 @@
 """The bench and the campaign that faults are put into: small and quick, with every part that a real one has."""
 
+from dataclasses import dataclass
+
 from bench.control.calibration import DriveCalibration
 from bench.guard.limits import Debounce, Limits, Ramps
 from bench.guard.quantities import Mover
@@ -33,6 +35,26 @@ LIMITS = Limits(
 )
 RAMPS = Ramps(stop=0.35, abort=0.2)
 MOVER = Mover(mass=SHAKER.moving_mass + 4.6, stiffness=SHAKER.k_s, force_constant=SHAKER.bl)
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A campaign of two tests: its clock [1/s, samples], its drive, and what is allowed.
+
+    Each test rests for `rest` seconds, goes in `glide` seconds to `amplitude` [m/s2] at `omega` [rad/s], and dwells
+    there.
+    """
+
+    rate: float = RATE
+    block: int = BLOCK
+    lead: int = LEAD
+    omega: float = OMEGA
+    amplitude: float = AMPLITUDE
+    calibration: DriveCalibration = CALIBRATION
+    rest: float = 0.2
+    glide: float = 0.25
+    limits: Limits = LIMITS
+    ramps: Ramps = RAMPS
 
 
 class NoPoint(Parameters):

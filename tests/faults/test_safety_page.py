@@ -8,6 +8,7 @@ from bench.engine.machine import LEGAL
 from bench.events import State
 from bench.guard.limits import Debounce, Limits, Ramps, Warnings
 from tests.faults.catalogue import catalogue
+from tests.faults.emulated.pool import cases, few
 from tests.faults.places import PLACES
 
 PAGE = (Path(__file__).parents[2] / "docs" / "safety.md").read_text()
@@ -36,3 +37,5 @@ def test_numbers_in_the_text() -> None:
     core = sum(place.core for place in PLACES)
     assert f"{core * len(catalogue())} faults in each run of the test suite" in PAGE
     assert f"{len(PLACES) * len(catalogue())} in\n" in PAGE
+    assert f"{len(few())} faults once each" in PAGE
+    assert f"{len(cases())} in `python" in PAGE

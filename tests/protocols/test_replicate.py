@@ -148,6 +148,34 @@ def played(acceleration: Array) -> Played:
     return Played(signals, np.zeros(acceleration.size))
 
 
+def test_the_best_drive_is_given_back_and_not_the_last(model: TableModel) -> None:
+    target = target_of()
+    stage = replicate(target, model, Limits(), ReplicationParameters(passes=2), "a record")
+    shares, ended = iter((0.9, 0.5)), list[Replicated]()
+
+    def plan() -> Plan:
+        ended.append((yield from stage))
+
+    steps, asked = plan(), list[Array]()
+    step: Step | None = next(steps)
+    while step is not None:
+        outcome: Outcome = Done()
+        if isinstance(step, Play):
+            asked.append(step.volts)
+            outcome = played(next(shares) * target.acceleration)
+        try:
+            step = steps.send(outcome)
+        except StopIteration:
+            step = None
+    (found,) = ended
+    assert [report.accepted for report in found.passes] == [True, False]
+    assert not np.array_equal(asked[0], asked[1])
+    np.testing.assert_array_equal(found.drive, asked[0])
+    assert found.acceleration == pytest.approx(0.9 * target.acceleration)
+    assert (found.status, found.reason) == ("out of passes", "no more than 2 passes are allowed")
+    assert found.repeatable == pytest.approx(0.1, rel=0.01)
+
+
 @pytest.mark.parametrize("when", ["while it is played", "in the ramp"])
 def test_a_fall_is_told_to_the_caller_who_stands_the_block_up(model: TableModel, when: str) -> None:
     target = target_of()

@@ -11,6 +11,7 @@ from bench.analysis.table_motion import Array, TableMotion, table_motion
 from bench.control.stroke.highpass import fit_by_high_pass
 from bench.control.stroke.least_change import fit_by_least_change
 from bench.control.stroke.reach import Reach
+from bench.control.target import FLAT, integrated, windowed
 from sim.errors import InvalidInput
 from sim.excitation import SampledRecord
 from sim.specimen import Frame
@@ -21,8 +22,20 @@ PERIODS = np.geomspace(0.1, 2.0, 40)
 SHORTEST = 16
 """Samples that a record must have."""
 
+TURNS = 8
+"""Fits at most within a band; each leaves about a tenth of what it changed for the next one."""
+
+TIGHTER = 0.995
+"""Share of the reach of one fit that the next one may use."""
+
+SAME = 0.01
+"""Share of the reach by which the fitted motion and what a table of the band makes of it may differ."""
+
 ROUNDING = 1e-9
 """Share of its peak at which a velocity or displacement counts as none."""
+
+
+NOT_BOTH = "band and stroke cannot both be had: let the band begin lower, or scale the record down"
 
 
 class Method(StrEnum):
@@ -72,8 +85,9 @@ def fit_stroke(
     method: Method = Method.LEAST_CHANGE,
     periods: Array = PERIODS,
     damping: float = DAMPING,
+    band: tuple[float, float] | None = None,
 ) -> StrokeFit:
-    """`record` made to keep the table within `reach`.
+    """`record` made to keep the table within `reach`; a record within `band` [Hz] stays within it.
 
     A record that does so and ends at rest is returned as it is. Raises InvalidInput for a record without motion or
     shorter than 16 samples, and where the method cannot make it fit, with the reason.
@@ -91,9 +105,10 @@ def fit_stroke(
         fitted, lead = passed.acceleration, passed.lead
         done = f"zero-phase high-pass at {passed.corner:.3g} Hz"
     else:
-        fitted = fit_by_least_change(original, dt, reach, periods, damping)
+        fitted = _least_change(original, dt, reach, periods, damping, band)
         changed = float(np.sqrt(np.mean((fitted - original) ** 2) / np.mean(original**2)))
-        done = f"least change below 2 Hz: {100.0 * changed:.3g} % of the record's rms acceleration"
+        where = "below 2 Hz" if band is None else f"within {band[0]:g} to {band[1]:g} Hz"
+        done = f"least change {where}: {100.0 * changed:.3g} % of the record's rms acceleration"
     return StrokeFit(
         record=SampledRecord(fitted, dt),
         lead=lead * dt,
@@ -104,6 +119,30 @@ def fit_stroke(
         spectrum_before=pseudo_acceleration(original, dt, periods, damping),
         spectrum=pseudo_acceleration(fitted, dt, periods, damping),
     )
+
+
+def _least_change(
+    original: Array, dt: float, reach: Reach, periods: Array, damping: float, band: tuple[float, float] | None
+) -> Array:
+    """The least change. Half sines end with the record, so a little of them lies below their frequency, where a table
+    of `band` makes nothing: that is taken away, and what it kept within reach or at rest is fitted again.
+    """
+    if band is None:
+        return fit_by_least_change(original, dt, reach, periods, damping)
+    made, asked = original, reach
+    allowed = np.array([reach.displacement, reach.velocity])
+    for turn in range(TURNS):
+        made = fit_by_least_change(made, dt, asked, periods, damping, band[0] / FLAT)
+        kept = windowed(made, dt, band)
+        velocity, displacement = (wave[: made.size] for wave in integrated(kept, 1.0 / dt))
+        over = np.array([np.abs(displacement).max(), np.abs(velocity).max()]) / allowed
+        lost = np.abs(displacement - table_motion(made, dt).displacement).max()
+        if over.max() <= 1.0 and lost <= SAME * reach.displacement:
+            return made
+        made, share = kept[: made.size], TIGHTER ** (turn + 1)
+        asked = Reach(share * reach.displacement, share * reach.velocity)
+    needs = f"no change from {band[0] / FLAT:.3g} Hz up was found, {1e3 * reach.displacement:.3g} mm and"
+    raise InvalidInput("record", "", f"{needs} {reach.velocity:.3g} m/s are allowed; {NOT_BOTH}")
 
 
 def _at_rest(motion: TableMotion) -> bool:

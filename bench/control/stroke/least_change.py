@@ -18,7 +18,10 @@ from bench.control.stroke.reach import Reach
 from sim.errors import InvalidInput
 
 HIGHEST = 2.0
-"""Highest frequency of a change [Hz]."""
+"""Highest frequency of a change [Hz], or `ABOVE` times its lowest where that is more."""
+
+ABOVE = 4.0
+"""Two octaves are room enough for a change that must not go below some frequency."""
 
 CHEAP = 0.5
 """Frequency [Hz] at which the change costs its square; elsewhere (f / CHEAP)^4 times that."""
@@ -47,17 +50,19 @@ class _Bound(NamedTuple):
     sign: int
 
 
-def fit_by_least_change(acceleration: Array, dt: float, reach: Reach, periods: Array, damping: float) -> Array:
+def fit_by_least_change(
+    acceleration: Array, dt: float, reach: Reach, periods: Array, damping: float, lowest: float = 0.0
+) -> Array:
     """`acceleration` [m/s2], shape (n,), changed as little as keeps the table in `reach` and ends it at rest.
 
-    `periods` [s] and `damping` of the oscillators whose peaks are to stay. Raises InvalidInput where no change below
-    2 Hz is enough.
+    `periods` [s] and `damping` of the oscillators whose peaks are to stay; the change has no part below `lowest` [Hz].
+    Raises InvalidInput where no change from there to 2 Hz, or to four times it, is enough.
     """
 
     def peaks_of(record: Array) -> list[Peak]:
         return [oscillator_peak(record, dt, float(period), damping) for period in periods]
 
-    problem = _Problem(acceleration, dt, reach)
+    problem = _Problem(acceleration, dt, reach, lowest)
     peaks = original = peaks_of(acceleration)
     scales = np.abs([peak.value for peak in original])
     fitted = problem.solved(peaks, scales)
@@ -70,9 +75,11 @@ def fit_by_least_change(acceleration: Array, dt: float, reach: Reach, periods: A
 class _Problem:
     """One record and its limits; samples that were held stay so from one solution to the next."""
 
-    def __init__(self, acceleration: Array, dt: float, reach: Reach) -> None:
+    def __init__(self, acceleration: Array, dt: float, reach: Reach, lowest: float) -> None:
         self._record, self._dt, self._reach = acceleration, dt, reach
-        self._modes = SineModes(acceleration.size, dt, HIGHEST)
+        highest = max(HIGHEST, ABOVE * lowest)
+        self._modes = SineModes(acceleration.size, dt, highest, lowest)
+        self._kind = f"below {highest:g} Hz" if lowest == 0.0 else f"from {lowest:.3g} to {highest:.3g} Hz"
         length = (acceleration.size - 1) * dt
         size = float(np.abs(acceleration).max())
         self._cost = 0.5 * length * (np.maximum(self._modes.frequencies, FLOOR) / CHEAP) ** 4 / size**2
@@ -98,7 +105,7 @@ class _Problem:
             try:
                 y = shortest(equations, (held, needed))
             except Infeasible:
-                raise self._refusal(f"no change below {HIGHEST:g} Hz keeps it") from None
+                raise self._refusal(f"no change {self._kind} keeps it") from None
             sizes = np.asarray(solve_triangular(root.T, y, lower=False), dtype=np.float64)
             fitted = at_rest_in_the_end(self._record - self._modes.sum(sizes), self._dt)
             motion = table_motion(fitted, self._dt)

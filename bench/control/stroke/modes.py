@@ -7,28 +7,30 @@ from bench.analysis.table_motion import Array
 
 
 class SineModes:
-    """sin(k pi j / (n - 1)) at the samples j = 0 to n - 1, for every k whose frequency is at most `highest` [Hz].
+    """sin(k pi j / (n - 1)) at the samples j = 0 to n - 1, for every k whose frequency is `lowest` to `highest` [Hz].
 
-    They vanish at both ends of the record.
+    There are two at least. They vanish at both ends of the record.
     """
 
-    def __init__(self, n: int, dt: float, highest: float) -> None:
+    def __init__(self, n: int, dt: float, highest: float, lowest: float = 0.0) -> None:
         self._n, self._dt = n, dt
         length = (n - 1) * dt
-        count = min(max(int(np.ceil(2.0 * length * highest)), 2), n - 2)
-        orders = np.arange(1, count + 1)
+        first = min(max(int(np.ceil(2.0 * length * lowest)), 1), n - 3)
+        last = min(max(int(np.ceil(2.0 * length * highest)), first + 1), n - 2)
+        self._below = first - 1
+        orders = np.arange(first, last + 1)
         self.frequencies: Array = orders / (2.0 * length)
         self._steps: Array = np.pi * orders / (n - 1)
 
     def sum(self, sizes: Array) -> Array:
         """The sum of the modes with `sizes`, shape (k,), at the samples, shape (n,)."""
         whole = np.zeros(self._n)
-        whole[1:-1] = 0.5 * _transformed(np.concatenate((sizes, np.zeros(self._n - 2 - sizes.size))))
+        whole[1:-1] = 0.5 * _transformed(np.pad(sizes, (self._below, self._n - 2 - self._below - sizes.size)))
         return whole
 
     def products(self, weights: Array) -> Array:
         """What `weights` at the samples, shape (n,), make of each mode: weights . mode, shape (k,)."""
-        return 0.5 * _transformed(weights[1:-1])[: self._steps.size]
+        return 0.5 * _transformed(weights[1:-1])[self._below : self._below + self._steps.size]
 
     def motions(self, samples: NDArray[np.intp]) -> tuple[Array, Array]:
         """Velocity and displacement after each of `samples`, shape (m,), under each mode of size 1, shape (m, k).

@@ -1,0 +1,93 @@
+"""kill -9 of `rockbench run` itself, with the emulated laboratory in a process of its own as an operator starts it."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from bench.config.dump import as_toml
+from bench.config.model import BenchConfiguration
+from bench.record.reader import open_record
+from bench.results import FILE
+from drivers.hardware.rig import HardwareRig
+from drivers.laboratory_client import ask
+from tests.emulated import emulated
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="kills processes the POSIX way")
+
+LONG = 60.0
+"""Longest wait for the program to come so far [s]."""
+LATE = 0.5
+"""What a busy machine may add to a time-out [s]."""
+
+
+@pytest.fixture(scope="module")
+def laboratory() -> Iterator[BenchConfiguration]:
+    with emulated("--lasers", "analogue", "--sample-rate", "1000") as configuration:
+        yield configuration
+
+
+def _until(truth: Callable[[], dict[str, Any]], what: Callable[[dict[str, Any]], bool], patience: float) -> float:
+    """Seconds until it is so."""
+    begin = time.monotonic()
+    while not what(truth()):
+        assert time.monotonic() < begin + patience, truth()
+        time.sleep(0.005)
+    return time.monotonic() - begin
+
+
+def _armed(truth: dict[str, Any]) -> bool:
+    return bool(truth["enabled"])
+
+
+def _driven(truth: dict[str, Any]) -> bool:
+    return _armed(truth) and abs(truth["drive"]) > 0.01
+
+
+@pytest.mark.parametrize(
+    "state",
+    ["running", pytest.param("armed", marks=pytest.mark.soak), pytest.param("aborting", marks=pytest.mark.soak)],
+)
+def test_the_chain_opens_by_itself(
+    state: str, laboratory: BenchConfiguration, tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
+    if state != "running" and "soak" not in str(request.config.option.markexpr):
+        pytest.skip("ten seconds: run with -m soak")
+    hardware = laboratory.hardware
+    hands, timeout = hardware.hands, hardware.daq.watchdog
+    assert hands is not None
+    assert timeout is not None
+
+    def truth() -> dict[str, Any]:
+        told: dict[str, Any] = ask(hands, "truth")
+        return told
+
+    file = tmp_path / "bench.toml"
+    file.write_text(as_toml(laboratory), encoding="utf-8")
+    command = [sys.executable, "-m", "bench", "run", "harmonic", "--config", str(file), "--yes", "--out", str(tmp_path)]
+    command += ["--omega", "20", "--beta", "0.25", "--ramp-time", "1"]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        _until(truth, _armed if state == "armed" else _driven, LONG)
+        if state == "aborting":
+            process.send_signal(signal.SIGINT)
+            time.sleep(laboratory.acquisition.block_duration)
+    finally:
+        process.kill()
+    assert process.wait(LONG) == -signal.SIGKILL
+    assert _until(truth, lambda told: not told["enabled"], timeout + LATE) < timeout + LATE
+    time.sleep(laboratory.acquisition.lead)
+    held = truth()["drive"]
+    time.sleep(0.1)
+    assert truth()["drive"] == held
+    with open_record(tmp_path / FILE) as record:
+        assert record.status == "running"
+    with HardwareRig(hardware, lead=100) as rig:
+        assert "rockbench_out" in rig.description["tasks left by another client"]
+        assert (truth()["enabled"], truth()["drive"]) == (False, 0.0)
