@@ -4,7 +4,7 @@ import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from types import TracebackType
+from types import FrameType, TracebackType
 
 from PySide6.QtCore import QSettings
 from PySide6.QtWidgets import QApplication
@@ -46,7 +46,11 @@ def _keep_going(controller: Controller, application: QApplication) -> None:
         controller.noticed.emit(Notice(controller.scene.time, "window", text, grave=True))
 
     sys.excepthook = tell
-    signal.signal(signal.SIGINT, lambda *_: application.quit())
+
+    def close(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - the signature is Python's
+        application.quit()
+
+    signal.signal(signal.SIGINT, close)
 
 
 def dress(application: QApplication, theme: Theme) -> None:

@@ -11,8 +11,8 @@ from bench.gui.palette import Theme
 from bench.gui.standing import Shape
 from bench.gui.stop import StopButton
 
-SIDE = 56
-"""Side of the shape [px]."""
+SIDE, HEIGHT = 56, 136
+"""Side of the shape, and height of the header [px]: STOP stays where it is whatever the header says."""
 
 
 def set_level(label: QLabel, level: str) -> None:
@@ -100,6 +100,7 @@ class Header(QWidget):
             value.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         details.addWidget(self.progress, 2, 0, 1, 2)
         details.setColumnStretch(1, 1)
+        self.setFixedHeight(HEIGHT)
         row = QHBoxLayout(self)
         row.addWidget(self.lamp)
         row.addLayout(words, 3)

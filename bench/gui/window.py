@@ -66,6 +66,7 @@ class Window(QMainWindow):
         self.setCentralWidget(whole)
         self.pages.setCurrentWidget(self.protocol)
         controller.surveyed.connect(self._surveyed)
+        controller.began.connect(self.welcome.hide)
         controller.began.connect(lambda: self.pages.setCurrentWidget(self.run))
         controller.ended.connect(lambda: self.pages.setCurrentWidget(self.results))
         kept = settings.value("geometry") if settings is not None else None

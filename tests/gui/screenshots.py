@@ -15,7 +15,7 @@ from PySide6.QtWidgets import QApplication
 
 from bench.cli.catalogue import CATALOGUE
 from bench.config.model import BenchConfiguration
-from bench.events import Estimate
+from bench.events import Estimate, Event
 from bench.gui.app import dress
 from bench.gui.controller import Controller
 from bench.gui.palette import DARK, LIGHT
@@ -43,11 +43,27 @@ def main(folder: Path) -> None:
                 application.processEvents()
                 time.sleep(0.005)
 
-        def picture(name: str, window: Window = window, suffix: str = suffix) -> None:
-            window.grab().save(str(folder / f"window-{name}{suffix}.png"))
+        def picture(
+            name: str, window: Window = window, suffix: str = suffix, application: QApplication = application
+        ) -> None:
+            # what was just said is laid out first
+            for _ in range(3):
+                application.processEvents()
+            if not suffix:
+                window.grab().save(str(folder / f"window-{name}{suffix}.png"))
 
         seen: list[Estimate] = []
-        controller.told.connect(lambda event, seen=seen: seen.append(event) if isinstance(event, Estimate) else None)
+
+        def measuring(event: Event, seen: list[Estimate] = seen, window: Window = window, suffix: str = suffix) -> None:
+            """A virtual run is over in seconds: its picture is taken in the moment itself."""
+            if isinstance(event, Estimate) and event.beta is not None and isfinite(event.alpha_2):
+                seen.append(event)
+                if len(seen) == 20:
+                    window.run.traces.draw()
+                    window.header.refresh()
+                    window.grab().save(str(folder / f"window-run{suffix}.png"))
+
+        controller.told.connect(measuring)
         asked: list[Question] = []
         controller.asked.connect(lambda question, asked=asked: asked.append(question) if question else None)
         window.pages.setCurrentWidget(window.setup)
@@ -67,8 +83,6 @@ def main(folder: Path) -> None:
             controller.answer(agreed=True)
             until(lambda: len(asked) > 1)  # noqa: B023
             controller.answer(agreed=True)
-            until(lambda: [each for each in seen if each.beta is not None and isfinite(each.alpha_2)][20:])  # noqa: B023
-            picture("run")
             until(lambda: not controller.running)  # noqa: B023
             application.processEvents()
             picture("results")

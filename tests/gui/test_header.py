@@ -9,7 +9,7 @@ from bench.events import Progress, State, StateChanged, StepStarted
 from bench.gui import texts
 from bench.gui.standing import standing
 from bench.gui.window import Window
-from bench.link.messages import Beat, Refused, SafetyInputs, Told
+from bench.link.messages import Beat, Question, Refused, SafetyInputs, Told
 from tests.gui.conftest import SpokenLink
 from tests.link.experiment import order
 
@@ -48,6 +48,22 @@ def test_state_step_time_and_inputs_are_shown(window: Window, link: SpokenLink) 
     assert header.inputs.text() == "end switch good, enable OPEN"
     assert header.inputs.property("level") == "alarm"
     assert header.progress.value() == 250
+
+
+def test_stop_stays_in_its_place_whatever_is_said(window: Window, link: SpokenLink, qtbot: QtBot) -> None:
+    window.resize(window.minimumSize())
+    stop = window.header.stop
+    place = stop.mapTo(window, stop.rect().topLeft())
+    link.said = [
+        Told(StepStarted(1.0, "a step with very much to say " * 12)),
+        Told(StateChanged(1.0, State.ARMED, State.WAITING, "a reason with very much to say " * 8)),
+        Question(1, "Mount the spring, and look at it from every side. " * 3),
+    ]
+    window._controller._look()
+    qtbot.waitUntil(window.prompt.isVisible)
+    qtbot.wait(100)
+    assert stop.mapTo(window, stop.rect().topLeft()) == place
+    assert window.width() == window.minimumWidth()
 
 
 def test_silence_is_shown_as_no_link(window: Window, link: SpokenLink) -> None:

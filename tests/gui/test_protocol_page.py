@@ -127,3 +127,16 @@ def test_results_are_never_overwritten(window: Window) -> None:
     page.survey()
     assert "never overwritten" in page.plan.verdict.text()
     assert not window._controller.busy
+
+
+def test_what_the_plan_says_is_not_cut_off(window: Window, spoken: type[SpokenLink], qtbot: QtBot) -> None:
+    page = window.protocol
+    window.resize(window.minimumSize())
+    page.survey()
+    warnings = tuple(
+        f"with a specimen at the 95 % of its uncertainty limit {k} would be exceeded" * 2 for k in range(3)
+    )
+    spoken.latest.said.append(Surveyed((), None, warnings, 60.0, 1e6, 1e9, "hash", {}))
+    window._controller._look()
+    for label in (page.plan.verdict, page.plan.details):
+        qtbot.waitUntil(lambda label=label: label.height() >= label.heightForWidth(label.width()), timeout=2000)
