@@ -24,6 +24,7 @@ from bench.report.summary import Summary, write_summary
 from bench.results import FILE, SUMMARY
 from bench.rigs import open_rig
 from drivers.clock import VirtualClock
+from drivers.rig import Rig
 from sim.parameters import Parameters
 
 
@@ -103,6 +104,15 @@ class Illustrated(Protocol):
         ...
 
 
+@runtime_checkable
+class Attending(Protocol):
+    """A subscriber that is shown the rig before anything moves."""
+
+    def opened(self, rig: Rig) -> None:
+        """The rig is open. It belongs to the thread that calls the subscriber, and only while it does."""
+        ...
+
+
 @dataclass(frozen=True)
 class SessionResult:
     """How a campaign ended. `summary` is ready for JSON, `table` for the terminal."""
@@ -167,6 +177,9 @@ def run_session(
         stream = Stream(rig.clock, [recorder, points, *subscribers])
         status, reason = "failed", "the program failed"
         try:
+            for subscriber in subscribers:
+                if isinstance(subscriber, Attending):
+                    subscriber.opened(rig)
             engine = Engine(
                 rig,
                 Guard(rig, configuration.limits, configuration.ramps, configuration.mover),

@@ -26,3 +26,8 @@ def test_a_headless_run_needs_no_window_no_driver_and_no_plot_until_its_end() ->
     assert not {"PySide6", "pyqtgraph", "nidaqmx", "grpc", "serial", "matplotlib"} & {
         name.split(".")[0] for name in loaded
     }
+
+
+def test_the_command_line_starts_without_the_window() -> None:
+    loaded = _run("import sys; import bench.cli.main; print(*sys.modules)").split()
+    assert not {"PySide6", "pyqtgraph"} & {name.split(".")[0] for name in loaded}

@@ -22,6 +22,7 @@ from bench.cli.refusal import tell
 from bench.cli.replay import replay_app
 from bench.cli.report import report_app
 from bench.cli.run import Start, run_app
+from bench.cli.window import gui_app
 from sim.errors import RockbenchError
 
 
@@ -52,6 +53,7 @@ def main(argv: Sequence[str] | None = None, start: Start | None = None) -> int:
     )
     app.command(run_app(start))
     app.command(check_app(start))
+    app.command(gui_app())
     app.command(devices_app())
     app.command(emulate_app())
     app.command(predict_app())

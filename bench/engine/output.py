@@ -100,7 +100,7 @@ class Output:
         except RigError as error:
             if self._requests.strongest == "halt" and self.driven:
                 # the rig was cut under the loop by the thread that asked
-                return self.cut(Ending("halted", "halt was asked for"))
+                return self.cut(Ending("halted", self._requests.reason))
             return self.cut(Ending("failed", str(error)))
         except RockbenchError as error:
             return Ending("failed", str(error))

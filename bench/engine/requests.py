@@ -13,24 +13,24 @@ class Requests:
     """
 
     def __init__(self) -> None:
-        self._stop = self._abort = self._halt = False
+        self._stop = self._abort = self._halt = ""
         self._cut: Callable[[], None] | None = None
 
     def cut_by(self, cut: Callable[[], None]) -> None:
         """From now on `halt` also calls `cut`, in the thread that asks."""
         self._cut = cut
 
-    def stop(self) -> None:
-        """Ramp the output out; what was measured is good."""
-        self._stop = True
+    def stop(self, why: str = "stop was asked for") -> None:
+        """Ramp the output out; what was measured is good. `why` is told as the reason, of the first that asked."""
+        self._stop = self._stop or why
 
-    def abort(self) -> None:
+    def abort(self, why: str = "abort was asked for") -> None:
         """Ramp the output out fast; the run is bad."""
-        self._abort = True
+        self._abort = self._abort or why
 
-    def halt(self) -> None:
+    def halt(self, why: str = "halt was asked for") -> None:
         """Cut the enable line now, in this thread; the loop finds the rig halted and ends by itself."""
-        self._halt = True
+        self._halt = self._halt or why
         if self._cut is not None:
             # the loop cuts once more, and that is where a failure is told
             with suppress(RigError):
@@ -44,3 +44,8 @@ class Requests:
         if self._abort:
             return "abort"
         return "stop" if self._stop else None
+
+    @property
+    def reason(self) -> str:
+        """Why the strongest request was made; empty without any."""
+        return self._halt or self._abort or self._stop

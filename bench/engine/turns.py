@@ -53,13 +53,13 @@ class Turns:
 
     def heed_requests(self) -> None:
         """End as somebody has asked, if somebody has."""
-        asked, state = self._requests.strongest, self.output.state
+        asked, why, state = self._requests.strongest, self._requests.reason, self.output.state
         if asked == "halt":
-            raise Ended(self.output.cut(Ending("halted", "halt was asked for")))
+            raise Ended(self.output.cut(Ending("halted", why)))
         if asked == "abort" and state is not State.ABORTING:
-            self._end(State.ABORTING, Ending("aborted", "abort was asked for"))
+            self._end(State.ABORTING, Ending("aborted", why))
         if asked == "stop" and state not in (State.ABORTING, State.STOPPING):
-            self._end(State.STOPPING, Ending("stopped", "stop was asked for"))
+            self._end(State.STOPPING, Ending("stopped", why))
 
     def end_test(self, *, fast: bool) -> bool:
         """Ramp out at the end of a test; whether the block fell on the way. A limit exceeded by then ends the run."""

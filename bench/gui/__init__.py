@@ -1,0 +1,1 @@
+"""The operator's window: an equal client of the engine beside the command line."""

@@ -1,0 +1,147 @@
+"""The client's side of the link: starts the session's process, asks and answers, and keeps what it says."""
+
+import json
+import secrets
+import subprocess
+import sys
+import tempfile
+import threading
+from collections import deque
+from contextlib import suppress
+from multiprocessing.connection import Client, Connection, Listener
+from queue import SimpleQueue
+from typing import Literal
+
+from bench.link.messages import (
+    SILENCE,
+    Alive,
+    Answer,
+    Ask,
+    Ended,
+    FromClient,
+    FromSession,
+    Leave,
+    Refused,
+    Run,
+    Survey,
+    Surveyed,
+    Traces,
+)
+from drivers.clock import now
+
+KEPT = 20_000
+"""Messages that wait for a client that does not take them; of more, the oldest are lost."""
+
+# Ctrl-C in the terminal of the client is for the client: the session hears of it over the link
+_OWN_GROUP = 0x200 if sys.platform == "win32" else 0
+"""CREATE_NEW_PROCESS_GROUP of Windows; elsewhere a session of its own does the same."""
+
+
+class Link:
+    """A session's process, and the connection to it. All methods return at once, and may be called by any thread.
+
+    The client's main loop calls `alive` at least every `bench.link.messages.BEAT` seconds: only that keeps the session
+    from taking the client for frozen.
+    """
+
+    def __init__(self, assignment: Survey) -> None:
+        self._received: deque[FromSession] = deque(maxlen=KEPT)
+        self._outgoing = SimpleQueue[FromClient]()
+        self._heard = now()
+        self._begun = self._over = False
+        self._errors = tempfile.TemporaryFile()  # noqa: SIM115 - closed with the process
+        key = secrets.token_bytes(32)
+        self._listener = Listener(authkey=key)
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "bench.link.process"],
+            stdin=subprocess.PIPE,
+            stdout=self._errors,
+            stderr=self._errors,
+            text=True,
+            creationflags=_OWN_GROUP,
+            start_new_session=sys.platform != "win32",
+        )
+        assert self.process.stdin is not None
+        with suppress(OSError), self.process.stdin as stdin:
+            stdin.write(json.dumps({"address": self._listener.address, "key": key.hex()}) + "\n")
+        self._address = self._listener.address
+        self._surveying = not isinstance(assignment, Run)
+        threading.Thread(target=self._talk, args=(assignment,), name="link", daemon=True).start()
+        threading.Thread(target=self._wait, args=(key,), name="session's process", daemon=True).start()
+
+    def alive(self) -> None:
+        """The client's main loop turns."""
+        if self._begun and not self._over:
+            self._outgoing.put(Alive())
+
+    def ask(self, end: Literal["stop", "abort", "halt"]) -> None:
+        """Ask for an end; also before the connection stands, and any number of times."""
+        self._outgoing.put(Ask(end))
+
+    def answer(self, number: int, *, agreed: bool) -> None:
+        """Answer question `number`."""
+        self._outgoing.put(Answer(number, agreed))
+
+    def take(self) -> list[FromSession]:
+        """What the session has said since the last call, in its order."""
+        return [self._received.popleft() for _ in range(len(self._received))]
+
+    @property
+    def silence(self) -> float:
+        """Seconds since the session's process was last heard."""
+        return now() - self._heard
+
+    @property
+    def standing(self) -> Literal["starting", "linked", "no link", "over"]:
+        """How the link is: "no link" when the process died or is silent before it told how it ended."""
+        if self._over:
+            return "over"
+        if self.process.poll() is not None:
+            return "no link"
+        if not self._begun:
+            return "starting"
+        return "linked" if self.silence <= SILENCE else "no link"
+
+    def leave(self) -> None:
+        """Let go of the session: a run ramps out, unless it was told to go on. A survey is given up."""
+        self._outgoing.put(Leave())
+        if self._surveying:
+            self.process.kill()
+
+    def _talk(self, assignment: Survey) -> None:
+        """The thread that hears; it starts the one that sends."""
+        with suppress(OSError, EOFError):
+            connection = self._listener.accept()
+            self._listener.close()
+            connection.send(assignment)
+            threading.Thread(target=self._send, args=(connection,), name="link, sending", daemon=True).start()
+            while True:
+                message = connection.recv()
+                self._heard, self._begun = now(), True
+                self._keep(message)
+
+    def _keep(self, message: FromSession) -> None:
+        # a client that does not look for long loses pictures first
+        if isinstance(message, Traces) and len(self._received) > KEPT // 2:
+            return
+        self._received.append(message)
+        self._over = self._over or isinstance(message, Ended | Refused | Surveyed)
+
+    def _send(self, connection: Connection) -> None:
+        with suppress(OSError):
+            while True:
+                connection.send(self._outgoing.get())
+
+    def _wait(self, key: bytes) -> None:
+        """Tell of a process that ends without a word, and wake the hearing thread if it never connected."""
+        code = self.process.wait()
+        with suppress(OSError, EOFError):
+            Client(self._address, authkey=key).close()
+        if not self._over:
+            self._errors.seek(0)
+            lines = self._errors.read().decode(errors="replace").strip().splitlines()
+            told = f": {lines[-1]}" if lines else ""
+            self._received.append(
+                Refused(f"the session's process ended without a word (exit code {code}){told}", failed=True)
+            )
+        self._errors.close()

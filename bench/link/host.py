@@ -1,0 +1,168 @@
+"""The session's side of the link: sends what the engine says, hears the client, and notices when it is gone."""
+
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from multiprocessing.connection import Connection
+from queue import Empty, SimpleQueue
+
+from bench.engine.requests import Requests
+from bench.events import Acquired, Event, State, StateChanged, Warned
+from bench.link.messages import (
+    BEAT,
+    PATIENCE,
+    Answer,
+    Ask,
+    Beat,
+    Ended,
+    FromSession,
+    Leave,
+    Opened,
+    Question,
+    Refused,
+    SafetyInputs,
+    Surveyed,
+    Told,
+)
+from bench.link.outbox import Outbox
+from bench.link.reduction import Reduction
+from drivers.clock import now
+from drivers.rig import Rig, RigError
+
+_LOOK = 0.1
+"""How often a wait for the operator's answer looks for another reason to end [s]."""
+
+
+class Host:
+    """Two threads beside the engine's: one sends, one hears. Neither is ever waited for by the engine.
+
+    `lost(why)` is called in the hearing thread when the client has gone or is silent; more than once if it comes back.
+    """
+
+    def __init__(self, connection: Connection, requests: Requests, lost: Callable[[str], None]) -> None:
+        self._connection, self._requests, self._lost = connection, requests, lost
+        self.outbox = Outbox()
+        self.answers = SimpleQueue[Answer]()
+        self.connected = True
+        self._sent = threading.Event()
+        self._state, self._reason, self._time = State.IDLE, "", 0.0
+        for work in (self._send, self._hear):
+            threading.Thread(target=work, name=work.__name__.strip("_"), daemon=True).start()
+
+    def note(self, event: Event) -> None:
+        """Keep what every beat tells, however much of the rest is lost on the way."""
+        self._time = max(self._time, event.time)
+        if isinstance(event, StateChanged):
+            self._state, self._reason = event.after, event.reason
+
+    def close(self, last: FromSession, timeout: float) -> None:
+        """Send what waits and then `last`; a client that does not read is left after `timeout` seconds."""
+        self.outbox.put(last, always=True)
+        self._sent.wait(timeout)
+
+    def _send(self) -> None:
+        over, beaten = False, 0.0
+        # a client that is gone is found by the hearing thread too, which tells
+        with suppress(OSError):
+            while not over:
+                for message in self.outbox.take(BEAT / 2):
+                    self._connection.send(message)
+                    over = over or isinstance(message, Surveyed | Ended | Refused)
+                if now() - beaten >= BEAT and not over:
+                    beaten = now()
+                    self._connection.send(self._beat())
+        self._sent.set()
+
+    def _beat(self) -> FromSession:
+        outbox = self.outbox
+        return Beat(self._state, self._reason, self._time, outbox.lost_events, outbox.lost_traces)
+
+    def _hear(self) -> None:
+        try:
+            while True:
+                if self._connection.poll(PATIENCE):
+                    self.connected = True
+                    self._heed(self._connection.recv())
+                else:
+                    self._lose(f"the client has been silent for {PATIENCE:g} s")
+        except (EOFError, OSError):
+            self._lose("the client is gone")
+
+    def _lose(self, why: str) -> None:
+        self.connected = False
+        self._lost(why)
+
+    def _heed(self, message: object) -> None:
+        match message:
+            case Ask("halt"):
+                self._requests.halt()
+            case Ask("abort"):
+                self._requests.abort()
+            case Ask("stop"):
+                self._requests.stop()
+            case Answer():
+                self.answers.put(message)
+            case Leave():
+                self._lose("the client was closed")
+            case _:
+                pass
+
+
+class AtTheClient:
+    """The person at the client answers the questions."""
+
+    name = "operator at the window"
+
+    def __init__(self, host: Host, requests: Requests) -> None:
+        self._host, self._requests = host, requests
+        self._number = 0
+
+    def confirm(self, request: str) -> bool:
+        """Wait for the answer to this question; any request to end and a client that is gone are a no."""
+        self._number += 1
+        self._host.outbox.put(Question(self._number, request), always=True)
+        while self._requests.strongest is None and self._host.connected:
+            with suppress(Empty):
+                answer = self._host.answers.get(timeout=_LOOK)
+                if answer.number == self._number:
+                    return answer.agreed
+        return False
+
+
+class Teller:
+    """The subscriber that puts the engine's events into the outbox."""
+
+    def __init__(self, host: Host, reduction: Callable[[Rig], Reduction]) -> None:
+        self._host, self._make = host, reduction
+        self._rig: Rig | None = None
+        self._reduction: Reduction | None = None
+
+    def opened(self, rig: Rig) -> None:
+        """The rig's channels decide what the traces are made of."""
+        self._rig, self._reduction = rig, self._make(rig)
+        names = tuple(channel.name for channel in rig.channels)
+        self._host.outbox.put(Opened(names, rig.sample_rate, rig.description), always=True)
+        self._tell_inputs(0.0)
+
+    def __call__(self, event: Event) -> None:
+        self._host.note(event)
+        if not isinstance(event, Acquired):
+            self._host.outbox.put(Told(event))
+            if isinstance(event, StateChanged):
+                self._tell_inputs(event.time)
+        elif self._reduction is not None:
+            self._trace(self._reduction, event)
+
+    def _trace(self, reduction: Reduction, event: Acquired) -> None:
+        try:
+            self._host.outbox.put(reduction(event))
+        except Exception as error:
+            # what is shown never ends what is measured
+            self._reduction = None
+            self._host.outbox.put(Told(Warned(event.time, f"no traces are shown from here on: {error}")))
+
+    def _tell_inputs(self, time: float) -> None:
+        # a rig that has failed says nothing of its inputs; what it failed with is told elsewhere
+        if self._rig is not None:
+            with suppress(RigError):
+                self._host.outbox.put(SafetyInputs(time, dict(self._rig.interlocks())))

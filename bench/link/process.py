@@ -1,0 +1,105 @@
+"""The process of a session: `python -m bench.link.process`, started by `bench.link.client` and by nothing else.
+
+It reads the client's address and key from standard input, connects, is given one assignment and carries it out.
+"""
+
+import json
+import signal
+import sys
+from multiprocessing.connection import Client, Connection
+from types import FrameType
+
+from bench.analysis.signals import SignalMap
+from bench.engine.operator import Unattended
+from bench.engine.requests import Requests
+from bench.link.host import AtTheClient, Host, Teller
+from bench.link.messages import Ended, FromSession, Refused, Run, Survey, Surveyed
+from bench.link.reduction import Reduction
+from bench.preflight.compiled import compile_run
+from bench.session import run_session
+from drivers.rig import Rig
+from sim.errors import InvalidInput, RockbenchError
+
+FAREWELL = 2.0
+"""Longest wait at the end for a client that does not read [s]."""
+
+
+def main() -> None:
+    """Connect, carry out the assignment, tell how it ended."""
+    told = json.loads(sys.stdin.readline())
+    with Client(told["address"], authkey=bytes.fromhex(told["key"])) as connection:
+        serve(connection)
+
+
+def serve(connection: Connection) -> None:
+    """Carry out the one assignment that comes over `connection`."""
+    assignment = connection.recv()
+    requests = Requests()
+    keep_going = isinstance(assignment, Run) and assignment.keep_going
+
+    def lost(why: str) -> None:
+        if not keep_going:
+            requests.stop(f"{why}, and the run was not told to go on without it")
+
+    host = Host(connection, requests, lost)
+    try:
+        last = _run(assignment, host, requests) if isinstance(assignment, Run) else _survey(assignment)
+    except KeyboardInterrupt:
+        last = Refused(f"ended before anything moved: {requests.reason}")
+    except InvalidInput as error:
+        last = Refused(str(error), error.item)
+    except (RockbenchError, OSError) as error:
+        last = Refused(str(error), failed=True)
+    except Exception as error:
+        host.close(Refused(f"{type(error).__name__}: {error}", failed=True), FAREWELL)
+        raise
+    host.close(last, FAREWELL)
+
+
+def _survey(asked: Survey) -> FromSession:
+    experiment = asked.make(asked.parameters)
+    experiment.check(asked.configuration)
+    found = compile_run(experiment, asked.configuration, asked.out)
+    room = found.room
+    return Surveyed(
+        margins=found.margins,
+        refusal=None if found.refusal is None else str(found.refusal),
+        warnings=found.warnings,
+        duration=found.forecast.duration,
+        needed=None if room is None else room.needed,
+        free=None if room is None else room.free,
+        plan_hash=found.plan_hash,
+        prediction=experiment.predict(asked.configuration),
+    )
+
+
+def _run(asked: Run, host: Host, requests: Requests) -> FromSession:
+    configuration = asked.configuration
+    _abort_on_terminate(requests)
+
+    def reduction(rig: Rig) -> Reduction:
+        signals = SignalMap(rig.channels, configuration.laser_reference)
+        return Reduction(rig.channels, rig.sample_rate, signals)
+
+    ended = run_session(
+        asked.make(asked.parameters),
+        configuration,
+        out=asked.out,
+        operator=AtTheClient(host, requests) if asked.person else Unattended("the bench itself"),
+        subscribers=[Teller(host, reduction)],
+        requests=requests,
+        realtime=asked.realtime,
+        about=asked.about,
+    )
+    return Ended(ended.status, ended.reason, ended.summary, ended.table, asked.out)
+
+
+def _abort_on_terminate(requests: Requests) -> None:
+    def handle(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - the signature is Python's
+        requests.abort("the session's process was told to terminate")
+
+    signal.signal(signal.SIGTERM, handle)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,142 @@
+"""The form says what the declaration says; nothing starts before its plan was checked."""
+
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QLineEdit
+from pytestqt.qtbot import QtBot
+
+from bench.cli.catalogue import CATALOGUE, Entry
+from bench.cli.check import CHECK
+from bench.config.declared import declared
+from bench.gui import texts
+from bench.gui.form import Form
+from bench.gui.window import Window
+from bench.link.messages import Refused, Run, Surveyed
+from protocols.harmonic.parameters import HarmonicParameters
+from sim.errors import InvalidInput
+from tests.gui.conftest import SpokenLink
+
+FINE = Surveyed((), None, (), 60.0, 1e6, 1e9, "hash", {})
+
+
+def _type(field: object, text: str) -> None:
+    assert isinstance(field, QLineEdit)
+    field.setText(text)
+
+
+@pytest.mark.parametrize("entry", [*CATALOGUE, CHECK], ids=lambda entry: entry.name)
+def test_an_untouched_form_is_the_defaults(entry: Entry, qtbot: QtBot) -> None:
+    form = Form(entry.parameters)
+    qtbot.addWidget(form)
+    values = [each for each in declared(entry.parameters) if each.group is None]
+    assert list(form.fields) == [each.name for each in values]
+    for each in values:
+        tip = form.fields[each.name].toolTip()
+        assert each.description[1:] in tip
+        assert each.allowed in tip
+    try:
+        expected = entry.parameters()
+    except ValueError:
+        # something is required, and the form says so beside it
+        assert form.refused
+        assert any(not label.isHidden() for label in form.errors.values())
+    else:
+        assert form.parameters() == expected
+
+
+def test_what_is_typed_is_what_is_asked(qtbot: QtBot) -> None:
+    form = Form(HarmonicParameters)
+    qtbot.addWidget(form)
+    _type(form.fields["omega"], "12.5, 16 18")
+    _type(form.fields["ramp_time"], "4")
+    _type(form.fields["starts"], "")
+    assert form.parameters() == HarmonicParameters(omega=(12.5, 16.0, 18.0), ramp_time=4.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [("omega", "16 99", "at most 40"), ("harmonics", "2.5", "whole number"), ("ramp_time", "soon", "a number")],
+)
+def test_a_refused_value_stays_as_typed_and_says_why(name: str, text: str, said: str, qtbot: QtBot) -> None:
+    form = Form(HarmonicParameters)
+    qtbot.addWidget(form)
+    _type(form.fields[name], text)
+    field = form.fields[name]
+    assert isinstance(field, QLineEdit)
+    assert field.text() == text
+    assert said in form.errors[name].text()
+    assert [each for each, label in form.errors.items() if not label.isHidden()] == [name]
+    with pytest.raises(InvalidInput):
+        form.parameters()
+
+
+def test_start_follows_the_check(window: Window, spoken: type[SpokenLink], qtbot: QtBot) -> None:
+    page = window.protocol
+    assert (page.start.isEnabled(), page.start.toolTip()) == (False, texts.START_UNCHECKED)
+    qtbot.mouseClick(page.check, Qt.MouseButton.LeftButton)
+    spoken.latest.said.append(FINE)
+    window._controller._look()
+    assert page.start.isEnabled()
+    _type(page.form.fields["cycles"], "7")
+    assert (page.start.isEnabled(), page.start.toolTip()) == (False, texts.START_UNCHECKED)
+    _type(page.form.fields["cycles"], "many")
+    assert page.start.toolTip() == texts.START_BAD
+    _type(page.form.fields["cycles"], "7")
+    page.survey()
+    spoken.latest.said.append(FINE)
+    window._controller._look()
+    page.keep_going.setChecked(True)
+    page.operator.setText("A. Person")
+    page.begin()
+    run = spoken.latest.assignment
+    assert isinstance(run, Run)
+    assert run.parameters.model_dump()["cycles"] == 7
+    assert (run.keep_going, run.about) == (True, {"operator": "A. Person"})
+    assert window.pages.currentWidget() is window.run
+    assert page.why_not == texts.START_BUSY
+
+
+@pytest.mark.parametrize(
+    "found",
+    [
+        Surveyed((), "limits.drift = 0.08 is refused: too near", (), None, None, None, "", {}),
+        Refused("limits.drift = 0.08 is refused: too near", "limits.drift"),
+    ],
+)
+def test_a_refused_plan_says_why_and_does_not_start(
+    found: Surveyed | Refused, window: Window, spoken: type[SpokenLink]
+) -> None:
+    page = window.protocol
+    page.survey()
+    spoken.latest.said.append(found)
+    window._controller._look()
+    assert "limits.drift = 0.08 is refused" in page.plan.verdict.text()
+    assert not page.start.isEnabled()
+    page.begin()
+    assert not window._controller.running
+
+
+@pytest.mark.usefixtures("spoken")
+def test_results_are_never_overwritten(window: Window) -> None:
+    page = window.protocol
+    folder = Path(page.folder.text())
+    folder.mkdir()
+    (folder / "campaign.h5").touch()
+    page.survey()
+    assert "never overwritten" in page.plan.verdict.text()
+    assert not window._controller.busy
+
+
+def test_what_the_plan_says_is_not_cut_off(window: Window, spoken: type[SpokenLink], qtbot: QtBot) -> None:
+    page = window.protocol
+    window.resize(window.minimumSize())
+    page.survey()
+    warnings = tuple(
+        f"with a specimen at the 95 % of its uncertainty limit {k} would be exceeded" * 2 for k in range(3)
+    )
+    spoken.latest.said.append(Surveyed((), None, warnings, 60.0, 1e6, 1e9, "hash", {}))
+    window._controller._look()
+    for label in (page.plan.verdict, page.plan.details):
+        qtbot.waitUntil(lambda label=label: label.height() >= label.heightForWidth(label.width()), timeout=2000)

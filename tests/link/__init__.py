@@ -1,0 +1,1 @@
+"""The link between a session's process and its client."""

@@ -1,0 +1,91 @@
+"""A short experiment on the small bench of the fault tests, made anew in the session's process."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from bench.config.model import Acquisition, BenchConfiguration, Simulation
+from bench.control.legs import Leg
+from bench.engine.steps import Arm, Calibrate, Dwell, Follow, Handle, Plan, RampOut, Say
+from bench.events import Estimate, PointFinished, StepStarted
+from bench.link.client import Link
+from bench.link.messages import Run
+from bench.record.tables import Column, Table
+from drivers.rig import Handwork
+from sim.errors import InvalidInput
+from sim.parameters import Parameters, quantity
+from tests.faults.setup import AMPLITUDE, BARE, CALIBRATION, LIMITS, OMEGA, PARAMETERS, RAMPS, NoPoint
+
+CYCLES = 4 * 60
+"""Cycles of the longest run: a minute."""
+
+
+class ShakingParameters(Parameters):
+    """One sine on the bare frame."""
+
+    cycles: int = quantity(CYCLES, "1", "cycles of the sine", ge=1, le=10_000)
+    gossip: int = quantity(0, "1", "events that are told between two cycles", ge=0)
+    amplitude: float = quantity(AMPLITUDE, "m/s2", "amplitude of the table acceleration", gt=0, le=2)
+
+
+class Shaking:
+    """Arms, shakes and ramps out."""
+
+    name = "shaking"
+    figure_name = "none.png"
+    point_type: type[Parameters] = NoPoint
+
+    def __init__(self, parameters: ShakingParameters) -> None:
+        self.parameters = parameters
+
+    def check(self, configuration: BenchConfiguration) -> None:
+        if configuration.limits.acceleration < self.parameters.amplitude:
+            raise InvalidInput("amplitude", self.parameters.amplitude, "the limit is lower")
+
+    def predict(self, configuration: BenchConfiguration) -> Table:
+        return {"value": Column(np.array([1.0]), "1", f"of the {configuration.backend} bench")}
+
+    def plan(self, configuration: BenchConfiguration) -> Plan:
+        yield Handle(Handwork.REMOVE_BLOCK, configuration.specimen, "Take the block off the table.")
+        yield Say(StepStarted(0.0, "shaking"))
+        yield Arm(0.2, patience=5.0)
+        yield Calibrate(CALIBRATION)
+        yield Follow((Leg(0.25, self.parameters.amplitude, OMEGA),))
+        for cycle in range(self.parameters.cycles):
+            yield Dwell(1)
+            for _ in range(self.parameters.gossip):
+                yield Say(Estimate(0.0, OMEGA, None, cycle, 0.001, float("nan"), float("nan"), float("nan")))
+        yield RampOut()
+        yield Say(PointFinished(0.0, NoPoint(value=1.0)))
+
+    def table(self, points: Sequence[Parameters]) -> str:
+        return f"{len(points)} points"
+
+    def figure(self, points: Sequence[Parameters], prediction: Table, path: Path) -> None:
+        path.write_text(f"{len(points)} of {len(prediction)}", encoding="utf-8")
+
+
+def bench() -> BenchConfiguration:
+    """The small bench: it rests soon and ramps fast."""
+    return BenchConfiguration(
+        specimen=BARE,
+        # these tests are about the link: a busy machine may be late
+        limits=LIMITS.model_copy(update={"late": 5.0}),
+        ramps=RAMPS,
+        acquisition=Acquisition(block_duration=0.05, lead=1.0),
+        simulation=Simulation(bench=PARAMETERS),
+    )
+
+
+def order(out: Path, *, realtime: bool = True, person: bool = False, keep_going: bool = False, **asked: object) -> Run:
+    """The order for a run with these parameters."""
+    parameters = ShakingParameters.model_validate(asked)
+    return Run(
+        Shaking, parameters, bench(), out, realtime=realtime, person=person, keep_going=keep_going, about={"notes": "n"}
+    )
+
+
+def begun(out: Path, **asked: object) -> Link:
+    """A link with such a run under way."""
+    return Link(order(out, **asked))  # type: ignore[arg-type]
