@@ -3,15 +3,15 @@
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from importlib import import_module
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bench.config.model import BenchConfiguration
+from bench.preflight.asked import UNKNOWN_SHAKER, Asked, demand
 from bench.preflight.bounds import bounds
-from bench.preflight.forecast import Demand, Forecast, Stage
+from bench.preflight.forecast import Forecast, Stage
 from bench.preflight.response import response_of
 from protocols.earthquake.asked import Travel, load, travel
 from protocols.earthquake.pace import Pace
@@ -24,8 +24,8 @@ from sim.specimen import Specimen
 
 Array = NDArray[np.float64]
 
-DRAWS, SEED, LIKELY = 32, 8, 0.95
-"""Specimens that are drawn besides the assumed one, their seed, and the share of them that a likely demand covers."""
+DRAWS, SEED = 32, 8
+"""Specimens that are drawn besides the assumed one, and their seed."""
 
 OFF = 0.03
 """Share by which the table's motion may be off, and every quantity of it above what was asked: noise, friction."""
@@ -41,19 +41,8 @@ _RAISED = ("acceleration", "force", "current")
 _UNKNOWN = {
     "drive_voltage": "nothing is known of this table yet: it is identified first",
     "drive_slew": "nothing is known of this table yet: it is identified first",
-    "force": "the moving mass is not known: give hardware.moving_mass and hardware.force_constant",
-    "current": "the force constant is not known: give hardware.moving_mass and hardware.force_constant",
-    "heating": "the force constant is not known: give hardware.moving_mass and hardware.force_constant",
+    **UNKNOWN_SHAKER,
 }
-
-
-@dataclass(frozen=True, eq=False)
-class _Asked:
-    """What one record asks of each quantity, shape (1 + DRAWS,), as assumed first; `chance` that the block stands."""
-
-    name: str
-    values: dict[str, Array]
-    chance: float | None
 
 
 def forecast(parameters: EarthquakeParameters, configuration: BenchConfiguration) -> Forecast:
@@ -68,7 +57,7 @@ def forecast(parameters: EarthquakeParameters, configuration: BenchConfiguration
     specimens = [configuration.specimen.bare(), *map(configuration.specimen.coupled, parameters.beta)]
     asked = [*first, *(_asked(shaking, specimen, configuration) for shaking in found for specimen in specimens)]
     return Forecast(
-        demands=tuple(_demand(quantity, asked) for quantity in bounds(configuration)),
+        demands=tuple(demand(quantity, asked, _UNKNOWN) for quantity in bounds(configuration)),
         stages=tuple(Stage(each.name, (), each.chance) for each in asked),
         duration=Pace(parameters, found, duration).total,
         warnings=table_warnings(parameters, configuration),
@@ -76,7 +65,7 @@ def forecast(parameters: EarthquakeParameters, configuration: BenchConfiguration
     )
 
 
-def _identification(parameters: EarthquakeParameters, configuration: BenchConfiguration) -> tuple[list[_Asked], float]:
+def _identification(parameters: EarthquakeParameters, configuration: BenchConfiguration) -> tuple[list[Asked], float]:
     """What the identification at the campaign's begin asks, and how long it takes [s]: nothing with a stored model."""
     if stored_table(parameters, configuration) is not None:
         return [], 0.0
@@ -84,10 +73,10 @@ def _identification(parameters: EarthquakeParameters, configuration: BenchConfig
     found = planned(wanted, configuration)
     # linear and at a level that keeps its distance: no specimen within its uncertainty changes much of it
     values = {quantity: np.full(1 + DRAWS, value) for quantity, value in found.asked.items()}
-    return [_Asked("the identification of the table", values, None)], expected_duration(wanted, found)
+    return [Asked("the identification of the table", values, None)], expected_duration(wanted, found)
 
 
-def _asked(shaking: Shaking, specimen: Specimen, configuration: BenchConfiguration) -> _Asked:
+def _asked(shaking: Shaking, specimen: Specimen, configuration: BenchConfiguration) -> Asked:
     block = specimen.block.mass if specimen.beta is not None else 0.0
     payload = specimen.frame.m1 + specimen.frame.m2 + block
     loads = load(shaking, payload, configuration, response_of(configuration))
@@ -107,7 +96,7 @@ def _asked(shaking: Shaking, specimen: Specimen, configuration: BenchConfigurati
     mounted = "the bare frame" if specimen.beta is None else f"beta = {specimen.beta:g}"
     stood = sum(each.toppled is None for each in travels[1:])
     chance = None if specimen.beta is None else (stood + 1) / (DRAWS + 2)
-    return _Asked(f"{shaking.name} with {mounted}", values, chance)
+    return Asked(f"{shaking.name} with {mounted}", values, chance)
 
 
 def _travels(
@@ -123,14 +112,3 @@ def _travels(
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         return list(pool.map(one, range(len(drawn))))
-
-
-def _demand(quantity: str, asked: Sequence[_Asked]) -> Demand:
-    known = [each for each in asked if quantity in each.values]
-    if not known:
-        return Demand(quantity, None, None, _UNKNOWN[quantity])
-    values = np.array([each.values[quantity] for each in known])
-    where, most = int(values[:, 0].argmax()), values.max(axis=0)
-    likely = max(float(np.quantile(most[1:], LIKELY)), float(most[0]))
-    storey = {"laser_1": "storey 1 in ", "laser_2": "storey 2 in "}.get(quantity, "")
-    return Demand(quantity, float(most[0]), likely, f"{storey}{known[where].name}")

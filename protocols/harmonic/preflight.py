@@ -3,7 +3,6 @@
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from importlib import import_module
 
 import numpy as np
@@ -12,8 +11,9 @@ from numpy.typing import NDArray
 from bench.config.model import BenchConfiguration
 from bench.control.legs import program
 from bench.control.starts import CATCH_ANGLE, DRIVE, SEED
+from bench.preflight.asked import UNKNOWN_SHAKER, Asked, demand
 from bench.preflight.bounds import bounds
-from bench.preflight.forecast import Demand, Forecast
+from bench.preflight.forecast import Forecast
 from bench.preflight.load import load
 from bench.preflight.motion import Travel, travel
 from bench.preflight.response import TableResponse, response_of
@@ -27,8 +27,6 @@ Array = NDArray[np.float64]
 
 DRAWS = 16
 """Specimens that are drawn besides the assumed one: their 95 % lies close below the worst of them."""
-
-LIKELY = 0.95
 
 RIPPLE = 0.03
 """Share by which every quantity of the table and its drive may exceed the asked one: noise, and what a calibration at
@@ -46,18 +44,8 @@ _RAISED = ("acceleration", "force", "current", "drive_slew")
 _UNKNOWN = {
     "drive_voltage": "nothing is known of this table: give table_model",
     "drive_slew": "nothing is known of this table: give table_model",
-    "force": "the moving mass is not known: give hardware.moving_mass and hardware.force_constant",
-    "current": "the force constant is not known: give hardware.moving_mass and hardware.force_constant",
-    "heating": "the force constant is not known: give hardware.moving_mass and hardware.force_constant",
+    **UNKNOWN_SHAKER,
 }
-
-
-@dataclass(frozen=True, eq=False)
-class _Asked:
-    """What one trial asks of each quantity, shape (1 + DRAWS,): as assumed first, then as drawn."""
-
-    name: str
-    values: dict[str, Array]
 
 
 def forecast(parameters: HarmonicParameters, configuration: BenchConfiguration) -> Forecast:
@@ -75,7 +63,7 @@ def forecast(parameters: HarmonicParameters, configuration: BenchConfiguration) 
         for trial, travels in zip(found, moved, strict=True)
     ]
     return Forecast(
-        demands=tuple(_demand(quantity, asked) for quantity in bounds(configuration)),
+        demands=tuple(demand(quantity, asked, _UNKNOWN) for quantity in bounds(configuration)),
         stages=tuple(trial.stage for trial in found),
         duration=Pace(parameters.omega, 1 + len(parameters.beta)).progress("").remaining,
     )
@@ -109,7 +97,7 @@ def _asked(
     parameters: HarmonicParameters,
     configuration: BenchConfiguration,
     response: TableResponse | None,
-) -> _Asked:
+) -> Asked:
     loads = load(
         program(trial.legs),
         trial.begin,
@@ -131,7 +119,7 @@ def _asked(
         "laser_2": np.array([max(each.storey_2, steady.storey_2) for each in travels]) / halves[1] + OFF_MIDDLE,
         "drift": np.array([max(each.drift, steady.drift) for each in travels]),
     }
-    return _Asked(trial.stage.name, values)
+    return Asked(trial.stage.name, values)
 
 
 def _steady(trial: Trial, parameters: HarmonicParameters, configuration: BenchConfiguration) -> Travel:
@@ -141,14 +129,3 @@ def _steady(trial: Trial, parameters: HarmonicParameters, configuration: BenchCo
     amplitude = parameters.amplitude_factor * configuration.specimen.uplift_acceleration
     motion = rocking_travel if trial.rocks else bare_travel
     return motion(trial.specimen, trial.steady, amplitude, configuration.laser_reference) or Travel(0.0, 0.0, 0.0)
-
-
-def _demand(quantity: str, asked: Sequence[_Asked]) -> Demand:
-    known = [each for each in asked if quantity in each.values]
-    if not known:
-        return Demand(quantity, None, None, _UNKNOWN[quantity])
-    values = np.array([each.values[quantity] for each in known])
-    where, most = int(values[:, 0].argmax()), values.max(axis=0)
-    likely = max(float(np.quantile(most[1:], LIKELY)), float(most[0]))
-    storey = {"laser_1": "storey 1 in ", "laser_2": "storey 2 in "}.get(quantity, "")
-    return Demand(quantity, float(most[0]), likely, f"{storey}{known[where].name}")
