@@ -1,75 +1,20 @@
 """Digital output tasks: lines that are set when they are written."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from nidaqmx.error_codes import DAQmxErrors
 
 from drivers.emulation.daqmx.errors import DaqmxFailure
-from drivers.emulation.daqmx.lines import Lines
+from drivers.emulation.daqmx.line_task import LineChannel, LineTask
 
 
-@dataclass(frozen=True)
-class Line:
-    """One line: the device it belongs to, and its name."""
-
-    device: str
-    name: str
-
-
-@dataclass(frozen=True)
-class LineChannel:
-    """One channel: a line, or several that are written together."""
-
-    name: str
-    lines: tuple[Line, ...]
-
-
-class DigitalOutput:
+class DigitalOutput(LineTask):
     """A `Job` without clock."""
 
-    awaited: str | None = None
-    start_terminal: str | None = None
-    source: str | None = None
-    clock_terminal: str | None = None
-
-    def __init__(self, lines: Lines) -> None:
-        self._lines = lines
-        self.outputs: list[LineChannel] = []
-
     @property
-    def channels(self) -> tuple[str, ...]:
-        return tuple(channel.name for channel in self.outputs)
-
-    @property
-    def all_lines(self) -> tuple[Line, ...]:
-        """Its lines, channel after channel."""
-        return tuple(line for channel in self.outputs for line in channel.lines)
-
-    @property
-    def lines_per_channel(self) -> int:
-        """Lines of the channel that has most of them."""
-        return max(len(channel.lines) for channel in self.outputs)
-
-    @property
-    def devices(self) -> frozenset[str]:
-        return frozenset(line.device for line in self.all_lines)
-
-    @property
-    def resources(self) -> frozenset[str]:
-        return frozenset(line.name for line in self.all_lines)
-
-    def check(self) -> None:
-        pass
-
-    def begin(self, tick: int) -> None:
-        pass
-
-    def end(self) -> None:
-        pass
-
-    def verdict(self) -> None:
-        pass
+    def outputs(self) -> list[LineChannel]:
+        """Its channels."""
+        return self._made
 
     def write(self, levels: Sequence[bool]) -> None:
         """Set all lines, in order. Raises DaqmxFailure when there are more or fewer levels, or the watchdog bars it."""
