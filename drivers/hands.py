@@ -9,15 +9,15 @@ from drivers.rig import Handwork
 class Hands(Protocol):
     """Does what is done by hand between two tests."""
 
-    def do(self, work: Handwork, stiffness: float | None) -> None:
-        """Do `work`, with a spring of `stiffness` [N/m]. Raises RigError when it cannot be done."""
+    def do(self, work: Handwork, amount: float | None) -> None:
+        """Do `work`, by `amount` where it has one. Raises RigError when it cannot be done."""
         ...
 
 
 class Person:
     """The person at the bench, who has done the work when the rig hears of it."""
 
-    def do(self, work: Handwork, stiffness: float | None) -> None:
+    def do(self, work: Handwork, amount: float | None) -> None:
         """Nothing is left to do."""
 
 
@@ -28,6 +28,6 @@ class RemoteHands:
         place_of(address)
         self._address = address
 
-    def do(self, work: Handwork, stiffness: float | None) -> None:
+    def do(self, work: Handwork, amount: float | None) -> None:
         """Have it done to the virtual specimen. Raises RigError, ConnectionLost or DeviceTimeout."""
-        ask(self._address, "handwork", work=work.value, stiffness=stiffness)
+        ask(self._address, "handwork", work=work.value, amount=amount)

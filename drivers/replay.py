@@ -198,7 +198,7 @@ class ReplayRig:
     def close(self) -> None:
         self._state = _State.CLOSED
 
-    def handwork(self, work: Handwork, stiffness: float | None = None) -> None:  # noqa: ARG002
+    def handwork(self, work: Handwork, amount: float | None = None) -> None:  # noqa: ARG002
         if self._state is not _State.STOPPED:
             raise RigError(f"{work.value} is refused: the rig is {self._state.value}; hands belong on a stopped rig")
 

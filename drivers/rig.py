@@ -53,14 +53,32 @@ class Alignment:
 
 
 class Handwork(StrEnum):
-    """What a person does at the bench between two tests."""
+    """What a person does at the bench between two tests. Some of it comes with an amount, in SI units."""
 
     MOUNT_SPRING = "mount spring"
+    """Block and spring are mounted, the block free to rock; the amount is what the spring's label says [N/m]."""
     REMOVE_BLOCK = "remove block"
     STAND_BLOCK_UP = "stand block up"
     LOCK_FRAME = "lock frame"
     """The storeys are clamped to the table and move with it, without spring and block."""
     UNLOCK_FRAME = "unlock frame"
+    HOLD_BLOCK = "hold block"
+    """As MOUNT_SPRING, with the block clamped to the table: it cannot lift, the spring is grounded on the table."""
+    LOCK_TABLE = "lock table"
+    """The table is clamped to the ground at mid stroke, whatever stands or will stand on it; it must not be driven."""
+    UNLOCK_TABLE = "unlock table"
+    WATCH_BLOCK = "watch block"
+    """The block stands alone, without spring, and the laser of storey 2 looks horizontally at its face on the frame's
+    side, at the height of the amount above the table [m]: see `sim.block_face`. No spring is mounted while it does; it
+    has nothing to measure when the block is taken away."""
+    WATCH_STOREYS = "watch storeys"
+    """The laser of storey 2 looks at its storey again."""
+    TILT_BLOCK = "tilt block"
+    """The block that stands alone is held tilted by the amount [rad], above zero with its top towards the frame, and
+    let go without a push a few seconds after the rig is armed; to be done again before each test."""
+    PULL_FRAME = "pull frame"
+    """Storey 2 is held aside by the amount [m] and let go without a push a few seconds after the rig is armed; to be
+    done again before each test."""
 
 
 class Rig(Protocol):
@@ -138,8 +156,8 @@ class Rig(Protocol):
         """Stop, and release every device. Allowed any number of times."""
         ...
 
-    def handwork(self, work: Handwork, stiffness: float | None = None) -> None:
-        """Told that a person has done `work` (with a spring of `stiffness` [N/m]) while the rig was stopped.
+    def handwork(self, work: Handwork, amount: float | None = None) -> None:
+        """Told that a person has done `work`, by `amount` where it has one, while the rig was stopped.
 
         A simulated rig does it to its specimen; a real one has nothing to do. Raises RigError when armed.
         """

@@ -17,7 +17,7 @@ from sim.specimen import Specimen
 from sim.virtual_bench import VirtualBench, VirtualBenchParameters
 
 _STILL_VELOCITY = 2.0e-4
-"""Velocity of table and storeys [m/s] below which the bench counts as at rest."""
+"""Velocity of table, storeys and the block's top [m/s] below which the bench counts as at rest."""
 _STILL_DISPLACEMENT = 2.0e-4
 """Displacement of the table from mid stroke [m] below which it counts as at rest."""
 _LONGEST_WAIT = 300.0
@@ -37,7 +37,8 @@ class SimulatedRig:
     `WallClock` a block is handed out when it would have been measured.
 
     `lead` is the number of drive samples that must be waiting, 50 ms unless told. Between two arms as much time
-    passes as a person waits: the bench coasts at zero drive until it is at rest. Every spring that is mounted is
+    passes as a person waits: the bench coasts at zero drive until it is at rest. What is held by hand is let go a few
+    seconds after sample 0; after a run that ended before, it is held on. Every spring that is mounted is
     `spring_factor` times as stiff as it is said to be.
     """
 
@@ -108,6 +109,7 @@ class SimulatedRig:
         self.bench.run(np.zeros(round(_WARM_UP * self.sample_rate)))
         self._queue.clear()
         self._drive.begin()
+        self.bench.arm()
         self._started = self._clock.now()
         self._moved = True
         self._state = _State.ARMED
@@ -144,12 +146,12 @@ class SimulatedRig:
         self.stop()
         self._state = _State.CLOSED
 
-    def handwork(self, work: Handwork, stiffness: float | None = None) -> None:
+    def handwork(self, work: Handwork, amount: float | None = None) -> None:
         if self._state is not _State.STOPPED:
             raise RigError(f"{work.value} is refused: the rig is {self._state.value}; hands belong on a stopped rig")
-        specimen = self._handyman.after(work, stiffness, self.bench.specimen)
+        arrangement = self._handyman.after(work, amount, self.bench.arrangement)
         self._come_to_rest()
-        self.bench.mount(specimen)
+        self.bench.mount(arrangement)
 
     def __enter__(self) -> Self:
         return self
@@ -176,11 +178,14 @@ class SimulatedRig:
 
     def _come_to_rest(self) -> None:
         """Let time pass at zero drive until nothing moves to speak of."""
+        # here and not in `halt`, which may interrupt a read
+        self.bench.disarm()
         waited = 0.0
         while self._moved and waited < _LONGEST_WAIT:
             self.bench.coast(1.0)
             waited += 1.0
             truth = self.bench.truth
-            velocity = max(float(np.abs(v).max()) for v in (truth.v, truth.v1, truth.v2))
+            top = 2.0 * self.bench.specimen.block.h_b * truth.omega
+            velocity = max(float(np.abs(v).max()) for v in (truth.v, truth.v1, truth.v2, top))
             self._moved = velocity > _STILL_VELOCITY or abs(float(truth.x[-1])) > _STILL_DISPLACEMENT
         self._moved = False

@@ -2,22 +2,20 @@
 
 from dataclasses import dataclass
 from math import ceil
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.random import SeedSequence
 from numpy.typing import NDArray
 from pydantic import model_validator
 
+from sim.arrangement import Arrangement
 from sim.channel import Channel
 from sim.errors import InvalidInput
 from sim.parameters import Parameters, quantity
 from sim.sensors import Accelerometer, Converter, DisplacementSensor, FilterUnit, Laser
 from sim.shaker import Shaker
+from sim.sight import sights
 from sim.specimen import Specimen
-
-if TYPE_CHECKING:
-    from sim.kernel.plant import Plant
 
 Array = NDArray[np.float64]
 
@@ -25,6 +23,8 @@ _LONGEST_STEP = 5.0e-4
 """Longest integration step [s]; its error in two seconds of violent rocking is below 1e-8 m."""
 _STEPS_PER_TIME_CONSTANT = 5
 """Steps within the shortest time constant of the shaker, should that ask for more."""
+_LET_GO = 3.0, 5.0
+"""A hand that holds the block or the frame lets go so long after the rig is armed [s], earliest and latest."""
 
 
 class VirtualBenchParameters(Parameters):
@@ -70,53 +70,15 @@ class Truth:
     v1: Array
     v2: Array
     theta: Array
-
-
-def plant_of(specimen: Specimen, shaker: Shaker, catch_angle: float) -> "Plant":
-    """The constants of the moving system as `sim.kernel.table` takes them."""
-    from sim.kernel.plant import Plant
-
-    f, k, (c1, c2) = specimen.frame, specimen.block, specimen.frame.dashpots
-    standing = specimen.beta is not None
-    return Plant(
-        m1=f.m1,
-        m2=f.m2,
-        k1=f.k1,
-        k2=f.k2,
-        c1=c1,
-        c2=c2,
-        h1=f.h1,
-        k_c=specimen.k_c,
-        d=specimen.d,
-        b=k.b,
-        h_b=k.h_b,
-        mass=k.mass if standing else 0.0,
-        inertia=k.inertia,
-        restitution=k.restitution,
-        g=specimen.g,
-        catch_angle=catch_angle,
-        moving_mass=shaker.moving_mass,
-        k_s=shaker.k_s,
-        c_s=shaker.c_s,
-        friction=shaker.friction,
-        friction_velocity=shaker.friction_velocity,
-        half_stroke=shaker.half_stroke,
-        stop_stiffness=shaker.stop_stiffness,
-        stop_damping=shaker.stop_damping,
-        bl=shaker.bl,
-        resistance=shaker.resistance,
-        holds_current=1.0 if shaker.amplifier == "current" else 0.0,
-        voltage_limit=shaker.voltage_limit,
-        current_limit=shaker.current_limit,
-        lag=shaker.amplifier_lag,
-    )
+    omega: Array
 
 
 class VirtualBench:
     """A bench that turns drive volts into counts, tick by tick, without end.
 
     Everything random comes from `seed`; the same seed and drive give the same counts, however the drive is cut
-    into blocks. Tick i of a block is sampled just before its drive sample takes effect.
+    into blocks. Tick i of a block is sampled just before its drive sample takes effect. What is held by hand is let go
+    between two ticks, without a push, a few seconds after `arm`.
     """
 
     def __init__(self, parameters: VirtualBenchParameters, specimen: Specimen, seed: int) -> None:
@@ -124,7 +86,7 @@ class VirtualBench:
 
         self._kernel = table
         self.parameters = parameters
-        sources = SeedSequence(seed).spawn(6)
+        sources = SeedSequence(seed).spawn(7)
         rate = parameters.sample_rate
         self._force_random, self._displacement_random, self._accelerometer_random = (
             np.random.default_rng(source) for source in sources[:3]
@@ -132,6 +94,8 @@ class VirtualBench:
         self._laser_1 = parameters.laser_1.stream(rate, sources[3])
         self._laser_2 = parameters.laser_2.stream(rate, sources[4])
         self._converter_random = np.random.default_rng(sources[5])
+        self._hand_random = np.random.default_rng(sources[6])
+        self._held_for: int | None = None
         self._filter = parameters.filter_unit.stream(rate)
         step = min(_LONGEST_STEP, parameters.shaker.shortest_time / _STEPS_PER_TIME_CONSTANT)
         self._substeps = ceil(1.0 / (rate * step) - 1e-9)
@@ -139,17 +103,22 @@ class VirtualBench:
         self._carried = np.zeros(2)
         self._mode = table.REST
         self._samples = np.zeros((0, table.COLUMNS))
-        self.mount(specimen)
+        self.mount(Arrangement(specimen))
+
+    @property
+    def arrangement(self) -> Arrangement:
+        """What stands on the table, and what is clamped or held by hand at this moment."""
+        return self._arrangement
 
     @property
     def specimen(self) -> Specimen:
         """What stands on the table."""
-        return self._specimen
+        return self._arrangement.specimen
 
     @property
     def fallen(self) -> bool:
         """Whether the block hangs in its catch."""
-        return self._mode == self._kernel.FALLEN
+        return self._mode == self._kernel.FALLEN and self._arrangement.tilt == 0.0
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -174,8 +143,15 @@ class VirtualBench:
     @property
     def truth(self) -> Truth:
         """The motion at the ticks of the last `run` or `coast`."""
-        s = self._samples
-        return Truth(x=s[:, 0], v=s[:, 1], a=s[:, 8], u1=s[:, 2], u2=s[:, 3], v1=s[:, 4], v2=s[:, 5], theta=s[:, 6])
+        x, v, u1, u2, v1, v2, theta, omega, a = self._samples.T
+        return Truth(x=x, v=v, a=a, u1=u1, u2=u2, v1=v1, v2=v2, theta=theta, omega=omega)
+
+    @property
+    def sights(self) -> Array:
+        """What the lasers saw at the ticks of the last `run` or `coast`, shape (4, n): see `sim.sight.sights`."""
+        # lasers stand together, see the parameters
+        on_ground = self.parameters.laser_1.reference == "ground"
+        return sights(np.ascontiguousarray(self._samples.T), self._arrangement, on_ground)
 
     def run(self, volts: Array) -> NDArray[np.int16]:
         """Play `volts`, shape (n,) [V], and return the counts sampled meanwhile, shape (n, 4)."""
@@ -189,35 +165,78 @@ class VirtualBench:
         """Let the bench move at zero drive without sampling it."""
         self._move(np.zeros(max(1, round(seconds * self.parameters.sample_rate))))
 
-    def mount(self, specimen: Specimen) -> None:
-        """Put `specimen` on the table, standing still; the table is steadied where it is."""
-        self._specimen = specimen
-        self._plant = plant_of(specimen, self.parameters.shaker, self.parameters.catch_angle)
+    def mount(self, arrangement: Arrangement) -> None:
+        """Arrange it so on the table, standing still; a block that hung in its catch stands up.
+
+        The table is steadied where it is, or locked at mid stroke. Raises InvalidInput, and nothing has changed, for a
+        block held beyond its catch.
+        """
+        catch = self.parameters.catch_angle
+        if abs(arrangement.tilt) >= catch:
+            raise InvalidInput("tilt", arrangement.tilt, f"it must be below the catch angle of {catch:g} rad")
+        self._arrange(arrangement)
+        self._held_for = None
         self._state[1:] = 0.0
+        self._state[2:4] = arrangement.storeys()
+        self._state[6] = arrangement.tilt
+        if arrangement.table_locked:
+            self._state[0] = 0.0
         self._carried[:] = 0.0
-        self._mode = self._kernel.REST
+        # a block in somebody's hand moves no more than one in the catch
+        self._mode = self._kernel.REST if arrangement.tilt == 0.0 else self._kernel.FALLEN
 
     def stand_up(self) -> None:
         """Stand the block up again and steady everything."""
-        self.mount(self._specimen)
+        self.mount(self._arrangement)
+
+    def arm(self) -> None:
+        """Told that the rig is armed: a hand that holds something lets go 3 to 5 s later."""
+        if self._arrangement.held:
+            self._held_for = round(self._hand_random.uniform(*_LET_GO) * self.parameters.sample_rate)
+
+    def disarm(self) -> None:
+        """Told that the rig is not armed any more: a hand that still holds something goes on holding it."""
+        self._held_for = None
+
+    def _arrange(self, arrangement: Arrangement) -> None:
+        self._arrangement = arrangement
+        self._plant = arrangement.plant(self.parameters.shaker, self.parameters.catch_angle)
+
+    def _let_go(self) -> None:
+        """Nobody's hand is on block and frame from here on; they are still."""
+        if self._arrangement.tilt != 0.0:
+            self._mode = self._kernel.ROCK_A if self._arrangement.tilt > 0.0 else self._kernel.ROCK_B
+        self._arrange(self._arrangement.let_go())
+        self._held_for = None
 
     def _move(self, volts: Array) -> None:
-        p = self.parameters
+        p, n = self.parameters, volts.size
         reach = p.shaker.drive_range
         requests = p.shaker.gain * np.clip(np.ascontiguousarray(volts, dtype=np.float64), -reach, reach)
         noise_level = p.shaker.force_noise * (0.5 * p.sample_rate) ** 0.5
-        noise = noise_level * self._force_random.standard_normal(volts.size)
-        self._samples = np.empty((volts.size, self._kernel.COLUMNS))
+        noise = noise_level * self._force_random.standard_normal(n)
+        self._samples = np.empty((n, self._kernel.COLUMNS))
+        start = 0
+        if self._held_for is not None and self._held_for < n:
+            start = self._held_for
+            self._stream(slice(0, start), requests, noise)
+            self._let_go()
+        self._stream(slice(start, n), requests, noise)
+        if self._held_for is not None:
+            self._held_for -= n
+
+    def _stream(self, ticks: slice, requests: Array, noise: Array) -> None:
+        """Move on through some of the ticks of a block."""
         self._mode = self._kernel.stream(
             self._plant,
-            1.0 / p.sample_rate,
+            1.0 / self.parameters.sample_rate,
             self._substeps,
-            requests,
-            noise,
+            requests[ticks],
+            noise[ticks],
             self._mode,
             self._state,
             self._carried,
-            self._samples,
+            self._samples[ticks],
         )
 
     def _sense(self) -> Array:
@@ -226,7 +245,7 @@ class VirtualBench:
         volts = np.empty((4, s.shape[1]))
         volts[0] = p.displacement_sensor.volts(s[0], p.sample_rate, self._displacement_random)
         volts[1] = p.accelerometer.volts(s[8], p.sample_rate, self._accelerometer_random)
-        for row, u, laser, stream in ((2, 2, p.laser_1, self._laser_1), (3, 3, p.laser_2, self._laser_2)):
-            on_ground = laser.reference == "ground"
-            volts[row] = stream.read(s[u] + s[0] if on_ground else s[u], s[u + 2] + s[1] if on_ground else s[u + 2])
+        seen = self.sights
+        volts[2] = self._laser_1.read(seen[0], seen[1])
+        volts[3] = self._laser_2.read(seen[2], seen[3])
         return volts

@@ -78,7 +78,7 @@ class LoopbackRig:
     def close(self) -> None:
         self.stop()
 
-    def handwork(self, work: Handwork, stiffness: float | None = None) -> None:  # noqa: ARG002
+    def handwork(self, work: Handwork, amount: float | None = None) -> None:  # noqa: ARG002
         if self.armed:
             raise RigError("hands off: the rig is armed")
         self.done.append(work)

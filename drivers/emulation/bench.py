@@ -44,7 +44,6 @@ class EmulatedBench:
         kept = round(_KEPT * parameters.sample_rate)
         self._counts = History(kept, self.terminals, np.int16)
         self._seen = History(kept, 4, np.float64)
-        self._on_ground = parameters.laser_1.reference == "ground"
         laser, lsb = parameters.laser_1, parameters.converter.lsb
         self._error_counts = round(laser.error_current * laser.load / lsb)
         self._outputs: dict[int, Callable[[], bool]] = {}
@@ -111,6 +110,10 @@ class EmulatedBench:
     def enable(self, closed: bool) -> None:
         with self.lock:
             self._advance()
+            if closed and not self._enabled:
+                self._bench.arm()
+            elif not closed:
+                self._bench.disarm()
             self._enabled = closed
 
     @property
@@ -129,11 +132,11 @@ class EmulatedBench:
             self._outputs[1 + storey] = live
 
     def sight(self, storey: int) -> "Storey":
-        """What the laser on a storey sees: 1 or 2."""
+        """What the laser of a storey sees, 1 or 2: the storey, or the block that laser 2 was turned to."""
         return Storey(self, storey)
 
     def seen(self, storey: int, times: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Displacement of a storey [m] as its laser sees it at monotonic times [s]: cubic between the ticks."""
+        """Displacement [m] that the laser of a storey sees at monotonic times [s]: cubic between the ticks."""
         ticks = (times - self._started) * self._rate
         with self.lock:
             if ticks.size and ticks[-1] > self._seen.end - 1:
@@ -148,13 +151,13 @@ class EmulatedBench:
         end = x1 * (1.0 + 2.0 * rest) - length * v1 * rest
         return start * rest * rest + end * place * place
 
-    def handwork(self, work: Handwork, stiffness: float | None) -> None:
-        """Do to the specimen what a person does. Raises RigError while the amplifier is enabled."""
+    def handwork(self, work: Handwork, amount: float | None) -> None:
+        """Do at the bench what a person does. Raises RigError while the amplifier is enabled."""
         with self.lock:
             if self._enabled:
                 raise RigError(f"{work.value} is refused: the amplifier is enabled; hands belong on a stopped bench")
             self._advance()
-            self._bench.mount(self._handyman.after(work, stiffness, self._bench.specimen))
+            self._bench.mount(self._handyman.after(work, amount, self._bench.arrangement))
 
     @property
     def enabled(self) -> bool:
@@ -189,11 +192,9 @@ class EmulatedBench:
             if not live():
                 counts[:, column] = self._error_counts
         self._counts.append(counts)
-        truth = self._bench.truth
-        x, v = (truth.x, truth.v) if self._on_ground else (0.0, 0.0)
-        self._seen.append(np.column_stack((truth.u1 + x, truth.v1 + v, truth.u2 + x, truth.v2 + v)))
+        self._seen.append(self._bench.sights.T)
         if self._told is not None:
-            self._told(truth.x)
+            self._told(self._bench.truth.x)
 
 
 class Storey:

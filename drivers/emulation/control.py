@@ -1,6 +1,6 @@
 """The control channel of an emulated laboratory: how another program does handwork, causes faults and asks the truth.
 
-A request is one line of JSON, `{"command": "handwork", "work": "remove block", "stiffness": null}`; the answer is one
+A request is one line of JSON, `{"command": "handwork", "work": "remove block", "amount": null}`; the answer is one
 line, `{"ok": true, "result": ...}` or `{"ok": false, "error": "..."}`. A connection may carry any number of requests.
 """
 

@@ -108,7 +108,7 @@ class Laboratory:
         }
 
     def _handwork(self, arguments: Mapping[str, Any]) -> None:
-        self.bench.handwork(Handwork(arguments["work"]), arguments.get("stiffness"))
+        self.bench.handwork(Handwork(arguments["work"]), arguments.get("amount"))
 
     def _laser(self, arguments: Mapping[str, Any]) -> None:
         """A fault of the laser on `storey`: the name of a method of EmulatedLaser, and its `arguments`."""

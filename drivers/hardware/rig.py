@@ -150,10 +150,10 @@ class HardwareRig:
         with self._told_once(), self._opened:
             self._daq.stop()
 
-    def handwork(self, work: Handwork, stiffness: float | None = None) -> None:
+    def handwork(self, work: Handwork, amount: float | None = None) -> None:
         if self._state is not _State.STOPPED:
             raise RigError(f"{work.value} is refused: the rig is {self._state.value}; hands belong on a stopped rig")
-        self._hands.do(work, stiffness)
+        self._hands.do(work, amount)
 
     def __enter__(self) -> Self:
         return self

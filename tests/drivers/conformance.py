@@ -287,4 +287,13 @@ class RigConformance:
             rig.handwork(Handwork.REMOVE_BLOCK)
             rig.handwork(Handwork.LOCK_FRAME)
             rig.handwork(Handwork.UNLOCK_FRAME)
+            rig.handwork(Handwork.HOLD_BLOCK, 0.4 * 213.44)
+            rig.handwork(Handwork.LOCK_TABLE)
+            rig.handwork(Handwork.WATCH_BLOCK, 0.3)
+            rig.handwork(Handwork.TILT_BLOCK, 0.05)
+            rig.handwork(Handwork.STAND_BLOCK_UP)
+            rig.handwork(Handwork.REMOVE_BLOCK)
+            rig.handwork(Handwork.WATCH_STOREYS)
+            rig.handwork(Handwork.UNLOCK_TABLE)
+            rig.handwork(Handwork.PULL_FRAME, 0.005)
         assert play(started(rig), np.zeros(samples(rig, 0.05)))[0].first == 0

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from drivers.clock import VirtualClock, WallClock
 from drivers.rig import Counts, DriveUnderflow, Handwork, Rig, RigError
 from drivers.simulated import SimulatedRig
+from sim.block_face import rotation
 from sim.errors import InvalidInput
 from sim.sensors import Laser
 from sim.specimen import Specimen
@@ -154,6 +155,48 @@ def test_a_locked_frame_moves_with_the_table_until_it_is_unlocked() -> None:
 def test_mounting_a_spring_needs_its_stiffness() -> None:
     with pytest.raises(InvalidInput, match="stiffness"):
         simulated().handwork(Handwork.MOUNT_SPRING)
+
+
+def test_a_tilted_block_is_let_go_seconds_after_arming_and_tilted_again() -> None:
+    rig = simulated()
+    rig.handwork(Handwork.LOCK_TABLE)
+    rig.handwork(Handwork.WATCH_BLOCK, 0.3)
+    for tilt in (0.08, -0.06):
+        rig.handwork(Handwork.TILT_BLOCK, tilt)
+        seen = rotation(measured(started(rig), np.zeros(14_000), "laser_2"), 0.3, rig.bench.specimen.block)
+        rig.stop()
+        # the laser's linearity, 0.16 mm of its range, over 300 mm
+        held = np.abs(seen - tilt) < 1e-3
+        assert held[: int(2.9 * 2000)].all()
+        assert not held[int(5.5 * 2000) :].all()
+        assert seen.min() < -0.03
+        assert seen.max() > 0.03
+        assert not rig.bench.fallen
+    # what was rocking when it was stopped has come to rest before the next test
+    seen = measured(started(rig), np.zeros(2000), "laser_2")
+    assert np.abs(rig.bench.truth.theta).max() == 0.0
+    assert np.ptp(seen) < 4e-4
+
+
+def test_a_frame_held_when_a_test_is_stopped_is_held_in_the_next() -> None:
+    rig = simulated()
+    rig.handwork(Handwork.PULL_FRAME, 0.02)
+    for end in (rig.stop, rig.halt):
+        still = measured(started(rig), np.zeros(5600), "laser_2")
+        assert np.abs(still - 0.02).max() < 1e-3
+        end()
+    swinging = measured(started(rig), np.zeros(12_000), "laser_2")
+    assert swinging.min() < -0.015
+
+
+def test_nothing_is_changed_by_handwork_that_is_refused() -> None:
+    rig = simulated(catch_angle=0.1)
+    rig.handwork(Handwork.WATCH_BLOCK, 0.3)
+    before = rig.bench.arrangement
+    for work, amount in ((Handwork.MOUNT_SPRING, 100.0), (Handwork.TILT_BLOCK, 0.11), (Handwork.PULL_FRAME, None)):
+        with pytest.raises((RigError, InvalidInput)):
+            rig.handwork(work, amount)
+        assert rig.bench.arrangement == before
 
 
 def test_the_same_seed_gives_the_same_session_however_it_is_read() -> None:

@@ -160,9 +160,9 @@ class FaultyRig:
     def close(self) -> None:
         self.inner.close()
 
-    def handwork(self, work: Handwork, stiffness: float | None = None) -> None:
+    def handwork(self, work: Handwork, amount: float | None = None) -> None:
         self._fail("handwork")
-        self.inner.handwork(work, stiffness)
+        self.inner.handwork(work, amount)
 
     def _played(self, n: int) -> None:
         """Count samples that were played, and how the table moved meanwhile."""

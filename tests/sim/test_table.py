@@ -9,11 +9,11 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from sim.arrangement import plant_of
 from sim.kernel.plant import FALLEN, REST, ROCK_A, ROCK_B, STATES
 from sim.kernel.table import COLUMNS, stream
 from sim.shaker import Shaker
 from sim.specimen import Block, Frame, Specimen
-from sim.virtual_bench import plant_of
 
 Array = NDArray[np.float64]
 

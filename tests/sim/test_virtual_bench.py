@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 from scipy.optimize import minimize
 
+from sim.arrangement import Arrangement
 from sim.sensors import Accelerometer, FilterUnit, Laser
 from sim.shaker import Shaker
 from sim.specimen import Specimen
@@ -138,7 +139,7 @@ def test_a_toppled_block_is_caught_and_pulls_the_frame_where_the_springs_balance
 def test_mounting_another_specimen_stands_it_still() -> None:
     bench = bench_with(Specimen(beta=0.4))
     bench.run(kick(2000))
-    bench.mount(Specimen())
+    bench.mount(Arrangement(Specimen()))
     bench.coast(0.001)
     truth = bench.truth
     assert truth.u1[0] == truth.u2[0] == truth.theta[0] == truth.v[0] == 0.0

@@ -69,7 +69,7 @@ def test_hands_are_told_of_the_work(server: ControlServer, done: list[dict[str, 
     hands = RemoteHands(server.address)
     hands.do(Handwork.MOUNT_SPRING, 1250.0)
     hands.do(Handwork.REMOVE_BLOCK, None)
-    assert done == [{"work": "mount spring", "stiffness": 1250.0}, {"work": "remove block", "stiffness": None}]
+    assert done == [{"work": "mount spring", "amount": 1250.0}, {"work": "remove block", "amount": None}]
 
 
 def test_a_person_has_done_it_already() -> None:

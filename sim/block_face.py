@@ -1,0 +1,61 @@
+"""What a laser that looks horizontally at the face of the stand-alone block sees of its rotation.
+
+The beam runs at height z above the table towards the face that is turned to the frame. A is the base corner under
+that face, B the one 2b behind it. theta > 0 turns the block about A, its top towards the frame, so the face is a line
+through A and the lit point moves by z tan(theta). theta < 0 turns it about B and lifts A: with n = (cos, -sin)(theta)
+normal to the face, the face is the line n p = 2b seen from B, which the beam meets 2b sec(theta) + z tan(theta) in
+front of B. Both together, displacements towards the frame being positive:
+
+    D = z tan(theta) + 2b (sec(theta) - 1) [theta < 0],    dD/dtheta = sec^2(theta) (z + 2b min(sin(theta), 0))
+
+D grows with theta as long as the beam meets the face, and theta follows from D in closed form.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sim.specimen import Block
+
+Array = NDArray[np.float64]
+
+
+def displacement(theta: ArrayLike, height: float, block: Block) -> Array:
+    """Displacement [m] of the lit point along the beam, towards the frame, at rotations `theta` [rad], any shape.
+
+    `height` of the beam above the table [m]. NaN where the beam misses the face: over it or under it.
+    """
+    angle = np.asarray(theta, dtype=np.float64)
+    sine, cosine = np.sin(angle), np.cos(angle)
+    low, high = heights(angle, block)
+    lit = (height >= low) & (height <= high)
+    # sec - 1 without cancellation
+    behind = np.where(angle < 0.0, 2.0 * np.sin(0.5 * angle) ** 2 / cosine, 0.0)
+    return np.where(lit, height * sine / cosine + 2.0 * block.b * behind, np.nan)
+
+
+def heights(theta: ArrayLike, block: Block) -> tuple[Array, Array]:
+    """Between which heights above the table [m] the face is at rotations `theta` [rad], any shape."""
+    angle = np.asarray(theta, dtype=np.float64)
+    low = np.maximum(-2.0 * block.b * np.sin(angle), 0.0)
+    return low, low + 2.0 * block.h_b * np.cos(angle)
+
+
+def displacement_rate(theta: ArrayLike, height: float, block: Block) -> Array:
+    """Derivative of `displacement` [m/rad]: times the angular velocity it is the velocity that the laser sees."""
+    angle = np.asarray(theta, dtype=np.float64)
+    return (height + 2.0 * block.b * np.minimum(np.sin(angle), 0.0)) / np.cos(angle) ** 2
+
+
+def rotation(displacement: ArrayLike, height: float, block: Block) -> Array:
+    """Rotation [rad] of the block whose lit point is displaced by `displacement` [m], any shape; inverse of the above.
+
+    About A atan(D / z). About B, with X = D + 2b, X cos + z sin = 2b for |theta|: two angles of a right triangle of
+    legs X and z with 2b along its hypotenuse, subtracted. NaN where no rotation gives that displacement.
+    """
+    seen = np.asarray(displacement, dtype=np.float64)
+    width = 2.0 * block.b
+    reach = seen + width
+    with np.errstate(invalid="ignore"):
+        across = np.sqrt(seen * (seen + 2.0 * width) + height * height)
+    about_b = np.arctan2(width * height - reach * across, reach * width + height * across)
+    return np.where(seen < 0.0, -about_b, np.arctan(seen / height))
