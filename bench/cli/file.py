@@ -2,10 +2,11 @@
 
 import json
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from cyclopts import App, Parameter
 
+from bench.cli.file_text import text_of
 from bench.cli.refusal import tell
 
 _File = Annotated[Path, Parameter(metavar="FILE", help="Data file of a campaign.")]
@@ -31,7 +32,9 @@ def info(file: _File, /, *, as_json: _Json = False) -> int:
     from bench.record.overview import overview
 
     content = overview(file)
-    print(json.dumps(content, allow_nan=False) if as_json else _text(content))
+    print(json.dumps(content, allow_nan=False) if as_json else text_of(content))
+    for problem in content["failing"]:
+        tell(f"{file}: {problem}")
     return 0
 
 
@@ -76,39 +79,14 @@ def recover(
     found = rebuild(file, out or file.with_name(f"{file.stem}-recovered.h5"))
     if as_json:
         told = {"file": str(found.target), "samples": found.rows, "unreadable": found.unreadable}
-        told |= {"damage": list(found.damage)}
-        print(json.dumps(told | {"events_from_journal": found.from_journal}))
+        told |= {"damage": list(found.damage), "lost": dict(found.lost)}
+        told |= {"events_from_journal": found.from_journal, "points_from_journal": found.points_from_journal}
+        print(json.dumps(told))
         return 0
-    print(f"{found.target}: {found.rows} samples per channel, {found.from_journal} events from the journal")
+    given = f"{found.from_journal} events and {found.points_from_journal} points from the journal"
+    print(f"{found.target}: {found.rows} samples per channel, {given}")
     for each in found.damage:
         tell(f"damaged in the original, and not mended by the copy: {each}")
-    if found.unreadable:
-        tell(f"{found.unreadable} samples per channel could not be read and are left out")
+    if found.loss:
+        tell(f"lost, and left out: {found.loss}")
     return 0
-
-
-def _text(content: dict[str, Any]) -> str:
-    rows = {
-        "file": f"{content['file']}, {content['bytes'] / 1e6:.1f} MB, format {content['format_version']}",
-        "campaign": content["title"],
-        "protocol": content["protocol"],
-        "software": " ".join(filter(None, (content["software"], content["git"]))),
-        "status": ": ".join(filter(None, (content["status"], content["summary"]))),
-        "time": f"{content['start_time']} to {content['end_time'] or '?'}",
-        "operator": content["operator"],
-        "notes": content["notes"],
-        "seed": content["seed"],
-        "plan": content["plan_hash"],
-        "samples": f"{content['samples']} at {content['sample_rate']:g} samples/s: {content['duration']:.1f} s"
-        f" in {len(content['runs'])} runs",
-        "points": f"{content['points']}; {content['events']} events",
-        "tables": ", ".join(f"{name} ({rows} rows)" for name, rows in content["tables"].items()),
-        "recovered": "; ".join(content["recovered"]),
-    }
-    lines = [f"{name:10} {value}" for name, value in rows.items() if value]
-    lines += [
-        f"channel    {each['name']}: {each['quantity']} [{each['unit']}], {each['device']}"
-        for each in content["channels"]
-    ]
-    lines += [f"device     {name}: {said}" for name, said in content["devices"].items()]
-    return "\n".join(lines)

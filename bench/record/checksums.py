@@ -1,11 +1,12 @@
 """The checksum of every dataset: of what is known before the run at its beginning, of all that grows at its end.
 
 A checksum is SHA-256 of the values' bytes as they are stored, uncompressed and in order, in hexadecimal digits.
-Those of attributes are of their names and values as JSON: a conversion that was changed later is found as well.
+Those of attributes are of their names and values as JSON: a conversion that was changed later is found as well. Groups
+have one of their attributes and of where their links lead: what is plotted, and against what.
 """
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from hashlib import sha256
 from typing import Any
 
@@ -13,11 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.record import hdf5
+from bench.record.fits import VIEWS
 
 GROUP = "checksums"
 WIDTH = 64
 ROWS_AT_ONCE = 2**18
 _DATASETS, _VALUES, _ATTRIBUTES = f"{GROUP}/dataset", f"{GROUP}/values", f"{GROUP}/attributes"
+_GROUPS, _CONTENTS = f"{GROUP}/group", f"{GROUP}/group_attributes"
 
 
 class Checksums:
@@ -30,6 +33,7 @@ class Checksums:
         self._entry, self._paths = entry, [each.name for each in stored]
         self._values = {each.name: "" if each.name in later else of_values(each) for each in stored}
         attributes = [of_attributes(each) for each in stored]
+        groups = {each.name: of_group(each) for each in covered_groups(entry)}
         group = hdf5.create_group(entry, GROUP, "NXcollection")
         hdf5.write_texts(group, "dataset", self._paths, description="path of each dataset but these")
         self._stored = hdf5.write_texts(
@@ -39,6 +43,10 @@ class Checksums:
             description="SHA-256 of its uncompressed values; empty until the file is closed where they change",
         )
         hdf5.write_texts(group, "attributes", attributes, description="SHA-256 of its attributes as JSON")
+        hdf5.write_texts(group, "group", groups, description="path of each group but this and views of fits")
+        hdf5.write_texts(
+            group, "group_attributes", groups.values(), description="SHA-256 of its attributes and links as JSON"
+        )
 
     def seal(self, grown: Mapping[str, str]) -> None:
         """Put in what was missing: `grown` by path, and of the rest what the file holds now."""
@@ -61,8 +69,26 @@ def of_values(stored: hdf5.Dataset) -> str:
 
 def of_attributes(stored: hdf5.Dataset) -> str:
     """SHA-256 of the attributes of a dataset as JSON: names in order, arrays as lists."""
-    found = {name: _plain(stored.attrs[name]) for name in stored.attrs}
-    return sha256(json.dumps(found, sort_keys=True).encode()).hexdigest()
+    return _of_json(_attributes(stored))
+
+
+def of_group(group: hdf5.Group) -> str:
+    """SHA-256 of a group's attributes and of the paths that its links lead to, both by name, as JSON."""
+    links = {name: target for name, target in hdf5.members(group) if isinstance(target, str)}
+    return _of_json({"attributes": _attributes(group), "links": links})
+
+
+def covered_groups(entry: hdf5.Group) -> Iterator[hdf5.Group]:
+    """The root, the entry and what is below it, but for the checksums and for views, which are made after them."""
+    yield hdf5.group(entry, "/")
+    yield from (each for each in hdf5.groups(entry) if each.name.split("/")[2:3] not in ([GROUP], [VIEWS]))
+
+
+def read_groups(entry: hdf5.Group) -> dict[str, str]:
+    """The checksums of the groups by path; none in files of before."""
+    if _GROUPS not in entry:
+        return {}
+    return dict(zip(*(hdf5.read_texts(hdf5.dataset(entry, path)[:]) for path in (_GROUPS, _CONTENTS)), strict=True))
 
 
 def read(entry: hdf5.Group) -> dict[str, tuple[str, str]]:
@@ -73,6 +99,15 @@ def read(entry: hdf5.Group) -> dict[str, tuple[str, str]]:
 
 def _bytes(values: NDArray[Any]) -> bytes:
     return values.tobytes()
+
+
+def _of_json(content: Mapping[str, Any]) -> str:
+    # what this software never writes has no form in JSON, but a checksum that is wrong
+    return sha256(json.dumps(content, sort_keys=True, default=repr).encode()).hexdigest()
+
+
+def _attributes(owner: hdf5.Group | hdf5.Dataset) -> dict[str, Any]:
+    return {name: _plain(owner.attrs[name]) for name in owner.attrs}
 
 
 def _plain(value: Any) -> Any:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from bench.events import Estimate, Event, PassFinished, RunningGain, TableIdentified
+from bench.events import Estimate, Event, PassFinished, RunningGain, TableIdentified, TwinEstimate
 from bench.record.fields import Field, Kind
 from bench.record.plot import TIME
 
@@ -11,6 +11,13 @@ FIXED_GROUPS = (
     "data",
     "estimates",
     "events",
+    "fit_columns",
+    "fit_parameters",
+    "fit_values",
+    "fits",
+    "fitted",
+    "identified",
+    "identified_correlations",
     "instrument",
     "metadata",
     "notes",
@@ -19,12 +26,16 @@ FIXED_GROUPS = (
     "recovery",
     "running_gains",
     "table_response",
+    "twin",
     "user",
 )
 FIXED_ENTRIES = ("complete", "end_time", "program_name", "start_time", "status", "summary", "title")
 COUNTED = (
     *("samples", "blocks", "events", "estimates", "points", "alignments"),
     *("running_gains", "passes", "table_response"),
+    *("fits", "fit_columns", "fit_parameters", "fit_values"),
+    "twin",
+    *("identified", "identified_correlations"),
 )
 """What is counted in the dataset `complete`: rows beyond were still on their way when the disk or the writer failed."""
 
@@ -88,11 +99,39 @@ TABLE_RESPONSE = (
     Field("coherence", Kind.REAL, "1", "share of the acceleration's power that the drive explains"),
     Field("noise", Kind.REAL, "m/s2/Hz^0.5", "spectral density of the noise in the acceleration"),
 )
+_BESIDE = {
+    "u1": ("m", "u1"),
+    "u2": ("m", "u2"),
+    "drift": ("m", "the drift"),
+    "drift_peak": ("m", "the largest drift since the rig was armed"),
+    "alpha_2": ("1", "the gain of the peak drift, coupled over bare"),
+}
+TWIN = (
+    Field("time", Kind.REAL, "s", "bench time at which the block had been read"),
+    Field("run", Kind.WHOLE, "1", "how many times the rig had been armed"),
+    Field("seconds", Kind.REAL, "s", "time of the run that the values are for"),
+    Field("members", Kind.WHOLE, "1", "models that made the band, besides the nominal one"),
+    Field("standing", Kind.REAL, "1", "share of them whose block stood"),
+    *(
+        Field(f"{name}{end}", Kind.REAL, unit, f"{what}, {which}")
+        for name, (unit, what) in _BESIDE.items()
+        for end, which in (
+            ("", "of the model"),
+            ("_low", "where the model's band began"),
+            ("_high", "where it ended"),
+            ("_measured", "as measured"),
+        )
+    ),
+    Field("theta", Kind.REAL, "rad", "angle of the model's block"),
+    Field("residual", Kind.REAL, "1", "rms of measured minus modelled drift over a second, over the drift's largest"),
+    Field("excess", Kind.REAL, "1", "the same of what of the measured drift lay outside the band"),
+)
 OWN_TABLES: Mapping[type[Event], tuple[str, tuple[Field, ...]]] = {
     Estimate: ("estimates", ESTIMATES),
     RunningGain: ("running_gains", RUNNING_GAINS),
     PassFinished: ("passes", PASSES),
     TableIdentified: ("table_response", TABLE_RESPONSE),
+    TwinEstimate: ("twin", TWIN),
 }
 """Events whose fields have a table of their own; arrays are as many rows."""
 

@@ -44,11 +44,15 @@ class Diary:
 
 
 def read(path: Path) -> Iterator[dict[str, Any]]:
-    """The lines of a journal; a last one that was cut short is left out, and so is a journal that is missing."""
+    """The lines of a journal before the first that was cut short or is damaged; none where there is no journal."""
     if not path.is_file():
         return
-    for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
+    # not splitlines: a text may hold other characters that end a line
+    for line in path.read_text(encoding="utf-8", errors="replace").split("\n"):
         try:
-            yield json.loads(line)
-        except json.JSONDecodeError:
+            read = json.loads(line)
+        except (json.JSONDecodeError, RecursionError):
             return
+        if not (isinstance(read, dict) and {"time", "kind", "text"} <= read.keys()):
+            return
+        yield read

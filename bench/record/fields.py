@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.record import hdf5
+from bench.record.errors import reading
 from sim.errors import InvalidInput
 from sim.parameters import Parameters, unit_of
 
@@ -77,7 +78,11 @@ class Field:
 
 def decode(stored: hdf5.Dataset) -> list[Any]:
     """The values of a field as they were before `encode`, absent ones None."""
-    kind, optional, values = Kind(stored.attrs["kind"]), bool(stored.attrs["optional"]), _read(stored)
+    with reading(stored.name):
+        return _decoded(Kind(stored.attrs["kind"]), bool(stored.attrs["optional"]), _read(stored))
+
+
+def _decoded(kind: Kind, optional: bool, values: NDArray[Any]) -> list[Any]:
     if kind is Kind.TEXT:
         return [None if optional and not text else text for text in hdf5.read_texts(values)]
     if kind is Kind.SWITCH:
@@ -88,9 +93,10 @@ def decode(stored: hdf5.Dataset) -> list[Any]:
 
 def field_of(name: str, stored: hdf5.Dataset) -> Field:
     """The field that a dataset was made for."""
-    attrs = stored.attrs
-    unit, told = str(attrs.get("units", "")), str(attrs["description"])
-    return Field(name, Kind(attrs["kind"]), unit, told, bool(attrs["optional"]))
+    with reading(stored.name):
+        attrs = stored.attrs
+        unit, told = str(attrs.get("units", "")), str(attrs["description"])
+        return Field(name, Kind(attrs["kind"]), unit, told, bool(attrs["optional"]))
 
 
 def fields_of(row_type: type[Parameters]) -> tuple[Field, ...]:
@@ -103,7 +109,7 @@ def fields_of(row_type: type[Parameters]) -> tuple[Field, ...]:
 
 
 def _read(stored: hdf5.Dataset) -> NDArray[Any]:
-    return stored[:]
+    return hdf5.read(stored, slice(None))
 
 
 def _classify(item: str, annotation: Any) -> tuple[Kind, bool]:

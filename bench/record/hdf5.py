@@ -5,16 +5,30 @@ Every numeric dataset is made by `write_numbers` or `grow_numbers`, which ask fo
 """
 
 import os
-from collections.abc import Iterable, Iterator
-from contextlib import suppress
+from collections.abc import Iterable
+from contextlib import AbstractContextManager, suppress
 from pathlib import Path
-from typing import Any, TypeGuard, cast
+from typing import Any, cast
 
 import h5py
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from bench.record.errors import RecordError
+from bench.record.hdf5_reading import attribute as attribute
+from bench.record.hdf5_reading import dataset as dataset
+from bench.record.hdf5_reading import datasets as datasets
+from bench.record.hdf5_reading import group as group
+from bench.record.hdf5_reading import groups as groups
+from bench.record.hdf5_reading import grows as grows
+from bench.record.hdf5_reading import has as has
+from bench.record.hdf5_reading import is_dataset as is_dataset
+from bench.record.hdf5_reading import members as members
+from bench.record.hdf5_reading import names as names
+from bench.record.hdf5_reading import place as place
+from bench.record.hdf5_reading import place_of_chunk as place_of_chunk
+from bench.record.hdf5_reading import read as read
+from bench.record.hdf5_reading import read_text as read_text
+from bench.record.hdf5_reading import read_texts as read_texts
 from bench.record.hdf5_types import Dataset as Dataset
 from bench.record.hdf5_types import File as File
 from bench.record.hdf5_types import Group as Group
@@ -50,6 +64,11 @@ def let_go(file: File) -> None:
         file.close()
 
 
+def open_again(path: Path) -> AbstractContextManager[File]:
+    """A finished file, to add to it. Raises OSError when this program has it open."""
+    return cast("AbstractContextManager[File]", h5py.File(path, "r+", libver=VERSIONS, locking=LOCKING))
+
+
 def open_to_read(path: Path) -> File:
     """A finished file, one that is being written, or one that a killed writer left."""
     # in single-writer mode HDF5 tries for hours to read what is damaged, so only what was not closed is opened so
@@ -66,42 +85,6 @@ def is_hdf5(path: Path) -> bool:
     return cast(bool, h5py.is_hdf5(path))
 
 
-def dataset(parent: Group, path: str) -> Dataset:
-    """The dataset at `path` below `parent`. Raises RecordError when there is none."""
-    return cast(Dataset, _member(parent, path, h5py.Dataset))
-
-
-def group(parent: Group, path: str) -> Group:
-    """The group at `path` below `parent`. Raises RecordError when there is none."""
-    return cast(Group, _member(parent, path, h5py.Group))
-
-
-def members(parent: Group) -> Iterator[tuple[str, "Dataset | Group | str"]]:
-    """What is in a group, by name: datasets, groups, and for a soft link the path that it leads to."""
-    for name in parent:
-        found = cast(object, cast(h5py.Group, parent).get(name, getlink=True))
-        yield name, found.path if isinstance(found, h5py.SoftLink) else cast("Dataset | Group", parent[name])
-
-
-def datasets(parent: Group) -> Iterator[Dataset]:
-    """Every dataset below `parent`, in the order in which they were made; what links lead to comes once."""
-    for _, member in members(parent):
-        if isinstance(member, h5py.Dataset):
-            yield cast(Dataset, member)
-        elif not isinstance(member, str):
-            yield from datasets(cast(Group, member))
-
-
-def is_dataset(member: object) -> TypeGuard[Dataset]:
-    """Whether a member of a group is a dataset."""
-    return isinstance(member, h5py.Dataset)
-
-
-def grows(stored: Dataset) -> bool:
-    """Whether rows can be appended to a dataset."""
-    return stored.maxshape == (None,)
-
-
 def create_group(parent: Group, name: str, nx_class: str) -> Group:
     """A new group of a NeXus class; what is in it keeps the order in which it was made."""
     made = parent.create_group(name, track_order=True)
@@ -109,9 +92,21 @@ def create_group(parent: Group, name: str, nx_class: str) -> Group:
     return made
 
 
+def delete(parent: Group, name: str) -> None:
+    """Take a member out of a group."""
+    del cast(h5py.Group, parent)[name]
+
+
 def link(parent: Group, name: str, target: str) -> None:
     """A soft link to an absolute path: the data stay where they are."""
     parent[name] = h5py.SoftLink(target)
+
+
+def view(parent: Group, name: str, source: Dataset, part: slice) -> Dataset:
+    """A dataset that shows part of another one of the same file and holds nothing itself."""
+    layout = h5py.VirtualLayout(shape=(part.stop - part.start,), dtype=source.dtype)
+    layout[:] = h5py.VirtualSource(".", source.name, shape=source.shape, dtype=source.dtype)[part]
+    return cast(Dataset, cast(h5py.Group, parent).create_virtual_dataset(name, layout))
 
 
 def write_numbers(parent: Group, name: str, values: object, *, unit: str, description: str) -> Dataset:
@@ -166,16 +161,6 @@ def write_texts(parent: Group, name: str, texts: Iterable[str], *, description: 
     return made
 
 
-def read_text(parent: Group, path: str) -> str:
-    """A scalar text."""
-    return bytes(dataset(parent, path)[()]).decode()
-
-
-def read_texts(stored: NDArray[Any]) -> list[str]:
-    """Texts of fixed length as read from a dataset."""
-    return [bytes(text).decode() for text in stored]
-
-
 def clip_text(text: str, width: int) -> bytes:
     """UTF-8 of at most `width` bytes; a longer text ends with an ellipsis, and no character is cut in two."""
     stored = text.encode()
@@ -202,13 +187,3 @@ def append_chunks(target: Dataset, packed: Iterable[bytes], count: int, rows: in
     target.resize((start + count * rows,))
     for number, data in enumerate(packed):
         raw.write_direct_chunk((start + number * rows,), data)
-
-
-def _member(parent: Group, path: str, kind: type) -> object:
-    try:
-        found = parent[path]
-    except KeyError:
-        found = None
-    if not isinstance(found, kind):
-        raise RecordError(f"the file has no {kind.__name__.lower()} {parent.name.rstrip('/')}/{path}: it is damaged")
-    return found

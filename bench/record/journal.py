@@ -6,6 +6,7 @@ from bench.events import (
     Acquired,
     Estimate,
     Event,
+    FitFinished,
     LimitExceeded,
     OperatorAnswered,
     OperatorAsked,
@@ -13,15 +14,18 @@ from bench.events import (
     Progress,
     RunningGain,
     SensorsAligned,
+    SpecimenIdentified,
+    SpecimenMounted,
     StateChanged,
     StepStarted,
     TableIdentified,
+    TwinEstimate,
     Warned,
 )
 from drivers.rig import Alignment
 
-NOT_JOURNALLED = (Acquired, Estimate, Progress, RunningGain)
-"""Too many to read; samples, estimates and running gains have their own place in the file."""
+NOT_JOURNALLED = (Acquired, Estimate, Progress, RunningGain, TwinEstimate)
+"""Too many to read; samples and estimates have their own places in the file."""
 
 
 def text_of(event: Event) -> str:
@@ -31,6 +35,13 @@ def text_of(event: Event) -> str:
             return f"{event.before} -> {event.after}: {event.reason}"
         case StepStarted() | Warned() | TableIdentified():
             return event.text
+        case FitFinished():
+            return f"{event.name}: {event.text}"
+        case SpecimenIdentified():
+            return "; ".join(
+                f"{each.name} = {each.value:.7g} +- {each.standard_uncertainty:.2g} (k = 1)"
+                for each in event.identified.findings
+            )
         case PassFinished():
             return f"{event.motion}: {event.text}"
         case LimitExceeded():
@@ -39,6 +50,10 @@ def text_of(event: Event) -> str:
             return event.request
         case OperatorAnswered():
             return f"{event.request} (answered by {event.by})"
+        case SpecimenMounted():
+            amount = "" if event.amount is None else f" {event.amount:g}"
+            label = event.specimen.label
+            return f"{event.work}{amount}: {'bare frame' if label is None else f'beta = {label:g}'}"
         case SensorsAligned():
             return "; ".join(_placed(one) for one in event.alignments)
         case _:

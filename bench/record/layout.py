@@ -11,7 +11,7 @@ from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
 
-from bench.record import hdf5, tables
+from bench.record import findings, fits, hdf5, tables
 from bench.record.checksums import Checksums
 from bench.record.declared import (
     ALIGNMENTS,
@@ -25,6 +25,7 @@ from bench.record.declared import (
 )
 from bench.record.fields import fields_of
 from bench.record.growing import Growing
+from bench.record.opening import FORMAT, FORMAT_VERSION
 from bench.record.plot import companions, create_plot
 from bench.record.rows import Rows
 from bench.record.samples import Samples, chunk_of
@@ -33,8 +34,6 @@ from drivers.rig import Channel
 from sim.errors import InvalidInput
 from sim.parameters import Parameters
 
-FORMAT = "rocking-bench record"
-FORMAT_VERSION = 2
 STATUS_WIDTH, TIME_WIDTH, SUMMARY_WIDTH = 16, 40, 4096
 
 
@@ -47,6 +46,7 @@ class Status(StrEnum):
     ABORTED = "aborted"
     HALTED = "halted"
     FAILED = "failed"
+    INTERRUPTED = "interrupted"
 
 
 @dataclass(frozen=True)
@@ -120,6 +120,7 @@ def build(file: hdf5.File, skeleton: Skeleton) -> Parts:
         "blocks": Rows(instrument, "blocks", BLOCKS),
         "events": Rows(entry, "events", EVENTS),
         **{name: Rows(entry, name, fields) for name, fields in OWN_TABLES.values()},
+        **{name: Rows(entry, name, fields) for name, fields in (fits.TABLES | findings.TABLES).items()},
         "points": Rows(entry, "points", fields_of(skeleton.point_type)),
         "alignments": Rows(instrument, "alignments", ALIGNMENTS),
     }

@@ -2,28 +2,33 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
-from bench.record import diary
-from bench.record.errors import RecordError, reason
-from bench.record.reader import Record, open_record
+from bench.record import diary, hdf5, reanalysis
+from bench.record.errors import UNREADABLE, RecordError, reason
+from bench.record.opening import ANALYSIS, FORMAT, open_file
+from bench.record.reader import Record
 
 
-def overview(path: Path) -> dict[str, object]:
+def overview(path: Path) -> dict[str, Any]:
     """Read the headings of a file; of the samples only how many there are.
 
     Raises InvalidInput for what is no record of ours, RecordError for one that cannot be read.
     """
-    with open_record(path) as record:
+    with open_file(path, kinds=(FORMAT, ANALYSIS)) as file:
         try:
-            return {"file": str(path), "bytes": path.stat().st_size, **_content(record), "journal": _journal(path)}
-        except (OSError, RuntimeError, KeyError, ValueError) as error:
+            heading = {"file": str(path), "bytes": path.stat().st_size, "kind": hdf5.attribute(file, "format")}
+            if heading["kind"] == ANALYSIS:
+                return heading | reanalysis.overview(file, path)
+            return heading | _content(Record(file)) | {"journal": _journal(path)}
+        except UNREADABLE as error:
             raise RecordError(
                 f"{path} is damaged ({reason(error)}): `rockbench file recover` keeps the rest"
             ) from error
 
 
 def _content(record: Record) -> dict[str, object]:
-    metadata, rows = record.metadata, record.rows
+    metadata, rows, judged = record.metadata, record.rows, record.integrity()
     given = {name: metadata.get(name) for name in ("protocol", "operator", "notes", "seed", "git", "plan_hash")}
     return {
         "format_version": record.format_version,
@@ -47,6 +52,8 @@ def _content(record: Record) -> dict[str, object]:
         "events": record.counted["events"],
         "tables": {name: len(next(iter(table.values())).values) for name, table in record.tables.items() if table},
         "checksums": len(record.checksums),
+        "failing": list(judged.failing.values()),
+        "unchecked": len(judged.unchecked),
         "recovered": record.recoveries,
     }
 

@@ -6,17 +6,19 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from bench.record import checksums, hdf5, tables
+from bench.events import FitFinished
+from bench.record import checksums, findings, fits, hdf5, tables
 from bench.record.declared import FIXED_GROUPS, OWN_TABLES
-from bench.record.errors import RecordError, reason
+from bench.record.errors import UNREADABLE, RecordError, reading, reason
 from bench.record.fields import decode
-from bench.record.layout import FORMAT, FORMAT_VERSION
+from bench.record.integrity import SMALL, Integrity, integrity
+from bench.record.opening import open_file
 from bench.record.plot import GROUP as PLOT
 from bench.record.plot import TIME
 from bench.record.stored import StoredSamples
 from bench.record.tables import Column
 from drivers.rig import Alignment
-from sim.errors import InvalidInput
+from sim.identified import Identified
 
 
 @dataclass(frozen=True)
@@ -35,37 +37,15 @@ def open_record(path: Path, *, judging: bool = False) -> "Record":
     what is damaged raises an error at once.
     Raises InvalidInput when there is no such file or it is not one of ours, RecordError when it cannot be read.
     """
-    if not path.is_file():
-        raise InvalidInput("record", str(path), "there is no such file")
+    file = open_file(path, judging=judging)
     try:
-        file = hdf5.open_to_judge(path) if judging else hdf5.open_to_read(path)
-    except (OSError, RuntimeError, ValueError) as error:
-        if not hdf5.is_hdf5(path):
-            raise InvalidInput("record", str(path), "it is not an HDF5 file") from error
-        raise RecordError(
-            f"{path} cannot be read ({reason(error)}): another program holds it, or it is damaged;"
-            " `rockbench file recover` keeps what it can"
-        ) from error
-    try:
-        _check_format(path, file)
         return Record(file)
-    except BaseException:
+    except BaseException as error:
         file.close()
+        if isinstance(error, UNREADABLE):
+            told = f"{path} is damaged: {reason(error)}; `rockbench file recover` keeps what it can"
+            raise RecordError(told) from error
         raise
-
-
-def _check_format(path: Path, file: hdf5.File) -> None:
-    if file.attrs.get("format") != FORMAT or "format_version" not in file.attrs:
-        raise InvalidInput("record", str(path), "it is an HDF5 file but no record of rocking-bench")
-    try:
-        version = int(file.attrs["format_version"])
-    except (TypeError, ValueError):
-        version = 0
-    if version < 1:
-        given = file.attrs["format_version"]
-        raise InvalidInput("record", str(path), f"its format {given!r} is no version: the file is damaged")
-    if version > FORMAT_VERSION:
-        raise InvalidInput("record", str(path), f"its format {version} is newer than this software reads: update it")
 
 
 class Record(StoredSamples):
@@ -91,12 +71,13 @@ class Record(StoredSamples):
         """See what a writer has added since the file was opened."""
         self._count_again()
         for path in self._growing:
-            hdf5.dataset(self._entry, path).refresh()
+            with reading(path):
+                hdf5.dataset(self._entry, path).refresh()
 
     @property
     def format_version(self) -> int:
         """Version of the layout that the file was written in."""
-        return int(self._file.attrs["format_version"])
+        return int(hdf5.attribute(self._file, "format_version"))
 
     @property
     def file(self) -> hdf5.File:
@@ -106,12 +87,21 @@ class Record(StoredSamples):
     @property
     def recoveries(self) -> list[str]:
         """How the file was rebuilt from others, one line each; mostly none."""
-        return hdf5.read_text(self._entry, "recovery/description").splitlines() if "recovery" in self._entry else []
+        if not hdf5.has(self._entry, "recovery/description"):
+            return []
+        return hdf5.read_text(self._entry, "recovery/description").splitlines()
 
     @property
     def checksums(self) -> dict[str, tuple[str, str]]:
         """SHA-256 of values and attributes by dataset; those of values are empty where the file was not closed."""
-        return checksums.read(self._entry) if checksums.GROUP in self._entry else {}
+        return checksums.read(self._entry) if hdf5.has(self._entry, checksums.GROUP) else {}
+
+    def integrity(self, largest: int | None = SMALL) -> Integrity:
+        """What is not as it was written: `record.integrity().failing`, one line by path; `str` of it is one line.
+
+        Datasets of at most `largest` bytes are read for it, every one when it is None; that takes as long as reading.
+        """
+        return integrity(self._entry, largest)
 
     @property
     def status(self) -> str:
@@ -142,13 +132,13 @@ class Record(StoredSamples):
     def software(self) -> str:
         """Name and version of the software that wrote the file."""
         name = hdf5.dataset(self._entry, "program_name")
-        return f"{hdf5.read_text(self._entry, 'program_name')} {name.attrs['version']}"
+        return f"{hdf5.read_text(self._entry, 'program_name')} {hdf5.attribute(name, 'version')}"
 
     @cached_property
     def metadata(self) -> dict[str, str]:
         """The texts that were given to the recorder."""
         group = hdf5.group(self._entry, "metadata")
-        return {name: hdf5.read_text(group, name) for name in group}
+        return {name: hdf5.read_text(group, name) for name in hdf5.names(group)}
 
     @property
     def events(self) -> list[RecordedEvent]:
@@ -175,22 +165,42 @@ class Record(StoredSamples):
     @property
     def running_gains(self) -> dict[str, list[Any]]:
         """The running gains under records, one list per column; `beta` is None for the bare frame."""
-        return self._decoded("running_gains") if "running_gains" in self._entry else {}
+        return self._decoded("running_gains") if hdf5.has(self._entry, "running_gains") else {}
+
+    @property
+    def twin(self) -> dict[str, list[Any]]:
+        """What the model said that ran beside, one list per column; no columns in a file that knows of none."""
+        return self._decoded("twin") if hdf5.has(self._entry, "twin") else {}
 
     @property
     def passes(self) -> list[dict[str, Any]]:
         """What the passes of replications achieved, one dict each; none in a file that knows of none."""
-        return self._rows("passes") if "passes" in self._entry else []
+        return self._rows("passes") if hdf5.has(self._entry, "passes") else []
 
     @property
     def table_response(self) -> dict[str, list[Any]]:
         """The identified response of the table, one list per column, one row per line; empty where there is none."""
-        return self._decoded("table_response") if "table_response" in self._entry else {}
+        return self._decoded("table_response") if hdf5.has(self._entry, "table_response") else {}
+
+    @property
+    def fits(self) -> list[FitFinished]:
+        """The models that were fitted, as they were said; none in a file that knows of none."""
+        return fits.read(self._entry, self._complete("fits")) if hdf5.has(self._entry, "fits") else []
+
+    @property
+    def identified(self) -> Identified | None:
+        """What was known of the specimen when the run had last found something; None where it identified nothing."""
+        return findings.last(*self.findings.values())
+
+    @property
+    def findings(self) -> dict[str, list[dict[str, Any]]]:
+        """The rows of what was identified, each time that it was said, and of its correlations."""
+        return {name: self._rows(name) if hdf5.has(self._entry, name) else [] for name in findings.TABLES}
 
     @property
     def alignments(self) -> dict[int, tuple[Alignment, ...]]:
         """How sensors with clocks of their own were placed on the sample clock, by run; empty where there are none."""
-        if "alignments" not in self._instrument:
+        if not hdf5.has(self._instrument, "alignments"):
             return {}
         columns = self._decoded("alignments", self._instrument)
         runs = columns.pop("run")
@@ -216,17 +226,19 @@ class Record(StoredSamples):
             "points",
             "instrument/alignments",
             *(name for name, _ in OWN_TABLES.values()),
+            *fits.TABLES,
+            *findings.TABLES,
         ]
-        folders = [folder for folder in folders if folder in self._entry]
-        paths += [f"{folder}/{name}" for folder in folders for name in hdf5.group(self._entry, folder)]
+        folders = [folder for folder in folders if hdf5.has(self._entry, folder)]
+        paths += [f"{folder}/{name}" for folder in folders for name in hdf5.names(hdf5.group(self._entry, folder))]
         paths += [f"{PLOT}/{TIME}"] if self.format_version > 1 else []
         return [*paths, "instrument/drive/voltage", "status", "summary", "end_time"]
 
     def _decoded(self, name: str, parent: hdf5.Group | None = None) -> dict[str, list[Any]]:
         """The columns of a table that grew, in the order in which they were declared."""
         group = hdf5.group(parent or self._entry, name)
-        columns = {column: decode(hdf5.dataset(group, column)) for column in group}
-        whole = min(self._complete(name), *(len(values) for values in columns.values()))
+        columns = {column: decode(hdf5.dataset(group, column)) for column in hdf5.names(group)}
+        whole = min([self._complete(name), *(len(values) for values in columns.values())])
         return {column: values[:whole] for column, values in columns.items()}
 
     def _rows(self, name: str) -> list[dict[str, Any]]:

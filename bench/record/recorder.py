@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.events import Acquired, Estimate, Event, PointFinished, Progress, RunningGain, StateChanged
+from bench.events import Acquired, Estimate, Event, PointFinished, Progress, RunningGain, StateChanged, TwinEstimate
 from bench.record.errors import RecordError, reason
 from bench.record.layout import Skeleton, Status
 from bench.record.tables import Table
@@ -129,7 +129,7 @@ class Recorder:
         Raises InvalidInput for an unknown status, RecordError when the end of the record could not be written. A disk
         that does not answer is left to itself: the program can end.
         """
-        ends = [str(end) for end in Status if end is not Status.RUNNING]
+        ends = [str(end) for end in Status if end not in (Status.RUNNING, Status.INTERRUPTED)]
         if status not in ends:
             raise InvalidInput("status of the record", str(status), "one of " + ", ".join(ends))
         if self._closed:
@@ -211,7 +211,7 @@ class Recorder:
                 self._writer.add_block(item.time, item.run, item.first, item.counts, item.drive)
             case Event():
                 self._writer.add_event(item)
-                self._pressing |= not isinstance(item, Estimate | RunningGain)
+                self._pressing |= not isinstance(item, Estimate | RunningGain | TwinEstimate)
                 self._partial |= isinstance(item, StateChanged)
             case _Sync():
                 self._commit(partial=True)

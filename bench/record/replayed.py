@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from bench.config.model import BenchConfiguration
+from bench.config.twin import Twin
 from bench.record.reader import Record
 from drivers.rig import Channel, Counts
 from sim.errors import InvalidInput
@@ -72,6 +73,11 @@ class ReplayedRecord:
         self._configuration = _configuration(record)
 
     @property
+    def configuration(self) -> BenchConfiguration:
+        """How the bench was configured."""
+        return self._configuration
+
+    @property
     def channels(self) -> tuple[Channel, ...]:
         """The inputs."""
         return self._record.channels
@@ -101,9 +107,13 @@ class ReplayedRecord:
         devices = {channel.name: channel.device for channel in record.channels}
         return {"recorded": f"{record.title}, {record.start_time}", "software": record.software, **devices}
 
-    @cached_property
+    @property
     def runs(self) -> tuple[ReplayedRun, ...]:
         """The runs in their order, as far as they were in the file when they were first asked for."""
+        return self._runs
+
+    @cached_property
+    def _runs(self) -> tuple[ReplayedRun, ...]:
         blocks = self._record.blocks
         ends = np.append(blocks["row"][1:], self._record.rows)
         return tuple(
@@ -127,7 +137,9 @@ def _configuration(record: Record) -> BenchConfiguration:
     if stored is None:
         raise InvalidInput("record", record.title, "it does not say how its bench was configured: not replayable")
     try:
-        return BenchConfiguration.model_validate_json(stored)
+        configuration = BenchConfiguration.model_validate_json(stored)
     except ValidationError as error:
         allowed = "its configuration is of another version of this software; replay it with that one"
         raise InvalidInput("record", record.title, allowed) from error
+    # a file from before there was a twin has no place for what it says
+    return configuration if record.twin else configuration.model_copy(update={"twin": Twin(enabled=False)})

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bench.record import hdf5
 from bench.record.fields import Field
@@ -37,6 +38,10 @@ class Rows:
         self._pending.append(
             tuple(field.encode(value) for (field, _), value in zip(self._columns, values, strict=True))
         )
+
+    def extend(self, *columns: NDArray[Any]) -> None:
+        """Append many rows: a column per field in their order, all of one length, nothing absent."""
+        self._pending += zip(*(column.tolist() for column in columns), strict=True)
 
     def write(self) -> None:
         """Put the waiting rows into the file."""

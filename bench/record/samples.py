@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.record import hdf5
+from bench.record.errors import reading
 from bench.record.growing import Growing
 from bench.record.packing import Packer
 from drivers.rig import Channel, Counts
@@ -30,7 +31,7 @@ class Samples:
     ) -> None:
         self.chunk = chunk_of(sample_rate)
         stored = [_create_channel(instrument, channel, self.chunk) for channel in channels]
-        stored += [_create_drive(instrument, self.chunk), time]
+        stored += [create_drive(instrument, self.chunk), time]
         self._packer = Packer()
         self.grown = [Growing(each, self._packer) for each in stored]
         self._pending: list[tuple[Counts, NDArray[np.float32], NDArray[np.float64]]] = []
@@ -79,21 +80,29 @@ def chunk_of(sample_rate: float) -> int:
     return max(1, round(CHUNK_TIME * sample_rate))
 
 
+def read_channels(instrument: hdf5.Group) -> tuple[Channel, ...]:
+    """The inputs, in the order of the rig. Raises RecordError where one is damaged."""
+    names = [name for name in hdf5.names(instrument) if hdf5.has(instrument, f"{name}/counts")]
+    return tuple(read_channel(instrument, name) for name in names)
+
+
 def read_channel(instrument: hdf5.Group, name: str) -> Channel:
     """The channel as it was when its counts were stored."""
-    attrs = hdf5.dataset(instrument, f"{name}/counts").attrs
-    low, high = (int(end) for end in attrs["valid"])
-    return Channel(
-        name=name,
-        quantity=str(attrs["quantity"]),
-        unit=str(attrs["value_units"]),
-        scale=float(attrs["scale"]),
-        offset=float(attrs["offset"]),
-        valid=(low, high),
-        device=str(attrs["device"]),
-        higher=tuple(float(term) for term in attrs.get("higher", ())),
-        faults={int(count): text for count, text in json.loads(attrs.get("faults", "{}")).items()},
-    )
+    stored = hdf5.dataset(instrument, f"{name}/counts")
+    with reading(f"the conversion of {stored.name}"):
+        attrs = stored.attrs
+        low, high = (int(end) for end in attrs["valid"])
+        return Channel(
+            name=name,
+            quantity=str(attrs["quantity"]),
+            unit=str(attrs["value_units"]),
+            scale=float(attrs["scale"]),
+            offset=float(attrs["offset"]),
+            valid=(low, high),
+            device=str(attrs["device"]),
+            higher=tuple(float(term) for term in attrs.get("higher", ())),
+            faults={int(count): text for count, text in json.loads(attrs.get("faults", "{}")).items()},
+        )
 
 
 def _create_channel(instrument: hdf5.Group, channel: Channel, chunk: int) -> hdf5.Dataset:
@@ -116,7 +125,8 @@ def _create_channel(instrument: hdf5.Group, channel: Channel, chunk: int) -> hdf
     return counts
 
 
-def _create_drive(instrument: hdf5.Group, chunk: int) -> hdf5.Dataset:
+def create_drive(instrument: hdf5.Group, chunk: int) -> hdf5.Dataset:
+    """The empty dataset of the drive, with chunks of so many rows."""
     # a 24 bit mantissa resolves full scale 256 times finer than a 16 bit converter: nothing that was played is lost
     drive = hdf5.create_group(instrument, "drive", "NXcollection")
     voltage = hdf5.grow_numbers(

@@ -1,5 +1,6 @@
 """The samples of a file: channels, drive and time, by row and by run."""
 
+from collections.abc import Mapping
 from functools import cached_property
 from typing import Any
 
@@ -7,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.record import hdf5
-from bench.record.declared import COUNTED
-from bench.record.samples import read_channel
+from bench.record.opening import counts
+from bench.record.samples import read_channels
 from bench.record.series import RecordedRun, Series
 from drivers.rig import Channel, Counts
 from sim.errors import InvalidInput
@@ -27,14 +28,12 @@ class StoredSamples:
     @cached_property
     def sample_rate(self) -> float:
         """Samples per second and channel [1/s]."""
-        return float(hdf5.dataset(self._instrument, "sample_rate")[()])
+        return float(hdf5.read(hdf5.dataset(self._instrument, "sample_rate")))
 
     @cached_property
     def channels(self) -> tuple[Channel, ...]:
         """The inputs, in the order of the rig."""
-        return tuple(
-            read_channel(self._instrument, name) for name in self._instrument if f"{name}/counts" in self._instrument
-        )
+        return read_channels(self._instrument)
 
     @property
     def rows(self) -> int:
@@ -55,12 +54,11 @@ class StoredSamples:
         """The drive as sent [V]."""
         return self._cut(hdf5.dataset(self._instrument, "drive/voltage"), rows)
 
-    @property
+    @cached_property
     def blocks(self) -> dict[str, NDArray[Any]]:
         """Where the blocks begin: arrays `row`, `run`, `first` (sample index in the run) and `time` [s] when read."""
-        columns = {
-            name: hdf5.dataset(self._instrument, f"blocks/{name}")[:] for name in ("row", "run", "first", "time")
-        }
+        stored = {name: hdf5.dataset(self._instrument, f"blocks/{name}") for name in ("row", "run", "first", "time")}
+        columns = {name: hdf5.read(each, slice(None)) for name, each in stored.items()}
         whole = min(self._complete("blocks"), *(len(values) for values in columns.values()))
         # the samples of the last blocks may still be to come
         count = int(np.searchsorted(columns["row"][:whole], self.rows))
@@ -78,7 +76,7 @@ class StoredSamples:
         """The runs in their order, with their channels as arrays; as far as they are in the file now."""
         blocks, rows = self.blocks, self.rows
         begins = np.flatnonzero(np.diff(blocks["run"], prepend=-1))
-        ends = [*blocks["row"][begins[1:]].tolist(), rows]
+        ends = [*blocks["row"][begins[1:]].tolist(), rows][: len(begins)]
         return tuple(
             self._run(int(blocks["run"][block]), range(int(blocks["row"][block]), end))
             for block, end in zip(begins, ends, strict=True)
@@ -99,17 +97,17 @@ class StoredSamples:
         return RecordedRun(number, rows, series, drive, Series("time", "time since arming", "s", self.time, rows))
 
     @cached_property
-    def counted(self) -> dict[str, int]:
+    def counted(self) -> Mapping[str, int]:
         """How many rows of every part are whole, whatever the length of its datasets; older files have fewer parts.
 
         It is read once and ahead of what it counts, so that all that is read of a living file is of one moment.
         """
-        counts = hdf5.dataset(self._entry, "complete")[:].tolist()
-        return dict(zip(COUNTED, [*counts, *[0] * (len(COUNTED) - len(counts))], strict=True))
+        return counts(self._entry)
 
     def _count_again(self) -> None:
         hdf5.dataset(self._entry, "complete").refresh()
         self.__dict__.pop("counted", None)
+        self.__dict__.pop("blocks", None)
         _ = self.counted
 
     def _complete(self, name: str) -> int:
@@ -122,7 +120,7 @@ class StoredSamples:
         start, stop, step = rows.indices(self.rows)
         if step < 1:
             raise InvalidInput("step of the rows", step, "it must be positive")
-        return stored[start : max(start, stop) : step]
+        return hdf5.read(stored, slice(start, max(start, stop), step))
 
     def _channel_named(self, name: str) -> Channel:
         for channel in self.channels:

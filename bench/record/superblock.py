@@ -22,13 +22,17 @@ _MASK = 0xFFFFFFFF
 
 
 def is_let_go(path: Path) -> bool:
-    """Whether no writer has the file open or died with it; also for what is no file of this layout."""
+    """Whether no writer has the file open or died with it; also for what is no file of this layout, or damaged here."""
     head = _head(path)
-    return head is None or head[4] == 0
+    return head is None or head[4] == 0 or checksum(_LAYOUT.pack(*head)[:-4]) != head[-1]
 
 
 class Quiet(io.RawIOBase):
-    """A file as if its writer had closed it, as long as its superblock says it must be; what is missing is zeros."""
+    """A file as if its writer had closed it, as long as its superblock says it must be; what is missing is zeros.
+
+    What describes the file has checksums, which zeros do not pass. Values that are not packed have none: whoever reads
+    them must ask `bench.record.extent` first where they end.
+    """
 
     def __init__(self, path: Path) -> None:
         self._file = path.open("rb")

@@ -61,14 +61,14 @@ def read(group: "hdf5.Group") -> dict[str, Column]:
     from bench.record import hdf5
 
     table: dict[str, Column] = {}
-    for key in group:
+    for key in hdf5.names(group):
         stored = hdf5.dataset(group, key)
-        values: NDArray[Any] = stored[:]
+        values: NDArray[Any] = hdf5.read(stored, slice(None))
         if values.dtype.kind == "S":
             values = np.array(hdf5.read_texts(values), dtype=np.str_)
         elif stored.attrs.get("kind") == "switch":
             values = np.where(values < 0, np.nan, values) if (values < 0).any() else values.astype(np.bool_)
-        table[key] = Column(values, str(stored.attrs.get("units", "")), str(stored.attrs["description"]))
+        table[key] = Column(values, str(stored.attrs.get("units", "")), str(hdf5.attribute(stored, "description")))
     return table
 
 

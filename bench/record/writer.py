@@ -2,14 +2,15 @@
 
 import json
 import tempfile
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.events import Event, PointFinished, SensorsAligned
-from bench.record import hdf5
+from bench.events import Event, FitFinished, PointFinished, SensorsAligned, SpecimenIdentified
+from bench.record import findings, fits, hdf5
 from bench.record.declared import COUNTED, OWN_TABLES
 from bench.record.diary import Diary, beside
 from bench.record.disk import Platter
@@ -52,6 +53,7 @@ class RecordWriter:
 
     def __init__(self, path: Path, skeleton: Skeleton) -> None:
         skeleton.check()
+        self._path = path
         for taken in (path, beside(path)):
             if taken.exists():
                 raise InvalidInput("record", str(taken), _EXISTS)
@@ -99,6 +101,10 @@ class RecordWriter:
             values = [getattr(event, field.name) for field in own[1]]
             for row in zip(*values, strict=True) if isinstance(values[0], np.ndarray) else [values]:
                 rows[own[0]].add(*row)
+        if isinstance(event, FitFinished):
+            fits.add(rows, event)
+        if isinstance(event, SpecimenIdentified):
+            findings.add(rows, event.time, event.identified)
         if isinstance(event, NOT_JOURNALLED):
             return
         if isinstance(event, SensorsAligned):
@@ -110,6 +116,8 @@ class RecordWriter:
             text = f"row {len(rows['points'])} of points"
             rows["points"].add(*(getattr(event.point, name) for name in self._point_fields))
             more = {"point": json.loads(event.point.model_dump_json())}
+        if isinstance(event, SpecimenIdentified):
+            more = {"identified": event.identified.model_dump(mode="json")}
         rows["events"].add(event.time, kind, text)
         self._diary.add(event.time, kind, text, more)
 
@@ -139,6 +147,10 @@ class RecordWriter:
         self._parts.checksums.seal({grown.path: grown.checksum for grown in self._parts.grown})
         self._flush()
         self._file.close()
+        if whole := len(self._parts.rows["fits"]):
+            # without them all is still there; recovery makes them when another program holds the file now
+            with suppress(OSError, RuntimeError), hdf5.open_again(self._path) as file:
+                fits.add_views(hdf5.group(file, "entry"), whole)
         self._platter.sync()
         self._let_go()
 

@@ -14,6 +14,7 @@ import bench.record
 from bench.cli.main import main
 from bench.events import PointFinished, Warned
 from bench.record import diary
+from bench.record.errors import RecordError
 from tests.bench.test_record import CHANNELS, FULL, METADATA, RATE, begin, block
 
 ROWS = 3000
@@ -114,6 +115,27 @@ def add_dataset(file: Any) -> None:
     file["entry/added"] = "later"
 
 
+def plot_another(file: Any) -> None:
+    file["entry/data"].attrs["signal"] = "storey 2"
+
+
+def lead_elsewhere(file: Any) -> None:
+    del file["entry/data/storey 1"]
+    file["entry/data/storey 1"] = h5py.SoftLink("/entry/instrument/storey 2/counts")
+
+
+def rename_class(file: Any) -> None:
+    file["entry/instrument/table"].attrs["NX_class"] = "NXdetector"
+
+
+def change_root(file: Any) -> None:
+    file.attrs["default"] = "nowhere"
+
+
+def add_group(file: Any) -> None:
+    file["entry"].create_group("added")
+
+
 @pytest.mark.parametrize(
     ("change", "named"),
     [
@@ -124,6 +146,11 @@ def add_dataset(file: Any) -> None:
         (lose_events, "/entry/events/time is missing"),
         (lose_rows, "has 2999 rows, 3000 were written"),
         (add_dataset, "/entry/added has no checksum"),
+        (plot_another, "attributes or links of /entry/data are not"),
+        (lead_elsewhere, "attributes or links of /entry/data are not"),
+        (rename_class, "attributes or links of /entry/instrument/table are not"),
+        (change_root, "attributes or links of / are not"),
+        (add_group, "/entry/added has no checksum"),
     ],
 )
 def test_what_was_changed_is_found(
@@ -145,6 +172,11 @@ def be_foreign(path: Path) -> None:
         file["x"] = 1.0
 
 
+def be_a_directory(path: Path) -> None:
+    path.unlink()
+    path.mkdir()
+
+
 @pytest.mark.parametrize("command", ["info", "verify", "recover"])
 @pytest.mark.parametrize(
     ("spoil", "named"),
@@ -155,17 +187,18 @@ def be_foreign(path: Path) -> None:
         (be_foreign, "no record of rocking-bench"),
         (be_newer, "99 is newer"),
         (Path.unlink, "no such file"),
+        (be_a_directory, "is a directory"),
     ],
 )
 def test_what_is_no_record_is_refused_in_one_line(
     command: str, spoil: Callable[[Path], None], named: str, path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     spoil(path)
-    before = path.read_bytes() if path.exists() else None
+    before = path.read_bytes() if path.is_file() else None
     told = rejected(capsys, command, str(path))
     assert named in told
     assert told.count("\n") == 1
-    assert (path.read_bytes() if path.exists() else None) == before
+    assert (path.read_bytes() if path.is_file() else None) == before
     assert [each.name for each in path.parent.iterdir() if each != path] == []
 
 
@@ -229,7 +262,7 @@ def test_events_that_the_file_lost_come_from_the_journal(tmp_path: Path, capsys:
     recorder.close("completed")
     diary.beside(old).write_bytes(diary.beside(path).read_bytes() + b'{"time": 2.0, "ki')
     assert main(["file", "recover", str(old)]) == 0
-    assert "2 events from the journal" in capsys.readouterr().out
+    assert "2 events and 1 points from the journal" in capsys.readouterr().out
     with bench.record.open(tmp_path / "old-recovered.h5") as record, bench.record.open(path) as written:
         assert record.events == written.events
         assert record.points == written.points
@@ -277,3 +310,49 @@ def test_a_version_that_is_none_is_refused(version: object, path: Path, capsys: 
     edited(path, lambda file: file.attrs.__setitem__("format_version", version))
     assert main(["file", "info", str(path)]) == 2
     assert "is no version" in capsys.readouterr().err
+
+
+def test_what_does_not_hold_is_listed_at_once_or_by_reading_all(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with bench.record.open(path) as record:
+        sound = record.integrity(None)
+        assert (sound.failing, sound.unchecked, sound.compared) == ({}, (), len(record.checksums))
+        # 3000 counts of 2 bytes are not read where at most 5000 bytes are
+        assert "/entry/instrument/table/counts" in record.integrity(5000).unchecked
+    edited(path, change_sample)
+    edited(path, change_prediction)
+    with bench.record.open(path) as record:
+        assert [*record.integrity(5000).failing] == ["/entry/prediction/alpha_2"]
+        assert {*record.integrity().failing} == {"/entry/prediction/alpha_2", "/entry/instrument/table/counts"}
+        assert str(record.integrity()).startswith("damaged or changed since it was written: /entry/prediction/alpha_2")
+    assert main(["file", "info", str(path), "--json"]) == 0
+    captured = capsys.readouterr()
+    assert len(json.loads(captured.out)["failing"]) == 2
+    assert "/entry/prediction/alpha_2 is not what was written" in captured.err
+
+
+def test_a_file_of_before_groups_had_checksums_is_sound(path: Path) -> None:
+    def go_back(file: Any) -> None:
+        for name in ("group", "group_attributes"):
+            del file[f"entry/checksums/{name}"]
+
+    edited(path, go_back)
+    assert main(["file", "verify", str(path)]) == 0
+
+
+def test_an_object_that_cannot_be_read_is_named(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with h5py.File(path) as file:
+        place: int = h5py.h5o.get_info(file["entry/events/kind"].id).addr
+    content = bytearray(path.read_bytes())
+    assert content[place : place + 4] == b"OHDR"
+    content[place + 30] ^= 0xFF
+    path.write_bytes(content)
+    assert "/entry/events/kind cannot be read" in rejected(capsys, "verify", str(path))
+    with bench.record.open(path) as record, pytest.raises(RecordError, match="/entry/events/kind cannot be read"):
+        _ = record.events
+    assert main(["file", "recover", str(path)]) == 0
+    assert "/entry/events/kind cannot be read" in capsys.readouterr().err
+    assert path.read_bytes() == content
+    # the samples are kept, and the file says why the events are not there
+    with bench.record.open(path.with_name("campaign-recovered.h5")) as record:
+        assert (record.rows, record.events, record.status) == (ROWS, [], "interrupted")
+        assert "/entry/events/kind cannot be read" in record.summary

@@ -54,11 +54,7 @@ def _driven(truth: dict[str, Any]) -> bool:
     "state",
     ["running", pytest.param("armed", marks=pytest.mark.soak), pytest.param("aborting", marks=pytest.mark.soak)],
 )
-def test_the_chain_opens_by_itself(
-    state: str, laboratory: BenchConfiguration, tmp_path: Path, request: pytest.FixtureRequest
-) -> None:
-    if state != "running" and "soak" not in str(request.config.option.markexpr):
-        pytest.skip("ten seconds: run with -m soak")
+def test_the_chain_opens_by_itself(state: str, laboratory: BenchConfiguration, tmp_path: Path) -> None:
     hardware = laboratory.hardware
     hands, timeout = hardware.hands, hardware.daq.watchdog
     assert hands is not None

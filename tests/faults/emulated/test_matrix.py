@@ -40,9 +40,7 @@ def test_no_fault_and_no_state_is_left_out() -> None:
 
 @pytest.mark.soak
 @pytest.mark.timeout(3600)
-def test_everywhere(request: pytest.FixtureRequest) -> None:
-    if "soak" not in str(request.config.option.markexpr):
-        pytest.skip("a quarter of an hour: run with -m soak")
+def test_everywhere() -> None:
     with Campaigns(ALL) as everywhere:
         verdicts = [everywhere.verdict(case) for case in ALL]
     assert not [str(verdict) for verdict in verdicts if verdict.broken]

@@ -1,0 +1,67 @@
+"""How much of a dataset is in the file: of one that was cut short, HDF5 reads zeros beyond its end and says nothing."""
+
+from collections.abc import Mapping
+
+from bench.record import hdf5
+from bench.record.declared import part_of
+from bench.record.errors import UNREADABLE, RecordError
+
+_EVERY, _STRIDE = 2048, 64
+"""Of a long dataset each of the first chunks is looked up, and one in so many of the others: of the pieces in which
+HDF5 keeps their places, the smallest lie at the beginning."""
+
+
+def intact_rows(stored: hdf5.Dataset, size: int) -> int:
+    """Rows before the first chunk that is not wholly in the first `size` bytes of the file, or whose place is lost."""
+    length, chunk = stored.shape[0], (stored.chunks or (1,))[0]
+    for start in range(0, length, chunk):
+        if not _is_within(stored, start, size):
+            return start
+    return length
+
+
+def is_within(stored: hdf5.Dataset, size: int) -> bool:
+    """Whether a dataset that does not grow is wholly in the first `size` bytes of the file."""
+    place = hdf5.place(stored)
+    return place is None or place[0] + place[1] <= size
+
+
+def check_whole(entry: hdf5.Group, counted: Mapping[str, int], size: int) -> None:
+    """Read what describes the file, and look up where its counted rows are.
+
+    Raises what HDF5 raises for what is damaged, and RecordError where rows are beyond `size` bytes.
+    """
+    for group in hdf5.groups(entry):
+        for name in group.attrs:
+            _ = group.attrs[name]
+    for stored in hdf5.datasets(entry):
+        for name in stored.attrs:
+            _ = stored.attrs[name]
+        if hdf5.grows(stored):
+            rows = min(counted[part_of(stored.name)], stored.shape[0])
+            chunk = (stored.chunks or (1,))[0]
+            chunks = -(-rows // chunk)
+            some = {*range(min(chunks, _EVERY)), *range(_EVERY, chunks, _STRIDE), *range(max(chunks - 1, 0), chunks)}
+            whole = all(_is_within(stored, number * chunk, size) for number in some)
+        else:
+            whole = is_within(stored, size)
+        if not whole:
+            raise RecordError(f"{stored.name} reaches beyond the end of the file: it is truncated")
+
+
+def whole_rows(entry: hdf5.Group, counted: Mapping[str, int], size: int) -> dict[str, int]:
+    """The rows of every part that all of its datasets have, of those that were `counted`."""
+    whole = dict(counted)
+    for stored in hdf5.datasets(entry):
+        if hdf5.grows(stored):
+            part = part_of(stored.name)
+            whole[part] = min(whole[part], intact_rows(stored, size))
+    return whole
+
+
+def _is_within(stored: hdf5.Dataset, row: int, size: int) -> bool:
+    try:
+        place = hdf5.place_of_chunk(stored, row)
+    except UNREADABLE:
+        return False
+    return place is not None and place[0] + place[1] <= size
