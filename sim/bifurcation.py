@@ -13,6 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from sim.errors import InvalidInput
+from sim.specimen import Specimen
 from sim.steady import Orbit, rocking_orbit
 
 PRECISION = 1e-8
@@ -67,7 +68,7 @@ def bifurcations(branch: Sequence[Orbit]) -> list[Bifurcation]:
 
 def _located(before: Orbit, after: Orbit) -> Bifurcation:
     """The orbit between two with its leading multiplier on the unit circle, by secants (Illinois rule)."""
-    if before.specimen.coupled(after.specimen.beta or 0.0) != after.specimen:
+    if _with_beta(before.specimen, 0.0) != _with_beta(after.specimen, 0.0):
         raise InvalidInput("branch", "neighbours of different specimens", "only beta, omega and amplitude may change")
     # [place, multiplier - 1] at both ends, on the two sides of the circle
     ends = [[0.0, before.multiplier - 1.0], [1.0, after.multiplier - 1.0]]
@@ -94,4 +95,9 @@ def _between(before: Orbit, after: Orbit, place: float, guess: Orbit) -> Orbit:
 
     beta = mixed(before.specimen.beta or 0.0, after.specimen.beta or 0.0)
     omega, amplitude = mixed(before.omega, after.omega), mixed(before.amplitude, after.amplitude)
-    return rocking_orbit(before.specimen.coupled(beta), omega, amplitude, guess)
+    return rocking_orbit(_with_beta(before.specimen, beta), omega, amplitude, guess)
+
+
+def _with_beta(specimen: Specimen, beta: float) -> Specimen:
+    """The specimen with a spring of that stiffness ratio, whatever is written on it."""
+    return specimen.model_copy(update={"beta": beta, "spring_label": None})

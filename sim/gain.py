@@ -42,7 +42,7 @@ class Layer:
 class GainPrediction:
     """Gain coefficients at one frequency. A layer is None where its motion does not exist or was not found.
 
-    `omega` [rad/s]; `bare`: peaks of the frame without block, exact.
+    `omega` [rad/s]; `beta`: the spring's label; `bare`: peaks of the frame without block, exact.
     """
 
     omega: float
@@ -61,7 +61,7 @@ class GainPrediction:
 
 @dataclass(frozen=True, eq=False)
 class SeismicGain:
-    """Gain coefficients of one stiffness ratio under a record; both None unless the run was completed.
+    """Gain coefficients of the spring labelled `beta` under a record; both None unless the run was completed.
 
     `motion` says whether and when the block overturned (`motion.overturned`, `motion.end_time`), and has the peaks;
     `bare` has those of the frame without block.
@@ -127,7 +127,7 @@ def seismic_curve(
         known = motion.status is Status.COMPLETED
         alpha_1 = motion.peaks.u1 / bare.peaks.u1 if known else None
         alpha_2 = motion.peaks.drift / bare.peaks.drift if known else None
-        curve.append(SeismicGain(member.beta or 0.0, alpha_1, alpha_2, bare.peaks, motion))
+        curve.append(SeismicGain(member.label or 0.0, alpha_1, alpha_2, bare.peaks, motion))
     return curve
 
 
@@ -148,7 +148,7 @@ def _prediction(
 
     return GainPrediction(
         omega=omega,
-        beta=specimen.beta or 0.0,
+        beta=specimen.label or 0.0,
         amplitude=amplitude,
         bare=bare,
         rocking=layer(rocking),

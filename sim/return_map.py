@@ -124,11 +124,11 @@ def jacobians(q: Floats, x: Floats, accuracy: Accuracy = 4) -> Floats:
     return np.einsum("s,nsji->nij", weights, out.reshape(len(x), nodes.size, 6, 6)) / steps[:, None, :]
 
 
-def newton(q: Floats, x: Floats, known: Floats | None = None, accuracy: Accuracy = 4) -> Solutions:
+def newton(q: Floats, x: Floats, known: Floats | None = None, accuracy: Accuracy | None = 4) -> Solutions:
     """The fixed points near x, shape (n, 6); `known` are guesses of the Jacobians there, shape (n, 6, 6).
 
     A Jacobian is used as long as it serves, since a chord step costs one map; at the end it is taken anew with
-    `accuracy`.
+    `accuracy`. None: it is not, and most of the cost is saved where only the points and their peaks are wanted.
     """
     n = len(x)
     place, peaks, sizes = x.copy(), np.full((n, 3), np.nan), scales(q)
@@ -150,7 +150,7 @@ def newton(q: Floats, x: Floats, known: Floats | None = None, accuracy: Accuracy
         if not active.size:
             break
     place[~found], jacobian[~found] = np.nan, np.nan
-    if found.any():
+    if found.any() and accuracy is not None:
         jacobian[found] = jacobians(q[found], place[found], accuracy)
         found &= np.isfinite(jacobian).all(axis=(1, 2))
     return Solutions(place, jacobian, peaks, found)

@@ -4,7 +4,7 @@ Symbols are those of the paper (Tables 1 to 3); its values are the defaults.
 """
 
 from functools import cached_property
-from math import hypot, sqrt
+from math import hypot, isclose, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,15 +109,49 @@ class Block(Parameters):
         """r = factor (J - 2b S_y) / J with S_y = M b: angular velocity after over before an impact (Housner)."""
         return self.restitution_factor * (1.0 - 2.0 * self.b * self.mass * self.b / self.inertia)
 
+    def restitution_on(self, table_mass: float) -> float:
+        """The same on a table of `table_mass` [kg], specimen not counted, that nothing holds during the impact.
+
+        Housner's balance with the table's share of the horizontal momentum: (r J - mu) / (J - mu) with
+        mu = (M h_b)^2 / (m_t + M).
+        """
+        mu = (self.mass * self.h_b) ** 2 / (table_mass + self.mass)
+        return (self.restitution * self.inertia - mu) / (self.inertia - mu)
+
+
+class Spring(Parameters):
+    """A coupling spring whose stiffness has been measured."""
+
+    label: float = quantity(..., "1", "what is written on it: beta, its nominal stiffness over k1", gt=0)
+    k_c: float = quantity(..., "N/m", "its stiffness", gt=0)
+
 
 class Specimen(Parameters):
-    """Frame, block and spring. `beta = None` is the bare frame: no block, no spring."""
+    """Frame, block and spring. `beta = None` is the bare frame: no block, no spring.
+
+    Equations use `beta` and `k_c`. What people call a spring is its `label`, which stays when k1 or k_C turn out to be
+    other than they were taken to be.
+    """
 
     frame: Frame = Frame()
     block: Block = Block()
     beta: float | None = quantity(None, "1", "stiffness ratio k_C/k1 of the spring; absent for the bare frame", ge=0)
+    spring_label: float | None = quantity(None, "1", "what is written on the mounted spring; absent: beta", ge=0)
+    spring_k1: float | None = quantity(
+        None, "N/m", "k1 that the labels of the springs refer to: nominal k_C = label times it; absent: k1", gt=0
+    )
+    springs: tuple[Spring, ...] = quantity((), "", "springs whose stiffness has been measured")
     d: float = quantity(0.10, "m", "free length of the spring (not given in the paper)", gt=0)
     g: float = quantity(9.81, "m/s2", "acceleration of gravity", gt=0)
+
+    @model_validator(mode="after")
+    def _springs_can_be_told_apart(self) -> "Specimen":
+        labels = [spring.label for spring in self.springs]
+        if len(set(labels)) < len(labels):
+            raise InvalidInput("springs", labels, "each label may be there once")
+        if self.spring_label is not None and self.beta is None:
+            raise InvalidInput("spring_label", self.spring_label, "the bare frame has no spring: leave it out")
+        return self
 
     @property
     def k_c(self) -> float:
@@ -125,17 +159,39 @@ class Specimen(Parameters):
         return (self.beta or 0.0) * self.frame.k1
 
     @property
+    def label(self) -> float | None:
+        """What the mounted spring is called in requests, results and figures; None for the bare frame."""
+        return self.beta if self.spring_label is None else self.spring_label
+
+    @property
+    def nominal_k_c(self) -> float:
+        """Stiffness that the label of the mounted spring promises [N/m]; 0 for the bare frame."""
+        return (self.label or 0.0) * (self.spring_k1 or self.frame.k1)
+
+    @property
     def uplift_acceleration(self) -> float:
         """g / lambda [m/s2]: base acceleration that lifts the stand-alone block (Eq. 9)."""
         return self.g / self.block.slenderness
 
-    def coupled(self, beta: float) -> "Specimen":
-        """The same specimen with a spring of stiffness ratio `beta`."""
-        return Specimen(frame=self.frame, block=self.block, beta=beta, d=self.d, g=self.g)
+    def coupled(self, label: float) -> "Specimen":
+        """The same specimen with the spring labelled `label`: its measured stiffness, the nominal one without."""
+        measured = next((each.k_c for each in self.springs if isclose(each.label, label)), None)
+        if measured is not None:
+            return self.with_spring(measured, label)
+        return self._mounted(label) if self.spring_k1 is None else self.with_spring(label * self.spring_k1, label)
+
+    def with_spring(self, k_c: float, label: float | None = None) -> "Specimen":
+        """The same specimen with a spring of `k_c` [N/m], whatever is written on it: `label`, or what it amounts to."""
+        nominal = k_c / (self.spring_k1 or self.frame.k1)
+        return self._mounted(k_c / self.frame.k1, nominal if label is None else label)
 
     def bare(self) -> "Specimen":
         """The same frame without block and spring."""
-        return Specimen(frame=self.frame, block=self.block, beta=None, d=self.d, g=self.g)
+        return self._mounted(None)
+
+    def _mounted(self, beta: float | None, label: float | None = None) -> "Specimen":
+        kept = {name: getattr(self, name) for name in ("frame", "block", "spring_k1", "springs", "d", "g")}
+        return Specimen(**kept, beta=beta, spring_label=label if label != beta else None)
 
     def packed(self) -> NDArray[np.float64]:
         """The parameters as `sim.kernel` takes them, shape (16,): see `sim.kernel.packing` for the order."""

@@ -46,7 +46,12 @@ class Declared:
 
     @property
     def group(self) -> type[Parameters] | None:
-        """The nested group that this field holds, or None for a value."""
+        """The nested group that this field holds, or None for a value or a list."""
+        return None if self.many else self.element
+
+    @property
+    def element(self) -> type[Parameters] | None:
+        """The nested group that this field holds, one or many, or None for values."""
         return self.kind if isinstance(self.kind, type) and issubclass(self.kind, Parameters) else None
 
     @property
@@ -79,7 +84,7 @@ class Declared:
         least = next((limit.min_length for limit in self.lengths if isinstance(limit, MinLen)), 0)
         most = next((limit.max_length for limit in self.lengths if isinstance(limit, MaxLen)), None)
         count = _COUNT.get(least, f"{least} or more") if most is None else f"{least} to {most}"
-        what = f"{count} {_PLURAL.get(self.kind, 'values')}"
+        what = f"{count} {'tables' if self.element is not None else _PLURAL.get(self.kind, 'values')}"
         return f"{what}, each {self.limits}" if self.limits else what
 
     @property
@@ -106,7 +111,7 @@ def at(model: type[Parameters], path: Sequence[str | int]) -> Declared | None:
         if group is None or key not in group.model_fields:
             return None
         found = _declared(key, group.model_fields[key])
-        group = found.group
+        group = found.element
     return replace(found, many=False) if found is not None and isinstance(path[-1], int) else found
 
 
@@ -146,7 +151,7 @@ def _declared(name: str, field: FieldInfo) -> Declared:
         kind=kind,
         many=many,
         optional=optional,
-        default=field.get_default(call_default_factory=True, validated_data={}),
+        default=None if field.is_required() else field.get_default(call_default_factory=True, validated_data={}),
         unit=unit_of(field),
         description=field.description or "",
         constraints=tuple(item for item in metadata if type(item) in _BOUNDS),

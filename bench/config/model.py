@@ -4,11 +4,15 @@ from typing import Literal
 
 from pydantic import model_validator
 
-from bench.analysis.gain import SensorAccuracy
+from bench.analysis.laser_calibration import LaserCalibration
+from bench.analysis.sensor_accuracy import SensorAccuracy, SensorDoubt
+from bench.config.twin import Twin
 from bench.guard.limits import Limits, Ramps
 from bench.guard.quantities import Mover
 from drivers.hardware.parameters import Hardware
 from sim.errors import InvalidInput
+from sim.identified import Identified
+from sim.knowledge import SpecimenKnowledge
 from sim.parameters import Parameters, quantity
 from sim.specimen import Specimen
 from sim.uncertainty import SpecimenUncertainty
@@ -55,6 +59,18 @@ class BenchConfiguration(Parameters):
     backend: Literal["simulated", "hardware"] = quantity("simulated", "", "what drives and reads the bench")
     specimen: Specimen = Specimen()
     uncertainty: SpecimenUncertainty = SpecimenUncertainty()
+    specimen_file: str | None = quantity(
+        None, "", "JSON file of what has been identified of the specimen, read beside this file; absent: nothing has"
+    )
+    identified: Identified | None = quantity(
+        None, "", "what has been identified of the specimen, in place of a specimen_file; goes before what is assumed"
+    )
+    laser_calibration: str | None = quantity(
+        None, "", "JSON file of a calibration of the lasers, read beside this file; absent: their data sheets hold"
+    )
+    calibrated: LaserCalibration | None = quantity(
+        None, "", "a calibration of the lasers, in place of a laser_calibration file"
+    )
     table_model: str | None = quantity(
         None,
         "",
@@ -64,8 +80,37 @@ class BenchConfiguration(Parameters):
     ramps: Ramps = Ramps()
     acquisition: Acquisition = Acquisition()
     analysis: SensorAccuracy = SensorAccuracy()
+    twin: Twin = Twin()
     simulation: Simulation = Simulation()
     hardware: Hardware = Hardware()
+
+    @property
+    def known_specimen(self) -> Specimen:
+        """The specimen as it is known best, for every prediction: identified where it was, assumed elsewhere."""
+        return self.specimen if self.identified is None else self.identified.applied(self.specimen)
+
+    @property
+    def known(self) -> SpecimenKnowledge:
+        """How well `known_specimen` is known."""
+        return SpecimenKnowledge(**dict(self.uncertainty), identified=self.identified or Identified())
+
+    @property
+    def known_on_table(self) -> SpecimenKnowledge:
+        """The same for a steady motion on this table, which may give way at the block's impacts.
+
+        Its control gives the lost momentum back over the period, so predictions are for fixed ground; all that a table
+        left to itself would take of the restitution is taken as a half width.
+        """
+        block, mass = self.known_specimen.block, self.table_mass
+        if mass is None or block.restitution == 0.0:
+            return self.known
+        give = 1.0 - max(block.restitution_on(mass), 0.0) / block.restitution
+        return self.known.model_copy(update={"give": give})
+
+    @property
+    def sensors(self) -> SensorDoubt:
+        """All that is left open of the sensors."""
+        return SensorDoubt(self.analysis, self.laser_ranges, self.calibrated)
 
     @property
     def seed(self) -> int | None:
@@ -101,14 +146,19 @@ class BenchConfiguration(Parameters):
 
     @property
     def mover(self) -> Mover | None:
-        """What force and current are estimated from, with the assumed specimen on the table; None when unknown."""
-        frame, block = self.specimen.frame, self.specimen.block
-        payload = frame.m1 + frame.m2 + block.mass
+        """What force and current are estimated from, with the known specimen on the table; None when unknown."""
+        specimen, mass = self.known_specimen, self.table_mass
+        payload = specimen.frame.m1 + specimen.frame.m2 + specimen.block.mass
         if self.backend == "simulated":
             shaker = self.simulation.bench.shaker
             return Mover(shaker.moving_mass + payload, shaker.k_s, shaker.bl)
-        mass, constant = self.hardware.moving_mass, self.hardware.force_constant
+        constant = self.hardware.force_constant
         return None if mass is None or constant is None else Mover(mass + payload, 0.0, constant)
+
+    @property
+    def table_mass(self) -> float | None:
+        """Mass that moves with the table, without the specimen [kg]; None when unknown."""
+        return self.simulation.bench.shaker.moving_mass if self.backend == "simulated" else self.hardware.moving_mass
 
     @property
     def laser_reference(self) -> Literal["ground", "table"]:
@@ -122,6 +172,13 @@ class BenchConfiguration(Parameters):
         lasers = self.simulation.bench if self.backend == "simulated" else self.hardware
         return lasers.laser_1.measuring_range, lasers.laser_2.measuring_range
 
+    def at_pace(self, *, realtime: bool) -> "BenchConfiguration":
+        """The same, with what depends on the pace of its time decided: hardware knows real time only."""
+        if self.twin.enabled is not None:
+            return self
+        twin = self.twin.model_copy(update={"enabled": realtime or self.backend == "hardware"})
+        return self.model_copy(update={"twin": twin})
+
     @property
     def serves_itself(self) -> bool:
         """Whether no person is needed for the work between two tests: the bench is simulated or emulated."""
@@ -133,6 +190,23 @@ class BenchConfiguration(Parameters):
             if specimen is not None and specimen.beta is not None:
                 allowed = "the protocol says which springs are mounted; leave it out (see simulation.spring_factor)"
                 raise InvalidInput(f"{name}.beta", specimen.beta, allowed)
+        return self
+
+    @model_validator(mode="after")
+    def _what_is_identified_can_be(self) -> "BenchConfiguration":
+        if self.specimen_file is not None and self.identified is not None:
+            raise InvalidInput("specimen_file", self.specimen_file, "identified is there too; leave one of them out")
+        try:
+            _ = self.known_specimen
+        except InvalidInput as refusal:
+            raise InvalidInput(f"identified.{refusal.item}", refusal.value, refusal.allowed) from None
+        return self
+
+    @model_validator(mode="after")
+    def _one_calibration(self) -> "BenchConfiguration":
+        if self.laser_calibration is not None and self.calibrated is not None:
+            allowed = "calibrated is there too; leave one of them out"
+            raise InvalidInput("laser_calibration", self.laser_calibration, allowed)
         return self
 
     @model_validator(mode="after")

@@ -7,10 +7,13 @@ from typing import Any
 
 import tomlkit
 
+from bench.config.calibration_file import read_calibration
 from bench.config.declared import Declared, declared, summary
 from bench.config.model import BenchConfiguration
+from bench.config.specimen_file import read_specimen
 from bench.config.validation import dotted, problems, validated
 from sim.errors import InvalidInput
+from sim.identified import Identified
 from sim.parameters import Parameters
 
 _HEADING = """\
@@ -37,8 +40,9 @@ def read_table(path: Path, item: str) -> dict[str, Any]:
 
 
 def read_configuration(path: Path) -> BenchConfiguration:
-    """The configuration in a file. Raises InvalidInput naming file and key."""
-    return validated(BenchConfiguration, read_table(path, "configuration file"), _within(path))
+    """The configuration in a file, with what its files hold in their place. InvalidInput names file and key."""
+    read = validated(BenchConfiguration, read_table(path, "configuration file"), _within(path))
+    return _with_calibration_file(_with_specimen_file(read, path), path)
 
 
 def problems_of(path: Path) -> list[InvalidInput]:
@@ -46,7 +50,37 @@ def problems_of(path: Path) -> list[InvalidInput]:
 
     Raises InvalidInput when it is not TOML at all.
     """
-    return problems(BenchConfiguration, read_table(path, "configuration file"), _within(path))
+    found = problems(BenchConfiguration, read_table(path, "configuration file"), _within(path))
+    if not found:
+        try:
+            read_configuration(path)
+        except InvalidInput as refusal:
+            return [refusal]
+    return found
+
+
+def _with_specimen_file(configuration: BenchConfiguration, path: Path) -> BenchConfiguration:
+    """What is identified in place of the name of a file with it, which is sought from the folder of `path` on.
+
+    Raises InvalidInput when it cannot be read.
+    """
+    if configuration.specimen_file is None:
+        return configuration
+    return with_identified(configuration, read_specimen(path.parent / configuration.specimen_file))
+
+
+def _with_calibration_file(configuration: BenchConfiguration, path: Path) -> BenchConfiguration:
+    """The calibration in place of the name of its file, sought likewise. Raises InvalidInput when it cannot be read."""
+    if configuration.laser_calibration is None:
+        return configuration
+    found = read_calibration(path.parent / configuration.laser_calibration)
+    return configuration.model_copy(update={"laser_calibration": None, "calibrated": found})
+
+
+def with_identified(configuration: BenchConfiguration, identified: Identified) -> BenchConfiguration:
+    """With other findings than it had. Raises InvalidInput when such a specimen cannot be."""
+    identified.applied(configuration.specimen)
+    return configuration.model_copy(update={"specimen_file": None, "identified": identified})
 
 
 def write_commented(path: Path) -> None:
@@ -79,7 +113,9 @@ def _lines(model: type[Parameters], path: tuple[str, ...], mark: str = "") -> It
             if entry.description:
                 yield f"# {entry.description}"
             yield f"# {summary(entry.group)}"
-            yield f"{inner}[{'.'.join(here)}]"
+            # a group with values that must be there is not one to uncomment: a run writes it
+            required = any(field.is_required() for field in entry.group.model_fields.values())
+            yield f"{'# ' if required else inner}[{'.'.join(here)}]"
             yield from _lines(entry.group, here, inner)
 
 

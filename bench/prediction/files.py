@@ -11,19 +11,19 @@ from numpy.typing import NDArray
 from bench.provenance import software
 from bench.record.tables import Table
 from bench.report.files import write_new
+from sim.knowledge import SpecimenKnowledge
 from sim.parameters import Parameters
 from sim.specimen import Specimen
 
 FORMAT, FORMAT_VERSION = "rocking-bench prediction", 1
 
 
-def provenance(request: Parameters, specimen: Specimen) -> dict[str, Any]:
-    """What a prediction was computed from and with."""
-    return {
-        "request": request.model_dump(mode="json"),
-        "specimen": specimen.model_dump(mode="json"),
-        "software": software(),
-    }
+def provenance(request: Parameters, specimen: Specimen, known: SpecimenKnowledge | None = None) -> dict[str, Any]:
+    """What a prediction was computed from and with; `known` where it says how far it may be off."""
+    found = {"request": request.model_dump(mode="json"), "specimen": specimen.model_dump(mode="json")}
+    if known is not None:
+        found["known"] = known.model_dump(mode="json")
+    return {**found, "software": software()}
 
 
 def rows_of(table: Table) -> list[dict[str, Any]]:

@@ -1,25 +1,28 @@
 """The gain map: every steady motion over frequency and stiffness, as in Fig. 4 of the paper."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bench.prediction.requests import MapRequest
-from bench.prediction.steady import amplitude_of, table_of
+from bench.prediction.steady import amplitude_of, band_columns, table_of
 from bench.record.tables import Table
-from sim.maps import LayerMap, gain_map
+from sim.knowledge import SpecimenKnowledge
+from sim.maps import GainMap, LayerMap, gain_map
+from sim.rocking import Peaks, State
 from sim.specimen import Specimen
-from sim.steady import resting_level
+from sim.steady import Orbit, resting_level
 
-IMPACTS = {"rocking": 2, "resting": 0}
+IMPACTS: dict[Literal["rocking", "resting"], int] = {"rocking": 2, "resting": 0}
 """Impacts of each layer in a period of the drive."""
 
 
-def map_table(specimen: Specimen, request: MapRequest) -> Table:
+def map_table(specimen: Specimen, request: MapRequest, known: SpecimenKnowledge | None = None) -> Table:
     """One row for each layer that exists at a point, ascending in stiffness, then frequency.
 
+    With `known`, how well the specimen is, columns more are the band of alpha_2.
     Raises SchedulerUnavailable when the request names a scheduler that does not answer.
     """
     betas, omegas = np.sort(request.beta), np.sort(request.omega)
@@ -27,7 +30,7 @@ def map_table(specimen: Specimen, request: MapRequest) -> Table:
     made = gain_map(specimen, betas, omegas, amplitude, scheduler=request.scheduler)
     parts = [
         _columns(name, layer, omegas, betas, amplitude)
-        for name, layer in (("rocking", made.rocking), ("resting", made.resting))
+        for name, layer in zip(IMPACTS, (made.rocking, made.resting), strict=True)
     ]
     if request.outcomes:
         from sim.outcomes import outcome_map
@@ -35,6 +38,9 @@ def map_table(specimen: Specimen, request: MapRequest) -> Table:
         came = outcome_map(made, scheduler=request.scheduler)
         for part, layer in zip(parts, (made.rocking, made.resting), strict=True):
             part |= {"outcome": came.outcome[layer.exists], "outcome_time_s": came.time[layer.exists]}
+    if known is not None:
+        for part, name in zip(parts, IMPACTS, strict=True):
+            part |= band_columns(_orbits(made, name), part["alpha_2"], known, request.members)
     whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     # stable: of two layers at one point, the rocking one stays first
     order = np.lexsort((whole["omega_rad_s"], whole["beta"]))
@@ -67,8 +73,35 @@ def resting_margin(specimen: Specimen, request: MapRequest) -> NDArray[np.float6
     )
 
 
+def _orbits(made: GainMap, name: Literal["rocking", "resting"]) -> list[Orbit]:
+    """The motions of one layer, in the order of its columns."""
+    layer = made.rocking if name == "rocking" else made.resting
+    specimens = [made.specimen.coupled(float(beta)) for beta in made.betas]
+    orbits: list[Orbit] = []
+    for i, j in np.argwhere(layer.exists).tolist():
+        phase, u1, u2, v1, v2, velocity = np.nan_to_num(made.sections[i, j]).tolist()
+        orbits.append(
+            Orbit(
+                specimen=specimens[i],
+                omega=float(made.omegas[j]),
+                amplitude=made.amplitude,
+                layer=name,
+                phase=phase,
+                start=State(u1, u2, v1, v2, 0.0, velocity),
+                peaks=Peaks(*layer.peaks[i, j].tolist()),
+                impacts=IMPACTS[name],
+                multipliers=layer.multipliers[i, j],
+            )
+        )
+    return orbits
+
+
 def _columns(
-    name: str, layer: LayerMap, omegas: NDArray[np.float64], betas: NDArray[np.float64], amplitude: float
+    name: Literal["rocking", "resting"],
+    layer: LayerMap,
+    omegas: NDArray[np.float64],
+    betas: NDArray[np.float64],
+    amplitude: float,
 ) -> dict[str, NDArray[Any]]:
     here = layer.exists
     n = int(here.sum())

@@ -122,7 +122,7 @@ def _from_rest(coupled: Specimen, omega: float, amplitude: float, request: Histo
     )
     return History(
         omega=omega,
-        beta=coupled.beta or 0.0,
+        beta=coupled.label or 0.0,
         motion=FROM_REST,
         status=str(motion.status),
         end_time=motion.end_time,
@@ -148,7 +148,7 @@ def _steady(orbit: Orbit, request: HistoryRequest) -> History:
     bare = np.column_stack([(u1 * rotation).imag, (u2 * rotation).imag])
     return History(
         omega=orbit.omega,
-        beta=orbit.specimen.beta or 0.0,
+        beta=orbit.specimen.label or 0.0,
         motion=orbit.layer,
         status="steady" if orbit.stable else "steady, unstable",
         end_time=periods * orbit.period,

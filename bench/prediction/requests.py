@@ -70,11 +70,23 @@ class SineRequest(Parameters):
     _each_once = field_validator("omega", "beta")(each_once)
 
 
-class SteadyRequest(SineRequest):
+class GainRequest(SineRequest):
+    """What every prediction of a gain in a steady motion is asked for."""
+
+    members: int = quantity(
+        0,
+        "1",
+        "specimens that are drawn for the band of alpha_2, 95 % of which it holds; 0: it is computed to first order",
+        ge=0,
+        le=100_000,
+    )
+
+
+class SteadyRequest(GainRequest):
     """Steady motions at single points."""
 
 
-class SpectrumRequest(SineRequest):
+class SpectrumRequest(GainRequest):
     """Gain against frequency, a spectrum for each stiffness."""
 
     omega: tuple[Frequency, ...] = quantity(
@@ -85,7 +97,7 @@ class SpectrumRequest(SineRequest):
     )
 
 
-class MapRequest(SineRequest):
+class MapRequest(GainRequest):
     """Gain over frequency and stiffness."""
 
     omega: tuple[Frequency, ...] = quantity(
@@ -102,6 +114,9 @@ class MapRequest(SineRequest):
     )
     outcomes: bool = quantity(
         False, "", "also start every point at rest with the sine switched on, and say what it comes to (3 ms a point)"
+    )
+    band: bool = quantity(
+        False, "", "also compute the band of alpha_2 at every point (half a minute for the default map, to first order)"
     )
     scheduler: str | None = quantity(
         None, "", "address of a dask.distributed scheduler that shares out the work, such as tcp://10.0.0.5:8786"
@@ -157,6 +172,13 @@ class SeismicRequest(RecordsRequest):
     )
     stroke_fit: Literal["none", "least-change", "high-pass"] = quantity(
         "none", "", "how the scaled motions are made to fit the configured bench's stroke"
+    )
+    members: int = quantity(
+        0,
+        "1",
+        "specimens that are drawn at every stiffness for a band that holds 95 % of their alpha_2; 0: no band",
+        ge=0,
+        le=100_000,
     )
 
     _each_once = field_validator("beta")(each_once)

@@ -1,7 +1,7 @@
 """Gain coefficients under earthquake records: against stiffness, and against the lower end of the table's band."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,9 +10,11 @@ from bench.config.model import BenchConfiguration
 from bench.control.preparation import PreparedMotion, prepare
 from bench.control.stroke.fit import Method, periods_of
 from bench.control.stroke.reach import Reach
+from bench.prediction.bands import Bands, record_bands
 from bench.prediction.requests import BandStudyRequest, RecordsRequest, SeismicRequest
 from sim.errors import InvalidInput
 from sim.gain import SeismicGain, seismic_curve
+from sim.knowledge import SpecimenKnowledge
 from sim.specimen import Specimen
 
 Band = tuple[float, float] | None
@@ -20,11 +22,15 @@ Band = tuple[float, float] | None
 
 @dataclass(frozen=True, eq=False)
 class SeismicCurve:
-    """What the model says of one record: the motion of the table that it becomes, and a gain for each stiffness."""
+    """What the model says of one record: the motion of the table that it becomes, and a gain for each stiffness.
+
+    `bands`, where they were asked for: of alpha_2 at each stiffness.
+    """
 
     accelerogram: Accelerogram
     prepared: PreparedMotion
     gains: list[SeismicGain]
+    bands: Bands | None = None
 
 
 def band_of(text: str | None, configuration: BenchConfiguration) -> Band:
@@ -43,13 +49,26 @@ def band_of(text: str | None, configuration: BenchConfiguration) -> Band:
 
 
 def seismic_curves(
-    specimen: Specimen, records: Sequence[Accelerogram], request: SeismicRequest, configuration: BenchConfiguration
+    specimen: Specimen,
+    records: Sequence[Accelerogram],
+    request: SeismicRequest,
+    configuration: BenchConfiguration,
+    known: SpecimenKnowledge | None = None,
 ) -> list[SeismicCurve]:
-    """A curve for each record. Raises InvalidInput for a record that cannot be prepared."""
+    """A curve for each record, with the bands that are asked for, where it is `known` how well the specimen is.
+
+    Raises InvalidInput for a record that cannot be prepared.
+    """
     band, betas = band_of(request.table_band, configuration), sorted(request.beta)
     reach = None if request.stroke_fit == "none" else Reach.of(configuration)
     method = Method.HIGH_PASS if request.stroke_fit == "high-pass" else Method.LEAST_CHANGE
-    return [_curve(specimen, record, request, betas, band, reach, method) for record in records]
+    curves = [_curve(specimen, record, request, betas, band, reach, method) for record in records]
+    if known is None or not request.members:
+        return curves
+    coupled = [specimen.coupled(beta) for beta in betas]
+    return [
+        replace(curve, bands=record_bands(coupled, curve.prepared.record, known, request.members)) for curve in curves
+    ]
 
 
 def band_study(

@@ -43,6 +43,12 @@ GAINS: Columns = {
     "bare_drift_max_m": (np.float64, "m", "greatest |u2 - u1| of the bare frame"),
 }
 
+GAIN_BANDS: Columns = {
+    "alpha_2_low": (np.float64, "1", "where the 95 % of alpha_2 of the drawn specimens that stood begin"),
+    "alpha_2_high": (np.float64, "1", "where they end"),
+    "members_share": (np.float64, "1", "share of the drawn specimens that stood"),
+}
+
 MOTIONS: Columns = {
     **RECORD,
     "source": (np.str_, "", "file of the record, or how it was made"),
@@ -61,7 +67,12 @@ MOTIONS: Columns = {
 
 def gains_table(curves: Sequence[SeismicCurve]) -> Table:
     """One row for each record, band and stiffness."""
-    return _table(GAINS, [_gain(curve, gain) for curve in curves for gain in curve.gains])
+    table = _table(GAINS, [_gain(curve, gain) for curve in curves for gain in curve.gains])
+    found = [curve.bands for curve in curves if curve.bands is not None]
+    if len(found) < len(curves):
+        return table
+    rows = [row for each in found for row in zip(each.low, each.high, each.share, strict=True)]
+    return {**table, **_table(GAIN_BANDS, rows)}
 
 
 def motions_table(curves: Sequence[SeismicCurve]) -> Table:

@@ -6,10 +6,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.prediction.bands import bands
 from bench.prediction.requests import SineRequest
 from bench.record.tables import Column, Table
 from sim.gain import GainPrediction, gain_spectrum, predict_gain
+from sim.knowledge import SpecimenKnowledge
 from sim.specimen import Specimen
+from sim.steady import Orbit
 
 if TYPE_CHECKING:
     from bench.prediction.timed import Timed
@@ -48,6 +51,10 @@ COLUMNS: dict[str, tuple[str, str, int | None]] = {
 """Unit, meaning, and significant digits of what is computed."""
 
 EXTRA: dict[str, tuple[str, str, int | None]] = {
+    "alpha_2_uncertainty": ("1", "expanded uncertainty of alpha_2 (k = 2): what is left open of the specimen", 6),
+    "alpha_2_low": ("1", "where the band of alpha_2 that holds 95 % begins", 6),
+    "alpha_2_high": ("1", "where it ends", 6),
+    "members_share": ("1", "share of the drawn specimens that have this motion; 1 to first order", 6),
     "status": ("", "exact, or how the run by another solver ended", None),
     "outcome": ("", "what the sine switched on at rest comes to: rocking, resting, other, toppled or failed", None),
     "outcome_time_s": ("s", "time of the overturning, or when the outcome was decided", None),
@@ -75,11 +82,17 @@ def predict_spectra(specimen: Specimen, request: SineRequest) -> list[GainPredic
     ]
 
 
-def steady_table(predictions: Sequence[GainPrediction], timed: "Sequence[Timed | None] | None" = None) -> Table:
+def steady_table(
+    predictions: Sequence[GainPrediction],
+    timed: "Sequence[Timed | None] | None" = None,
+    known: SpecimenKnowledge | None = None,
+    members: int = 0,
+) -> Table:
     """One row for each layer of each prediction, to the digits that are known.
 
     `timed`, one for each prediction: gains of the rocking layer by another solver, which take the place of the exact
-    ones; how its run ended is then a column more.
+    ones; how its run ended is then a column more. `known`: how well the specimen is; columns more are then the band of
+    alpha_2, see `bench.prediction.bands.bands`.
     """
     rows: list[Row] = []
     for k, prediction in enumerate(predictions):
@@ -90,7 +103,26 @@ def steady_table(predictions: Sequence[GainPrediction], timed: "Sequence[Timed |
                 row |= run.as_row() if run is not None else {"status": "exact"}
             rows.append(row)
     names = [*COLUMNS, "status"] if timed is not None else list(COLUMNS)
-    return table_of({name: np.array([row[name] for row in rows]) for name in names} if rows else {})
+    if not rows:
+        return table_of({})
+    columns: dict[str, NDArray[Any]] = {name: np.array([row[name] for row in rows]) for name in names}
+    if known is not None:
+        layers = [layer for prediction in predictions for layer in prediction.layers.values()]
+        columns |= band_columns([layer.orbit for layer in layers], columns["alpha_2"], known, members)
+    return table_of(columns)
+
+
+def band_columns(
+    orbits: Sequence[Orbit], alpha_2: NDArray[np.float64], known: SpecimenKnowledge, members: int
+) -> dict[str, NDArray[np.float64]]:
+    """The columns of a band of alpha_2, by name."""
+    found = bands(orbits, alpha_2, known, members)
+    return {
+        "alpha_2_uncertainty": found.uncertainty,
+        "alpha_2_low": found.low,
+        "alpha_2_high": found.high,
+        "members_share": found.share,
+    }
 
 
 def table_of(values: Mapping[str, NDArray[Any]]) -> Table:

@@ -41,7 +41,7 @@ class StrokeFits:
 
 def stroke_fits(record: Accelerogram, request: StrokeFitRequest, configuration: BenchConfiguration) -> StrokeFits:
     """Raises InvalidInput for a record that cannot be prepared, and where no method that was asked for makes it fit."""
-    specimen = configuration.specimen
+    specimen = configuration.known_specimen
     reach = Reach.of(configuration, request.share)
     asked: dict[str, Any] = {
         "band": band_of(request.table_band, configuration),

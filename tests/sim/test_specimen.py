@@ -32,6 +32,17 @@ def test_block_is_that_of_table_2() -> None:
     assert Block(restitution_factor=0.992).restitution == pytest.approx(0.992 * 0.9769231, abs=1e-6)
 
 
+@pytest.mark.parametrize("table_mass", [5.0, 50.0])
+def test_restitution_on_a_table_keeps_the_momenta_that_an_impact_keeps(table_mass: float) -> None:
+    """Of block and table horizontally, and of the block about the corner that it comes to: two linear equations."""
+    block = Block(restitution_factor=0.992)
+    lever = block.mass * block.h_b
+    momenta = np.array([[table_mass + block.mass, -lever], [-lever, block.inertia]])
+    _, turning = np.linalg.solve(momenta, [-lever, block.restitution * block.inertia])
+    assert block.restitution_on(table_mass) == pytest.approx(turning, rel=1e-12)
+    assert block.restitution_on(1e12) == pytest.approx(block.restitution, rel=1e-9)
+
+
 def test_uplift_acceleration_and_coupling() -> None:
     specimen = Specimen(beta=0.25)
     assert 1.01 * specimen.uplift_acceleration == pytest.approx(1.238512, abs=1e-6)

@@ -1,0 +1,93 @@
+"""The band within which a predicted alpha_2 lies, for what is left open of the specimen."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.analysis.gain import COVERAGE
+from sim.ensemble import record_gains, steady_gains
+from sim.excitation import SampledRecord
+from sim.knowledge import SpecimenKnowledge
+from sim.specimen import Specimen
+from sim.steady import Orbit
+
+INTERVAL = (0.025, 0.975)
+"""Ends of a band that holds 95 % of the members of a Monte Carlo."""
+
+SEED = 20260101
+"""Of the members: the same for every point, so that a band is as smooth as its curve."""
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Bands:
+    """Bands of alpha_2 at n steady motions, arrays of shape (n,); NaN where none can be stated.
+
+    `uncertainty` is expanded (k = 2); `low` and `high` hold 95 %; `share` is the part of the members that have such a
+    motion at all, 1 to first order.
+    """
+
+    uncertainty: Floats
+    low: Floats
+    high: Floats
+    share: Floats
+
+
+def bands(
+    orbits: Sequence[Orbit], alpha_2: Sequence[float] | Floats, known: SpecimenKnowledge, members: int = 0
+) -> Bands:
+    """The band around each `alpha_2`, shape (n,), of the motions `orbits`.
+
+    By a Monte Carlo with so many `members`, or with none to first order: along each independent direction the gain is
+    computed one standard uncertainty to either side (GUM 5.1.4, note 2), and the band is symmetric. Where a motion
+    exists on one side only, that side counts.
+    """
+    best = np.asarray(alpha_2, dtype=np.float64)
+    of: dict[Specimen, list[Specimen]] = {}
+    for orbit in orbits:
+        if orbit.specimen not in of:
+            of[orbit.specimen] = _members(orbit.specimen, known, members)
+    # what is exactly known of one spring may be open of another: as many members for all
+    most = max(map(len, of.values()), default=0)
+    own = [of[orbit.specimen] + [orbit.specimen] * (most - len(of[orbit.specimen])) for orbit in orbits]
+    gains = steady_gains(orbits, own)[:, :, 1]
+    return _drawn(gains) if members else _first_order(best, gains)
+
+
+def record_bands(specimens: Sequence[Specimen], record: SampledRecord, known: SpecimenKnowledge, members: int) -> Bands:
+    """The band of alpha_2 of each of n `specimens` under `record`, from rest, by a Monte Carlo with so many `members`.
+
+    First order says nothing here: who topples, and when impacts fall, does not change smoothly.
+    """
+    drawn = [_members(specimen, known, members) for specimen in specimens]
+    gains = record_gains([one for own in drawn for one in own], record)[:, 1]
+    return _drawn(gains.reshape(len(specimens), members))
+
+
+def _members(specimen: Specimen, known: SpecimenKnowledge, members: int) -> list[Specimen]:
+    if members:
+        return known.draws(specimen, members, np.random.default_rng(SEED))
+    return [one for pair in known.deviations(specimen) for one in pair]
+
+
+def _first_order(best: Floats, gains: Floats) -> Bands:
+    sides = gains.reshape(len(best), -1, 2) - best[:, None, None]
+    lost = np.isnan(sides)
+    # of a side that is lost the other is the mirror image
+    one, other = (np.where(lost[:, :, k], -sides[:, :, 1 - k], sides[:, :, k]) for k in (0, 1))
+    size = COVERAGE * np.sqrt(np.sum((0.5 * (one - other)) ** 2, axis=1))
+    return Bands(size, np.maximum(best - size, 0.0), best + size, np.ones(best.size))
+
+
+def _drawn(gains: Floats) -> Bands:
+    n = len(gains)
+    share = np.isfinite(gains).mean(axis=1)
+    size, low, high = np.full(n, np.nan), np.full(n, np.nan), np.full(n, np.nan)
+    some = share * gains.shape[1] > 1.0
+    if some.any():
+        size[some] = COVERAGE * np.nanstd(gains[some], axis=1, ddof=1)
+        low[some], high[some] = np.nanquantile(gains[some], INTERVAL, axis=1)
+    return Bands(size, low, high, share)

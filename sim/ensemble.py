@@ -1,0 +1,91 @@
+"""Gain coefficients of many specimens that a motion may be of: a Monte Carlo, or first order, at one cost.
+
+Steady motions of the members lie near a known one, so all of them are found together by Newton's method from its
+section, with its Jacobian; those that are farther away are followed there one by one. Under a record each is a run.
+"""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.excitation import SampledRecord
+from sim.linear import steady_peaks
+from sim.return_map import follow, jacobians, newton, parameters
+from sim.rocking import Status, simulate_many
+from sim.specimen import Specimen
+from sim.steady import Orbit, resting_level
+from sim.sweep import processors, sweep
+
+Floats = NDArray[np.float64]
+
+RUN_TOLERANCE = 1e-8
+"""Of the runs under a record: far below what an ensemble can tell."""
+
+_Member = tuple[Orbit, Specimen]
+"""A specimen, and the orbit near which its own is looked for."""
+
+
+def steady_gains(
+    orbits: Sequence[Orbit], members: Sequence[Sequence[Specimen]], bare_amplitude: float | None = None
+) -> Floats:
+    """alpha_1 and alpha_2 of m specimens on the layer of each of n orbits, shape (n, m, 2), on all processors.
+
+    `members[i]` are the specimens at `orbits[i]`, under its frequency and amplitude; `bare_amplitude` [m/s2] is that of
+    the test without block, when it was another. NaN where a member has no such motion: it does not rest, or its orbit
+    cannot be followed there.
+    """
+    every = [(orbit, specimen) for orbit, own in zip(orbits, members, strict=True) for specimen in own]
+    bounds = np.linspace(0, len(every), processors() + 1).astype(int).tolist()
+    chunks = [every[first:last] for first, last in pairwise(bounds) if last > first]
+    if not chunks:
+        return np.empty((len(orbits), 0, 2))
+    peaks = np.concatenate(sweep(_peaks, chunks))
+    bare = np.array([_bare(specimen, orbit, bare_amplitude) for orbit, specimen in every])
+    return (peaks / bare).reshape(len(orbits), -1, 2)
+
+
+def record_gains(members: Sequence[Specimen], record: SampledRecord) -> Floats:
+    """alpha_1 and alpha_2 of n specimens under `record`, from rest, shape (n, 2), on all processors.
+
+    NaN where the block does not stand to the end.
+    """
+    runs = simulate_many([*members, *(specimen.bare() for specimen in members)], record, tolerance=RUN_TOLERANCE)
+    peaks = np.array([(run.peaks.u1, run.peaks.drift) for run in runs]).reshape(2, -1, 2)
+    stood = np.array([run.status is Status.COMPLETED for run in runs[: len(members)]], dtype=np.bool_)
+    return np.where(stood[:, None], peaks[0] / peaks[1], np.nan)
+
+
+def _peaks(chunk: Sequence[_Member]) -> Floats:
+    """Peaks of u1 and drift [m], shape (n, 2)."""
+    peaks = np.full((len(chunk), 2), np.nan)
+    rocking = [i for i, (orbit, _) in enumerate(chunk) if orbit.layer == "rocking"]
+    if rocking:
+        peaks[rocking] = _rocking([chunk[i] for i in rocking])
+    for i, (orbit, specimen) in enumerate(chunk):
+        if orbit.layer == "resting" and orbit.amplitude < resting_level(specimen, orbit.omega):
+            found = steady_peaks(specimen, orbit.omega, orbit.amplitude, resting=True)
+            peaks[i] = found.u1, found.drift
+    return peaks
+
+
+def _rocking(chunk: Sequence[_Member]) -> Floats:
+    orbits = list({id(orbit): orbit for orbit, _ in chunk}.values())
+    place = {id(orbit): k for k, orbit in enumerate(orbits)}
+    origin = np.concatenate([parameters(orbit.specimen, orbit.omega, orbit.amplitude) for orbit in orbits])
+    sections = np.array([orbit.section for orbit in orbits])
+    slopes = jacobians(origin, sections, 2)
+    of = np.array([place[id(orbit)] for orbit, _ in chunk])
+    q = np.concatenate([parameters(specimen, orbit.omega, orbit.amplitude) for orbit, specimen in chunk])
+    found = newton(q, sections[of], slopes[of], accuracy=None)
+    for i in np.flatnonzero(~found.found).tolist():
+        solution = follow(origin[of[i]], sections[of[i]], q[i])
+        if solution is not None:
+            found.put(i, solution)
+    return found.peaks[:, :2]
+
+
+def _bare(specimen: Specimen, orbit: Orbit, amplitude: float | None) -> tuple[float, float]:
+    peaks = steady_peaks(specimen, orbit.omega, orbit.amplitude if amplitude is None else amplitude)
+    return peaks.u1, peaks.drift

@@ -1,0 +1,219 @@
+"""What has been measured of a specimen: values, how certain they are, and how they hang together."""
+
+from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
+from itertools import pairwise
+from math import isclose
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import AwareDatetime, ValidationError, field_validator, model_validator
+
+from sim.errors import InvalidInput
+from sim.parameters import Parameters, quantity, unit_of
+from sim.specimen import Block, Frame, Specimen, Spring
+
+SPRING = "k_c:"
+"""What the name of a spring's stiffness begins with; the spring's label beta follows."""
+
+UNITS = {name: unit_of(Frame.model_fields[name]) for name in ("m1", "m2", "k1", "k2", "xi1", "xi2")} | {
+    name: unit_of(Block.model_fields[name]) for name in ("restitution_factor",)
+}
+"""Quantities of frame and block that can be identified, with their SI units."""
+
+_HIGHEST = {"xi1": 1.0, "xi2": 1.0, "restitution_factor": 2.0}
+_MAY_VANISH = ("xi1", "xi2")
+_ROUNDING = 1e-9
+"""How far below zero the least eigenvalue of a correlation matrix may be by the rounding of its coefficients."""
+
+
+def spring_name(label: float) -> str:
+    """The name of the stiffness of the spring that is labelled beta = `label`."""
+    return f"{SPRING}{label:.12g}"
+
+
+def spring_label(name: str) -> float | None:
+    """The label of the spring that `name` stands for; None when it is another quantity."""
+    if not name.startswith(SPRING):
+        return None
+    try:
+        label = float(name.removeprefix(SPRING))
+    except ValueError:
+        label = 0.0
+    if not 0.0 < label < np.inf:
+        raise InvalidInput("name", name, f'the label of a spring is a number above 0, as in "{SPRING}0.25"')
+    return label
+
+
+def unit(name: str) -> str:
+    """The SI unit of a quantity that can be identified. Raises InvalidInput for another name."""
+    if spring_label(name) is not None:
+        return "N/m"
+    if name not in UNITS:
+        close = get_close_matches(name, UNITS, n=1)
+        known = f"the nearest is {close[0]}" if close else f'it may be {", ".join(UNITS)}, or "{SPRING}" and a label'
+        raise InvalidInput("name", name, f"no such quantity can be identified; {known}")
+    return UNITS[name]
+
+
+def possible(name: str, value: float) -> bool:
+    """Whether a finding of this quantity can have this value: what is fitted may fall beyond what can be."""
+    above = value >= 0.0 if name in _MAY_VANISH else value > 0.0
+    return above and value < _HIGHEST.get(name, np.inf)
+
+
+def _canonical(name: str) -> str:
+    label = spring_label(name)
+    return name if label is None else spring_name(label)
+
+
+class Finding(Parameters):
+    """One quantity of the specimen as it was measured."""
+
+    name: str = quantity(..., "", "the quantity: m1, m2, k1, k2, xi1, xi2, restitution_factor, or k_c:LABEL")
+    value: float = quantity(..., "", "best estimate, in the quantity's SI unit", ge=0)
+    standard_uncertainty: float = quantity(..., "", "standard uncertainty (k = 1), in the quantity's SI unit", ge=0)
+    source: str = quantity(..., "", "what it was found from")
+    date: AwareDatetime = quantity(..., "", "when it was measured")
+
+    @property
+    def unit(self) -> str:
+        """The SI unit of value and uncertainty."""
+        return unit(self.name)
+
+    @field_validator("name")
+    @classmethod
+    def _known(cls, name: str) -> str:
+        try:
+            unit(name)
+        except InvalidInput as refusal:
+            raise ValueError(refusal.allowed) from None
+        return _canonical(name)
+
+    @model_validator(mode="after")
+    def _within_the_limits_of_the_quantity(self) -> "Finding":
+        if self.value == 0.0 and self.name not in _MAY_VANISH:
+            raise InvalidInput("value", self.value, f"{self.name} must be above 0")
+        highest = _HIGHEST.get(self.name, np.inf)
+        if self.value >= highest:
+            raise InvalidInput("value", self.value, f"{self.name} must be below {highest:g}")
+        return self
+
+
+class Correlation(Parameters):
+    """How the errors of two findings hang together."""
+
+    first: str = quantity(..., "", "name of a finding")
+    second: str = quantity(..., "", "name of another finding")
+    coefficient: float = quantity(..., "1", "correlation coefficient of their errors", ge=-1, le=1)
+
+    @field_validator("first", "second")
+    @classmethod
+    def _as_findings_are_named(cls, name: str) -> str:
+        return _canonical(name)
+
+    @property
+    def pair(self) -> frozenset[str]:
+        """The two names, in no order."""
+        return frozenset((self.first, self.second))
+
+
+class Identified(Parameters):
+    """Everything that has been measured of a specimen. Findings that no correlation names are independent."""
+
+    findings: tuple[Finding, ...] = quantity((), "", "what was measured, each quantity once")
+    correlations: tuple[Correlation, ...] = quantity((), "", "correlations between findings")
+
+    @model_validator(mode="after")
+    def _that_can_be(self) -> "Identified":
+        names = self.names
+        for index, name in enumerate(names):
+            if name in names[:index]:
+                raise InvalidInput("findings", name, "each quantity may be there once")
+        labels = sorted((label, name) for name in names if (label := spring_label(name)) is not None)
+        for (label, _), (next_label, name) in pairwise(labels):
+            if isclose(label, next_label):
+                raise InvalidInput("findings", name, f"its label cannot be told from that of {spring_name(label)}")
+        pairs: set[frozenset[str]] = set()
+        for one in self.correlations:
+            for name in (one.first, one.second):
+                if name not in names:
+                    raise InvalidInput("correlations", name, f"there is no such finding; there are {', '.join(names)}")
+            if one.first == one.second or one.pair in pairs:
+                pair = f"{one.first}, {one.second}"
+                raise InvalidInput("correlations", pair, "two different findings, each pair once")
+            pairs.add(one.pair)
+        if self.correlations and float(np.linalg.eigvalsh(self.correlation(names)).min()) < -_ROUNDING:
+            refused = [one.coefficient for one in self.correlations]
+            allowed = "quantities cannot be correlated like this together: the matrix has a negative eigenvalue"
+            raise InvalidInput("correlations", refused, allowed)
+        return self
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the findings, in their order."""
+        return tuple(finding.name for finding in self.findings)
+
+    def finding(self, name: str) -> Finding | None:
+        """The finding of a quantity; None when it has not been measured."""
+        return next((finding for finding in self.findings if finding.name == name), None)
+
+    def covariance(self, names: Sequence[str]) -> NDArray[np.float64]:
+        """Covariance of the findings `names`, shape (n, n), SI. Raises InvalidInput for one that is not there."""
+        found = [self.finding(name) for name in names]
+        if None in found:
+            missing = names[found.index(None)]
+            raise InvalidInput("name", missing, f"it has not been identified; {', '.join(self.names) or 'nothing'} is")
+        sizes = np.array([finding.standard_uncertainty for finding in found if finding is not None])
+        return self.correlation(names) * np.outer(sizes, sizes)
+
+    def applied(self, specimen: Specimen) -> Specimen:
+        """`specimen` as it is known best: what was measured stands in place of what it says.
+
+        The labels of the springs go on referring to its own k1. Raises InvalidInput for values that cannot be together.
+        """
+        values = {finding.name: finding.value for finding in self.findings}
+        measured = tuple(
+            Spring(label=label, k_c=value) for name, value in values.items() if (label := spring_label(name))
+        )
+        labels = [spring.label for spring in measured]
+        others = tuple(spring for spring in specimen.springs if spring.label not in labels)
+        frame = {name: values[name] for name in Frame.model_fields if name in values}
+        block = {name: values[name] for name in Block.model_fields if name in values}
+        try:
+            best = specimen.model_copy(
+                update={
+                    # built anew: a copy would keep the natural frequencies that the frame has cached
+                    "frame": Frame(**(specimen.frame.model_dump() | frame)),
+                    "block": Block(**(specimen.block.model_dump() | block)),
+                    "springs": others + measured,
+                    "spring_k1": specimen.spring_k1 or (specimen.frame.k1 if "k1" in values else None),
+                }
+            )
+        except ValidationError as error:
+            cause = error.errors()[0].get("ctx", {}).get("error", error)
+            raise InvalidInput("findings", ", ".join(values), f"such a specimen cannot be: {cause}") from None
+        return best if specimen.label is None else best.coupled(specimen.label)
+
+    def correlation(self, names: Sequence[str]) -> NDArray[np.float64]:
+        """Correlation matrix of the findings `names`, shape (n, n)."""
+        matrix = np.eye(len(names))
+        for one in self.correlations:
+            if one.first in names and one.second in names:
+                i, j = names.index(one.first), names.index(one.second)
+                matrix[i, j] = matrix[j, i] = one.coefficient
+        return matrix
+
+    def extended(self, findings: Iterable[Finding], correlations: Iterable[Correlation] = ()) -> "Identified":
+        """With newer findings, which replace older ones of the same name together with their correlations."""
+        findings, correlations = tuple(findings), tuple(correlations)
+        kept, pairs = self.without(*(finding.name for finding in findings)), {one.pair for one in correlations}
+        still = tuple(one for one in kept.correlations if one.pair not in pairs)
+        return Identified(findings=kept.findings + findings, correlations=still + correlations)
+
+    def without(self, *names: str) -> "Identified":
+        """What is left when the findings `names` are taken away, with every correlation of theirs."""
+        return Identified(
+            findings=tuple(finding for finding in self.findings if finding.name not in names),
+            correlations=tuple(one for one in self.correlations if not one.pair & set(names)),
+        )

@@ -1,0 +1,169 @@
+"""How well a specimen is known, and specimens drawn from what is left open."""
+
+from collections.abc import Mapping
+from math import hypot, sqrt
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.identified import Finding, Identified, spring_name
+from sim.parameters import quantity
+from sim.specimen import Block, Frame, Specimen
+from sim.uncertainty import SpecimenUncertainty
+
+LARGEST_DAMPING = 0.999
+"""A drawn damping ratio stays below 1, as a frame's must."""
+
+ELASTIC = 1.0 - 1e-12
+"""A drawn restitution stays below 1, as a block's must, rounding included."""
+
+LEAST = 1e-3
+"""Share of its best estimate that a drawn quantity keeps: none is negative."""
+
+RECTANGULAR = 1.0 / sqrt(3.0)
+"""Standard uncertainty of a quantity that may be anywhere within a half width of 1 (GUM 4.3.7)."""
+
+Floats = NDArray[np.float64]
+
+FRAME = ("m1", "m2", "k1", "k2", "xi1", "xi2")
+RESTITUTION = "restitution_factor"
+SPRING = "k_c"
+"""Quantities that may be uncertain; SPRING is the stiffness of the mounted spring."""
+
+_WIDTH = {
+    "k1": "stiffness",
+    "k2": "stiffness",
+    "xi1": "damping",
+    "xi2": "damping",
+    RESTITUTION: "restitution",
+    SPRING: "spring",
+}
+"""The half width of each quantity. Masses have none: a balance knows them, or a fit has found them."""
+
+_OF_MASSES = "stiffness"
+"""The half width that stands for the masses where parts are looked at one by one: frame and masses are one fit."""
+
+
+class SpecimenKnowledge(SpecimenUncertainty):
+    """Measured quantities by their covariance, jointly normal; the others by their half widths.
+
+    The specimens that it is asked about have the measured values already, see `Identified.applied`. `give` is a further
+    relative half width of the restitution.
+    """
+
+    identified: Identified = Identified()
+    give: float = quantity(0.0, "1", "of the block's restitution, by a table that gives way at the impacts", ge=0, lt=1)
+
+    def draws(self, specimen: Specimen, n: int, random: np.random.Generator) -> list[Specimen]:
+        """`n` specimens that `specimen` may really be. A restitution that would reach 1 is drawn just below."""
+        widths = np.array([getattr(self, width) for width in _WIDTH.values()])
+        columns = dict(zip(_WIDTH, (1.0 + widths * random.uniform(-1.0, 1.0, (n, widths.size))).T, strict=True))
+        if measured := self._measured(specimen):
+            matrix, sizes = self._spread(measured)
+            root = np.array(sizes)[:, None] * root_of(matrix)
+            normal = 1.0 + random.standard_normal((n, len(measured))) @ root.T
+            columns |= dict(zip(measured, normal.T, strict=True))
+        if self.give > 0.0:
+            columns[RESTITUTION] = columns[RESTITUTION] * (1.0 + self.give * random.uniform(-1.0, 1.0, n))
+        rows = np.column_stack(list(columns.values())).tolist()
+        return [_off(specimen, dict(zip(columns, row, strict=True))) for row in rows]
+
+    def relative(self, specimen: Specimen) -> dict[str, float]:
+        """Relative standard uncertainty of every quantity of `specimen` that is left open, by name."""
+        sizes = {name: RECTANGULAR * float(getattr(self, width)) for name, width in _WIDTH.items()}
+        measured = self._measured(specimen)
+        sizes |= dict(zip(measured, self._spread(measured)[1], strict=True))
+        sizes[RESTITUTION] = hypot(sizes[RESTITUTION], RECTANGULAR * self.give)
+        return {name: size for name, size in sizes.items() if size > 0.0}
+
+    def correlations(self, specimen: Specimen) -> dict[tuple[str, str], float]:
+        """Correlation coefficients of pairs of those quantities; pairs that are not here are independent."""
+        measured, sizes = self._measured(specimen), self.relative(specimen)
+        names, (matrix, own) = list(measured), self._spread(measured)
+        # what else makes a quantity uncertain is independent, and weakens its correlations
+        shares = [size / sizes[name] if name in sizes else 0.0 for name, size in zip(names, own, strict=True)]
+        weakened = matrix * np.outer(shares, shares)
+        return {
+            (names[i], names[j]): float(weakened[i, j])
+            for i in range(len(names))
+            for j in range(i)
+            if weakened[i, j] != 0.0
+        }
+
+    def deviations(self, specimen: Specimen) -> list[tuple[Specimen, Specimen]]:
+        """Pairs of specimens, one standard uncertainty to either side of `specimen` along independent directions.
+
+        For a result y, the sum over the pairs of ((y_1 - y_2) / 2)^2 is its variance to first order: GUM 5.1.4, note 2,
+        along the principal axes of the correlation matrix.
+        """
+        sizes = self.relative(specimen)
+        names = list(sizes)
+        matrix = np.eye(len(names))
+        for (one, other), coefficient in self.correlations(specimen).items():
+            i, j = names.index(one), names.index(other)
+            matrix[i, j] = matrix[j, i] = coefficient
+        steps = np.array(list(sizes.values()))[:, None] * root_of(matrix)
+
+        def moved(step: Floats) -> Specimen:
+            return _off(specimen, dict(zip(names, (1.0 + step).tolist(), strict=True)))
+
+        return [(moved(step), moved(-step)) for step in steps.T if step.any()]
+
+    def only(self, *widths: str) -> Self:
+        """With all but these half widths, and what was measured in place of them, taken as exactly known."""
+        findings = [
+            finding if _governor(finding.name) in widths else finding.model_copy(update={"standard_uncertainty": 0.0})
+            for finding in self.identified.findings
+        ]
+        identified = Identified(findings=tuple(findings), correlations=self.identified.correlations)
+        give = self.give if "restitution" in widths else 0.0
+        zero = dict.fromkeys(set(SpecimenUncertainty.model_fields) - set(widths), 0.0)
+        return self.model_copy(update={**zero, "identified": identified, "give": give})
+
+    def _measured(self, specimen: Specimen) -> dict[str, Finding]:
+        """The findings that speak of `specimen`, by the name of the quantity."""
+        names = {name: name for name in (*FRAME, RESTITUTION)}
+        if specimen.label:
+            names[SPRING] = spring_name(specimen.label)
+        found = {name: self.identified.finding(finding) for name, finding in names.items()}
+        return {name: finding for name, finding in found.items() if finding is not None}
+
+    def _spread(self, measured: Mapping[str, Finding]) -> tuple[Floats, list[float]]:
+        """Correlation matrix of findings, shape (n, n), and their relative standard uncertainties."""
+        findings = list(measured.values())
+        matrix = self.identified.correlation([finding.name for finding in findings])
+        return matrix, [finding.standard_uncertainty / finding.value for finding in findings]
+
+
+def root_of(matrix: Floats) -> Floats:
+    """A matrix R, shape (n, n), with R R' = `matrix`, which is symmetric and positive semidefinite but for rounding."""
+    values, vectors = np.linalg.eigh(matrix)
+    root: Floats = vectors * np.sqrt(np.maximum(values, 0.0))
+    return root
+
+
+def _governor(finding: str) -> str:
+    """The half width in whose place a finding stands."""
+    return _WIDTH.get(finding, _OF_MASSES if finding in FRAME else _WIDTH[SPRING])
+
+
+def _off(specimen: Specimen, factors: Mapping[str, float]) -> Specimen:
+    """`specimen` with its values times the factors, kept within what a specimen can be.
+
+    The spring's is on k_C, whatever k1 is.
+    """
+    frame, block, beta = specimen.frame, specimen.block, specimen.beta
+    f = dict.fromkeys((*FRAME, RESTITUTION, SPRING), 1.0) | {k: max(v, LEAST) for k, v in factors.items()}
+    # built anew: a copy would keep the natural frequencies that the frame has cached
+    values = frame.model_dump() | {name: getattr(frame, name) * f[name] for name in FRAME}
+    values |= {name: min(values[name], LARGEST_DAMPING) for name in ("xi1", "xi2")}
+    elastic = ELASTIC / block.restitution if block.restitution > 0.0 else 1.0
+    bounce = {RESTITUTION: block.restitution_factor * min(f[RESTITUTION], elastic)}
+    return specimen.model_copy(
+        update={
+            "frame": Frame(**values),
+            "block": Block(**(block.model_dump() | bounce)),
+            "beta": None if beta is None else beta * f[SPRING] / f["k1"],
+        }
+    )
