@@ -4,7 +4,7 @@ A fit over one cycle needs no whole number of samples, averages the noise of hun
 of the motion without the upward bias of picking the largest noisy sample.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil, tau
 
@@ -91,15 +91,35 @@ def mean_amplitude(cycles: Sequence[Cycle], column: int) -> float:
     return float(np.mean([abs(cycle.fundamental[column]) for cycle in cycles]))
 
 
-def mean_cycle(cycles: Sequence[Cycle]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Peaks of the mean of many cycles, shape (m,), each cycle's magnitude there, (n, m), and harmonics, (m,).
+@dataclass(frozen=True, eq=False)
+class Waves:
+    """The mean of many cycles.
 
-    The mean is taken of the coefficients, so that noise does not raise the peak as a mean of peaks would. The
-    harmonics are the rms of all above the fundamental over the fundamental.
+    `waveform` and its `rates` [per rad of phase], shape (k, m), over one period; `peaks`, shape (m,), are the largest
+    magnitudes, in row `at` of the waveform; `there`, (n, m), is each cycle's magnitude at it. `harmonics`, (m,), are
+    the rms of all above the fundamental over the fundamental.
+    """
+
+    waveform: NDArray[np.float64]
+    rates: NDArray[np.float64]
+    at: NDArray[np.intp]
+    peaks: NDArray[np.float64]
+    there: NDArray[np.float64]
+    harmonics: NDArray[np.float64]
+
+
+def mean_waves(cycles: Sequence[Cycle], bound: Mapping[int, int] | None = None) -> Waves:
+    """The mean is taken of the coefficients, so that noise does not raise the peak as a mean of peaks would.
+
+    `bound` tells for a column that its signal has no mean and no harmonics above the given one.
     """
     all_coefficients = np.array([cycle.coefficients for cycle in cycles])
+    harmonics = (all_coefficients.shape[1] - 1) // 2
+    orders: NDArray[np.float64] = np.arange(1, harmonics + 1, dtype=np.float64)
+    for column, highest in (bound or {}).items():
+        all_coefficients[:, np.concatenate(([0.0], orders, orders)) > highest, column] = 0.0
+        all_coefficients[:, 0, column] = 0.0
     mean = all_coefficients.mean(axis=0)
-    harmonics = (mean.shape[0] - 1) // 2
     basis = _basis(_ANGLES, harmonics)
     waveform = basis @ mean
     at = np.argmax(np.abs(waveform), axis=0)
@@ -107,7 +127,16 @@ def mean_cycle(cycles: Sequence[Cycle]) -> tuple[NDArray[np.float64], NDArray[np
     there = sign * np.einsum("mk,nkm->nm", basis[at], all_coefficients)
     power = mean[1 : harmonics + 1] ** 2 + mean[harmonics + 1 :] ** 2
     fundamental = np.where(power[0] > 0.0, power[0], np.inf)
-    return _peak(waveform), there, np.sqrt(power[1:].sum(axis=0) / fundamental)
+    cosines, sines = mean[1 : harmonics + 1], mean[harmonics + 1 :]
+    turned = np.concatenate((np.zeros_like(mean[:1]), orders[:, None] * sines, -orders[:, None] * cosines))
+    return Waves(
+        waveform=waveform,
+        rates=basis @ turned,
+        at=at,
+        peaks=_peak(waveform),
+        there=there,
+        harmonics=np.sqrt(power[1:].sum(axis=0) / fundamental),
+    )
 
 
 def _peak(waveform: NDArray[np.float64]) -> NDArray[np.float64]:

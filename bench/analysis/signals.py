@@ -5,6 +5,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.analysis.laser_calibration import LaserCalibration
 from drivers.rig import Channel
 from sim.errors import InvalidInput
 
@@ -18,10 +19,16 @@ ACCELERATION, DISPLACEMENT, U1, DRIFT, LASER_1, LASER_2 = range(6)
 class SignalMap:
     """Turns channel values into signals, counted from the zero taken at rest.
 
-    Lasers beside the table see x_g + u; lasers on it see u. The drift is free of x_g either way.
+    Lasers beside the table see x_g + u; lasers on it see u. The drift is free of x_g either way. A `calibration` takes
+    the errors that it found of lasers and table sensors away.
     """
 
-    def __init__(self, channels: tuple[Channel, ...], reference: Literal["ground", "table"]) -> None:
+    def __init__(
+        self,
+        channels: tuple[Channel, ...],
+        reference: Literal["ground", "table"],
+        calibration: LaserCalibration | None = None,
+    ) -> None:
         names = [channel.name for channel in channels]
         needed = ("table_acceleration", "table_displacement", "laser_1", "laser_2")
         for name in needed:
@@ -29,6 +36,7 @@ class SignalMap:
                 raise InvalidInput("channels", ", ".join(names), f"the harmonic analysis needs a channel {name}")
         self._columns = [names.index(name) for name in needed]
         self._ground = reference == "ground"
+        self._calibration = calibration
         self._zero = np.zeros(len(SIGNALS))
 
     def tare(self, values: NDArray[np.float64]) -> None:
@@ -51,6 +59,12 @@ class SignalMap:
 
     def _raw(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         acceleration, displacement, first, second = (values[:, column] for column in self._columns)
+        if (found := self._calibration) is not None:
+            acceleration, displacement = (
+                found.table_acceleration * acceleration,
+                found.table_displacement * displacement,
+            )
+            first, second = found.laser_1.corrected(first), found.laser_2.corrected(second)
         signals = np.empty((values.shape[0], len(SIGNALS)), order="F")
         signals[:, ACCELERATION] = acceleration
         signals[:, DISPLACEMENT] = displacement

@@ -47,17 +47,24 @@ class SteadyDetector:
     """
 
     def __init__(
-        self, tolerance: float, columns: Sequence[int] | None = None, kin: Sequence[int] = (), jitter: float = 0.0
+        self,
+        tolerance: float,
+        columns: Sequence[int] | None = None,
+        kin: Sequence[int] = (),
+        jitter: float = 0.0,
+        beside: Sequence[int] = (),
     ) -> None:
         """`columns` are the signals that are judged, all of them when absent; `kin` the places, among them, of signals
         of one kind: none is held to less than `KIN_SHARE` of the largest.
 
+        `beside` are signals that are not judged, and on `KIN_SHARE` of whose motion every other is judged at least.
         `jitter` [rad] is how far a phase may wander because a sensor runs on its own clock.
         """
         self._tolerance = tolerance
         self._columns = slice(None) if columns is None else list(columns)
         self._kin = list(kin)
         self._jitter = jitter
+        self._beside, self._floor = list(beside), 1e-12
         self._cycles: deque[Cycle] = deque(maxlen=2 * WINDOW)
 
     def push(self, cycle: Cycle) -> None:
@@ -75,6 +82,9 @@ class SteadyDetector:
         cycles = list(self._cycles)
         amplitudes = np.array([cycle.fundamental[self._columns] for cycle in cycles])
         peaks = np.array([cycle.peak[self._columns] for cycle in cycles])
+        if self._beside:
+            others = np.mean([cycle.fundamental[self._beside] for cycle in cycles[WINDOW:]], axis=0)
+            self._floor = max(KIN_SHARE * float(np.abs(others).max()), 1e-12)
         noise = [cycle.noise[self._columns] * np.sqrt(2.0 / cycle.samples) for cycle in cycles]
         sigma = np.array(noise).mean(axis=0)
         spreads, drifts = zip(self._compare(amplitudes, sigma), self._compare(peaks, 2.0 * sigma), strict=True)
@@ -104,7 +114,7 @@ class SteadyDetector:
         return np.maximum(np.abs(np.abs(these) - size), turned - self._jitter * size)
 
     def _size(self, mean: NDArray[np.complex128] | NDArray[np.float64]) -> NDArray[np.float64]:
-        size = np.maximum(np.abs(mean), 1e-12)
+        size = np.maximum(np.abs(mean), self._floor)
         if self._kin:
             size[self._kin] = np.maximum(size[self._kin], KIN_SHARE * size[self._kin].max())
         return size

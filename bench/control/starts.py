@@ -13,10 +13,10 @@ import numpy as np
 
 from bench.control.candidates import Candidate, candidates
 from bench.control.legs import Leg, program
+from sim.knowledge import SpecimenKnowledge
 from sim.rocking import Motion, Status, simulate_many
 from sim.specimen import Specimen
 from sim.steady import NoOrbit, Orbit, rocking_orbit
-from sim.uncertainty import SpecimenUncertainty
 
 DRIVE = 0.03
 """Relative half width of the table's amplitude during a start, before the amplitude's control has closed on it."""
@@ -75,7 +75,7 @@ def plan_starts(
     amplitude: float,
     orbit: Orbit | None,
     count: int,
-    uncertainty: SpecimenUncertainty | None = None,
+    uncertainty: SpecimenKnowledge | None = None,
 ) -> list[Start]:
     """The `count` most robust starts to `amplitude` [m/s2] at `omega` [rad/s], best first, the shorter one of equals.
 
@@ -84,7 +84,7 @@ def plan_starts(
     Raises InvalidInput for a bare frame or meaningless numbers.
     """
     random = np.random.default_rng(SEED)
-    allowed = uncertainty or SpecimenUncertainty()
+    allowed = uncertainty or SpecimenKnowledge()
 
     def cases(n: int) -> list[_Case]:
         return _cases(allowed.draws(specimen, n, random), omega, amplitude, orbit, random)

@@ -21,7 +21,7 @@ def delay_lines(sines: Sines, parameters: CheckParameters, configuration: BenchC
 
     A delay is positive where the laser says later than the table's displacement what both have seen.
     """
-    most = allowed_delay(configuration.specimen, parameters.highest_omega, parameters.u1_error)
+    most = allowed_delay(configuration.known_specimen, parameters.highest_omega, parameters.u1_error)
     setting = _setting(configuration)
     found: list[tuple[float, float]] = []
     for name, amplitudes in (("laser_1", sines.laser_1), ("laser_2", sines.laser_2)):

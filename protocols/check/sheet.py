@@ -30,7 +30,7 @@ _UNCLAMP = "Take the clamps off the storeys."
 
 def check_plan(parameters: CheckParameters, configuration: BenchConfiguration) -> Plan:
     """The whole check as steps; every line is published as a point as soon as it is known."""
-    bare = configuration.specimen.bare()
+    bare = configuration.known_specimen.bare()
     yield Handle(Handwork.LOCK_FRAME, bare, _CLAMP)
     yield Say(StepStarted(0.0, "listen at rest"))
     heard = yield Listen(parameters.rest)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from bench.config.model import BenchConfiguration
 from bench.engine.steps import Plan
@@ -10,6 +11,9 @@ from bench.record.tables import Table
 from protocols.earthquake.parameters import EarthquakeParameters
 from protocols.earthquake.point import EarthquakePoint
 from sim.parameters import Parameters
+
+if TYPE_CHECKING:
+    from protocols.earthquake.sources import Sources
 
 
 class EarthquakeCampaign:
@@ -27,12 +31,28 @@ class EarthquakeCampaign:
         self._histories = Histories()
         self._records: list[dict[str, object]] = []
         self._band = (0.0, 0.0)
+        self._sources: Sources | None = None
 
     def check(self, configuration: BenchConfiguration) -> None:
         """Raise InvalidInput for records, a band or a table model that cannot be used on this bench."""
         from protocols.earthquake.check import check
 
-        check(self.parameters, configuration)
+        check(self.parameters, configuration, self._sources)
+
+    def sources(self, configuration: BenchConfiguration) -> Mapping[str, Table]:
+        """The records and the table model that are read from files."""
+        from protocols.earthquake.records import shakings
+        from protocols.earthquake.sources import Sources
+        from protocols.earthquake.table import stored_table
+
+        records = tuple(shaking.accelerogram for shaking in shakings(self.parameters, configuration, self._sources))
+        return Sources(records, stored_table(self.parameters, configuration, self._sources)).tables
+
+    def restore(self, tables: Mapping[str, Table]) -> None:
+        """Take them from the tables of a data file from now on."""
+        from protocols.earthquake.sources import Sources
+
+        self._sources = Sources.stored(tables)
 
     def preflight(self, configuration: BenchConfiguration) -> Forecast:
         """Every record with every specimen: the most that is asked of every limit, and the chance that it stands."""
@@ -52,8 +72,9 @@ class EarthquakeCampaign:
         from protocols.earthquake.sheet import EarthquakeSheet
 
         self._band = band_used(self.parameters, configuration)
-        self._records = [shaking.described() for shaking in shakings(self.parameters, configuration)]
-        return EarthquakeSheet(self.parameters, configuration, self._histories).plan()
+        found = shakings(self.parameters, configuration, self._sources)
+        self._records = [shaking.described() for shaking in found]
+        return EarthquakeSheet(self.parameters, configuration, self._histories, self._sources).plan()
 
     def table(self, points: Sequence[Parameters]) -> str:
         """The points and the paper's statement as plain text."""

@@ -71,11 +71,14 @@ def measured(
     moved = tracking(shaking, signals)
     return EarthquakePoint.model_validate(
         {
-            **common(shaking, specimen.beta or 0.0, target_gain, bare),
+            **common(shaking, specimen.label or 0.0, target_gain, bare),
             "status": PointStatus.MEASURED,
             "alpha_1": found.alpha_1,
             "alpha_1_uncertainty": found.alpha_1_uncertainty,
             "alpha_1_predicted": found.alpha_1_predicted,
+            "alpha_1_low": found.alpha_1_low,
+            "alpha_1_high": found.alpha_1_high,
+            "alpha_1_agrees": found.alpha_1_agrees,
             "alpha_2": found.alpha_2,
             "alpha_2_uncertainty": found.alpha_2_uncertainty,
             "alpha_2_predicted": found.alpha_2_predicted,
@@ -83,8 +86,8 @@ def measured(
             "alpha_2_high": found.high,
             "alpha_2_bench_uncertainty": found.bench,
             "agrees": found.agrees,
-            "dominating": found.dominating,
-            "uncertainty_parts": found.parts_as_json,
+            "dominating": found.budget.dominating,
+            "uncertainty_parts": found.budget.as_json,
             "topple_chance": found.chance,
             "drift_peak_m": observed.drift.peak.value,
             "drift_peak_s": observed.drift.peak.time,
@@ -110,13 +113,13 @@ def overturned(
     """A record that toppled the block; the prediction is for the motion with the bare frame, which was whole."""
     time = overturning_time(signals, shaking.target.sample_rate, specimen)
     base = bare.observed.base
-    scale = configuration.analysis.table_scale
-    predicted = predict_draws(base, base, specimen, configuration.uncertainty, draws, seed, table_scale=scale)
+    scale = configuration.sensors.table_scale
+    predicted = predict_draws(base, base, specimen, configuration.known, draws, seed, table_scale=scale)
     when = "at a time that the first storey does not show" if time is None else f"{time:.2f} s after the drive began"
     said = f"the block overturned {when}; predicted chance {predicted.chance:.0%}"
     return EarthquakePoint.model_validate(
         {
-            **common(shaking, specimen.beta or 0.0, target_gain, bare),
+            **common(shaking, specimen.label or 0.0, target_gain, bare),
             "status": PointStatus.OVERTURNED,
             "topple_chance": predicted.chance,
             "overturned_s": time,
@@ -137,7 +140,7 @@ def not_played(
 def _remarks(found: Compared, observed: Observed) -> Iterator[str]:
     """Everything that a reader of the point should know."""
     if found.alpha_2_predicted is None:
-        yield "the specimen as assumed topples under the achieved motion; the interval is that of draws that stood"
+        yield "the specimen as known topples under the achieved motion; the interval is that of draws that stood"
     elif found.chance > CHANCE_NOTE:
         yield f"the block stood; {found.chance:.0%} of the draws topple it"
     if found.agrees is False:

@@ -26,10 +26,13 @@ class EarthquakePoint(Parameters):
     alpha_1: float | None = quantity(None, "1", "measured gain of the peak of u1, coupled over bare")
     alpha_1_uncertainty: float | None = quantity(None, "1", "expanded uncertainty of alpha_1 (k = 2)")
     alpha_1_predicted: float | None = quantity(None, "1", "predicted gain of u1 for the achieved motions of the table")
+    alpha_1_low: float | None = quantity(None, "1", "where the 95 % of what may be measured of it begin")
+    alpha_1_high: float | None = quantity(None, "1", "where they end")
+    alpha_1_agrees: bool | None = quantity(None, "1", "whether alpha_1 lies between alpha_1_low and alpha_1_high")
     alpha_2: float | None = quantity(None, "1", "measured gain of the peak drift, coupled over bare")
     alpha_2_uncertainty: float | None = quantity(None, "1", "expanded uncertainty of alpha_2 (k = 2)")
     alpha_2_predicted: float | None = quantity(
-        None, "1", "predicted gain for the achieved motions of the table, specimen as assumed"
+        None, "1", "predicted gain for the achieved motions of the table, specimen as known"
     )
     alpha_2_low: float | None = quantity(None, "1", "where the 95 % of what may be measured begin, by Monte Carlo")
     alpha_2_high: float | None = quantity(None, "1", "where they end")

@@ -8,6 +8,7 @@ from bench.config.model import BenchConfiguration
 from bench.record.tables import Column, Table
 from protocols.earthquake.parameters import EarthquakeParameters
 from protocols.earthquake.records import shakings
+from protocols.earthquake.sources import Sources
 from sim.gain import SeismicGain, seismic_curve
 
 STEP = 0.05
@@ -38,10 +39,10 @@ def gain_curves(parameters: EarthquakeParameters, configuration: BenchConfigurat
 
 
 def target_gains(
-    parameters: EarthquakeParameters, configuration: BenchConfiguration
+    parameters: EarthquakeParameters, configuration: BenchConfiguration, sources: Sources | None = None
 ) -> dict[tuple[str, float], float | None]:
     """alpha_2 under the asked motion for every record and asked stiffness; None where the block topples."""
-    curves = _curves(parameters, configuration)
+    curves = _curves(parameters, configuration, sources)
     return {
         (name, gain.beta): gain.alpha_2
         for name, curve in curves.items()
@@ -50,18 +51,22 @@ def target_gains(
     }
 
 
-def _curves(parameters: EarthquakeParameters, configuration: BenchConfiguration) -> dict[str, list[SeismicGain]]:
+def _curves(
+    parameters: EarthquakeParameters, configuration: BenchConfiguration, sources: Sources | None = None
+) -> dict[str, list[SeismicGain]]:
     # frozen parameters are hashable, though pydantic does not declare it
-    return _computed(parameters, configuration)  # pyright: ignore[reportArgumentType]
+    return _computed(parameters, configuration, sources)  # pyright: ignore[reportArgumentType]
 
 
 @lru_cache(maxsize=4)
-def _computed(parameters: EarthquakeParameters, configuration: BenchConfiguration) -> dict[str, list[SeismicGain]]:
+def _computed(
+    parameters: EarthquakeParameters, configuration: BenchConfiguration, sources: Sources | None
+) -> dict[str, list[SeismicGain]]:
     first, last = max(min(parameters.beta) - MARGIN, STEP), max(parameters.beta) + MARGIN
     grid = np.linspace(first, last, round((last - first) / STEP) + 1)
     betas = sorted({*(round(float(beta), 6) for beta in grid), *parameters.beta})
-    specimen = configuration.specimen
+    specimen = configuration.known_specimen
     return {
         shaking.name: seismic_curve(specimen, shaking.prepared.record, betas)
-        for shaking in shakings(parameters, configuration)
+        for shaking in shakings(parameters, configuration, sources)
     }

@@ -54,7 +54,7 @@ def forecast(parameters: EarthquakeParameters, configuration: BenchConfiguration
     """
     found = shakings(parameters, configuration)
     first, duration = _identification(parameters, configuration)
-    specimens = [configuration.specimen.bare(), *map(configuration.specimen.coupled, parameters.beta)]
+    specimens = [configuration.known_specimen.bare(), *map(configuration.known_specimen.coupled, parameters.beta)]
     asked = [*first, *(_asked(shaking, specimen, configuration) for shaking in found for specimen in specimens)]
     return Forecast(
         demands=tuple(demand(quantity, asked, _UNKNOWN) for quantity in bounds(configuration)),
@@ -93,7 +93,7 @@ def _asked(shaking: Shaking, specimen: Specimen, configuration: BenchConfigurati
         "laser_2": np.array([each.storey_2 for each in travels]) / halves[1] + OFF_MIDDLE,
         "drift": np.array([each.drift for each in travels]),
     }
-    mounted = "the bare frame" if specimen.beta is None else f"beta = {specimen.beta:g}"
+    mounted = "the bare frame" if specimen.beta is None else f"beta = {specimen.label:g}"
     stood = sum(each.toppled is None for each in travels[1:])
     chance = None if specimen.beta is None else (stood + 1) / (DRAWS + 2)
     return Asked(f"{shaking.name} with {mounted}", values, chance)
@@ -104,7 +104,7 @@ def _travels(
 ) -> Sequence[Travel]:
     """Motion of the specimen as assumed and as drawn, on all processors."""
     import_module("sim.kernel.rocking")  # compiled once, before the threads start
-    drawn = [specimen, *configuration.uncertainty.draws(specimen, DRAWS, np.random.default_rng(SEED))]
+    drawn = [specimen, *configuration.known.draws(specimen, DRAWS, np.random.default_rng(SEED))]
     grounded = configuration.laser_reference == "ground"
 
     def one(k: int) -> Travel:

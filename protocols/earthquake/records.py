@@ -16,6 +16,7 @@ from bench.control.stroke.reach import Reach
 from bench.control.target import Target
 from bench.prediction.seismic import band_of
 from protocols.earthquake.parameters import EarthquakeParameters
+from protocols.earthquake.sources import Sources
 from sim.errors import InvalidInput
 from sim.excitation import SampledRecord
 
@@ -76,21 +77,28 @@ def band_used(parameters: EarthquakeParameters, configuration: BenchConfiguratio
     return band
 
 
-def shakings(parameters: EarthquakeParameters, configuration: BenchConfiguration) -> tuple[Shaking, ...]:
-    """Every record, read and prepared once, in the order asked. Raises InvalidInput."""
+def shakings(
+    parameters: EarthquakeParameters, configuration: BenchConfiguration, sources: Sources | None = None
+) -> tuple[Shaking, ...]:
+    """Every record, read and prepared once, in the order asked; `sources` are those of a data file.
+
+    Raises InvalidInput.
+    """
     # frozen parameters are hashable, though pydantic does not declare it
-    return _shakings(parameters, configuration)  # pyright: ignore[reportArgumentType]
+    return _shakings(parameters, configuration, sources)  # pyright: ignore[reportArgumentType]
 
 
 @lru_cache(maxsize=4)
-def _shakings(parameters: EarthquakeParameters, configuration: BenchConfiguration) -> tuple[Shaking, ...]:
+def _shakings(
+    parameters: EarthquakeParameters, configuration: BenchConfiguration, sources: Sources | None
+) -> tuple[Shaking, ...]:
     named = parameters.records or tuple(f"synthetic:{name}" for name in NAMES)
-    records = read_records([RecordReference.parse(text) for text in named])
+    records = sources.records if sources else read_records([RecordReference.parse(text) for text in named])
     return tuple(_shaking(record, parameters, configuration) for record in records)
 
 
 def _shaking(record: Accelerogram, parameters: EarthquakeParameters, configuration: BenchConfiguration) -> Shaking:
-    specimen = configuration.specimen
+    specimen = configuration.known_specimen
     try:
         part, begin = _strongest(record.sampled, parameters.longest)
         prepared = prepare(

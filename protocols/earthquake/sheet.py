@@ -31,6 +31,7 @@ from protocols.earthquake.point import EarthquakePoint
 from protocols.earthquake.prediction import target_gains
 from protocols.earthquake.records import Shaking, shakings
 from protocols.earthquake.shaken import tracking
+from protocols.earthquake.sources import Sources
 from protocols.earthquake.table import identification_time, table_for
 from protocols.replicate import replicate
 from sim.errors import InvalidInput
@@ -48,20 +49,25 @@ class EarthquakeSheet:
     """One campaign on one bench: what the plan knows and gathers while it runs."""
 
     def __init__(
-        self, parameters: EarthquakeParameters, configuration: BenchConfiguration, histories: Histories
+        self,
+        parameters: EarthquakeParameters,
+        configuration: BenchConfiguration,
+        histories: Histories,
+        sources: Sources | None = None,
     ) -> None:
         self._parameters, self._configuration, self._histories = parameters, configuration, histories
-        self._specimen = configuration.specimen
-        self._shakings = shakings(parameters, configuration)
-        self._targets = target_gains(parameters, configuration)
-        self._pace = Pace(parameters, self._shakings, identification_time(parameters, configuration))
+        self._specimen = configuration.known_specimen
+        self._sources = sources
+        self._shakings = shakings(parameters, configuration, sources)
+        self._targets = target_gains(parameters, configuration, sources)
+        self._pace = Pace(parameters, self._shakings, identification_time(parameters, configuration, sources))
         self._bare: dict[str, BareTest | str] = {}
         self._shortfalls: dict[str, str] = {}
         self._points = 0
 
     def plan(self) -> Plan:
         """The whole campaign as steps."""
-        model = yield from table_for(self._parameters, self._configuration, self._pace)
+        model = yield from table_for(self._parameters, self._configuration, self._pace, self._sources)
         for shaking in self._shakings:
             self._bare[shaking.name] = yield from self._bare_frame(shaking, model)
             self._pace.learned(shaking.name)
@@ -122,20 +128,20 @@ class EarthquakeSheet:
         )
 
     def _spring(self, specimen: Specimen) -> Generator[Step, Outcome, None]:
-        request = f"Stand the block on its base and mount the spring of beta = {specimen.beta:g}."
+        request = f"Stand the block on its base and mount the spring of beta = {specimen.label:g}."
         yield Handle(Handwork.MOUNT_SPRING, specimen, request)
         for shaking in self._shakings:
             bare = self._bare[shaking.name]
             if isinstance(bare, BareTest):
                 point = self._noted(shaking, (yield from self._point(shaking, specimen, bare)))
             else:
-                point = not_played(shaking, specimen.beta or 0.0, self._target(shaking, specimen), None, bare)
+                point = not_played(shaking, specimen.label or 0.0, self._target(shaking, specimen), None, bare)
             self._pace.played(shaking.name)
-            yield Say(self._pace.progress(f"finished {shaking.name}, beta = {specimen.beta:g}"))
+            yield Say(self._pace.progress(f"finished {shaking.name}, beta = {specimen.label:g}"))
             yield Say(PointFinished(0.0, point))
 
     def _point(self, shaking: Shaking, specimen: Specimen, bare: BareTest) -> Generator[Step, Outcome, EarthquakePoint]:
-        yield Say(StepStarted(0.0, f"{shaking.name}, beta = {specimen.beta:g}"))
+        yield Say(StepStarted(0.0, f"{shaking.name}, beta = {specimen.label:g}"))
         outcome = yield from self._play(shaking, bare.drive, self._watch(shaking, specimen, bare))
         if isinstance(outcome, Fallen):
             yield Handle(Handwork.STAND_BLOCK_UP, specimen, FALLEN_REQUEST)
@@ -147,9 +153,9 @@ class EarthquakeSheet:
             try:
                 observed = observe(outcome.signals, shaking.target.rest, rate)
             except InvalidInput as lost:
-                return not_played(shaking, specimen.beta or 0.0, target, bare, f"no peak is to be seen: {lost}")
+                return not_played(shaking, specimen.label or 0.0, target, bare, f"no peak is to be seen: {lost}")
             expected = History.of(specimen, observed.base).drift
-            self._histories.coupled(shaking, specimen.beta or 0.0, outcome.signals, expected)
+            self._histories.coupled(shaking, specimen.label or 0.0, outcome.signals, expected)
             return measured(
                 shaking, specimen, bare, outcome.signals, observed, target, self._configuration, p.draws, seed
             )
@@ -174,7 +180,7 @@ class EarthquakeSheet:
         base = bare.observed.base
         expected = (History.of(specimen.bare(), base), History.of(specimen, base))
         noise = bare.observed.drift.peak.uncertainty
-        return Watch(shaking.name, specimen.beta, shaking.target.sample_rate, bare.signals[:, DRIFT], noise, expected)
+        return Watch(shaking.name, specimen.label, shaking.target.sample_rate, bare.signals[:, DRIFT], noise, expected)
 
     def _noted(self, shaking: Shaking, point: EarthquakePoint) -> EarthquakePoint:
         """With what the drive lacks that it was played with."""
@@ -182,4 +188,4 @@ class EarthquakeSheet:
         return point.model_copy(update={"reason": "; ".join(said)})
 
     def _target(self, shaking: Shaking, specimen: Specimen) -> float | None:
-        return self._targets[shaking.name, specimen.beta or 0.0]
+        return self._targets[shaking.name, specimen.label or 0.0]

@@ -18,6 +18,7 @@ from drivers.rig import Handwork
 from protocols.earthquake.pace import Pace
 from protocols.earthquake.parameters import EarthquakeParameters
 from protocols.earthquake.records import band_used
+from protocols.earthquake.sources import Sources
 from protocols.identify.level import mounted_name, planned
 from protocols.identify.parameters import IdentifyParameters
 from protocols.identify.sheet import expected_duration, identify_plan
@@ -30,15 +31,20 @@ OCTAVE_LINES = 4
 """Lines in the lowest octave of the identification, where an octave holds the fewest."""
 
 
-def stored_table(parameters: EarthquakeParameters, configuration: BenchConfiguration) -> TableModel | None:
-    """The configured table model; None when none is named.
+def stored_table(
+    parameters: EarthquakeParameters, configuration: BenchConfiguration, sources: Sources | None = None
+) -> TableModel | None:
+    """The configured table model; None when none is named. That of a data file was fresh when its run began.
 
     Raises InvalidInput when it cannot be read, is too old, or does not suit the sample rate or the band.
     """
     if configuration.table_model is None:
         return None
-    model = TableModel.read(Path(configuration.table_model))
-    model.require_fresh(datetime.now(UTC))
+    if sources is not None and sources.table is not None:
+        model = sources.table
+    else:
+        model = TableModel.read(Path(configuration.table_model))
+        model.require_fresh(datetime.now(UTC))
     model.require_rate(configuration.sample_rate)
     band = band_used(parameters, configuration)
     low, high = band[0] / REACH, band[1] * REACH
@@ -54,13 +60,16 @@ def table_warnings(parameters: EarthquakeParameters, configuration: BenchConfigu
     the frame at which nothing tells how well the table follows.
     """
     said: list[str] = []
-    model, bare = stored_table(parameters, configuration), mounted_name(configuration.specimen.bare())
+    model, bare = stored_table(parameters, configuration), mounted_name(configuration.known_specimen.bare())
     if model is not None and model.specimen != bare:
         said.append(
             f"table_model was identified with {model.specimen!r} on the table, the drives are learned with the {bare}:"
             " more passes may be needed; `rockbench run identify` without --beta identifies the table for it"
         )
-    mode, low = min(configuration.specimen.frame.natural_frequencies) / tau, band_used(parameters, configuration)[0]
+    mode, low = (
+        min(configuration.known_specimen.frame.natural_frequencies) / tau,
+        band_used(parameters, configuration)[0],
+    )
     if mode * FLAT < low:
         said.append(
             f"the frame's first mode at {mode:.3g} Hz lies below the band from {low:g} Hz on: what the table does there"
@@ -86,21 +95,23 @@ def identification(parameters: EarthquakeParameters, configuration: BenchConfigu
     return IdentifyParameters(band_low=first, band_high=high * REACH, period=period)
 
 
-def identification_time(parameters: EarthquakeParameters, configuration: BenchConfiguration) -> float:
+def identification_time(
+    parameters: EarthquakeParameters, configuration: BenchConfiguration, sources: Sources | None = None
+) -> float:
     """Expected length of the identification [s]; zero with a stored model. Raises InvalidInput as both do."""
-    if stored_table(parameters, configuration) is not None:
+    if stored_table(parameters, configuration, sources) is not None:
         return 0.0
     wanted = identification(parameters, configuration)
     return expected_duration(wanted, planned(wanted, configuration))
 
 
 def table_for(
-    parameters: EarthquakeParameters, configuration: BenchConfiguration, pace: Pace
+    parameters: EarthquakeParameters, configuration: BenchConfiguration, pace: Pace, sources: Sources | None = None
 ) -> Generator[Step, Outcome, TableModel]:
     """The stored table, or it is identified now; afterwards the bare frame stands on it."""
-    model = stored_table(parameters, configuration)
+    model = stored_table(parameters, configuration, sources)
     if model is not None:
-        bare = configuration.specimen.bare()
+        bare = configuration.known_specimen.bare()
         yield Handle(Handwork.REMOVE_BLOCK, bare, "Take the spring and the block off the table.")
         return model
     found: list[TableModel] = []

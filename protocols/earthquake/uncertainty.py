@@ -9,7 +9,6 @@ by one say which counts most, and no more: where the response is chaotic each of
 together do.
 """
 
-import json
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -21,16 +20,16 @@ import numpy as np
 from numpy.random import SeedSequence
 from numpy.typing import NDArray
 
-from bench.analysis.gain import COVERAGE
+from bench.analysis.budget import COVERAGE, Budget
 from bench.analysis.transient_base import BaseMotion
 from bench.config.model import BenchConfiguration
 from bench.control.starts import CATCH_ANGLE
 from protocols.earthquake.observed import Observed
 from protocols.earthquake.sensors import drift_errors, u1_errors
 from sim.excitation import SampledRecord
+from sim.knowledge import SpecimenKnowledge
 from sim.rocking import Status, simulate
 from sim.specimen import Specimen
-from sim.uncertainty import SpecimenUncertainty
 
 Array = NDArray[np.float64]
 
@@ -45,7 +44,7 @@ HELD = 0.95
 CHAOTIC = 2.0
 """Variance of all parts drawn one by one over that of one joint draw from which on they do not add up."""
 
-NONE = SpecimenUncertainty(**dict.fromkeys(SpecimenUncertainty.model_fields, 0.0))
+NONE = SpecimenKnowledge().only()
 """A specimen that is exactly known."""
 
 _KEPT = {
@@ -76,43 +75,45 @@ class Predicted:
 
 @dataclass(frozen=True)
 class Compared:
-    """A measured gain beside its prediction; `low` and `high` hold 95 % of what may be measured.
+    """Measured gains beside their predictions; `low` and `high` hold 95 % of what may be measured of alpha_2,
+    `alpha_1_low` and `alpha_1_high` of alpha_1.
 
     `bench` holds 95 % of the magnitudes of measured minus predicted alpha_2 that the bench leaves open, were the
-    specimen known exactly; None where that specimen topples. `parts` are standard uncertainties of alpha_2, each drawn
+    specimen known exactly; None where that specimen topples. `budget` has standard uncertainties of alpha_2, each drawn
     alone, the largest first; `chaotic` says that they do not add up.
     """
 
     alpha_1: float
     alpha_1_uncertainty: float
     alpha_1_predicted: float | None
+    alpha_1_low: float | None
+    alpha_1_high: float | None
     alpha_2: float
     alpha_2_uncertainty: float
     alpha_2_predicted: float | None
     low: float | None
     high: float | None
-    agrees: bool | None
     bench: float | None
-    parts: dict[str, float]
+    budget: Budget
     chaotic: bool
     chance: float
 
     @property
-    def dominating(self) -> str:
-        """The largest part."""
-        return next(iter(self.parts), "")
+    def agrees(self) -> bool | None:
+        """Whether alpha_2 is what may be measured; None where the model leaves nothing to compare with."""
+        return _within(self.alpha_2, self.low, self.high)
 
     @property
-    def parts_as_json(self) -> str:
-        """All parts, for a file."""
-        return json.dumps({name: float(f"{value:.3g}") for name, value in self.parts.items()})
+    def alpha_1_agrees(self) -> bool | None:
+        """The same of alpha_1."""
+        return _within(self.alpha_1, self.alpha_1_low, self.alpha_1_high)
 
 
 def predict_draws(
     bare: BaseMotion,
     coupled: BaseMotion,
     specimen: Specimen,
-    uncertainty: SpecimenUncertainty,
+    uncertainty: SpecimenKnowledge,
     n: int,
     seed: int | SeedSequence,
     *,
@@ -152,54 +153,53 @@ def compare(
     bare: Observed, coupled: Observed, specimen: Specimen, configuration: BenchConfiguration, n: int, seed: int
 ) -> Compared:
     """The gains of two tests with one specimen, which has its spring in the second."""
-    accuracy, ranges = configuration.analysis, configuration.laser_ranges
+    sensors = configuration.sensors
     drifts, firsts = (bare.drift, coupled.drift), (bare.u1, coupled.u1)
     of_drift, of_u1, of_all, of_bench, of_parts = SeedSequence(seed).spawn(5)
-    noise, lasers = drift_errors(drifts, accuracy, ranges, n, of_drift)
+    errors = drift_errors(drifts, sensors, n, of_drift)
     grounded = configuration.laser_reference == "ground"
-    measured_2 = _ratio(noise + lasers)
-    measured_1 = _ratio(u1_errors(firsts, accuracy, ranges, grounded, n, of_u1))
+    measured_2 = _ratio(np.sum(list(errors.values()), axis=0))
+    measured_1 = _ratio(u1_errors(firsts, sensors, grounded, n, of_u1))
     alpha_2 = coupled.drift.peak.value / bare.drift.peak.value
     alpha_1 = coupled.u1.peak.value / bare.u1.peak.value
 
     def predicted(
-        uncertainty: SpecimenUncertainty, count: int, scale: float, noisy: bool, stream: SeedSequence
+        uncertainty: SpecimenKnowledge, count: int, scale: float, noisy: bool, stream: SeedSequence
     ) -> Predicted:
         return predict_draws(
             bare.base, coupled.base, specimen, uncertainty, count, stream, table_scale=scale, noisy=noisy
         )
 
-    everything = predicted(configuration.uncertainty, n, accuracy.table_scale, True, of_all)
+    everything = predicted(configuration.known, n, sensors.table_scale, True, of_all)
     stood = _stood(everything.alpha_2 * measured_2)
-    known = predicted(NONE, n // 2, accuracy.table_scale, True, of_bench)
+    known = predicted(NONE, n // 2, sensors.table_scale, True, of_bench)
     off = np.abs(_stood(known.alpha_2 * measured_2[: n // 2]) - known.nominal[1])
-    low, high = (float(np.quantile(stood, q)) for q in INTERVAL) if stood.size else (None, None)
-    parts = {
-        "noise of the peaks": alpha_2 * float(_ratio(noise).std()),
-        "lasers": alpha_2 * float(_ratio(lasers).std()),
-    }
-    parts |= _parts(predicted, configuration.uncertainty, n // 4, accuracy.table_scale, of_parts)
+    low, high = _interval(stood)
+    low_1, high_1 = _interval(_stood(everything.alpha_1 * measured_1))
+    parts = {name: alpha_2 * float(_ratio(each).std()) for name, each in errors.items()}
+    parts |= _parts(predicted, configuration.known, n // 4, sensors.table_scale, of_parts)
     apart = sum(value**2 for value in parts.values())
     return Compared(
         alpha_1=alpha_1,
         alpha_1_uncertainty=COVERAGE * alpha_1 * float(measured_1.std()),
         alpha_1_predicted=_known(everything.nominal[0]),
+        alpha_1_low=low_1,
+        alpha_1_high=high_1,
         alpha_2=alpha_2,
         alpha_2_uncertainty=COVERAGE * alpha_2 * float(measured_2.std()),
         alpha_2_predicted=_known(everything.nominal[1]),
         low=low,
         high=high,
-        agrees=None if low is None or high is None else low <= alpha_2 <= high,
         bench=_known(float(np.quantile(off, HELD))) if off.size else None,
-        parts=dict(sorted(parts.items(), key=lambda part: -part[1])),
+        budget=Budget(parts),
         chaotic=bool(stood.size) and apart > CHAOTIC * float(np.var(stood)),
         chance=everything.chance,
     )
 
 
 def _parts(
-    predicted: Callable[[SpecimenUncertainty, int, float, bool, SeedSequence], Predicted],
-    uncertainty: SpecimenUncertainty,
+    predicted: Callable[[SpecimenKnowledge, int, float, bool, SeedSequence], Predicted],
+    uncertainty: SpecimenKnowledge,
     n: int,
     table_scale: float,
     seed: SeedSequence,
@@ -211,8 +211,7 @@ def _parts(
         "scale of the table's sensors": predicted(NONE, n, table_scale, False, of_scale),
     }
     for (name, kept), stream in zip(_KEPT.items(), streams, strict=True):
-        only = NONE.model_copy(update={width: getattr(uncertainty, width) for width in kept})
-        runs[name] = predicted(only, n, 0.0, False, stream)
+        runs[name] = predicted(uncertainty.only(*kept), n, 0.0, False, stream)
     return {name: float(np.nanstd(run.alpha_2)) if run.chance < 1.0 else 0.0 for name, run in runs.items()}
 
 
@@ -224,6 +223,18 @@ def _ratio(errors: Array) -> Array:
 def _stood(gains: Array) -> Array:
     """Without the draws that toppled."""
     return gains[np.isfinite(gains)]
+
+
+def _interval(stood: Array) -> tuple[float | None, float | None]:
+    """Where 95 % of the draws lie."""
+    if not stood.size:
+        return None, None
+    low, high = np.quantile(stood, INTERVAL)
+    return float(low), float(high)
+
+
+def _within(value: float, low: float | None, high: float | None) -> bool | None:
+    return None if low is None or high is None else low <= value <= high
 
 
 def _known(value: float) -> float | None:

@@ -39,7 +39,7 @@ class HarmonicCampaign:
         """Gain spectra of every spring on both layers, wide enough to frame the measured points."""
         from protocols.harmonic.prediction import gain_spectra
 
-        return gain_spectra(self.parameters, configuration.specimen)
+        return gain_spectra(self.parameters, configuration.known_specimen, configuration.known_on_table)
 
     def plan(self, configuration: BenchConfiguration) -> Plan:
         """The lab sheet."""

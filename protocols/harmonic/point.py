@@ -27,9 +27,14 @@ class HarmonicPoint(Parameters):
     layer: str = quantity(..., "", "steady state that the prediction is for: rocking or resting")
     alpha_2: float | None = quantity(None, "1", "measured gain of the peak drift, coupled over bare")
     alpha_2_uncertainty: float | None = quantity(None, "1", "expanded uncertainty of alpha_2 (k = 2)")
+    dominating: str = quantity("", "", "the largest part of the uncertainty of alpha_2")
+    uncertainty_parts: str = quantity("", "", "standard uncertainty of alpha_2 by each part, largest first, as JSON")
     alpha_2_predicted: float | None = quantity(None, "1", "predicted gain at the achieved amplitude")
+    alpha_2_predicted_uncertainty: float | None = quantity(
+        None, "1", "expanded uncertainty of the predicted gain (k = 2): what is left open of the specimen"
+    )
     predicted_stable: bool | None = quantity(None, "1", "whether the predicted orbit is stable")
-    agrees: bool | None = quantity(None, "1", "difference within 2 % or the uncertainty, whichever is larger")
+    agrees: bool | None = quantity(None, "1", "difference within the uncertainties of both, root of their squares")
     drift_peak_m: float | None = quantity(None, "m", "peak drift of the coupled frame")
     bare_drift_peak_m: float | None = quantity(None, "m", "peak drift of the bare frame")
     amplitude_m_s2: float | None = quantity(None, "m/s2", "achieved amplitude of the table, coupled")

@@ -75,7 +75,7 @@ def _travels(found: Sequence[Trial], factors: Array, configuration: BenchConfigu
     drawn: dict[Specimen, list[Specimen]] = {}
     for trial in found:
         if trial.specimen not in drawn:
-            others = configuration.uncertainty.draws(trial.specimen, DRAWS, np.random.default_rng(SEED))
+            others = configuration.known.draws(trial.specimen, DRAWS, np.random.default_rng(SEED))
             drawn[trial.specimen] = [trial.specimen, *others]
 
     def one(run: tuple[Trial, int]) -> Travel:
@@ -126,6 +126,6 @@ def _steady(trial: Trial, parameters: HarmonicParameters, configuration: BenchCo
     """The steady state of the assumed specimen, which a simulation of limited length may not have reached."""
     if trial.steady is None:
         return Travel(0.0, 0.0, 0.0)
-    amplitude = parameters.amplitude_factor * configuration.specimen.uplift_acceleration
+    amplitude = parameters.amplitude_factor * configuration.known_specimen.uplift_acceleration
     motion = rocking_travel if trial.rocks else bare_travel
     return motion(trial.specimen, trial.steady, amplitude, configuration.laser_reference) or Travel(0.0, 0.0, 0.0)

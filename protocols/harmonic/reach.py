@@ -24,7 +24,7 @@ Reference = Literal["ground", "table"]
 def check_table(parameters: HarmonicParameters, configuration: BenchConfiguration) -> None:
     """Refuse table motions beyond limits or stroke, overshoot of a start included: x = a / Omega^2, v = a / Omega."""
     limits, stroke = configuration.limits, configuration.half_stroke
-    peak = max(OVERSHOOTS) * parameters.amplitude_factor * configuration.specimen.uplift_acceleration
+    peak = max(OVERSHOOTS) * parameters.amplitude_factor * configuration.known_specimen.uplift_acceleration
     if peak > limits.acceleration:
         allowed = f"a start needs {peak:.3g} m/s2, limits.acceleration = {limits.acceleration:g} m/s2"
         raise InvalidInput("amplitude_factor", parameters.amplitude_factor, allowed)
@@ -44,7 +44,7 @@ def check_table(parameters: HarmonicParameters, configuration: BenchConfiguratio
 
 def check_storeys(parameters: HarmonicParameters, configuration: BenchConfiguration) -> None:
     """Refuse frequencies at which a storey would leave its laser's range, bare or on the steady rocking motion."""
-    specimen = configuration.specimen
+    specimen = configuration.known_specimen
     amplitude = parameters.amplitude_factor * specimen.uplift_acceleration
     reference = configuration.laser_reference
     ranges = tuple(0.5 * whole for whole in configuration.laser_ranges)

@@ -16,6 +16,7 @@ from bench.control.answer import Answer, Sine
 from bench.control.calibration import DriveCalibration
 from bench.engine.steps import Arm, Calibrate, Dwell, Follow, Measured, Outcome, Say, Step, Trim
 from bench.events import Acquired, Estimate, Event, PointFinished
+from bench.prediction.model_uncertainty import expanded_uncertainty
 from drivers.rig import Channel
 from protocols.harmonic.judge import judge
 from protocols.harmonic.parameters import HarmonicParameters
@@ -156,22 +157,24 @@ class HarmonicFollower:
 
     def _again(self, point: HarmonicPoint) -> HarmonicPoint:
         omega = point.omega_rad_s
-        specimen = self._configuration.specimen.coupled(point.beta)
+        specimen = self._configuration.known_specimen.coupled(point.beta)
+        known = self._configuration.known_on_table
         bare = self._bare[omega]
         if point.status is PointStatus.OVERTURNED:
-            asked = self._parameters.amplitude_factor * self._configuration.specimen.uplift_acceleration
+            asked = self._parameters.amplitude_factor * self._configuration.known_specimen.uplift_acceleration
             layer = predict_gain(specimen, omega, asked, bare.peak.amplitude).rocking
             return point.model_copy(
                 update={
                     "layer": "rocking" if layer else "none",
                     "alpha_2_predicted": layer.alpha_2 if layer else None,
+                    "alpha_2_predicted_uncertainty": expanded_uncertainty(layer, known) if layer else None,
                     "predicted_stable": layer.stable if layer else None,
                     "bare_drift_peak_m": bare.peak.drift,
                     "bare_amplitude_m_s2": bare.peak.amplitude,
                 }
             )
         settled = self._settled(min(self._tries, key=lambda series: self._unlike(series, point)))
-        found = judge(settled, bare, omega, specimen, self._configuration.analysis, point.starts_tried)
+        found = judge(settled, bare, omega, specimen, known, self._configuration.sensors, point.starts_tried)
         return found.model_copy(update={"start_chance": point.start_chance})
 
     def _unlike(self, series: _Series, point: HarmonicPoint) -> float:
@@ -191,7 +194,7 @@ class HarmonicFollower:
         used = still[-self._cycles :]
         table = Answer.of(used, series.sine, series.turn or 1.0 + 0.0j)
         return Settled(
-            self._peak(used, steadiness),
+            self._peak(used, omega, steadiness),
             steadiness,
             series.waited,
             table.amplitude_error,
@@ -199,8 +202,8 @@ class HarmonicFollower:
             series.updates,
         )
 
-    def _peak(self, used: Sequence[Cycle], steadiness: Steadiness) -> SteadyPeak:
+    def _peak(self, used: Sequence[Cycle], omega: float, steadiness: Steadiness) -> SteadyPeak:
         how = self._settings.peak
         if how == "mean" or (how == "judged" and steadiness.steady):
-            return steady_peak(used, LEFT * self._tolerance)
-        return modulated_peak(used)
+            return steady_peak(used, omega, LEFT * self._tolerance)
+        return modulated_peak(used, omega)

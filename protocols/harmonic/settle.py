@@ -95,7 +95,7 @@ def settle_and_measure(
             if steadiness.steady or over:
                 used = outcome.cycles[-parameters.measured_cycles :]
                 table = Answer.of(used, sine, turn)
-                peak = _peak(used, steadiness, parameters)
+                peak = _peak(used, sine.omega, steadiness, parameters)
                 return Settled(peak, steadiness, waited, table.amplitude_error, table.phase_error, updates)
         recent.extend(outcome.cycles)
         yield from look(list(recent))
@@ -107,5 +107,9 @@ def settle_and_measure(
             detector.restart()
 
 
-def _peak(cycles: tuple[Cycle, ...], steadiness: Steadiness, parameters: HarmonicParameters) -> SteadyPeak:
-    return steady_peak(cycles, LEFT * parameters.settle_tolerance) if steadiness.steady else modulated_peak(cycles)
+def _peak(
+    cycles: tuple[Cycle, ...], omega: float, steadiness: Steadiness, parameters: HarmonicParameters
+) -> SteadyPeak:
+    if steadiness.steady:
+        return steady_peak(cycles, omega, LEFT * parameters.settle_tolerance)
+    return modulated_peak(cycles, omega)

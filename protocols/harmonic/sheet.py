@@ -17,6 +17,7 @@ from bench.control.legs import Leg
 from bench.control.starts import Start
 from bench.engine.steps import Arm, Calibrate, Fallen, Follow, Handle, Outcome, Plan, RampOut, Say, Step
 from bench.events import Estimate, PointFinished, StepStarted, Warned
+from bench.prediction.model_uncertainty import expanded_uncertainty
 from drivers.rig import Handwork, RigError
 from protocols.harmonic.calibrate import calibrate_drive, harmonic_frequencies
 from protocols.harmonic.judge import judge
@@ -42,7 +43,7 @@ class HarmonicSheet:
     def __init__(self, parameters: HarmonicParameters, configuration: BenchConfiguration) -> None:
         self._parameters = parameters
         self._configuration = configuration
-        self._specimen = configuration.specimen
+        self._specimen = configuration.known_specimen
         self._amplitude = parameters.amplitude_factor * self._specimen.uplift_acceleration
         self._pace = Pace(parameters.omega, 1 + len(parameters.beta))
         self._bare: dict[float, Settled] = {}
@@ -79,11 +80,11 @@ class HarmonicSheet:
         return calibration
 
     def _spring(self, specimen: Specimen, calibration: DriveCalibration) -> Generator[Step, Outcome, None]:
-        request = f"Stand the block on its base and mount the spring of beta = {specimen.beta:g}."
+        request = f"Stand the block on its base and mount the spring of beta = {specimen.label:g}."
         yield Handle(Handwork.MOUNT_SPRING, specimen, request)
         plans = {omega: self._starts(specimen, omega) for omega in self._parameters.omega}
         yield Arm(REST)
-        yield Say(StepStarted(0.0, f"calibrate the drive, beta = {specimen.beta:g}"))
+        yield Say(StepStarted(0.0, f"calibrate the drive, beta = {specimen.label:g}"))
         starts = [start for each in plans.values() for start in each]
         wanted, level = spring_calibration(self._parameters, specimen, starts)
         measured = yield from calibrate_drive(wanted, level, calibration)
@@ -94,7 +95,7 @@ class HarmonicSheet:
         for omega in self._parameters.omega:
             point = yield from self._point(specimen, omega, calibration, plans[omega])
             self._pace.finished(omega)
-            yield Say(self._pace.progress(f"finished beta = {specimen.beta:g} at {omega:g} rad/s"))
+            yield Say(self._pace.progress(f"finished beta = {specimen.label:g} at {omega:g} rad/s"))
             yield Say(PointFinished(0.0, point))
 
     def _point(
@@ -104,7 +105,7 @@ class HarmonicSheet:
         found: HarmonicPoint | None = None
         falls = 0
         for tried, start in enumerate(starts, 1):
-            where = f"beta = {specimen.beta:g} at {omega:g} rad/s, start {tried} of {len(starts)}: {start.name}"
+            where = f"beta = {specimen.label:g} at {omega:g} rad/s, start {tried} of {len(starts)}: {start.name}"
             yield Say(StepStarted(0.0, f"{where}, chance {start.chance:.0%}"))
             yield Arm(REST)
             yield Calibrate(calibration)
@@ -116,8 +117,8 @@ class HarmonicSheet:
                 yield from self._end_test(specimen, fast=True)
                 continue
             yield from self._end_test(specimen, fast=False)
-            accuracy = self._configuration.analysis
-            point = judge(settled, self._bare[omega], omega, specimen, accuracy, tried)
+            known, sensors = self._configuration.known_on_table, self._configuration.sensors
+            point = judge(settled, self._bare[omega], omega, specimen, known, sensors, tried)
             point = point.model_copy(update={"start_chance": start.chance})
             if point.status is PointStatus.STEADY or not point.predicted_stable:
                 return point
@@ -138,10 +139,13 @@ class HarmonicSheet:
         kind = "stable" if layer and layer.stable else "unstable"
         return HarmonicPoint(
             omega_rad_s=omega,
-            beta=specimen.beta or 0.0,
+            beta=specimen.label or 0.0,
             status=PointStatus.OVERTURNED,
             layer="rocking" if layer else "none",
             alpha_2_predicted=layer.alpha_2 if layer else None,
+            alpha_2_predicted_uncertainty=(
+                expanded_uncertainty(layer, self._configuration.known_on_table) if layer else None
+            ),
             predicted_stable=layer.stable if layer else None,
             bare_drift_peak_m=bare.drift,
             bare_amplitude_m_s2=bare.amplitude,
@@ -157,7 +161,7 @@ class HarmonicSheet:
         return settle_and_measure(asked, self._parameters, self._configuration.analysis, self._look(omega, specimen))
 
     def _starts(self, specimen: Specimen, omega: float) -> list[Start]:
-        uncertainty = self._configuration.uncertainty
+        uncertainty = self._configuration.known
         return list(planned_starts(specimen, omega, self._amplitude, self._parameters.starts, uncertainty))
 
     def _look(self, omega: float, specimen: Specimen | None) -> Look:
@@ -173,12 +177,12 @@ class HarmonicSheet:
         def look(cycles: list[Cycle]) -> Generator[Step, Outcome, None]:
             nonlocal cycles_seen
             cycles_seen += len(cycles)
-            peak = steady_peak(cycles)
+            peak = steady_peak(cycles, omega)
             alpha_2 = uncertainty = float("nan")
             if bare is not None and specimen is not None:
-                running = gain(peak, bare, self._configuration.analysis)
+                running = gain(peak, bare, self._configuration.sensors)
                 alpha_2, uncertainty = running.alpha_2, running.uncertainty
-            beta = specimen.beta if specimen else None
+            beta = specimen.label if specimen else None
             yield Say(Estimate(0.0, omega, beta, cycles_seen, peak.drift, alpha_2, uncertainty, predicted))
             yield Say(self._pace.progress(f"settling at {omega:g} rad/s", omega, cycles_seen))
 

@@ -19,9 +19,9 @@ from bench.preflight.response import TableResponse
 from protocols.harmonic.calibrate import CHANGE_TIME, MEASURED, PROBE, SETTLING, harmonic_frequencies
 from protocols.harmonic.parameters import HarmonicParameters
 from sim.gain import predict_gain
+from sim.knowledge import SpecimenKnowledge
 from sim.specimen import Specimen
 from sim.steady import resting_level
-from sim.uncertainty import SpecimenUncertainty
 
 BARE_CHANGE = 4.0
 """Time in which the bare frame goes from one frequency to the next [s], as the lab sheet has it."""
@@ -62,7 +62,7 @@ class Trial:
 
 
 def planned_starts(
-    specimen: Specimen, omega: float, amplitude: float, count: int, uncertainty: SpecimenUncertainty
+    specimen: Specimen, omega: float, amplitude: float, count: int, uncertainty: SpecimenKnowledge
 ) -> tuple[Start, ...]:
     """The starts that are tried at `amplitude` [m/s2] and `omega` [rad/s], best first, see
     `bench.control.starts.plan_starts`; computed once.
@@ -73,7 +73,7 @@ def planned_starts(
 
 @lru_cache(maxsize=1024)
 def _planned_starts(
-    specimen: Specimen, omega: float, amplitude: float, count: int, uncertainty: SpecimenUncertainty
+    specimen: Specimen, omega: float, amplitude: float, count: int, uncertainty: SpecimenKnowledge
 ) -> tuple[Start, ...]:
     layer = predict_gain(specimen, omega, amplitude).rocking
     return tuple(plan_starts(specimen, omega, amplitude, layer.orbit if layer else None, count, uncertainty))
@@ -86,7 +86,7 @@ def trials(
 
     Without a `response` of the table the calibration of the bare frame is taken to move it as asked.
     """
-    specimen = configuration.specimen
+    specimen = configuration.known_specimen
     amplitude = parameters.amplitude_factor * specimen.uplift_acceleration
     yield _bare_calibration(parameters, specimen, response)
     yield from _bare_tests(parameters, specimen)
@@ -94,7 +94,7 @@ def trials(
     for beta in parameters.beta:
         coupled = specimen.coupled(beta)
         plans = {
-            omega: planned_starts(coupled, omega, amplitude, parameters.starts, configuration.uncertainty)
+            omega: planned_starts(coupled, omega, amplitude, parameters.starts, configuration.known)
             for omega in parameters.omega
         }
         wanted, level = spring_calibration(parameters, coupled, [start for each in plans.values() for start in each])

@@ -37,13 +37,13 @@ class Planned:
 
 def specimen_of(parameters: IdentifyParameters, configuration: BenchConfiguration) -> Specimen:
     """What stands on the table during the identification."""
-    specimen = configuration.specimen
+    specimen = configuration.known_specimen
     return specimen.bare() if parameters.beta is None else specimen.coupled(parameters.beta)
 
 
 def mounted_name(specimen: Specimen) -> str:
     """What stands on the table, as a table model calls it."""
-    return "bare frame" if specimen.beta is None else f"block with the spring of beta = {specimen.beta:g}"
+    return "bare frame" if specimen.beta is None else f"block with the spring of beta = {specimen.label:g}"
 
 
 def planned(parameters: IdentifyParameters, configuration: BenchConfiguration) -> Planned:

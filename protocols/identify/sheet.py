@@ -79,7 +79,7 @@ def identify_plan(
 def _mounting(specimen: Specimen) -> Handle:
     if specimen.beta is None:
         return Handle(Handwork.REMOVE_BLOCK, specimen, "Take the spring and the block off the table.")
-    request = f"Stand the block on its base and mount the spring of beta = {specimen.beta:g}."
+    request = f"Stand the block on its base and mount the spring of beta = {specimen.label:g}."
     return Handle(Handwork.MOUNT_SPRING, specimen, request)
 
 

@@ -126,6 +126,20 @@ def test_the_statement_is_checked_by_name(done: Path) -> None:
     assert record["alpha_2"] == [None, points(done)[STANDS]["alpha_2"]]
 
 
+def test_the_data_file_replays_without_the_files_that_the_run_read(
+    done: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The record cannot be read any more, and the table's model is gone, or would be too old by now."""
+
+    def gone(*_: object) -> None:
+        raise AssertionError("no other file may be read")
+
+    monkeypatch.setattr("protocols.earthquake.records.read_records", gone)
+    monkeypatch.setattr("bench.control.table_model.TableModel.read", gone)
+    assert main(["replay", str(done / "campaign.h5"), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["agrees"]
+
+
 @pytest.mark.parametrize(
     ("flags", "said"),
     [

@@ -19,7 +19,7 @@ from protocols.earthquake import uncertainty
 from protocols.earthquake.judge import _remarks
 from protocols.earthquake.observed import Observed, PeakSeen, observe
 from protocols.earthquake.overturn import overturning_time
-from protocols.earthquake.uncertainty import NONE, Compared, Predicted, compare
+from protocols.earthquake.uncertainty import Compared, Predicted, compare
 from sim.excitation import SampledRecord
 from sim.rocking import simulate
 from sim.specimen import Frame, Specimen
@@ -45,6 +45,10 @@ def base(peak: float, omega: float = 16.0, noise: float = 0.0) -> BaseMotion:
     t = np.arange(0.0, 4.0, 0.002)
     shape = np.sin(omega * t) * np.sin(np.pi * t / t[-1]) ** 2
     return BaseMotion(peak * shape, 0.002, 1.0, np.full(t.size // 2 + 1, noise))
+
+
+NONE = SpecimenUncertainty(stiffness=0.0, damping=0.0, restitution=0.0, spring=0.0)
+"""A specimen that is exactly known."""
 
 
 def shown(motion: BaseMotion, noise: float = 0.0) -> Observed:
@@ -96,7 +100,7 @@ def test_noise_of_the_peaks_alone_is_in_interval_and_bench_uncertainty() -> None
     assert found.low == pytest.approx(found.alpha_2_predicted - half, abs=SCATTER * half)
     assert found.high == pytest.approx(found.alpha_2_predicted + half, abs=SCATTER * half)
     assert found.bench == pytest.approx(half, rel=SCATTER)
-    assert found.dominating == "noise of the peaks"
+    assert found.budget.dominating == "noise of the peaks"
 
 
 def test_the_specimen_alone_is_in_the_interval_and_not_in_the_bench_uncertainty() -> None:
@@ -107,7 +111,7 @@ def test_the_specimen_alone_is_in_the_interval_and_not_in_the_bench_uncertainty(
     assert high - low > 0.01
     assert (found.low, found.high) == pytest.approx((low, high), abs=SCATTER * 0.5 * (high - low))
     assert found.bench == pytest.approx(0.0, abs=1e-9)
-    assert found.dominating == "stiffness of the spring"
+    assert found.budget.dominating == "stiffness of the spring"
 
 
 def test_both_storeys_stiffness_counts_and_the_spring_keeps_its_own() -> None:

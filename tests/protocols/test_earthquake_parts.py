@@ -7,6 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from bench.analysis.gain import SensorAccuracy
+from bench.analysis.sensor_accuracy import LINEARITY, SensorDoubt
 from bench.analysis.signals import U1
 from bench.analysis.transient_base import BaseMotion
 from bench.analysis.transient_peak import TransientPeak
@@ -18,8 +19,8 @@ from protocols.earthquake.statement import check_statement
 from protocols.earthquake.uncertainty import predict_draws
 from sim.excitation import SampledRecord
 from sim.gain import seismic_curve
+from sim.knowledge import SpecimenKnowledge
 from sim.specimen import Specimen
-from sim.uncertainty import SpecimenUncertainty
 
 Array = NDArray[np.float64]
 
@@ -32,7 +33,7 @@ NONE = SensorAccuracy(
     table_scale=0.0,
 )
 RANGES = (0.2, 0.2)
-CERTAIN = SpecimenUncertainty(stiffness=0.0, damping=0.0, restitution=0.0, spring=0.0)
+CERTAIN = SpecimenKnowledge(stiffness=0.0, damping=0.0, restitution=0.0, spring=0.0)
 
 
 def seen(drift: float, lasers: tuple[float, float], noise: float = 0.0) -> PeakSeen:
@@ -41,8 +42,8 @@ def seen(drift: float, lasers: tuple[float, float], noise: float = 0.0) -> PeakS
 
 
 def spread(bare: PeakSeen, coupled: PeakSeen, accuracy: SensorAccuracy) -> float:
-    noise, lasers = drift_errors((bare, coupled), accuracy, RANGES, 20_000, 1)
-    return float(np.std((1.0 + noise[1] + lasers[1]) / (1.0 + noise[0] + lasers[0])))
+    errors = np.sum(list(drift_errors((bare, coupled), SensorDoubt(accuracy, RANGES), 20_000, 1).values()), axis=0)
+    return float(np.std((1.0 + errors[1]) / (1.0 + errors[0])))
 
 
 def test_what_both_tests_share_cancels_in_their_ratio() -> None:
@@ -52,9 +53,9 @@ def test_what_both_tests_share_cancels_in_their_ratio() -> None:
     # motions so small that the curve is a straight line are off by the same slope
     assert spread(small, seen(0.001, (0.00025, 0.00125)), linear) < 2e-4
     # one laser alone: the slope of a sine of height 0.16 mm with 0.5 to 2 waves in 0.2 m has an rms of 0.47 %
-    noise, lasers = drift_errors((seen(1e-4, (0.0, 1e-4)), one), linear, RANGES, 20_000, 2)
-    assert np.abs(noise).max() == 0.0
-    assert lasers[0].std() == pytest.approx(0.0008 * 2.0 * pi * np.sqrt(1.75 / 2.0), rel=0.03)
+    errors = drift_errors((seen(1e-4, (0.0, 1e-4)), one), SensorDoubt(linear, RANGES), 20_000, 2)
+    assert all(np.abs(each).max() == 0.0 for name, each in errors.items() if name != LINEARITY)
+    assert errors[LINEARITY][0].std() == pytest.approx(0.0008 * 2.0 * pi * np.sqrt(1.75 / 2.0), rel=0.03)
     mismatch = NONE.model_copy(update={"laser_mismatch": 0.001})
     assert spread(one, seen(0.01, (0.0025, 0.0125)), mismatch) == pytest.approx(0.0, abs=1e-9)
 

@@ -16,7 +16,8 @@ from bench.record.reader import open_record
 @pytest.mark.skipif(sys.platform == "win32", reason="sends SIGINT to one process")
 def test_ctrl_c(tmp_path: Path) -> None:
     folder = tmp_path / "run"
-    command = [sys.executable, "-c", "from bench.cli.main import run; run()", "run", "harmonic", "--out", str(folder)]
+    command = [sys.executable, "-c", "from bench.cli.main import run; run()", "run", "harmonic"]
+    command += ["--omega", "16", "--beta", "0.4", "0.64", "--out", str(folder)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
         _wait_until_running(folder / "campaign.h5", process)

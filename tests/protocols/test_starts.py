@@ -11,10 +11,10 @@ from bench.events import StepStarted
 from protocols.harmonic.point import PointStatus
 from sim.excitation import SineProgram, Sweep
 from sim.gain import predict_gain
+from sim.knowledge import SpecimenKnowledge
 from sim.rocking import Motion, simulate
 from sim.specimen import Specimen
 from sim.steady import Orbit, rocking_orbit
-from sim.uncertainty import SpecimenUncertainty
 from tests.protocols.test_sheet import BETA, OMEGA, Script, _cycle
 
 AMPLITUDE = 1.01 * 9.81 / 8.0
@@ -82,7 +82,7 @@ def test_the_stated_chance_is_what_other_draws_find(rank: int) -> None:
     start = plan_starts(specimen, 17.5, AMPLITUDE, orbit, 6)[rank]
     random = np.random.default_rng(77)
     reached = 0
-    for other in SpecimenUncertainty().draws(specimen, n, random):
+    for other in SpecimenKnowledge().draws(specimen, n, random):
         drive = 1.0 + random.uniform(-0.03, 0.03)
         own = rocking_orbit(other, 17.5, drive * AMPLITUDE, guess=orbit)
         motion = _tested(other, start, drive, dwell=80.0)
@@ -106,7 +106,7 @@ def test_a_chance_is_never_certain_and_the_same_question_has_the_same_answer() -
 def test_a_specimen_that_is_known_worse_has_smaller_chances() -> None:
     specimen = Specimen().coupled(0.97)
     orbit = _orbit(specimen, 20.0)
-    wide = SpecimenUncertainty(stiffness=0.2, damping=0.5, restitution=0.02, spring=0.4)
+    wide = SpecimenKnowledge(stiffness=0.2, damping=0.5, restitution=0.02, spring=0.4)
     usual, doubtful = (plan_starts(specimen, 20.0, AMPLITUDE, orbit, 6, each) for each in (None, wide))
     assert sum(start.chance for start in doubtful) < sum(start.chance for start in usual) - 0.5
 

@@ -1,0 +1,140 @@
+"""Whether the damping of a mode depends on its amplitude.
+
+With a damping ratio xi + s A, A the amplitude of the drift in the mode, the mode's coordinate q changes by
+
+    - s omega q integral of A dt
+
+to first order. These changes are further columns of the linearised fit: one for the slope s of each mode, or one for
+each of several windows of time, in which the damping ratio may be off the whole decay's.
+"""
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.analysis.free_decay.doubt import Errors, covariances
+from bench.analysis.free_decay.fit import Fit
+from bench.analysis.free_decay.shown import COUNT, DELAYS, GAINS, OFFSETS, STATE
+
+Array = NDArray[np.float64]
+
+WINDOWS = 5
+"""Windows in which the damping of a mode is looked at; in each its amplitude falls by the same factor."""
+
+FLOOR = 0.03
+"""Share of its largest amplitude down to which a mode is looked at."""
+
+_DAMPING = slice(2, 4)
+
+
+@dataclass(frozen=True, eq=False)
+class DampingCourse:
+    """How the damping of one mode goes with its amplitude.
+
+    `slope` [1/m] is that of the damping ratio over the amplitude of the drift, `own` and `common` [1/m2] its variances:
+    new in every decay, and common to all. `amplitude` [m], shape (WINDOWS,), is the mean of each window, `damping` the
+    ratio there and `uncertainty` its standard uncertainty, without what is common.
+    """
+
+    slope: float
+    own: float
+    common: float
+    amplitude: Array
+    damping: Array
+    uncertainty: Array
+
+
+def damping_courses(
+    fit: Fit, errors: Errors, begin: float, ratios: Array, omegas: Array
+) -> tuple[DampingCourse, DampingCourse]:
+    """The courses of both modes from `begin` [s] on, when the excitation is over.
+
+    `ratios` and `omegas` [rad/s], shape (2,), are the damping ratios and undamped frequencies as fitted.
+    """
+    modes = [_mode(fit, which, begin, float(omegas[which])) for which in range(2)]
+    slopes = _extended(fit, [mode.column(mode.amplitude) for mode in modes], keep_damping=True)
+    found, slopes = _stepped(slopes)
+    own, common = (np.diag(part)[-2:] for part in covariances(slopes, errors))
+    columns = [mode.column(inside) for mode in modes for inside in mode.windows]
+    pieces = _extended(fit, columns, keep_damping=False)
+    moved, pieces = _stepped(pieces)
+    off = moved[-len(columns) :].reshape(2, WINDOWS)
+    doubt = np.sqrt(np.diag(covariances(pieces, errors)[0])[-len(columns) :]).reshape(2, WINDOWS)
+    first, second = (
+        DampingCourse(
+            slope=float(found[which - 2]),
+            own=float(own[which]),
+            common=float(common[which]),
+            amplitude=np.array([float(mode.amplitude[inside].mean()) for inside in mode.windows]),
+            damping=ratios[which] + off[which],
+            uncertainty=doubt[which],
+        )
+        for which, mode in enumerate(modes)
+    )
+    return first, second
+
+
+@dataclass(frozen=True, eq=False)
+class _Mode:
+    """One mode: its circular frequency, the amplitude of its drift, shape (n,), and what the lasers show of it, (2, n).
+
+    `windows` are the samples of each window.
+    """
+
+    omega: float
+    step: float
+    amplitude: Array
+    shown: Array
+    windows: list[NDArray[np.bool_]]
+
+    def column(self, more: Array | NDArray[np.bool_]) -> Array:
+        """What the lasers show more, shape (2, n), when the damping ratio is larger by `more`, shape (n,)."""
+        return -self.omega * np.cumsum(more.astype(np.float64)) * self.step * self.shown
+
+
+def _mode(fit: Fit, which: int, begin: float, omega: float) -> _Mode:
+    found, stretch = fit.response, fit.stretch
+    table, _ = stretch.driving(float(fit.values[DELAYS][0]))
+    q = found.forced(table) + (found.adjoint @ fit.values[STATE])[:, None] * found.free(table.size)
+    q[1 - which] = 0.0
+    drift = found.shapes[1, which] - found.shapes[0, which]
+    amplitude = 2.0 * np.abs(drift) * np.abs(q[which])
+    after = stretch.time >= begin
+    largest = float(amplitude[after].max())
+    # each window as the model decays: what noise keeps alive later says nothing of damping
+    rate = -float(found.poles[which].real)
+    last = min(np.log(1.0 / FLOOR) / rate, float(stretch.time[-1]) - begin)
+    edges = [begin + last * share for share in np.linspace(0.0, 1.0, WINDOWS + 1).tolist()]
+    windows = [(stretch.time >= low) & (stretch.time < high) for low, high in pairwise(edges)]
+    return _Mode(
+        omega=omega,
+        step=stretch.step,
+        amplitude=np.where(after, np.minimum(amplitude, largest), 0.0),
+        shown=fit.values[GAINS][:, None] * found.storeys(q),
+        windows=windows,
+    )
+
+
+def _stepped(extended: Fit) -> tuple[Array, Fit]:
+    """How far all values move to fit best, and the fit with what is then left: its noise."""
+    moved = extended.moved(extended.residual)
+    left = extended.residual - np.tensordot(moved, extended.jacobian, 1)
+    return moved, replace(extended, residual=np.where(extended.residual == 0.0, 0.0, left))
+
+
+def _extended(fit: Fit, columns: list[Array], *, keep_damping: bool) -> Fit:
+    """The linearised fit with further values, behind those it has; the dashpots stay as they are unless kept free."""
+    there = fit.jacobian[OFFSETS].any(axis=0)
+    jacobian = np.concatenate((fit.jacobian, np.array(columns) * there))
+    flat = jacobian.reshape(len(jacobian), -1)
+    normal = flat @ flat.T
+    normal[:COUNT, :COUNT] += fit.expected
+    if not keep_damping:
+        jacobian[_DAMPING] = 0.0
+        normal[_DAMPING], normal[:, _DAMPING] = 0.0, 0.0
+        normal[_DAMPING, _DAMPING] = np.eye(2)
+    size = np.sqrt(np.diag(normal))
+    inverse = np.linalg.inv(normal / np.outer(size, size)) / np.outer(size, size)
+    return replace(fit, jacobian=jacobian, inverse=inverse)

@@ -1,0 +1,109 @@
+"""The exact linear response of the frame on a table that moves: closed form in modal coordinates.
+
+Absolute displacements z of the storeys, table displacement x. The forces of the lower springs and dashpots act on the
+motion relative to the table:
+
+    M z'' + C z' + K z = (k_1 x + c_1 x', 0)
+
+With w = z' - (c_1 / m_1, 0) x the derivative of x is not needed. The state (z, w) has two pairs of complex modes; each
+follows q' = lambda q + beta x, which is integrated exactly where straight lines join the samples of x (first-order
+hold): Franklin, Powell, Workman, Digital Control of Dynamic Systems, 3rd ed., 6.3.2.
+"""
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+class Constants(NamedTuple):
+    """Masses [kg], stiffnesses [N/m] and dashpots [N s/m] of the frame.
+
+    A spring from storey 1 to the table is part of k1: what is measured with the block held is k1 + k_C.
+    """
+
+    m1: float
+    m2: float
+    k1: float
+    k2: float
+    c1: float
+    c2: float
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """The frame's two modes; `poles`, shape (2,) [1/s], lie in the upper half plane, the slower first.
+
+    `shapes`, shape (4, 2), are of (z1, z2, w1, w2); `adjoint`, shape (2, 4), takes a state to the modes; `push`, shape
+    (2,), is what x does to them. `step` is the time between samples [s], `feed` [1/s] what x adds to z1'.
+    """
+
+    poles: Complex
+    shapes: Complex
+    adjoint: Complex
+    push: Complex
+    step: float
+    feed: float
+
+    def free(self, n: int) -> Complex:
+        """exp(lambda t) of the modes at n samples, shape (2, n)."""
+        return np.exp(self.poles[:, None] * (self.step * np.arange(n)))
+
+    def forced(self, x: Array) -> Complex:
+        """Modal coordinates under the table displacement `x` [m], shape (n,), from rest: shape (2, n)."""
+        from scipy import signal
+
+        lfilter: Any = signal.lfilter
+        h = self.step
+        z = self.poles * h
+        turn = np.exp(z)
+        first = (turn - 1.0) / z
+        second = (turn - 1.0 - z) / z**2
+        q = np.zeros((2, x.size), np.complex128)
+        for mode in range(2):
+            taps = self.push[mode] * h * np.array([second[mode], first[mode] - second[mode]])
+            # the first sample only begins the first line
+            q[mode] = lfilter(taps, [1.0, -turn[mode]], x, zi=-taps[:1] * x[0])[0]
+        return q
+
+    def storeys(self, q: Complex) -> Array:
+        """Absolute displacements (z1, z2) [m], shape (2, n), of modal coordinates, shape (2, n)."""
+        return 2.0 * (self.shapes[:2] @ q).real
+
+    def velocities(self, q: Complex, x: Array) -> Array:
+        """Absolute velocities (z1', z2') [m/s], shape (2, n), with the table displacement `x` [m], shape (n,)."""
+        found = 2.0 * (self.shapes[2:] @ q).real
+        found[0] += self.feed * x
+        return found
+
+
+def response(constants: Constants, step: float) -> Response:
+    """The modes of a frame. Raises ArithmeticError for one that does not oscillate in both."""
+    m1, m2, k1, k2, c1, c2 = constants
+    inverse = np.array([[1.0 / m1], [1.0 / m2]])
+    stiffness = inverse * np.array([[k1 + k2, -k2], [-k2, k2]])
+    damping = inverse * np.array([[c1 + c2, -c2], [-c2, c2]])
+    system = np.block([[np.zeros((2, 2)), np.eye(2)], [-stiffness, -damping]])
+    feed = np.array([c1 / m1, 0.0])
+    entry = np.concatenate((feed, np.array([k1 / m1, 0.0]) - damping @ feed))
+    if not np.isfinite(system).all():
+        raise ArithmeticError("the frame is not finite")
+    found, vectors = np.linalg.eig(system)
+    poles = np.asarray(found, np.complex128)
+    upper = np.flatnonzero(poles.imag > 0.0)
+    if upper.size != 2:
+        raise ArithmeticError("the frame does not oscillate in two modes")
+    upper = upper[np.argsort(np.abs(poles[upper]))]
+    adjoint = np.linalg.inv(vectors)[upper]
+    return Response(
+        poles=poles[upper],
+        shapes=vectors[:, upper].astype(np.complex128),
+        adjoint=adjoint.astype(np.complex128),
+        push=(adjoint @ entry).astype(np.complex128),
+        step=step,
+        feed=float(feed[0]),
+    )

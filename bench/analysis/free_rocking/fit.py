@@ -1,0 +1,218 @@
+"""The exact nonlinear motion fitted to what the laser saw, from soon after the release down to the last usable impact.
+
+Six values are of the motion: alpha, p and r of `sim.free_rocking`, the tilt (as a share of alpha) and the instant of a
+release from rest that would have led to it, and what the laser shows for the standing block. A release by hand is
+neither instant nor without a push: its energy and phase are in those two, and the samples until the block is surely
+free are left out. Two more are of the laser: with the displacement D it shows D + c_2 D^2 + c_3 D^3, the smooth part of
+its linearity. Its scale is none of them: with s times the angle, alpha and tilt come out s times as large, and r and p,
+which the times of the impacts tell, stay as they are.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.analysis.free_rocking.points import AFTER, BEFORE, Points
+from bench.analysis.free_rocking.swings import NotRocking, Seen, Swings
+from sim import block_face
+from sim.free_rocking import FreeRocking, energy
+from sim.specimen import Block
+
+Array = NDArray[np.float64]
+
+NAMES = ("alpha", "p", "restitution", "share", "start", "zero", "bend_2", "bend_3")
+ALPHA, P, R, SHARE, START, ZERO, BEND_2, BEND_3 = range(len(NAMES))
+
+FREE = 0.9
+"""Share of the tilt in the hand below which the block has surely left it."""
+
+FEWEST = 12
+"""Impacts below which what is fitted is not told apart."""
+
+_RATE = 250.0
+"""Samples per second that are fitted: the laser's are averaged down to this, the motion is smooth in between [1/s]."""
+
+_IMPACT, _ANGLE = 1e-4, 1e-4
+"""Standard uncertainties of single impacts [s] and turning points [rad] in the fit that the other one starts from."""
+
+_STEP = 1e-5
+"""Trend by which the motion's derivative to it is taken."""
+
+
+@dataclass(frozen=True, eq=False)
+class RockingFit:
+    """What was found: `values`, shape (8,), in the order of `NAMES`, SI, for the view of `block` at `height` [m].
+
+    `times` [s], `displacement` [m] and `swing` (the number of impacts before), all of shape (n,), are what was fitted,
+    `fitted` [m] what came out; `jacobian`, shape (n, 9), holds the derivatives to the values and, last, to the trend of
+    r with the impacts' speed around its mean.
+    """
+
+    values: Array
+    block: Block
+    height: float
+    times: Array
+    displacement: Array
+    swing: NDArray[np.intp]
+    fitted: Array
+    jacobian: Array
+
+    @property
+    def motion(self) -> FreeRocking:
+        """The motion that was found, on the side of the tilt that the data show."""
+        return _motion(self.values, float(np.sign((self.displacement - self.values[ZERO])[0])))
+
+    @property
+    def residual(self) -> Array:
+        """What is left [m], shape (n,)."""
+        return self.displacement - self.fitted
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of what is left [m]."""
+        return float(np.sqrt(np.mean(self.residual**2)))
+
+    @property
+    def impacts(self) -> int:
+        """How many impacts lie within what was fitted, the last one at its end."""
+        return int(self.swing[-1]) + 1
+
+    @cached_property
+    def gain(self) -> Array:
+        """How the values follow small changes of the displacement, shape (8, n) [unit/m]."""
+        return np.asarray(np.linalg.pinv(self.jacobian[:, :-1]), dtype=np.float64)
+
+    @cached_property
+    def trend_gain(self) -> Array:
+        """The same of the trend, when it is fitted with the others, shape (n,) [1/m]."""
+        return np.asarray(np.linalg.pinv(self.jacobian)[-1], dtype=np.float64)
+
+    @property
+    def trend(self) -> float:
+        """Change of r from impacts of no speed to that of a fall from alpha: to first order, one step from no trend."""
+        return float(self.trend_gain @ self.residual)
+
+    @property
+    def covariance(self) -> Array:
+        """Of the values by what is left, shape (8, 8)."""
+        return self._scattered(self.gain)
+
+    @property
+    def trend_uncertainty(self) -> float:
+        """Standard uncertainty of the trend by what is left."""
+        return float(np.sqrt(self._scattered(self.trend_gain[None, :])[0, 0]))
+
+    def straightened(self, displacement: Array) -> Array:
+        """What the laser shows [m], any shape, counted from the standing block and without the bend that was found."""
+        seen = displacement - self.values[ZERO]
+        return seen - self.values[BEND_2] * seen**2 - self.values[BEND_3] * seen**3
+
+    def _scattered(self, gain: Array) -> Array:
+        """Covariance of `gain` @ residual: what one half swing adds is correlated within itself, and with no other.
+
+        The sum over clusters of Liang and Zeger (1986), with the usual factor for few of them.
+        """
+        parts = gain * self.residual
+        starts = np.flatnonzero(np.diff(self.swing, prepend=-1))
+        sums = np.add.reduceat(parts, starts, axis=1)
+        count, parameters = starts.size, len(NAMES)
+        return sums @ sums.T * (count / (count - parameters))
+
+
+def fit_rocking(seen: Seen, swings: Swings, points: Points, alpha: float, p: float) -> RockingFit:
+    """The motion that fits, begun from the geometry's `alpha` [rad] and `p` [rad/s].
+
+    Raises NotRocking for too few impacts, or when no motion of a rocking block comes near.
+    """
+    size = max(round(seen.sample_rate / _RATE), 1)
+    times, displacement = _thinned(seen.times, size), _thinned(seen.displacement, size)
+    # the mean over a bin is the middle plus this times the second derivative
+    spread = (size**2 - 1) / (24.0 * seen.sample_rate**2)
+    swing = np.searchsorted(swings.crossings, times)
+    since = times - np.append(-np.inf, swings.crossings)[swing]
+    until = np.append(swings.crossings, np.inf)[swing] - times
+    used = (times > _freed(seen, swings)) & (swing < swings.crossings.size) & (since > AFTER) & (until > BEFORE)
+    times, displacement, swing = times[used], displacement[used], swing[used]
+    side = float(np.sign(swings.held))
+
+    def model(values: Array, trend: tuple[float, float] = (0.0, 0.0)) -> Array:
+        motion = _motion(values, side, *trend)
+        angle = motion.angle(times)
+        moved = block_face.displacement(angle, seen.height, seen.block)
+        moved += spread * block_face.displacement_rate(angle, seen.height, seen.block) * motion.acceleration(angle)
+        return values[ZERO] + moved + values[BEND_2] * moved**2 + values[BEND_3] * moved**3
+
+    scale = np.array([alpha, p, 1.0, 1.0, 0.1, 1e-3, 0.1, 10.0])
+
+    def misfit(x: Array) -> Array:
+        return model(x * scale) - displacement
+
+    lowest, highest = _bounds(alpha, p)
+    found = _least_squares(misfit, _from_points(swings, points, alpha, p) / scale, lowest / scale, highest / scale)
+    values = np.asarray(found.x) * scale
+    fitted, speed = model(values), float(np.mean(np.sqrt(_motion(values, side).energies[: swings.crossings.size])))
+    trend = (model(values, (_STEP, speed)) - fitted) / _STEP
+    jacobian = np.column_stack((np.asarray(found.jac) / scale, trend))
+    return RockingFit(values, seen.block, seen.height, times, displacement, swing, fitted, jacobian)
+
+
+def _motion(values: Array, side: float, trend: float = 0.0, trend_at: float = 0.0) -> FreeRocking:
+    alpha, p, r, share, start = (float(value) for value in values[:ZERO])
+    return FreeRocking(alpha, p, r, side * share * alpha, start, trend, trend_at)
+
+
+def _freed(seen: Seen, swings: Swings) -> float:
+    """When the block has surely left the hand [s]: a hand may tremble before."""
+    before = seen.angle(swings.zero)[: int(swings.crossings[0] * seen.sample_rate)]
+    return float(np.flatnonzero(np.abs(before) >= FREE * abs(swings.held))[-1]) / seen.sample_rate
+
+
+def _thinned(samples: Array, size: int) -> Array:
+    """Means of `size` samples."""
+    return samples[: samples.size // size * size].reshape(-1, size).mean(axis=1)
+
+
+def _bounds(alpha: float, p: float) -> tuple[Array, Array]:
+    """Within a factor of two of the geometry; the share and r where a motion exists; the others far off."""
+    lowest = np.array([0.5 * alpha, 0.5 * p, 0.05, 1e-3, -1e4, -1.0, -10.0, -1e3])
+    return lowest, np.array([2.0 * alpha, 2.0 * p, 0.9999, 0.999, 1e4, 1.0, 10.0, 1e3])
+
+
+def _from_points(swings: Swings, points: Points, alpha: float, p: float) -> Array:
+    """Start values: the motion whose impacts and turning points are nearest to those that were found."""
+    known = np.isfinite(points.impacts) & np.isfinite(points.amplitudes)
+    count = known.size if known.all() else int(np.argmin(known))
+    if count < FEWEST:
+        few = f"{count} impacts are large enough to be used, {FEWEST} are needed"
+        raise NotRocking(f"{few}: tilt the block farther, or let the laser look higher")
+    instants, sizes = points.impacts[:count], np.abs(points.amplitudes[:count])
+    side = float(np.sign(swings.held))
+    left = np.log(energy(np.minimum(sizes, 0.99 * alpha), alpha))
+    r = float(np.clip(np.exp(0.5 * np.polyfit(np.arange(count), left, 1)[0]), 0.06, 0.999))
+    share = float(np.clip(abs(swings.held) / alpha, 2e-3, 0.98))
+    fall = FreeRocking(alpha, p, r, share * alpha).impacts[0]
+
+    def misfit(x: Array) -> Array:
+        motion = _motion(np.append(x, 0.0), side)
+        if motion.impacts.size <= count:
+            return np.full(2 * count, 1e3)
+        late = (motion.impacts[:count] - instants) / _IMPACT
+        return np.concatenate((late, (motion.amplitudes[1 : count + 1] - sizes) / _ANGLE))
+
+    lowest, highest = _bounds(alpha, p)
+    guess = np.array([alpha, p, r, share, instants[0] - fall])
+    found = _least_squares(misfit, guess, lowest[:ZERO], highest[:ZERO])
+    return np.concatenate((np.asarray(found.x), [swings.zero, 0.0, 0.0]))
+
+
+def _least_squares(function: Callable[[Array], Array], start: Array, lowest: Array, highest: Array) -> Any:
+    from scipy.optimize import least_squares
+
+    found: Any = least_squares(function, start, bounds=(lowest, highest), x_scale="jac", max_nfev=60)
+    if not found.success:
+        raise NotRocking("no motion of a rocking block fits: see to the block's base, to its sides and to the laser")
+    return found

@@ -1,0 +1,1 @@
+"""Free rocking: the stand-alone block tilted by hand and let go, a laser on its face."""

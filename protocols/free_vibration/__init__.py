@@ -1,0 +1,1 @@
+"""Free vibration of the bare frame: stiffness and damping with their covariance, given the weighed masses."""

@@ -1,0 +1,104 @@
+"""The decays of one frame: recorded, fitted, told. One that cannot be used is repeated once, then left out."""
+
+from collections.abc import Callable, Generator
+
+import numpy as np
+
+from bench.analysis.free_decay.decay import Decay, Setting, pulsed_decay, released_decay
+from bench.analysis.free_decay.stretch import Unusable
+from bench.config.model import BenchConfiguration
+from bench.engine.steps import Handle, Outcome, Say, Step
+from bench.events import PointFinished, StepStarted, Warned
+from drivers.rig import Handwork
+from protocols.free_vibration.parameters import DecayParameters, FreeVibrationParameters
+from protocols.free_vibration.playing import Pace, found_level, played
+from protocols.free_vibration.pulse import QUIET, Planned, window_of
+from protocols.free_vibration.results import FrameResult, point_of, result_of
+from protocols.free_vibration.told import fit_finished
+from protocols.harmonic.evidence import Unmeasurable
+from sim.parameters import Parameters
+from sim.specimen import Specimen
+
+LETTING_GO = 6.0
+"""Time for which a hand is waited for [s]."""
+
+Telling = Callable[[FrameResult, int], Parameters]
+"""Makes the point of a result; the number is 0 for all decays together."""
+
+_TRIES = 2
+"""How often a decay is tried that cannot be used."""
+
+
+def pulsed_decays(
+    parameters: DecayParameters,
+    configuration: BenchConfiguration,
+    found: Planned,
+    setting: Setting,
+    pace: Pace,
+    name: str,
+    told: Telling = point_of,
+) -> Generator[Step, Outcome, list[Decay]]:
+    """Find the level, then record the decays; `told` makes the point of each.
+
+    Raises Unmeasurable when none can be used.
+    """
+    yield Say(StepStarted(0.0, f"{name}: {1e3 * found.drift:.3g} mm of drift, {_reason(found)}"))
+    pulse = found.pulse
+    volts = yield from found_level(pulse, found.drift, configuration, pace)
+
+    def once(activity: str) -> Generator[Step, Outcome, Decay]:
+        signals = yield from played(pulse.record(volts), pulse.sample_rate, pace, activity)
+        return pulsed_decay(signals, setting, QUIET, pulse.begin)
+
+    how = f"a pulse of {volts:.3g} V, {pulse.length:.0f} s"
+    return (yield from _repeated(parameters, setting, once, name, how, told))
+
+
+def released_decays(
+    parameters: FreeVibrationParameters, specimen: Specimen, setting: Setting, pace: Pace
+) -> Generator[Step, Outcome, list[Decay]]:
+    pull, window = parameters.pull, window_of(parameters, specimen)
+    silence = np.zeros(round((LETTING_GO + window) * setting.sample_rate))
+
+    def once(activity: str) -> Generator[Step, Outcome, Decay]:
+        request = (
+            f"Hold storey 2 aside by {1e3 * pull:g} mm, without touching storey 1, and let it go without a push once"
+            " the recording has begun."
+        )
+        yield Handle(Handwork.PULL_FRAME, specimen, request, pull)
+        signals = yield from played(silence, setting.sample_rate, pace, activity)
+        return released_decay(signals, setting)
+
+    how = f"let go by hand, {window:.0f} s"
+    return (yield from _repeated(parameters, setting, once, "free vibration", how, point_of))
+
+
+def _repeated(
+    parameters: DecayParameters,
+    setting: Setting,
+    once: Callable[[str], Generator[Step, Outcome, Decay]],
+    name: str,
+    how: str,
+    told: Telling,
+) -> Generator[Step, Outcome, list[Decay]]:
+    decays: list[Decay] = []
+    for number in range(1, parameters.repeats + 1):
+        for attempt in range(_TRIES):
+            yield Say(StepStarted(0.0, f"{name} {number} of {parameters.repeats}: {how}"))
+            try:
+                decay = yield from once(f"{name} {number} of {parameters.repeats}")
+            except Unusable as refusal:
+                again = "it is repeated" if attempt + 1 < _TRIES else "it is left out"
+                yield Say(Warned(0.0, f"{name} {number}: {refusal}; {again}"))
+                continue
+            decays.append(decay)
+            yield Say(fit_finished(decay, f"{name} {number}"))
+            yield Say(PointFinished(0.0, told(result_of([decay], setting.masses, setting.weighed), number)))
+            break
+    if not decays:
+        raise Unmeasurable("no decay could be used: see the warnings of this run")
+    return decays
+
+
+def _reason(found: Planned) -> str:
+    return "as asked for" if found.binds == "drift asked for" else f"{found.binds} allows no more"

@@ -1,0 +1,129 @@
+# pyright: reportUnknownMemberType=false
+"""The decays: what was measured and fitted, what is left, its spectrum, damping over amplitude, and the budget.
+
+matplotlib's keyword arguments have no types, hence the first line.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bench.analysis.free_decay.modal import OMEGA1, XI1
+from bench.analysis.gain import COVERAGE
+from bench.analysis.rounding import plus_minus
+from bench.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION, new_figure, set_grid
+from protocols.free_vibration.results import FrameResult
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+PARTS = {
+    "noise": BLUE,
+    "table": GREEN,
+    "clock": ORANGE,
+    "linearity": PURPLE,
+    "masses": GREY,
+    "timebase": SKY,
+    "scatter": VERMILLION,
+}
+QUANTITIES = ("$k_1$", "$k_2$", r"$\xi_1$", r"$\xi_2$")
+
+
+def decay_figure(result: FrameResult | None, title: str) -> "Figure":
+    """Six panels; without a result they are empty."""
+    figure = new_figure(9.0, 10.5)
+    grid = figure.add_gridspec(4, 2, height_ratios=(3, 2, 2.6, 2.6))
+    decay, rest = figure.add_subplot(grid[0, :]), figure.add_subplot(grid[1, :])
+    spectrum, budget = figure.add_subplot(grid[2, 0]), figure.add_subplot(grid[2, 1])
+    damping = [figure.add_subplot(grid[3, place]) for place in range(2)]
+    for panel in (decay, rest, spectrum, budget, *damping):
+        set_grid(panel)
+    decay.set_title(title if result is not None else "nothing was identified", loc="left", fontsize=10)
+    if result is None:
+        return figure
+    _draw_decay(decay, rest, result)
+    _draw_spectrum(spectrum, result)
+    _draw_budget(budget, result)
+    for mode, panel in enumerate(damping):
+        _draw_damping(panel, result, mode)
+    return figure
+
+
+def _draw_decay(decay: "Axes", rest: "Axes", result: FrameResult) -> None:
+    fit = result.decays[0].fit
+    time = fit.stretch.time
+    drift = 1e3 * (fit.stretch.seen[1] - fit.stretch.seen[0])
+    decay.plot(time, drift, color=BLUE, linewidth=0.9, label="measured (first decay)")
+    decay.plot(time, 1e3 * (fit.fitted[1] - fit.fitted[0]), "--", color=VERMILLION, linewidth=0.9, label="fitted")
+    decay.axvline(result.decays[0].begin, color=GREY, linewidth=0.8)
+    decay.set_ylabel("drift [mm]")
+    decay.legend(loc="upper right", fontsize=8)
+    for place, colour in enumerate((BLUE, GREEN)):
+        rest.plot(time, 1e6 * fit.residual[place], color=colour, linewidth=0.5, label=f"laser {place + 1}")
+    rest.set_ylabel("measured - fitted\n[um]")
+    rest.set_xlabel("time [s]")
+    rest.legend(loc="upper right", fontsize=8, ncols=2)
+
+
+def _draw_spectrum(panel: "Axes", result: FrameResult) -> None:
+    from scipy import signal
+
+    welch: Any = signal.welch
+    for place, colour in enumerate((BLUE, GREEN)):
+        powers: list[np.ndarray] = []
+        frequency = np.zeros(0)
+        for one in result.decays:
+            rate = 1.0 / one.fit.stretch.step
+            left = one.fit.residual[place]
+            frequency, power = welch(left, rate, nperseg=min(2048, left.size))
+            powers.append(power)
+        panel.loglog(
+            frequency[1:],
+            1e6 * np.sqrt(np.mean(powers, axis=0)[1:]),
+            color=colour,
+            linewidth=0.8,
+            label=f"laser {place + 1}",
+        )
+    for mode, omega in enumerate(result.frame.values[OMEGA1:]):
+        name = "modes" if mode == 0 else None
+        panel.axvline(omega / (2.0 * np.pi), color=BLACK, linewidth=0.7, linestyle=":", label=name)
+    panel.legend(loc="lower left", fontsize=7)
+    panel.set_xlabel("frequency [Hz]")
+    panel.set_ylabel(r"residual [um/$\sqrt{\mathrm{Hz}}$]")
+
+
+def _draw_budget(panel: "Axes", result: FrameResult) -> None:
+    """Standard uncertainties relative to the values, part by part, and the whole."""
+    width = 0.8 / (len(result.parts) + 1)
+    places = np.arange(len(QUANTITIES))
+    relative = np.abs(result.frame.values[: len(QUANTITIES)])
+    bars = {**{name: result.parts[name] for name in result.parts}, "together": result.uncertainty}
+    for number, (name, sizes) in enumerate(bars.items()):
+        share = 100.0 * sizes[: len(QUANTITIES)] / relative
+        panel.bar(places + number * width, share, width, color=PARTS.get(name, BLACK), label=name)
+    panel.set_xticks(places + 0.4 - 0.5 * width, QUANTITIES)
+    panel.set_ylabel("standard uncertainty [%]")
+    panel.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), fontsize=7, ncols=4, frameon=False)
+
+
+def _draw_damping(panel: "Axes", result: FrameResult, mode: int) -> None:
+    for one in result.decays:
+        course = one.courses[mode]
+        panel.errorbar(
+            1e3 * course.amplitude,
+            100.0 * course.damping,
+            100.0 * COVERAGE * course.uncertainty,
+            fmt="o",
+            ms=3,
+            color=BLUE,
+            lw=0.8,
+        )
+    value = 100.0 * result.frame.values[XI1 + mode]
+    slope, doubt = (0.1 * values[mode] for values in (result.slopes.values, result.slope_uncertainty))
+    panel.axhline(value, color=VERMILLION, linewidth=0.9)
+    panel.set_xlabel(f"drift in mode {mode + 1} [mm]")
+    panel.set_ylabel(rf"$\xi_{mode + 1}$ [%]")
+    verdict = "significant" if result.nonlinear[mode] else "not significant"
+    told = plus_minus(slope, COVERAGE * doubt)
+    panel.set_title(f"slope {told} %/mm (k = 2), {verdict} (99 %)", loc="left", fontsize=8)

@@ -1,0 +1,154 @@
+"""How a pulse is played, and how strong it must be: found out from one too small to do harm."""
+
+from collections.abc import Callable, Generator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.analysis.signals import ACCELERATION, DISPLACEMENT, DRIFT, LASER_1, LASER_2
+from bench.config.model import BenchConfiguration
+from bench.engine.steps import Arm, Fallen, Outcome, Play, Played, RampOut, Say, Step
+from bench.events import Event, Progress, StepStarted, Warned
+from protocols.free_vibration.pulse import QUIET, SHARE, Pulse
+from protocols.harmonic.calibrate import PROBE
+from protocols.harmonic.evidence import Unmeasurable
+
+Array = NDArray[np.float64]
+
+REST = 2.0
+"""Time at rest before each pulse, over which the zero of the signals is taken [s]."""
+
+STILL = 5e-5
+"""Scatter of the storeys at rest below which they are still [m]; a laser's steps stay below."""
+
+WAITING = 45.0
+"""Time that passes besides what is played: until the storeys are still, rest, ramp [s]."""
+
+AUDIBLE = 20.0
+"""How many times its noise the drift must reach in a probe."""
+
+GROWTH, NEAR = 10.0, 2.0
+"""Most by which the drive grows from one probe to the next; a probe is the last when less than the other is left."""
+
+LEAST = 0.003
+"""Drift [m] below which a decay is drowned by the steps of the lasers."""
+
+_LISTENED = 3.0
+"""Time after a probe's pulse in which the largest motion comes [s]."""
+
+_MOST = 6
+"""Probes before a table that answers less than expected is given up."""
+
+
+@dataclass
+class Pace:
+    """How far the run is: `expected` [s] in all, `gone` [s] of it."""
+
+    expected: float
+    gone: float = 0.0
+
+    def watch(self, sample_rate: float, activity: str) -> Callable[[Array], Event]:
+        """Tells how far it is, block by block."""
+        since = 0
+
+        def look(signals: Array) -> Event:
+            nonlocal since
+            since += len(signals)
+            gone = min(self.gone + since / sample_rate, self.expected)
+            return Progress(0.0, gone / self.expected, self.expected - gone, activity)
+
+        return look
+
+
+def played(volts: Array, sample_rate: float, pace: Pace, activity: str) -> Generator[Step, Outcome, Array]:
+    """Arm, play and ramp out; the signals, shape (n, 6). Raises Unmeasurable when something fell."""
+    yield Arm(REST, STILL)
+    outcome = yield Play(volts, pace.watch(sample_rate, activity))
+    end = yield RampOut(fast=isinstance(outcome, Fallen))
+    pace.gone = min(pace.gone + volts.size / sample_rate + WAITING, pace.expected)
+    if not isinstance(outcome, Played) or isinstance(end, Fallen):
+        raise Unmeasurable(
+            "storey 1 has moved aside for good: see to the frame, to what holds the block, and to laser 1"
+        )
+    return outcome.signals
+
+
+def found_level(
+    pulse: Pulse, drift: float, configuration: BenchConfiguration, pace: Pace
+) -> Generator[Step, Outcome, float]:
+    """The drive [V] with which the pulse makes a peak of `drift` [m], or as much as the limits allow.
+
+    Raises Unmeasurable when the frame does not answer, or cannot be brought to `LEAST`.
+    """
+    volts, seen, limit = PROBE, 0.0, _largest_drive(pulse, configuration)
+    for probe in range(1, _MOST + 1):
+        yield Say(StepStarted(0.0, f"probe {probe}: a pulse of {volts:.3g} V"))
+        signals = yield from played(pulse.record(volts, _LISTENED), pulse.sample_rate, pace, "the pulse is probed")
+        rest = round(QUIET * pulse.sample_rate)
+        seen, noise = _peak(signals[:, DRIFT]), float(np.nanstd(signals[:rest, DRIFT]))
+        if not seen > AUDIBLE * noise:
+            if volts >= GROWTH * PROBE:
+                raise Unmeasurable(
+                    f"the frame does not answer a pulse of {volts:.2g} V: {1e3 * seen:.2g} mm of drift, noise"
+                    f" {1e3 * noise:.2g} mm; see to the amplifier, the enable line, the emergency stop and the lasers"
+                )
+            volts *= GROWTH
+            continue
+        room, binds = _room(signals, pulse.sample_rate, configuration)
+        if limit / volts < room:
+            room, binds = limit / volts, "limits of the drive"
+        left = min(drift / seen, room)
+        if left < NEAR:
+            return (yield from _accepted(left * volts, left * seen, drift, binds))
+        volts *= min(GROWTH, left)
+    raise Unmeasurable(
+        f"after {_MOST} probes the drift comes to {1e3 * seen:.2g} mm where {1e3 * drift:.2g} mm are asked for: see to"
+        " the amplifier's gain and to what holds the table"
+    )
+
+
+def _accepted(volts: float, seen: float, drift: float, binds: str) -> Generator[Step, Outcome, float]:
+    if seen < LEAST:
+        raise Unmeasurable(
+            f"{binds} leaves {1e3 * seen:.2g} mm of drift, a decay needs {1e3 * LEAST:g} mm: raise the limit, or give"
+            " another --pulse"
+        )
+    if seen < 0.9 * drift:
+        yield Say(Warned(0.0, f"{binds} leaves {1e3 * seen:.2g} mm of drift, {1e3 * drift:.2g} mm are asked for"))
+    return volts
+
+
+def _room(signals: Array, sample_rate: float, configuration: BenchConfiguration) -> tuple[float, str]:
+    """By how much a motion may grow until it takes `SHARE` of a limit, and which that is."""
+    limits, halves = configuration.limits, [0.5 * whole for whole in configuration.laser_ranges]
+    acceleration, displacement = _peak(signals[:, ACCELERATION]), _peak(signals[:, DISPLACEMENT])
+    # the mean over some milliseconds: the difference of single samples is noise
+    many = max(round(0.02 * sample_rate), 1)
+    rows = len(signals) // many
+    smooth = signals[: rows * many, DISPLACEMENT].reshape(rows, many).mean(axis=1)
+    asked = {
+        "drift": _peak(signals[:, DRIFT]) / limits.drift,
+        "laser_range": max(_peak(signals[:, LASER_1]) / halves[0], _peak(signals[:, LASER_2]) / halves[1])
+        / min(limits.laser_range, 1.0),
+        "displacement": displacement / min(limits.displacement, configuration.half_stroke),
+        "velocity": _peak(np.diff(smooth)) * sample_rate / many / limits.velocity,
+        "acceleration": acceleration / limits.acceleration,
+    }
+    if (mover := configuration.mover) is not None:
+        asked["force"] = mover.mass * acceleration / limits.force
+        current = (mover.mass * acceleration + mover.stiffness * displacement) / mover.force_constant
+        asked["current"] = current / limits.current
+    binds = max(asked, key=lambda name: asked[name])
+    return SHARE / asked[binds], f"limits.{binds}"
+
+
+def _largest_drive(pulse: Pulse, configuration: BenchConfiguration) -> float:
+    """Peak [V] of the pulse that takes `SHARE` of the limits of the drive."""
+    limits = configuration.limits
+    slew = float(np.abs(np.diff(pulse.shape)).max()) * pulse.sample_rate
+    return SHARE * min(limits.drive_voltage, limits.drive_slew / slew)
+
+
+def _peak(values: Array) -> float:
+    return float(np.nanmax(np.abs(values)))

@@ -1,0 +1,156 @@
+"""Decays together: the quantities of `modal.NAMES` and the two slopes of the damping, with all covariances."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.analysis.free_decay.combine import Combined, combine
+from bench.analysis.free_decay.damping import DampingCourse
+from bench.analysis.free_decay.decay import Decay
+from bench.analysis.free_decay.doubt import COMMON
+from bench.analysis.free_decay.modal import K1, K2, NAMES, XI1, XI2
+from bench.analysis.gain import COVERAGE
+from protocols.free_vibration.point import DecayPoint
+
+Array = NDArray[np.float64]
+
+SIGNIFICANT = 2.576
+"""Standard uncertainties that a difference must reach to be significant: the normal quantile for 99 %."""
+
+
+@dataclass(frozen=True, eq=False)
+class FrameResult:
+    """One decay or several. `frame` combines the quantities, `slopes` those of the damping over the amplitude [1/m].
+
+    `masses` [kg] and `weighed` [kg2], shape (2, 2), are as weighed; `mass_shift`, shape (8, 2), is how the quantities
+    follow them, `time_shift`, shape (8,), how they follow the timebase by its standard uncertainty. `parts` are the
+    standard uncertainties, shape (8,), by part.
+    """
+
+    decays: tuple[Decay, ...]
+    frame: Combined
+    slopes: Combined
+    masses: tuple[float, float]
+    weighed: Array
+    mass_shift: Array
+    time_shift: Array
+    parts: dict[str, Array]
+
+    @property
+    def shared_shift(self) -> Array:
+        """How the quantities follow what all frames of a run share: both masses and the timebase, shape (8, 3)."""
+        return np.column_stack((self.mass_shift, self.time_shift))
+
+    @property
+    def shared(self) -> Array:
+        """Covariance of both masses [kg2] and of the timebase in its standard uncertainties, shape (3, 3)."""
+        whole = np.eye(3)
+        whole[:2, :2] = self.weighed
+        return whole
+
+    @property
+    def uncertainty(self) -> Array:
+        """Standard uncertainties of the quantities, shape (8,)."""
+        return np.sqrt(np.diag(self.frame.covariance))
+
+    @property
+    def slope_uncertainty(self) -> Array:
+        """Standard uncertainties of the slopes [1/m], shape (2,)."""
+        return np.sqrt(np.diag(self.slopes.covariance))
+
+    @property
+    def nonlinear(self) -> NDArray[np.bool_]:
+        """Which slope is significant, shape (2,)."""
+        return np.abs(self.slopes.values) > SIGNIFICANT * self.slope_uncertainty
+
+
+def result_of(decays: Sequence[Decay], masses: tuple[float, float], weighed: Array) -> FrameResult:
+    """What decays of one frame come to."""
+    frame = combine(
+        [one.quantities for one in decays], [one.doubt.own for one in decays], [one.doubt.common for one in decays]
+    )
+    slopes = combine(
+        [np.array([course.slope for course in one.courses]) for one in decays],
+        [np.diag([course.own for course in one.courses]) for one in decays],
+        [np.diag([course.common for course in one.courses]) for one in decays],
+    )
+    names = decays[0].doubt.parts
+    parts = {name: _part(name, decays, frame) for name in names} | {"scatter": frame.scatter}
+    shift = np.mean([one.doubt.mass_shift for one in decays], axis=0)
+    late = np.mean([one.doubt.time_shift for one in decays], axis=0)
+    return FrameResult(tuple(decays), frame, slopes, masses, weighed, shift, late, parts)
+
+
+def point_of(result: FrameResult, number: int) -> DecayPoint:
+    """The result as a point; `number` 0 for all decays together."""
+    names = dict(zip(NAMES, _FIELDS, strict=True))
+    values = {
+        name: value
+        for place, (field, doubt) in enumerate(names.values())
+        for name, value in (
+            (field, float(result.frame.values[place])),
+            (doubt, COVERAGE * float(result.uncertainty[place])),
+        )
+    }
+    birge = result.frame.birge
+    squares = [float(np.mean(one.fit.residual**2)) for one in result.decays]
+    slopes, doubts = result.slopes.values, COVERAGE * result.slope_uncertainty
+    return DecayPoint(
+        decay=number,
+        decays=len(result.decays),
+        **values,
+        drift_peak_m=max(one.peak for one in result.decays),
+        residual_m=float(np.sqrt(np.mean(squares))),
+        birge=None if np.isnan(birge).any() else float(birge.max()),
+        slope1_per_m=float(slopes[0]),
+        slope1_uncertainty=float(doubts[0]),
+        slope2_per_m=float(slopes[1]),
+        slope2_uncertainty=float(doubts[1]),
+        damping_is_linear=not bool(result.nonlinear.any()),
+        k1_parts=_parts_of(result, K1),
+        k2_parts=_parts_of(result, K2),
+        xi1_parts=_parts_of(result, XI1),
+        xi2_parts=_parts_of(result, XI2),
+        damping1_course=_course(result.decays[0].courses[0]) if number else "",
+        damping2_course=_course(result.decays[0].courses[1]) if number else "",
+    )
+
+
+def parts_as_json(parts: Mapping[str, float]) -> str:
+    """Standard uncertainties by part, the largest first."""
+    return json.dumps({name: _short(size) for name, size in sorted(parts.items(), key=lambda each: -each[1])})
+
+
+def _parts_of(result: FrameResult, place: int) -> str:
+    return parts_as_json({name: float(part[place]) for name, part in result.parts.items()})
+
+
+def _course(course: DampingCourse) -> str:
+    rows = (course.amplitude, course.damping, course.uncertainty)
+    return json.dumps([[_short(value) for value in row.tolist()] for row in rows])
+
+
+def _short(value: float) -> float:
+    """With five digits: texts of a data file are short."""
+    return float(f"{value:.5g}")
+
+
+_FIELDS = (
+    ("k1_n_m", "k1_uncertainty"),
+    ("k2_n_m", "k2_uncertainty"),
+    ("xi1", "xi1_uncertainty"),
+    ("xi2", "xi2_uncertainty"),
+    ("c1_n_s_m", "c1_uncertainty"),
+    ("c2_n_s_m", "c2_uncertainty"),
+    ("omega1_rad_s", "omega1_uncertainty"),
+    ("omega2_rad_s", "omega2_uncertainty"),
+)
+
+
+def _part(name: str, decays: Sequence[Decay], frame: Combined) -> Array:
+    """Standard uncertainty by one part: those of single decays average out, those of all do not."""
+    variances = np.array([np.diag(one.doubt.parts[name]) for one in decays])
+    return np.sqrt(np.mean(variances, axis=0) if name in COMMON else np.sum(frame.weights**2 * variances, axis=0))

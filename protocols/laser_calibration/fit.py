@@ -1,0 +1,227 @@
+"""From cycles of one motion to the errors of the lasers that saw it.
+
+Under a slow sine of the table a laser's reading is r = x + e(r) - d v + c omega^2 x: its error e by the place, its
+delay d, and what the clamps yield, c, because the storeys must be accelerated; passes at two frequencies tell c from a
+scale. All is fitted by least squares to the mean cycles of the passes, at even steps of the phase, with e as Chebyshev
+polynomials of the reading. That the table's motion is no pure sine does no harm: both sensors show what it is.
+
+The order is the lowest whose curve, fitted to all passes but one, foretells the one left out as well as the best does,
+within one standard error. What is left open of the curve is the scatter of what is found without each pass in turn
+(jackknife), and what higher orders would add.
+
+The lasers are the standards of length: data sheets allow a laser a smooth error of some share of its whole range, which
+over the span of the passes says more of a scale than the table's sensors do. So the mean of the spans of both lasers is
+taken as true; the table's sensors and each laser are told against it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from math import pi, sqrt
+
+import numpy as np
+from numpy.polynomial import chebyshev
+from numpy.typing import NDArray
+
+from bench.analysis.cycles import Cycle, mean_waves
+from bench.analysis.laser_calibration import LaserCalibration, LaserCurve
+from bench.analysis.sensor_accuracy import WAVES, SensorAccuracy
+from bench.analysis.signals import ACCELERATION, DISPLACEMENT, LASER_1, LASER_2
+
+Array = NDArray[np.float64]
+
+HIGHEST = 9
+"""Highest order that is tried: above it the cycles, fitted with ten harmonics, show less and less."""
+
+PLACES = 201
+"""Readings at which curves are compared."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pass:
+    """The mean cycle of one pass at `omega` [rad/s], shape (k,) each: displacement of the table [m] and its rate [m/s],
+    both lasers [m].
+    """
+
+    omega: float
+    displacement: Array
+    speed: Array
+    lasers: tuple[Array, Array]
+    ratio: float
+    """Amplitude of the table's displacement over that which its acceleration shows, a / omega^2."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """The curve of one laser against the table's displacement as shown, as Chebyshev coefficients `error` [m] over the
+    readings from `low` to `high` [m]; `delay` [s].
+
+    `scores` are the root mean squares [m] of what each order from 1 on foretells wrongly; `residual` [m] is that of
+    what the chosen one leaves. `without`, shape (passes, PLACES) [m], are the curves, and `delays` [s] the delays,
+    found without each pass in turn.
+    """
+
+    low: float
+    high: float
+    error: Array
+    delay: float
+    scores: Array
+    residual: float
+    without: Array
+    delays: Array
+
+    @property
+    def uncertainty(self) -> float:
+        """Standard uncertainty of the curve at one reading [m], its mean left out."""
+        bent = self.without - self.without.mean(axis=1)[:, None]
+        variance = float(np.mean([jackknife(place) ** 2 for place in bent.T]))
+        return sqrt(variance + self.residual**2)
+
+    @property
+    def slope(self) -> float:
+        """How much more its readings span than the displacement, over what they span."""
+        ends = chebyshev.chebval(np.array([-1.0, 1.0]), self.error)
+        return float(ends[1] - ends[0]) / (self.high - self.low)
+
+    @property
+    def slopes(self) -> Array:
+        """The same without each pass in turn, shape (passes,)."""
+        spans: Array = self.without[:, -1] - self.without[:, 0]
+        return spans / (self.high - self.low)
+
+
+def jackknife(found: Array) -> float:
+    """Standard uncertainty of what was found of n passes, from what is found without each, shape (n,)."""
+    return sqrt((found.size - 1) / found.size * float(np.sum((found - found.mean()) ** 2)))
+
+
+def one_pass(cycles: Sequence[Cycle], omega: float) -> Pass:
+    """A pass at `omega` [rad/s] from its cycles; their signals are counted from the rest."""
+    waves = mean_waves(cycles)
+    moved = np.mean([cycle.fundamental for cycle in cycles], axis=0)
+    return Pass(
+        omega=omega,
+        displacement=waves.waveform[:, DISPLACEMENT],
+        speed=omega * waves.rates[:, DISPLACEMENT],
+        lasers=(waves.waveform[:, LASER_1], waves.waveform[:, LASER_2]),
+        ratio=float(abs(moved[DISPLACEMENT]) * omega**2 / abs(moved[ACCELERATION])),
+    )
+
+
+def fitted(passes: Sequence[Pass], laser: int, rest: float) -> Fitted:
+    """The curve of laser 0 or 1 that rests at the reading `rest` [m]; the passes have two frequencies or more."""
+    readings = [rest + each.lasers[laser] for each in passes]
+    # what all passes cover
+    low, high = max(float(r.min()) for r in readings), min(float(r.max()) for r in readings)
+    rows = [_columns(r, each, low, high) for r, each in zip(readings, passes, strict=True)]
+    errors = [r - each.displacement for r, each in zip(readings, passes, strict=True)]
+    every = range(len(passes))
+
+    def solved(order: int, out: int | None = None) -> Array:
+        kept = [*range(order + 1), -2, -1]
+        chosen = [k for k in every if k != out]
+        found, *_ = np.linalg.lstsq(
+            np.concatenate([rows[k][:, kept] for k in chosen]), np.concatenate([errors[k] for k in chosen]), rcond=None
+        )
+        return found.astype(np.float64)
+
+    def missed(order: int, out: int) -> float:
+        wrong = errors[out] - rows[out][:, [*range(order + 1), -2, -1]] @ solved(order, out)
+        # a pass has its own rounding of the zero
+        return float(np.var(wrong))
+
+    squares: Array = np.array([[missed(order, out) for out in every] for order in range(1, HIGHEST + 1)])
+    means = squares.mean(axis=1)
+    best = int(means.argmin())
+    allowed = means[best] + float(np.std(squares[best], ddof=1)) / sqrt(len(passes))
+    order = int(np.flatnonzero(means <= allowed)[0]) + 1
+    whole, finest = solved(order), solved(HIGHEST)
+    alone: Array = np.array([solved(order, out) for out in every])
+    at = np.linspace(-1.0, 1.0, PLACES)
+    return Fitted(
+        low=low,
+        high=high,
+        error=whole[:-2],
+        delay=float(whole[-2]),
+        scores=np.sqrt(means),
+        residual=float(np.std(chebyshev.chebval(at, finest[:-2]) - chebyshev.chebval(at, whole[:-2]))),
+        without=(chebyshev.chebvander(at, order) @ alone[:, :-2].T).T.astype(np.float64),
+        delays=alone[:, -2],
+    )
+
+
+def calibration(
+    passes: Sequence[Pass],
+    curves: tuple[Fitted, Fitted],
+    rests: tuple[float, float],
+    devices: tuple[str, str],
+    accuracy: SensorAccuracy,
+    ranges: tuple[float, float],
+    *,
+    reference_linearity: float,
+    valid_days: float,
+    date: datetime,
+) -> LaserCalibration:
+    """All that the passes say. `reference_linearity` is that of the displacement sensor, relative to what is covered;
+    `accuracy` and `ranges` [m] are what the data sheets say of the lasers.
+    """
+    slopes = [curve.slope for curve in curves]
+    # the mean span of the lasers is true: shown displacements times this factor
+    factor = 1.0 / (1.0 - 0.5 * sum(slopes))
+    found = [
+        LaserCurve(
+            sensor=device,
+            lowest=curve.low,
+            highest=curve.high,
+            rest=rest,
+            error=tuple(_rescaled(curve, factor).tolist()),
+            uncertainty=curve.uncertainty,
+            scale=(1.0 - 0.5 * sum(slopes)) / (1.0 - slope),
+            delay=curve.delay,
+            delay_uncertainty=jackknife(curve.delays),
+        )
+        for curve, rest, device, slope in zip(curves, rests, devices, slopes, strict=True)
+    ]
+    span = min(curve.high - curve.low for curve in curves)
+    ratios = np.array([each.ratio for each in passes])
+    standard = np.sqrt(np.mean([_span_doubt(span, accuracy, whole) ** 2 for whole in ranges]) / 2.0)
+    scatter = np.hypot(np.std(ratios, ddof=1) / sqrt(len(passes)), jackknife((curves[0].slopes + curves[1].slopes) / 2))
+    # what is left of the curves tilts them, too
+    bent = np.hypot(curves[0].uncertainty, curves[1].uncertainty) / (0.5 * span)
+    return LaserCalibration(
+        date=date,
+        valid_days=valid_days,
+        laser_1=found[0],
+        laser_2=found[1],
+        differential_scale=found[1].scale / found[0].scale,
+        differential_uncertainty=float(np.hypot(jackknife(curves[1].slopes - curves[0].slopes), bent)),
+        common_linearity=reference_linearity * span,
+        table_displacement=factor,
+        table_acceleration=factor * float(ratios.mean()),
+        table_uncertainty=float(np.hypot(standard, scatter)),
+    )
+
+
+def _span_doubt(span: float, accuracy: SensorAccuracy, whole: float) -> float:
+    """Standard relative uncertainty of what one laser with the range `whole` [m] says of a `span` [m].
+
+    Of its scale, half the variance of the difference of two; of its linearity, a sine of any phase and some waves: the
+    difference of two of its values, span apart, is 2 sin(pi w span / R) cos(phase) of its height.
+    """
+    waves = np.linspace(*WAVES, 101)
+    bent = sqrt(2.0 * float(np.mean(np.sin(pi * waves * span / whole) ** 2)))
+    return float(np.hypot(accuracy.laser_linearity * whole * bent / span, accuracy.laser_mismatch / sqrt(2.0)))
+
+
+def _rescaled(curve: Fitted, factor: float) -> Array:
+    """The error against the true displacement, `factor` times the shown one: r - factor (r - e), as coefficients."""
+    error = factor * curve.error
+    error[:2] += (1.0 - factor) * np.array([0.5 * (curve.high + curve.low), 0.5 * (curve.high - curve.low)])
+    return error
+
+
+def _columns(readings: Array, each: Pass, low: float, high: float) -> Array:
+    """Chebyshev polynomials up to HIGHEST, and what a delay and a yielding clamp do; shape (k, HIGHEST + 3)."""
+    place = (2.0 * readings - high - low) / (high - low)
+    columns = (chebyshev.chebvander(place, HIGHEST), -each.speed, each.omega**2 * each.displacement)
+    return np.column_stack(columns).astype(np.float64)

@@ -1,0 +1,180 @@
+"""The lab sheet of the laser calibration.
+
+1. The storeys are clamped to the table, so that every sensor sees one motion.
+2. The table is driven by slow sines, each pass a little smaller than the one before.
+3. The clamps are taken off.
+"""
+
+from collections.abc import Callable, Generator
+from datetime import UTC, datetime
+from math import tau
+
+import numpy as np
+
+from bench.analysis.laser_calibration import LaserCalibration
+from bench.config.model import BenchConfiguration
+from bench.control.calibration import DriveCalibration
+from bench.control.legs import Leg
+from bench.engine.steps import (
+    Arm,
+    Calibrate,
+    Dwell,
+    Follow,
+    Handle,
+    Heard,
+    Listen,
+    Measured,
+    Outcome,
+    Plan,
+    RampOut,
+    Say,
+    Step,
+)
+from bench.events import FitFinished, FittedParameter, PointFinished, Progress, Series, StepStarted
+from drivers.rig import Handwork
+from protocols.check.probe import probed_drive
+from protocols.harmonic.calibrate import SETTLING, calibrate_drive
+from protocols.harmonic.evidence import Unmeasurable, need_cycles
+from protocols.laser_calibration.fit import Fitted, Pass, calibration, fitted, one_pass
+from protocols.laser_calibration.parameters import LaserCalibrationParameters
+from protocols.laser_calibration.point import sensors
+
+REST = 2.0
+"""Time at rest over which the lasers' readings there, and the zero of the signals, are taken [s]."""
+
+SMALLER = 0.01
+"""Share by which each pass is smaller than the first for every pass before it."""
+
+START, CHANGE = 12.0, 3.0
+"""Time in which the table goes to the first pass, and from one to the next [s]. An amplifier that makes a velocity
+displaces the table by what its ramp does not make even, and only the suspension takes it back, within seconds.
+"""
+
+LEVELS = (0.2, 0.7)
+"""Shares of the amplitude at which the drive is calibrated: friction takes less and less of it."""
+
+_CLAMP = "Take spring and block off the table and clamp both storeys to it; keep clear, the amplifier is switched on."
+_UNCLAMP = "Take the clamps off the storeys."
+_LOOSE = "the first storey is pulled aside although no block stands on the table: check lasers and clamps"
+
+
+def passes_of(parameters: LaserCalibrationParameters) -> list[tuple[float, float]]:
+    """Frequency [rad/s] and amplitude [m] of the passes: the slow ones first."""
+    slow = parameters.passes // 2
+    return [
+        (parameters.omega * (0.5 if number < slow else 1.0), parameters.amplitude * (1.0 - SMALLER * number))
+        for number in range(parameters.passes)
+    ]
+
+
+def expected_duration(parameters: LaserCalibrationParameters) -> float:
+    """Expected length of the calibration [s]."""
+    slow = 2.0 * tau / parameters.omega
+    probing = 2 * (SETTLING + 8) * slow + len(LEVELS) * 2 * (6 * slow + 2.0)
+    measuring = sum(CHANGE + (SETTLING + parameters.cycles) * tau / omega for omega, _ in passes_of(parameters))
+    return 2.0 * REST + probing + 3.0 * START + measuring + 5.0
+
+
+def calibration_plan(
+    parameters: LaserCalibrationParameters,
+    configuration: BenchConfiguration,
+    keep: Callable[[LaserCalibration, tuple[Fitted, Fitted]], None],
+) -> Plan:
+    """The whole calibration as steps; `keep` is given what was found."""
+    bare = configuration.known_specimen.bare()
+    yield Handle(Handwork.LOCK_FRAME, bare, _CLAMP)
+    yield Say(StepStarted(0.0, "the lasers at rest"))
+    heard = yield Listen(REST)
+    if not isinstance(heard, Heard):
+        raise TypeError(f"listening came to {heard}")
+    rests = _rests(heard)
+    yield Arm(REST)
+    try:
+        passes = yield from _passes(parameters)
+    except Unmeasurable:
+        yield RampOut(fast=True)
+        raise
+    yield RampOut()
+    curves = fitted(passes, 0, rests[0]), fitted(passes, 1, rests[1])
+    devices = {channel.name: channel.device for channel in heard.channels}
+    found = calibration(
+        passes,
+        curves,
+        rests,
+        (devices["laser_1"], devices["laser_2"]),
+        configuration.analysis,
+        configuration.laser_ranges,
+        reference_linearity=parameters.reference_linearity,
+        valid_days=parameters.valid_days,
+        date=datetime.now(UTC).replace(microsecond=0),
+    )
+    keep(found, curves)
+    for number, (curve, laser) in enumerate(zip(curves, found.lasers, strict=True), 1):
+        yield Say(_told(f"laser_{number}", curve, laser.delay, laser.delay_uncertainty))
+    for point in sensors(found):
+        yield Say(PointFinished(0.0, point))
+    yield Handle(Handwork.UNLOCK_FRAME, bare, _UNCLAMP)
+
+
+def _passes(parameters: LaserCalibrationParameters) -> Generator[Step, Outcome, list[Pass]]:
+    """Calibrate the drive carefully, then drive and measure. Raises Unmeasurable where the signals show too little."""
+    slow = 0.5 * parameters.omega
+    yield Say(StepStarted(0.0, "calibrate the drive"))
+    known: DriveCalibration = yield from probed_drive(slow)
+    for share in LEVELS:
+        measured = yield from calibrate_drive([slow, parameters.omega], share * parameters.amplitude * slow**2, known)
+        if not isinstance(measured, DriveCalibration):
+            raise Unmeasurable(_LOOSE)
+        known = measured
+        yield Calibrate(known)
+    passes: list[Pass] = []
+    for number, (omega, amplitude) in enumerate(passes_of(parameters), 1):
+        text = f"pass {number} of {parameters.passes}: {1e3 * amplitude:.1f} mm at {omega:g} rad/s"
+        yield Say(StepStarted(0.0, text))
+        share = (number - 1) / parameters.passes
+        yield Say(Progress(0.0, share, (1.0 - share) * expected_duration(parameters), text))
+        if passes and passes[-1].omega == omega:
+            yield Follow((Leg(CHANGE, amplitude * omega**2, omega),))
+        else:
+            if passes:
+                yield Follow((Leg(START, 0.0, passes[-1].omega),))
+            yield Follow((Leg(START, amplitude * omega**2, omega),))
+        outcome = yield Dwell(SETTLING + parameters.cycles)
+        if not isinstance(outcome, Measured):
+            raise Unmeasurable(_LOOSE)
+        cycles = outcome.cycles[SETTLING:]
+        need_cycles(cycles, parameters.cycles)
+        passes.append(one_pass(cycles, omega))
+    return passes
+
+
+def _rests(heard: Heard) -> tuple[float, float]:
+    """Readings of both lasers at rest [m]. Raises Unmeasurable when one has nothing to read."""
+    found: list[float] = []
+    for name in ("laser_1", "laser_2"):
+        column, channel = next((k, each) for k, each in enumerate(heard.channels) if each.name == name)
+        values = channel.to_unit(heard.counts[:, column])
+        if not np.isfinite(values).any():
+            raise Unmeasurable(f"{name} shows nothing at rest: see whether it is on and its storey is in its range")
+        found.append(float(np.nanmean(values)))
+    return found[0], found[1]
+
+
+def _told(name: str, curve: Fitted, delay: float, doubt: float) -> FitFinished:
+    at = np.linspace(curve.low, curve.high, curve.without.shape[1])
+    fit = np.polynomial.chebyshev.chebval(np.linspace(-1.0, 1.0, at.size), curve.error)
+    passes = {
+        f"without_{number}": Series(each - each.mean(), "m", f"the same without pass {number}")
+        for number, each in enumerate(curve.without, 1)
+    }
+    return FitFinished(
+        0.0,
+        f"error of {name}",
+        f"{name}: order {curve.error.size - 1}, {1e6 * curve.uncertainty:.1f} um left open at one reading",
+        {
+            "reading": Series(at, "m", "reading from the middle of the range"),
+            "error": Series(fit - fit.mean(), "m", "reading minus displacement as the table's sensor shows it"),
+            **passes,
+        },
+        {"delay": FittedParameter(delay, doubt, "s")},
+    )

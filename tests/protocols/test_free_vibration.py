@@ -1,0 +1,281 @@
+"""Free vibration and springs end to end, on virtual benches that are not as they are assumed to be."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from bench.analysis.free_decay.stretch import Unusable
+from bench.analysis.rounding import in_brackets, plus_minus
+from bench.config.model import BenchConfiguration, Simulation
+from bench.config.specimen_file import read_specimen
+from bench.engine.operator import Unattended
+from bench.engine.requests import Requests
+from bench.engine.steps import Handle, Plan
+from bench.events import Acquired, Event, FitFinished, OperatorAsked, StepStarted, Warned
+from bench.guard.limits import Limits
+from bench.preflight.compiled import compile_run
+from bench.publication.campaign import Campaign
+from bench.publication.free_vibration import vibration_section
+from bench.record.reader import open_record
+from bench.record.verification import verify
+from bench.report.page.document import Picture, Table
+from bench.results import FILE
+from bench.session import Experiment, SessionResult, run_session
+from protocols.coupling_stiffness.experiment import CouplingStiffness
+from protocols.coupling_stiffness.parameters import CouplingStiffnessParameters
+from protocols.free_vibration.experiment import FreeVibration
+from protocols.free_vibration.parameters import FreeVibrationParameters
+from protocols.free_vibration.pulse import SHARE, planned
+from protocols.harmonic.evidence import Unmeasurable
+from sim.errors import InvalidInput
+from sim.identified import Correlation, Finding, Identified
+from sim.sensors import Laser
+from sim.specimen import Frame, Specimen
+from sim.virtual_bench import VirtualBenchParameters
+
+TRUE = Frame(k1=1.04 * 213.44, k2=0.96 * 56.45, xi1=0.013, xi2=0.028)
+SPRING = 1.08
+FURTHEST = 4.0
+"""Standard uncertainties that an identified value may be off in a test: one in 16 000 is farther."""
+
+
+def bench(**changes: object) -> BenchConfiguration:
+    lasers = {"laser_1": Laser(scale_error=0.002), "laser_2": Laser(scale_error=-0.002)}
+    simulated = VirtualBenchParameters(sample_rate=1000.0, **lasers)  # type: ignore[arg-type]
+    simulation = Simulation(bench=simulated, specimen=Specimen(frame=TRUE), spring_factor=SPRING, seed=3)
+    return BenchConfiguration(simulation=simulation, **changes)  # type: ignore[arg-type]
+
+
+def run(experiment: Experiment, configuration: BenchConfiguration, out: Path) -> tuple[SessionResult, list[Event]]:
+    events: list[Event] = []
+    result = run_session(
+        experiment,
+        configuration,
+        out=out,
+        operator=Unattended(),
+        subscribers=[lambda event: None if isinstance(event, Acquired) else events.append(event)],
+        requests=Requests(),
+        realtime=False,
+    )
+    return result, events
+
+
+def close(finding: Finding | None, truth: float) -> bool:
+    assert finding is not None
+    return abs(finding.value - truth) < FURTHEST * finding.standard_uncertainty
+
+
+def test_pulses_tell_the_frame_and_everything_is_kept(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    parameters = FreeVibrationParameters(repeats=2, window=10.0)
+    result, events = run(FreeVibration(parameters), bench(), out)
+    assert (result.status, result.reason) == ("completed", "the plan was carried out")
+    found = read_specimen(out / "specimen.json")
+    assert found.names == ("k1", "k2", "xi1", "xi2", "m1", "m2")
+    assert all(close(found.finding(name), getattr(TRUE, name)) for name in found.names)
+    k1 = found.finding("k1")
+    # half a gram of each storey, and little else
+    assert k1 is not None
+    assert 0.5e-3 < k1.standard_uncertainty / k1.value < 1.0e-3
+    assert found.correlation(("k1", "m1"))[0, 1] > 0.3
+    steps = [event.text for event in events if isinstance(event, StepStarted)]
+    assert steps[:2] == ["free vibration: 30 mm of drift, as asked for", "probe 1: a pulse of 0.02 V"]
+    fits = [event for event in events if isinstance(event, FitFinished)]
+    with open_record(out / FILE) as record:
+        assert [fit.name for fit in record.fits] == ["free vibration 1", "free vibration 2"]
+        np.testing.assert_array_equal(record.fits[0].columns["laser_1"].values, fits[0].columns["laser_1"].values)
+        assert [point["decay"] for point in record.points] == [1, 2, 0]
+        together = record.points[-1]
+        assert together["k1_n_m"] == k1.value
+        assert 0.024 < together["drift_peak_m"] < 0.036
+        assert together["birge"] is not None
+        section = vibration_section(Campaign(out / FILE, record))
+        assert section is not None
+        frame, budget, damping = (part for part in section.parts if isinstance(part, Table))
+        assert [row[0] for row in budget.rows] == ["k₁", "k₂", "ξ₁", "ξ₂"]
+        assert len([part for part in section.parts if isinstance(part, Picture)]) == 2
+        parts = json.loads(together["k1_parts"])
+        assert np.linalg.norm(list(parts.values())) == pytest.approx(0.5 * together["k1_uncertainty"], rel=1e-3)
+        assert next(iter(parts)) == "masses"
+        assert [row[0] for row in frame.rows] == [row[0] for row in damping.rows] == ["1", "2", "all"]
+        assert frame.rows[-1][1].startswith(f"{k1.value:.2f} ± {2.0 * k1.standard_uncertainty:.2f}")
+    assert verify(out / FILE).problems == ()
+    assert (out / "free_vibration.png").stat().st_size > 50_000
+    assert "all" in result.table.splitlines()[5]
+
+
+def test_a_frame_let_go_by_hand_says_the_same(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    parameters = FreeVibrationParameters(excitation="hand", repeats=1, window=20.0, pull=0.025)
+    result, events = run(FreeVibration(parameters), bench(), out)
+    assert result.status == "completed"
+    found = read_specimen(out / "specimen.json")
+    assert all(close(found.finding(name), getattr(TRUE, name)) for name in found.names)
+    asked = [event.request.split()[0] for event in events if isinstance(event, OperatorAsked)]
+    assert asked == ["Take", "Clamp", "Hold", "Take"]
+    assert not any("probe" in event.text for event in events if isinstance(event, StepStarted))
+
+
+def test_the_spring_is_the_difference_that_it_makes(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    parameters = CouplingStiffnessParameters(beta=(0.25, 0.97), repeats=1, window=10.0)
+    result, _ = run(CouplingStiffness(parameters), bench(), out)
+    assert result.status == "completed"
+    found = read_specimen(out / "specimen.json")
+    for label in (0.25, 0.97):
+        truth = SPRING * label * 213.44
+        finding = found.finding(f"k_c:{label}")
+        assert finding is not None
+        assert close(finding, truth)
+        # what both frames have in common cancels: better than the bare frame's own 0.08 % would allow
+        assert finding.standard_uncertainty / truth < 0.0012
+    with open_record(out / FILE) as record:
+        springs = [point for point in record.points if point["beta"] is not None and point["decay"] == 0]
+        for point in springs:
+            off = point["beta_mounted"] - point["beta"] * SPRING * 213.44 / TRUE.k1
+            assert abs(off) < 0.5 * FURTHEST * point["beta_uncertainty"]
+            assert point["k2_agrees"] is True
+        section = vibration_section(Campaign(out / FILE, record))
+        assert section is not None
+        springs_table, budget = (part for part in section.parts if isinstance(part, Table))
+        assert [row[0] for row in springs_table.rows][::2] == ["bare frame", "0.25", "0.97"]
+        assert [row[0] for row in budget.rows] == ["β = 0.25", "β = 0.97"]
+        assert len([part for part in section.parts if isinstance(part, Picture)]) == 2
+    assert (out / "coupling_stiffness.png").stat().st_size > 50_000
+    assert len(result.table.splitlines()) == 8
+
+
+def before(name: str, value: float, size: float) -> Finding:
+    return Finding(
+        name=name,
+        value=value,
+        standard_uncertainty=size,
+        source="before",
+        date="2026-11-20T10:00:00Z",  # type: ignore[arg-type]
+    )
+
+
+KNOWN = Identified(
+    findings=(before("k1", TRUE.k1 + 0.1, 0.16), before("k2", TRUE.k2, 0.04)),
+    correlations=(Correlation(first="k1", second="k2", coefficient=-0.5),),
+)
+KNOWN_REFERENCE = CouplingStiffnessParameters(beta=(0.64,), repeats=1, window=10.0, reference=False)
+
+
+def test_a_spring_against_a_frame_that_was_identified_before(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    run(CouplingStiffness(KNOWN_REFERENCE), bench(identified=KNOWN), out)
+    found = read_specimen(out / "specimen.json")
+    assert found.names == ("k1", "k2", "k_c:0.64")
+    assert close(found.finding("k_c:0.64"), SPRING * 0.64 * 213.44)
+    spring = found.finding("k_c:0.64")
+    # k1's own uncertainty does not cancel now
+    assert spring is not None
+    assert spring.standard_uncertainty > 0.16
+    # k_C = k1(held) - k1 with k1(held) known independently
+    expected = -0.16 / spring.standard_uncertainty
+    assert found.correlation(("k_c:0.64", "k1"))[0, 1] == pytest.approx(expected, rel=1e-6)
+    assert found.correlation(("k_c:0.64", "k2"))[0, 1] == pytest.approx(-0.5 * expected, rel=1e-6)
+
+
+def test_the_pulse_keeps_its_distance_from_every_limit(tmp_path: Path) -> None:
+    parameters = FreeVibrationParameters(drift=0.5)
+    configuration = bench(limits=Limits(drift=0.04))
+    found = planned(parameters, configuration, configuration.specimen.bare())
+    assert (found.binds, found.drift) == ("drift", pytest.approx(SHARE * 0.04))
+    preflight = compile_run(FreeVibration(parameters), configuration, tmp_path)
+    assert preflight.refusal is None
+    assert preflight.margins[0].margin == pytest.approx(1.0 - SHARE)
+    known = {margin.demand.quantity for margin in preflight.margins if margin.margin is not None}
+    assert {"displacement", "velocity", "acceleration", "drive_voltage", "laser_1", "drift", "current"} <= known
+
+
+@pytest.mark.parametrize(
+    ("experiment", "item", "told"),
+    [
+        (FreeVibration(FreeVibrationParameters(drift=0.002)), "drift", "0.003 m"),
+        (FreeVibration(FreeVibrationParameters(pulse=0.005)), "pulse", "0.01 s at least"),
+        (FreeVibration(FreeVibrationParameters(excitation="hand", pull=0.1)), "pull", "lasers' ranges"),
+        (CouplingStiffness(CouplingStiffnessParameters(reference=False)), "reference", "not identified"),
+    ],
+)
+def test_what_cannot_be_done_is_refused_beforehand(experiment: Experiment, item: str, told: str) -> None:
+    with pytest.raises(InvalidInput, match=told) as refusal:
+        experiment.check(BenchConfiguration())
+    assert refusal.value.item == item
+
+
+@pytest.mark.parametrize(
+    ("values", "item"),
+    [
+        ({"excitation": "hand", "drift": 0.02}, "drift"),
+        ({"excitation": "hand", "pulse": 0.5}, "pulse"),
+        ({"pull": 0.03}, "pull"),
+    ],
+)
+def test_what_would_have_no_effect_is_refused(values: dict[str, object], item: str) -> None:
+    with pytest.raises(ValidationError, match=f"{item} = .* is refused: .* leave it out"):
+        FreeVibrationParameters(**values)  # type: ignore[arg-type]
+
+
+def test_a_weighing_that_the_specimen_file_overrules_is_refused_and_other_masses_are_told(tmp_path: Path) -> None:
+    weighed = Identified(findings=(before("m1", 1.0624, 0.0004), before("m2", TRUE.m2, 0.0004)))
+    with pytest.raises(InvalidInput, match=r"m1 = 1\.0624 kg .*leave it out") as refusal:
+        FreeVibration(FreeVibrationParameters(mass_uncertainty=0.05)).check(bench(identified=weighed))
+    assert refusal.value.item == "mass_uncertainty"
+    parameters = FreeVibrationParameters(excitation="hand", repeats=1, window=5.0)
+    _, events = run(FreeVibration(parameters), bench(identified=weighed), tmp_path / "run")
+    assert any("m1 = 1.0624 kg" in event.text for event in events if isinstance(event, Warned))
+    found = read_specimen(tmp_path / "run" / "specimen.json")
+    assert found.finding("m1") == weighed.finding("m1")
+    assert found.correlation(("k1", "m1"))[0, 1] > 0.3
+
+
+def test_a_run_that_fails_does_not_leave_the_table_clamped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def useless(*_: object) -> None:
+        raise Unusable("nothing was seen")
+
+    monkeypatch.setattr("protocols.free_vibration.decays.released_decay", useless)
+    parameters = FreeVibrationParameters(excitation="hand", repeats=1, window=5.0)
+    result, events = run(FreeVibration(parameters), bench(), tmp_path / "run")
+    assert "no decay could be used" in result.reason
+    asked = [event.request for event in events if isinstance(event, OperatorAsked)]
+    assert asked[-1] == "Take the clamp off the table."
+    assert "STILL LOCKED" not in result.table
+
+
+def test_a_spring_that_fails_does_not_leave_its_block_clamped(monkeypatch: pytest.MonkeyPatch) -> None:
+    def useless(*_: object) -> Plan:
+        raise Unmeasurable("no decay could be used")
+        yield
+
+    monkeypatch.setattr("protocols.coupling_stiffness.sheet._decays", useless)
+    springs, asked = CouplingStiffness(KNOWN_REFERENCE), []
+    with pytest.raises(Unmeasurable):
+        asked.extend(springs.plan(bench(identified=KNOWN)))
+    requests = [step.request for step in asked if isinstance(step, Handle)]
+    assert requests[-1].startswith("Take the clamp, the spring and the block off")
+    assert "STILL CLAMPED" not in springs.table([])
+
+
+def test_a_table_or_block_that_stays_clamped_is_told() -> None:
+    def until(plan: Plan, last: str) -> None:
+        for step in plan:
+            if isinstance(step, Handle) and step.request.startswith(last):
+                break
+        plan.close()
+
+    frame, springs = FreeVibration(FreeVibrationParameters(excitation="hand")), CouplingStiffness(KNOWN_REFERENCE)
+    until(frame.plan(bench()), "Clamp")
+    until(springs.plan(bench(identified=KNOWN)), "Stand the block")
+    assert "THE TABLE IS STILL LOCKED" in frame.table([])
+    assert "THE BLOCK IS STILL CLAMPED" in springs.table([])
+
+
+def test_numbers_are_written_with_as_many_digits_as_they_deserve() -> None:
+    assert [in_brackets(221.9972, 0.1613), in_brackets(0.0130037, 6e-6)] == ["222.00(16)", "0.0130037(60)"]
+    assert in_brackets(1.5, float("nan")) == "1.5"
+    assert [plus_minus(221.9972, 0.323), plus_minus(2.0, 0.0)] == ["222.00 +- 0.32", "2"]
