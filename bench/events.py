@@ -4,15 +4,17 @@ Recorder, live analysis, console and window are subscribers: functions that take
 its own thread, in the order of their subscription, so a subscriber that has work to do queues it.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.rig import Alignment, Block
+from drivers.rig import Alignment, Block, Handwork
+from sim.identified import Identified
 from sim.parameters import Parameters
+from sim.specimen import Specimen
 
 
 class State(StrEnum):
@@ -54,6 +56,15 @@ class Acquired(Event):
     run: int
     block: Block
     drive: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SpecimenMounted(Event):
+    """A person has done `work`, by `amount` where it has one: `specimen` is what stands on the table now."""
+
+    specimen: Specimen
+    work: Handwork
+    amount: float | None = None
 
 
 @dataclass(frozen=True)
@@ -112,6 +123,54 @@ class RunningGain(Event):
     predicted: float
 
 
+TWIN_TRACE = ("seconds", "u1", "u2", "theta", "drift_low", "drift_high")
+"""Columns of the trace of a `TwinEstimate`, in SI units."""
+
+
+@dataclass(frozen=True, eq=False)
+class TwinEstimate(Event):
+    """Where the model is that runs beside the test, and where the specimen: at the sample that the lasers took
+    `seconds` into `run`, the last that both are known for; `time` is when its block had been read.
+
+    u1, u2, drift and `drift_peak`, the largest since the rig was armed, are in m; `_low` and `_high` are the ends of
+    the model's band, `_measured` what the lasers saw. `theta` [rad]; `alpha_2` once the protocol has stated one.
+    `residual` is the root mean square of measured minus modelled drift over the last second, `excess` that of what of
+    the measured drift lies outside the band, both over the largest of the drift itself so far. `members` make the band,
+    with the nominal model; `standing` is the share of both whose block stands. NaN where there is no such value.
+
+    `trace`, shape (n, 6), is the model since the estimate before, every 10 ms: columns TWIN_TRACE.
+    """
+
+    run: int
+    seconds: float
+    members: int
+    standing: float
+    u1: float
+    u1_low: float
+    u1_high: float
+    u1_measured: float
+    u2: float
+    u2_low: float
+    u2_high: float
+    u2_measured: float
+    drift: float
+    drift_low: float
+    drift_high: float
+    drift_measured: float
+    drift_peak: float
+    drift_peak_low: float
+    drift_peak_high: float
+    drift_peak_measured: float
+    alpha_2: float
+    alpha_2_low: float
+    alpha_2_high: float
+    alpha_2_measured: float
+    theta: float
+    residual: float
+    excess: float
+    trace: NDArray[np.float64]
+
+
 @dataclass(frozen=True)
 class PassFinished(Event):
     """A drive was played to make the table follow `motion`: how well it did, pass `number` of a replication.
@@ -146,6 +205,53 @@ class TableIdentified(Event):
     noise: NDArray[np.float64]
 
 
+@dataclass(frozen=True, eq=False)
+class Series:
+    """Values over the axis of a fit, shape (n,), their unit in SI symbols ("1" for a number), and what they are."""
+
+    values: NDArray[np.float64]
+    unit: str
+    description: str
+
+
+@dataclass(frozen=True)
+class FittedParameter:
+    """What a fit found for a parameter of its model; the standard uncertainty has the same unit, NaN if unknown."""
+
+    value: float
+    uncertainty: float
+    unit: str
+
+
+@dataclass(frozen=True, eq=False)
+class FitFinished(Event):
+    """A model was fitted to a stretch of a recording; `name` is short and its own within a session, `text` one line.
+
+    `columns` by name, all of one length: first the axis (such as the time), then what was measured, and to be compared
+    with it what was fitted, what is left, and so on. Names are fit for a file. Raises ValueError when they are not.
+    """
+
+    name: str
+    text: str
+    columns: Mapping[str, Series]
+    parameters: Mapping[str, FittedParameter]
+
+    def __post_init__(self) -> None:
+        shapes = {series.values.shape for series in self.columns.values()}
+        if len(shapes) != 1 or len(*shapes) != 1:
+            raise ValueError(f"columns of the fit {self.name} have shapes {shapes}; they need to be one, (n,)")
+        for name in (self.name, *self.columns):
+            if not name.strip(".") or "/" in name:
+                raise ValueError(f"{name!r} in the fit {self.name} is no name for a file")
+
+
+@dataclass(frozen=True)
+class SpecimenIdentified(Event):
+    """What is known of the specimen by now: what was known before, with the findings of this run."""
+
+    identified: Identified
+
+
 @dataclass(frozen=True)
 class PointFinished(Event):
     """A point of the campaign has its result: an instance of the protocol's `point_type`."""
@@ -172,9 +278,10 @@ class LimitExceeded(Event):
 
 @dataclass(frozen=True)
 class OperatorAsked(Event):
-    """The plan waits for a person: what to do and why."""
+    """The plan waits for a person: what to do and why, and of which kind the work is, where that is known."""
 
     request: str
+    work: Handwork | None = None
 
 
 @dataclass(frozen=True)

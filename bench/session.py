@@ -23,6 +23,7 @@ from bench.record.tables import Table
 from bench.report.summary import Summary, write_summary
 from bench.results import FILE, SUMMARY
 from bench.rigs import open_rig
+from bench.twin.beside import twin_beside
 from drivers.clock import VirtualClock
 from drivers.rig import Rig
 from sim.parameters import Parameters
@@ -83,6 +84,19 @@ class Keeping(Protocol):
 
     def keep(self, path: Path) -> None:
         """Write it, if the run came to something worth keeping."""
+        ...
+
+
+@runtime_checkable
+class Sourced(Protocol):
+    """An experiment that reads files besides its configuration; the data file keeps what they hold."""
+
+    def sources(self, configuration: BenchConfiguration) -> Mapping[str, Table]:
+        """What was read, as tables. Raises InvalidInput as `Experiment.check` does."""
+        ...
+
+    def restore(self, tables: Mapping[str, Table]) -> None:
+        """Take it from the tables of a data file, not from the files, from now on."""
         ...
 
 
@@ -156,7 +170,10 @@ def run_session(
     protocol.check(configuration)
     preflight = compile_run(protocol, configuration, out)
     preflight.require()
+    # after the hash of the plan: it is the same at every pace
+    configuration = configuration.at_pace(realtime=realtime)
     prediction = protocol.predict(configuration)
+    sources = protocol.sources(configuration) if isinstance(protocol, Sourced) else dict[str, Table]()
     if requests.strongest is not None:
         raise KeyboardInterrupt
     out.mkdir(parents=True, exist_ok=True)
@@ -169,7 +186,7 @@ def run_session(
             point_type=protocol.point_type,
             metadata=_metadata(protocol, configuration, rig.description)
             | {"plan_hash": preflight.plan_hash, **(about or {})},
-            tables={"prediction": prediction, **preflight.tables},
+            tables={"prediction": prediction, **preflight.tables, **sources},
             # in virtual time nothing moves on while the disk is waited for
             hold_up=PATIENCE if isinstance(rig.clock, VirtualClock) else 0.0,
         )
@@ -180,18 +197,23 @@ def run_session(
             for subscriber in subscribers:
                 if isinstance(subscriber, Attending):
                     subscriber.opened(rig)
+            signals = SignalMap(rig.channels, configuration.laser_reference, configuration.calibrated)
             engine = Engine(
                 rig,
                 Guard(rig, configuration.limits, configuration.ramps, configuration.mover),
-                SignalMap(rig.channels, configuration.laser_reference),
+                signals,
                 stream,
                 requests,
                 operator,
                 configuration.block_samples,
             )
-            for warning in preflight.warnings:
+            strange = configuration.calibrated.strange(rig.description) if configuration.calibrated else ()
+            for warning in (*strange, *preflight.warnings):
                 stream.say(Warned(0.0, warning))
-            ending = engine.run(protocol.plan(configuration))
+            # as long as the model takes, a bench in virtual time stands still
+            patient = isinstance(rig.clock, VirtualClock)
+            with twin_beside(stream, rig, configuration, signals, requests, patient=patient):
+                ending = engine.run(protocol.plan(configuration))
             status, reason = ending.status, ending.reason
         finally:
             recorder.close(status, reason)
@@ -233,7 +255,7 @@ def _metadata(protocol: Experiment, configuration: BenchConfiguration, devices: 
         "protocol": protocol.name,
         "parameters": protocol.parameters.model_dump_json(),
         "configuration": configuration.model_dump_json(),
-        "specimen": configuration.specimen.model_dump_json(),
+        "specimen": configuration.known_specimen.model_dump_json(),
         **({} if configuration.seed is None else {"seed": str(configuration.seed)}),
         "devices": json.dumps(devices),
         **software(),

@@ -14,6 +14,7 @@ from bench.engine.stream import Stream
 from bench.events import Event, Subscriber
 from bench.guard.guard import Guard
 from bench.record.recorder import Recorder
+from bench.twin.beside import twin_beside
 from drivers.rig import Rig
 from sim.parameters import Parameters
 
@@ -39,18 +40,20 @@ def recorded(
         metadata={"configuration": configuration.model_dump_json(), **(metadata or {})},
         hold_up=60.0,
     )
-    stream = Stream(rig.clock, [recorder, *subscribers])
+    stream, requests = Stream(rig.clock, [recorder, *subscribers]), requests or Requests()
+    signals = SignalMap(rig.channels, configuration.laser_reference)
     engine = Engine(
         rig,
         Guard(rig, configuration.limits, configuration.ramps, configuration.mover),
-        SignalMap(rig.channels, configuration.laser_reference),
+        signals,
         stream,
-        requests or Requests(),
+        requests,
         operator or Unattended(),
         configuration.block_samples,
     )
     for event in first:
         stream.say(event)
-    ending = engine.run(plan)
+    with twin_beside(stream, rig, configuration, signals, requests, patient=True):
+        ending = engine.run(plan)
     recorder.close(ending.status, ending.reason)
     return ending

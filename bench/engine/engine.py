@@ -27,9 +27,9 @@ from bench.engine.steps import (
 )
 from bench.engine.stream import Stream
 from bench.engine.turns import Turns
-from bench.events import OperatorAnswered, OperatorAsked, State
+from bench.events import OperatorAnswered, OperatorAsked, SpecimenMounted, State
 from bench.guard.guard import Guard
-from drivers.rig import Rig
+from drivers.rig import Handwork, Rig
 from sim.specimen import Specimen
 
 
@@ -127,12 +127,15 @@ class Engine:
         machine = self._output.machine
         self._turns.heed_requests()
         machine.go(State.WAITING, step.request)
-        self._stream.say(OperatorAsked(0.0, step.request))
+        self._stream.say(OperatorAsked(0.0, step.request, step.work))
         agreed = self._operator.confirm(step.request)
         machine.go(State.IDLE, "the operator answered")
         self._turns.heed_requests()
         if not agreed:
             raise Ended(Ending("aborted", f"the operator declined: {step.request}"))
-        self._rig.handwork(step.work, step.specimen.k_c or None)
+        self._rig.handwork(step.work, (step.specimen.nominal_k_c or None) if step.amount is None else step.amount)
         self._specimen = step.specimen
+        if step.work in (Handwork.WATCH_BLOCK, Handwork.WATCH_STOREYS):
+            self._rest.sees_storeys = step.work is Handwork.WATCH_STOREYS
         self._stream.say(OperatorAnswered(0.0, step.request, self._operator.name))
+        self._stream.say(SpecimenMounted(0.0, step.specimen, step.work, step.amount))

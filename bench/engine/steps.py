@@ -20,11 +20,16 @@ from sim.specimen import Specimen
 
 @dataclass(frozen=True)
 class Handle:
-    """A person does something at the resting bench; `request` says what and why. Comes to nothing."""
+    """A person does something at the resting bench; `request` says what and why. Comes to nothing.
+
+    `specimen` is what stands on the table afterwards. `amount` goes with the work, see `drivers.rig.Handwork`; absent:
+    what the label of the specimen's spring says, if it has one [N/m].
+    """
 
     work: Handwork
     specimen: Specimen
     request: str
+    amount: float | None = None
 
 
 @dataclass(frozen=True)

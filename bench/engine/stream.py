@@ -15,6 +15,10 @@ class Stream:
         self._origin = clock.now()
         self._subscribers = tuple(subscribers)
 
+    def join(self, subscriber: Subscriber) -> None:
+        """From now on `subscriber` hears everything too, each time after all that were there before."""
+        self._subscribers += (subscriber,)
+
     def now(self) -> float:
         """Seconds of the bench's clock since the session began."""
         return self._clock.now() - self._origin

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Protocol
 
@@ -34,12 +35,15 @@ class Asked(Protocol):
 
 @dataclass(frozen=True)
 class Preflight:
-    """What was found. `margins` are tightest first; `room` is None where the run's duration is not known."""
+    """What was found. `margins` are tightest first; `room` is None where the run's duration is not known; `sensors` is
+    what is to be said of their calibration.
+    """
 
     forecast: Forecast
     margins: tuple[Margin, ...]
     room: Room | None
     plan_hash: str
+    sensors: tuple[str, ...] = ()
 
     @property
     def refusal(self) -> InvalidInput | None:
@@ -49,7 +53,7 @@ class Preflight:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What the operator should know although the run may begin."""
-        return (*self.forecast.warnings, *warnings(self.margins))
+        return (*self.sensors, *self.forecast.warnings, *warnings(self.margins))
 
     @property
     def tables(self) -> Mapping[str, Table]:
@@ -80,4 +84,11 @@ def compile_run(experiment: Asked, configuration: BenchConfiguration, folder: Pa
         plan_hash=plan_hash(
             experiment.name, experiment.parameters, configuration, software()["rocking-bench"], forecast
         ),
+        sensors=_aged(configuration),
     )
+
+
+def _aged(configuration: BenchConfiguration) -> tuple[str, ...]:
+    """A word where the lasers' calibration is too old."""
+    said = None if configuration.calibrated is None else configuration.calibrated.expired(datetime.now(UTC))
+    return () if said is None else (said,)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bench.config.model import BenchConfiguration
+from bench.record.declared import TWIN
 from sim.errors import InvalidInput
 
 SPARE = 3.0
@@ -43,12 +44,14 @@ def room(configuration: BenchConfiguration, duration: float, folder: Path) -> Ro
 
 
 def bytes_per_second(configuration: BenchConfiguration) -> float:
-    """Counts of every channel and the drive: 16 bit simulated, up to 32 bit on hardware."""
+    """Counts of every channel and the drive, 16 bit simulated, up to 32 bit on hardware; and what the twin says."""
     if configuration.backend == "simulated":
         channels, width = 4, 2
     else:
         channels, width = len(configuration.hardware.transducers) + 2, 4
-    return configuration.sample_rate * (channels * width + DRIVE_BYTES)
+    beside = configuration.at_pace(realtime=False).twin.enabled
+    said = 8 * len(TWIN) / configuration.acquisition.block_duration if beside else 0.0
+    return configuration.sample_rate * (channels * width + DRIVE_BYTES) + said
 
 
 def _readable(size: int) -> str:
