@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.record import findings
 from bench.record.declared import EVENTS, OWN_TABLES
 from bench.record.reader import Record
 from bench.record.series import RecordedRun
@@ -114,18 +115,29 @@ def _tables(record: Record) -> Iterator[tuple[str, list[TableColumn]]]:
     points, about = record.points, record.results
     if points:
         yield "points", [_column(name, about[name].unit, about[name].description, points) for name in points[0]]
-    declared = dict(OWN_TABLES.values())
+    declared = dict(OWN_TABLES.values()) | findings.TABLES
     own: dict[str, list[dict[str, Any]]] = {
         "estimates": _rows(record.estimates),
         "running_gains": _rows(record.running_gains),
         "passes": record.passes,
         "table_response": _rows(record.table_response),
+        "twin": _rows(record.twin),
+        "identified": record.findings["identified"],
+        "identified_correlations": record.findings["identified_correlations"],
         "events": [{"time": each.time, "kind": each.kind, "text": each.text} for each in record.events],
     }
     for name, rows in own.items():
         fields = EVENTS if name == "events" else declared[name]
         if rows:
             yield name, [_column(field.name, field.unit, field.description, rows) for field in fields]
+    for number, fit in enumerate(record.fits, start=1):
+        yield (
+            f"fit_{number}",
+            [
+                _plain(key, each.unit, f"{fit.name}: {each.description}", each.values.tolist())
+                for key, each in fit.columns.items()
+            ],
+        )
     for name, table in record.tables.items():
         columns = [_plain(key, each.unit, each.description, each.values.tolist()) for key, each in table.items()]
         if columns and columns[0].values:

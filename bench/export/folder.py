@@ -7,22 +7,28 @@ from uuid import uuid4
 
 from bench.export import matlab, parquet, text, uff
 from bench.export.content import content_of
+from bench.record.integrity import Integrity
 from bench.record.reader import Record
 from sim.errors import InvalidInput
 
 Format = Literal["mat", "csv", "uff", "parquet"]
 
+DAMAGED = "DAMAGED.txt"
+"""File that travels with an export of what failed its checksum."""
+
 _WRITERS = {"mat": matlab.write, "csv": text.write, "uff": uff.write, "parquet": parquet.write}
 
 
-def export(record: Record, path: Path, to: Format, out: Path, *, raw: bool = False) -> list[Path]:
-    """Write an open file, read from `path`, into the new folder `out`; the files that are in it then.
+def export(record: Record, path: Path, to: Format, out: Path, *, raw: bool = False) -> tuple[list[Path], Integrity]:
+    """Write an open file, read from `path`, into the new folder `out`; returns the files that are in it then, and
+    whether the record is as it was written. What is not stands in the file DAMAGED.txt beside the others.
 
     Physical values are float64; with `raw` the counts are written with the way to values beside them. Raises
     InvalidInput when `out` exists or cannot be made, or when the format cannot hold what there is.
     """
     if out.exists():
         raise InvalidInput("--out", str(out), "it exists, and nothing is ever overwritten; name another folder")
+    integrity = record.integrity(None)
     content = content_of(record, path, raw=raw)
     if to == "mat":
         matlab.check(content)
@@ -34,8 +40,11 @@ def export(record: Record, path: Path, to: Format, out: Path, *, raw: bool = Fal
         raise InvalidInput("--out", str(out), f"the folder cannot be made: {error.strerror}") from None
     try:
         _WRITERS[to](content, unfinished)
+        if integrity.failing:
+            lines = (f"{path.name} is damaged or was changed since it was written:", *integrity.failing.values())
+            (unfinished / DAMAGED).write_text("\n".join(lines) + "\n", encoding="utf-8")
         unfinished.rename(out)
     except BaseException:
         shutil.rmtree(unfinished, ignore_errors=True)
         raise
-    return sorted(out.iterdir())
+    return sorted(out.iterdir()), integrity

@@ -9,8 +9,11 @@ from typing import Any, cast
 
 from bench.config.model import BenchConfiguration
 from bench.config.validation import dotted, validated
+from bench.record.integrity import Integrity
 from bench.record.reader import Record
 from sim.errors import InvalidInput
+from sim.knowledge import SpecimenKnowledge
+from sim.parameters import Parameters
 from sim.specimen import Specimen
 from sim.uncertainty import SpecimenUncertainty
 
@@ -20,10 +23,14 @@ SETTING = {"frequency": "omega_rad_s", "stiffness": "beta", "record": "record"}
 
 @dataclass(frozen=True, eq=False)
 class Campaign:
-    """An open file and where it lies. `configuration` is None where the file's is not one that this version knows."""
+    """An open file and where it lies. `configuration` is None where the file's is not one that this version knows.
+
+    `asked` declares the parameters of the file's protocol: None where this version does not know it.
+    """
 
     path: Path
     record: Record
+    asked: type[Parameters] | None = None
 
     @cached_property
     def protocol(self) -> str:
@@ -40,6 +47,11 @@ class Campaign:
         """The results, absent values as None."""
         rows = self.record.points
         return [{name: None if value != value else value for name, value in row.items()} for row in rows]
+
+    @cached_property
+    def integrity(self) -> Integrity:
+        """Every dataset of the file held against its checksum; reads the whole file."""
+        return self.record.integrity(None)
 
     @cached_property
     def harmonic_points(self) -> list[dict[str, Any]]:
@@ -65,6 +77,11 @@ class Campaign:
     def uncertainty(self) -> SpecimenUncertainty:
         """What was left open of the specimen; the usual where the file does not say."""
         return SpecimenUncertainty() if self.configuration is None else self.configuration.uncertainty
+
+    @cached_property
+    def known(self) -> SpecimenKnowledge:
+        """How well the specimen was known, in a steady motion on the file's table."""
+        return SpecimenKnowledge() if self.configuration is None else self.configuration.known_on_table
 
     @cached_property
     def configuration(self) -> BenchConfiguration | None:

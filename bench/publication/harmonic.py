@@ -5,9 +5,11 @@ from typing import Any
 
 from bench.analysis.signals import SignalMap
 from bench.prediction.model_uncertainty import expanded_uncertainty
+from bench.publication.budgets import budget_parts
 from bench.publication.campaign import Campaign
 from bench.publication.cycles import Dwells
 from bench.publication.numbers import ABSENT, percent, plain, with_uncertainty, yes_or_no
+from bench.publication.typography import counted, typeset
 from bench.record.tables import arrays
 from bench.report.figure import gain_spectra
 from bench.report.map_figure import MapPoint
@@ -19,58 +21,53 @@ from sim.gain import Layer, predict_gain
 ROWS = 4
 """Points in a figure of cycles."""
 
-NONE = "There is no harmonic test in this file."
-
 LAYERS = "rocking", "resting"
 
 
 def results_section(campaign: Campaign) -> Section:
     """Every point: measured and predicted gain with their uncertainties, and how it was reached."""
     points = campaign.harmonic_points
-    parts: list[Part] = [NONE]
-    if points:
-        compared = [row["agrees"] for row in points if row["agrees"] is not None]
-        parts = [
-            f"{len(points)} points were tested; {len(compared)} have a steady motion to compare, and {sum(compared)} "
-            "of those agree with the prediction: within 2 % or the measurement's uncertainty, whichever is larger. "
-            "Both gains are for the achieved amplitudes of the table and for the layer on which the point lies. The "
-            "uncertainty of a measured gain is expanded (k = 2) and holds sensors and scatter; that of a predicted one "
-            "(k = 2, to first order) is what the half widths of the specimen's parameters leave open.",
-            _gains(campaign, points),
-            _conditions(points),
-        ]
-        remarks = [
-            f"β {row['beta']:g}, Ω {row['omega_rad_s']:g} rad/s: {row['reason']}" for row in points if row["reason"]
-        ]
-        if remarks:
-            parts += ["What was noticed at single points:", Listing(remarks)]
+    compared = [row["agrees"] for row in points if row["agrees"] is not None]
+    parts: list[Part] = [
+        f"{counted(len(points), 'point was', 'points were')} tested; {len(compared)} of them had a steady motion to "
+        f"compare, and {sum(compared)} of those were found to agree with the prediction. Both gains are for the "
+        "achieved amplitudes of the table and for the layer on which the point lies. They agree when they differ by no "
+        "more than their two uncertainties, taken together as the root of the sum of squares. The uncertainty of a "
+        "measured gain is expanded (k = 2) and holds sensors and scatter; that of a predicted one (k = 2, to first "
+        "order) is what is left open of the specimen.",
+        _gains(campaign, points),
+        _conditions(points),
+        *budget_parts(points),
+    ]
+    remarks = [
+        f"β = {row['beta']:g}, Ω = {row['omega_rad_s']:g} rad/s: {typeset(row['reason'])}"
+        for row in points
+        if row["reason"]
+    ]
+    if remarks:
+        parts += ["What was noticed at single points:", Listing(remarks)]
     return Section("results", "Harmonic tests: measured against predicted", parts)
 
 
-def spectra_section(campaign: Campaign) -> Section:
-    """Gain spectra: the prediction that the file holds, and the points."""
-    points, table = campaign.harmonic_points, campaign.record.tables.get("prediction", {})
-    drawn = {"omega", "beta", "alpha_2", "stable", "layer"} <= table.keys()
-    parts: list[Part] = [NONE]
-    if points and drawn:
-        figure = gain_spectra(points, arrays(table))
-        text = (
-            "Gain spectra: measured points with expanded uncertainty (k = 2), and the prediction made before the test."
-        )
-        description = "Gain of the peak drift over frequency, logarithmic, a panel for each stiffness ratio."
-        parts = [Picture(figure, text, description)]
-    elif points:
-        parts = ["The file holds no predicted spectra."]
-    return Section("spectra", "Gain spectra (as Fig. 6 of the paper)", parts)
+def spectra_section(campaign: Campaign) -> Section | None:
+    """Gain spectra: the prediction that the file holds, and the points; None where it holds none."""
+    table = campaign.record.tables.get("prediction", {})
+    if not {"omega", "beta", "alpha_2", "stable", "layer"} <= table.keys():
+        return None
+    picture = Picture(
+        gain_spectra(campaign.harmonic_points, arrays(table)),
+        "Gain spectra: measured points with expanded uncertainty (k = 2), and the prediction made before the test.",
+        "Gain of the peak drift over frequency, logarithmic, a panel for each stiffness ratio.",
+    )
+    return Section("spectra", "Gain spectra (as Fig. 6 of the paper)", [picture])
 
 
-def histories_section(campaign: Campaign) -> Section:
-    """The last measured cycles of every point beside the predicted motion."""
+def histories_section(campaign: Campaign) -> Section | None:
+    """The last measured cycles of every point beside the predicted motion; None where none was measured."""
     points = [row for row in campaign.harmonic_points if row["drift_peak_m"] is not None]
-    parts: list[Part] = [NONE]
-    if points:
-        parts = _histories(campaign, points)
-    return Section("histories", "Time histories (as Fig. 5 of the paper)", parts)
+    if not points:
+        return None
+    return Section("histories", "Time histories (as Fig. 5 of the paper)", _histories(campaign, points))
 
 
 def map_points(campaign: Campaign) -> list[MapPoint]:
@@ -83,7 +80,9 @@ def _histories(campaign: Campaign, points: Sequence[Mapping[str, Any]]) -> list[
     if configuration is None:
         return [Notice("Not drawn: the configuration in this file is not one that this version of the software knows.")]
     try:
-        dwells = Dwells(campaign, SignalMap(campaign.record.channels, configuration.laser_reference))
+        dwells = Dwells(
+            campaign, SignalMap(campaign.record.channels, configuration.laser_reference, configuration.calibrated)
+        )
     except InvalidInput as refused:
         return [Notice(f"Not drawn: {refused}.")]
     drawn: list[MeasuredMotion] = []
@@ -91,7 +90,7 @@ def _histories(campaign: Campaign, points: Sequence[Mapping[str, Any]]) -> list[
     for row in points:
         motion = dwells.motion(row, _layer(campaign, row))
         if motion is None:
-            missing.append(f"β {row['beta']:g}, Ω {row['omega_rad_s']:g} rad/s")
+            missing.append(f"β = {row['beta']:g}, Ω = {row['omega_rad_s']:g} rad/s")
         else:
             drawn.append(motion)
     parts: list[Part] = [
@@ -141,7 +140,9 @@ def _gains(campaign: Campaign, points: Sequence[Mapping[str, Any]]) -> Table:
     for row in points:
         measured, predicted = row["alpha_2"], row["alpha_2_predicted"]
         layer = _layer(campaign, row)
-        open_ = None if layer is None else expanded_uncertainty(layer, campaign.uncertainty)
+        open_ = row.get("alpha_2_predicted_uncertainty")
+        if open_ is None and layer is not None:
+            open_ = expanded_uncertainty(layer, campaign.known)
         stable = row["predicted_stable"]
         rows.append(
             [

@@ -1,6 +1,9 @@
 """Numbers as a report prints them: as many digits as the uncertainty leaves, and never a bare one."""
 
-from math import floor, isfinite, log10
+from math import isfinite
+
+from bench.analysis.rounding import decimals, plus_minus
+from bench.publication.typography import raised
 
 ABSENT = "–"
 MINUS = "−"
@@ -13,7 +16,7 @@ def plain(value: float | None, digits: int = 4) -> str:
     text = f"{value:.{digits}g}"
     if "e" in text:
         mantissa, exponent = text.split("e")
-        text = f"{mantissa}·10^{int(exponent)}"
+        text = f"{mantissa}·10{raised(int(exponent))}"
     return text.replace("-", MINUS)
 
 
@@ -21,10 +24,9 @@ def with_uncertainty(value: float | None, uncertainty: float | None) -> str:
     """`value` ± `uncertainty`, the latter to two significant digits and the former to the same decimal place."""
     if value is None or not isfinite(value):
         return ABSENT
-    if uncertainty is None or not isfinite(uncertainty) or uncertainty <= 0.0:
+    if uncertainty is None or decimals(uncertainty) is None:
         return plain(value)
-    places = max(0, 1 - floor(log10(uncertainty)))
-    return f"{value:.{places}f} ± {uncertainty:.{places}f}".replace("-", MINUS)
+    return plus_minus(value, uncertainty, "±").replace("-", MINUS)
 
 
 def percent(share: float | None, places: int = 2) -> str:

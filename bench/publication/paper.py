@@ -11,15 +11,17 @@ from bench.prediction.seismic import SeismicCurve, seismic_curves
 from bench.prediction.seismic_statement import seismic_statement
 from bench.prediction.statements import POINTS, POINTS_BETA, SECTIONS, harmonic_statements
 from bench.prediction.steady import predict_spectra, steady_table
-from bench.provenance import software
+from bench.provenance import revision, software
+from bench.publication.facts import facts_table
 from bench.publication.made import made_line
 from bench.publication.predicted import histories_picture, map_section
+from bench.publication.provenance import NAME, libraries, program
 from bench.publication.records import drift_picture, gains_picture, motions_table, record_pictures
 from bench.publication.specimen import modes_section, specimen_section
 from bench.publication.verdicts import Named, statement_table, verdicts_table
 from bench.record.tables import arrays
 from bench.report.figure import gain_spectra
-from bench.report.page.document import Column, Document, Listing, Notice, Part, Picture, Section, Table
+from bench.report.page.document import Column, Document, Notice, Part, Picture, Section, Table
 from sim.specimen import Specimen
 
 PARTS = ("statements", "modes", "map", "histories", "spectra", "records", "seismic")
@@ -125,9 +127,9 @@ class _Paper:
             f"once limited to the band that a long-stroke shaker reproduces, {self._band}. "
             "Motions start at rest; a block that topples has no gain. Statement 8 is checked on both.",
         ]
+        parts.append(motions_table([curve for curves in self._curves.values() for curve in curves]))
         for words, curves in self._curves.items():
             parts.append(gains_picture(curves, words))
-        parts.append(motions_table([curve for curves in self._curves.values() for curve in curves]))
         softest = drift_picture(self._specimen, next(reversed(self._curves.values())), SECTIONS[0])
         return Section("seismic", "Gain curves under records (as Fig. 8 and 9 of the paper)", [*parts, softest])
 
@@ -162,10 +164,9 @@ def _of_what(records: Sequence[Accelerogram]) -> list[Part]:
 
 
 def _provenance(request: PaperRequest) -> Section:
-    rows = [[name, version] for name, version in software().items()]
-    parts: list[Part] = [
-        Table("Software", [Column("program", words=True), Column("version", words=True)], rows),
-        "Records:",
-        Listing([f"{record.name}: {record.source}, SHA-256 {record.sha256}" for record in request.records]),
-    ]
-    return Section("provenance", "Provenance", parts)
+    made = software()
+    software_table = facts_table("Software", {"made by": program(made[NAME], revision()), "libraries": libraries(made)})
+    columns = [Column("record", words=True), Column("source", words=True), Column("SHA-256", words=True)]
+    rows = [[record.name, record.source, record.sha256] for record in request.records]
+    records = [Table("Records", columns, rows)] if {"records", "seismic", "statements"} & {*request.parts} else []
+    return Section("provenance", "Provenance", [software_table, *records])

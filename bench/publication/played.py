@@ -41,13 +41,13 @@ def played_records(record: Record) -> list[Played]:
             continue
         stop = int(rows[block + 1]) if block + 1 < rows.size else record.rows
         begin = int(rows[bisect_left(runs, runs[block])])
-        one = Played(
-            str(name), None if beta is None else float(beta), begin, stop - round(seconds * record.sample_rate), stop
-        )
+        samples = round(seconds * record.sample_rate)
+        one = Played(str(name), None if beta is None else float(beta), begin, stop - samples, stop)
         # one play grows block by block; another one begins elsewhere
         if found and (found[-1].run, found[-1].name, found[-1].beta) == (one.run, one.name, one.beta):
             # the last gain ends within a block, the first one at the end of one: only that tells where the play begins
-            one = replace(one, start=found.pop().start)
+            start = found.pop().start
+            one = replace(one, start=start, stop=start + samples)
         found.append(one)
     return [one for one in found if one.start >= one.run]
 

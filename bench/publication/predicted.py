@@ -17,8 +17,6 @@ LOW, HIGH, STEP = 12.0, 21.0, 0.1
 BETA_LOW, BETA_HIGH, BETA_STEP = 0.1, 1.2, 0.02
 """Frequencies [rad/s] and stiffness ratios of a map; measured points beyond them widen it."""
 
-MAP_HEADING = "Gain surface and map (as Fig. 4 of the paper)"
-
 MOST = 20_000
 """Points of a map at most."""
 
@@ -53,7 +51,7 @@ def map_section(specimen: Specimen, amplitude_factor: float, measured: Sequence[
     found = " Circles are measured points with their α₂." if measured else ""
     description = "Surfaces and contour maps of alpha 1 and alpha 2 over frequency and stiffness ratio."
     parts.append(Picture(figure, f"Gain surfaces (a) and maps (b, c) of α₁ and α₂, predicted.{found}", description))
-    return Section("map", MAP_HEADING, parts)
+    return Section("map", "Gain surface and map (as Fig. 4 of the paper)", parts)
 
 
 def histories_picture(made: Sequence[History], names: Sequence[str]) -> Picture:

@@ -10,6 +10,7 @@ from bench.analysis.response_spectrum import DAMPING, logarithmic_periods, pseud
 from bench.analysis.table_motion import table_motion
 from bench.prediction.seismic import SeismicCurve
 from bench.publication.numbers import plain
+from bench.publication.typography import listed
 from bench.report.page.document import Column, Picture, Table
 from bench.report.record_figure import RecordPicture, record_figure
 from bench.report.seismic_drift_figure import ModelDrift, model_drift_figure
@@ -17,7 +18,7 @@ from bench.report.seismic_figure import GainCurve, seismic_figure
 from sim.rocking import simulate
 from sim.specimen import Specimen
 
-TOGETHER = 2
+TOGETHER = 3
 """Records in one figure."""
 
 SHORTEST, LONGEST = 0.05, 5.0
@@ -38,7 +39,7 @@ def record_pictures(records: Sequence[Accelerogram]) -> Iterator[Picture]:
             spectrum = pseudo_acceleration(record.acceleration, record.dt, periods)
             shown = (record.acceleration, motion.velocity, motion.displacement, periods, spectrum, DAMPING)
             drawn.append(RecordPicture(record.name, record.dt, *shown))
-        names = " and ".join(record.name for record in some)
+        names = listed([record.name for record in some])
         yield Picture(
             record_figure(drawn),
             f"{names}: acceleration, velocity and displacement of the ground, and pseudo-acceleration spectrum.",

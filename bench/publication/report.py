@@ -1,15 +1,22 @@
 """The report of a campaign from its file: what was tested on what, how, and what came out beside the prediction."""
 
-from collections.abc import Callable
+from collections.abc import Iterator
 from typing import Any
 
 from bench.publication.campaign import Campaign
-from bench.publication.conditions import limits_section, provenance_section
-from bench.publication.harmonic import NONE, histories_section, map_points, results_section, spectra_section
+from bench.publication.conditions import damage_notice, limits_section
+from bench.publication.fits import fits_section
+from bench.publication.free_rocking import rocking_section
+from bench.publication.free_vibration import vibration_section
+from bench.publication.harmonic import histories_section, map_points, results_section, spectra_section
+from bench.publication.identified import identified_section
 from bench.publication.made import made_line
-from bench.publication.predicted import MAP_HEADING, map_section
+from bench.publication.points import points_section
+from bench.publication.predicted import map_section
+from bench.publication.provenance import provenance_section
 from bench.publication.seismic import seismic_section
 from bench.publication.specimen import modes_section, specimen_section
+from bench.publication.typography import listed, moment
 from bench.report.page.document import Document, Notice, Part, Section
 
 USUAL_BETAS = (0.25, 0.64, 0.97)
@@ -19,31 +26,32 @@ MOST_MODES = 4
 
 def campaign_report(campaign: Campaign) -> Document:
     """Everything that the file has. Raises InvalidInput for a file without a specimen that can be used."""
-    sections: list[Callable[[], Section]] = [
-        lambda: results_section(campaign),
-        lambda: spectra_section(campaign),
-        lambda: _map(campaign),
-        lambda: histories_section(campaign),
-        lambda: seismic_section(campaign),
-        lambda: specimen_section(campaign.specimen, campaign.uncertainty),
-        lambda: modes_section(campaign.specimen, _betas(campaign)[:MOST_MODES]),
-        lambda: limits_section(campaign),
-        lambda: provenance_section(campaign),
-    ]
     return Document(
         title=f"Test report: {campaign.path.stem}" if campaign.path.stem != "campaign" else _title(campaign),
         summary=_summary(campaign),
-        sections=[section() for section in sections],
+        sections=[section for section in _sections(campaign) if section is not None],
         made=made_line(),
     )
 
 
-def _map(campaign: Campaign) -> Section:
-    """The map is that of the test's amplitude: without a test there is none to draw."""
-    points = map_points(campaign)
-    if not points:
-        return Section("map", MAP_HEADING, [NONE])
-    return map_section(campaign.specimen, _amplitude_factor(campaign), points)
+def _sections(campaign: Campaign) -> Iterator[Section | None]:
+    if campaign.harmonic_points:
+        yield results_section(campaign)
+        yield spectra_section(campaign)
+        # the map is that of the test's amplitude: without a test there is none to draw
+        yield map_section(campaign.specimen, _amplitude_factor(campaign), map_points(campaign))
+        yield histories_section(campaign)
+    if campaign.seismic_points:
+        yield seismic_section(campaign)
+    yield rocking_section(campaign) or vibration_section(campaign) or points_section(campaign)
+    yield identified_section(campaign)
+    yield fits_section(campaign)
+    configuration = campaign.configuration
+    identified = None if configuration is None else configuration.identified
+    yield specimen_section(campaign.specimen, campaign.uncertainty, identified)
+    yield modes_section(campaign.specimen, _betas(campaign)[:MOST_MODES])
+    yield limits_section(campaign)
+    yield provenance_section(campaign)
 
 
 def _title(campaign: Campaign) -> str:
@@ -52,27 +60,47 @@ def _title(campaign: Campaign) -> str:
 
 def _summary(campaign: Campaign) -> list[Part]:
     record = campaign.record
-    kinds: list[str] = []
-    if campaign.harmonic_points:
-        omegas = sorted({row["omega_rad_s"] for row in campaign.harmonic_points})
-        listed = ", ".join(f"{omega:g}" for omega in omegas)
-        kinds.append(f"steady sine tests at {listed} rad/s, {_amplitude_factor(campaign):g} g/λ")
-    if campaign.seismic_points:
-        records = dict.fromkeys(row["record"] for row in campaign.seismic_points)
-        kinds.append(f"earthquake records {', '.join(records)}")
-    tested = " and ".join(kinds) or f"{campaign.protocol or 'an experiment'} without points of gain"
-    betas = ", ".join(f"{beta:g}" for beta in _betas(campaign)) if kinds else ""
-    springs = f", coupled by springs of β = {betas} and bare" if betas else ""
+    tested = _tested(campaign)
+    betas = listed([f"{beta:g}" for beta in _betas(campaign)]) if tested else ""
+    springs = f", bare and coupled by springs of β = {betas}" if betas else ""
+    what = listed(tested) or f"{campaign.protocol or 'an experiment'}, which measures no gain,"
     backend = str(campaign.devices.get("backend", "not stated"))
+    ended = f"ended {moment(record.end_time)}" if record.end_time else "not ended"
     parts: list[Part] = [
-        f"Tested: {tested}, on a two-storey frame with a rocking block{springs}. Bench: {backend}. Begun "
-        f"{record.start_time}, ended {record.end_time or 'not'}; status: {record.status}."
+        *damage_notice(campaign),
+        f"Tested: {what} on a two-storey frame with a rocking block{springs}. Bench: {backend}. Begun "
+        f"{moment(record.start_time)}, {ended}; status: {record.status}.{_people(campaign)}",
     ]
     if backend == "simulated":
         parts.append(
             Notice("The bench was simulated: measured stands for what a virtual bench with its noise and errors gave.")
         )
+    absent = [
+        kind
+        for kind, there in (("harmonic", campaign.harmonic_points), ("earthquake", campaign.seismic_points))
+        if not there
+    ]
+    if absent:
+        parts.append(f"The file holds no {' and no '.join(absent)} test.")
     return parts
+
+
+def _tested(campaign: Campaign) -> list[str]:
+    kinds: list[str] = []
+    if campaign.harmonic_points:
+        omegas = sorted({row["omega_rad_s"] for row in campaign.harmonic_points})
+        frequencies = listed([f"{omega:g}" for omega in omegas])
+        kinds.append(f"steady sine tests at {frequencies} rad/s, {_amplitude_factor(campaign):g} g/λ")
+    if campaign.seismic_points:
+        records = dict.fromkeys(str(row["record"]) for row in campaign.seismic_points)
+        kinds.append(f"{'earthquake records' if len(records) > 1 else 'the earthquake record'} {listed([*records])}")
+    return kinds
+
+
+def _people(campaign: Campaign) -> str:
+    given = campaign.record.metadata
+    words = (("Operator", given.get("operator")), ("Notes", given.get("notes")))
+    return "".join(f" {name}: {text.rstrip('.')}." for name, text in words if text)
 
 
 def _betas(campaign: Campaign) -> list[float]:

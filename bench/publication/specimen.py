@@ -5,10 +5,12 @@ from collections.abc import Sequence
 from bench.config.declared import declared
 from bench.prediction.files import rows_of
 from bench.prediction.modes import modes_table
-from bench.publication.numbers import plain
+from bench.publication.numbers import plain, with_uncertainty
+from bench.publication.typography import moment, typeset, unit_text
 from bench.record.tables import arrays
 from bench.report.modes_figure import modes_figure
 from bench.report.page.document import Column, Part, Picture, Section, Table
+from sim.identified import Identified, spring_label
 from sim.specimen import Specimen
 from sim.uncertainty import SpecimenUncertainty
 
@@ -27,15 +29,22 @@ SYMBOLS = {
 """How parameters are written, where it is not by their names."""
 
 
-def specimen_section(specimen: Specimen, uncertainty: SpecimenUncertainty | None) -> Section:
-    """The parameters of frame, block and spring; `uncertainty` is None where they are taken as exact."""
+def specimen_section(
+    specimen: Specimen, uncertainty: SpecimenUncertainty | None, identified: Identified | None = None
+) -> Section:
+    """The parameters of frame, block and spring, and what of them was measured; `uncertainty` is None where they are
+    taken as exact.
+    """
     text = (
         "A two-storey shear frame whose first storey a spring couples to a rigid block that rocks on its base. Every "
         "prediction in this report was computed from these values."
     )
     if uncertainty is None:
         text += " They are those of the paper's Tables 1 to 3 unless said otherwise, and taken as exact."
-    parts: list[Part] = [text, _parameters(specimen, uncertainty), _derived(specimen)]
+    measured = () if identified is None else identified.names
+    parts: list[Part] = [text, _parameters(specimen, uncertainty, measured), _derived(specimen)]
+    if identified is not None and identified.findings:
+        parts.append(findings_table(identified))
     return Section("specimen", "Specimen", parts)
 
 
@@ -72,17 +81,17 @@ def modes_section(specimen: Specimen, betas: Sequence[float]) -> Section:
         "Modes (as Fig. 3 of the paper)",
         [
             "Modes of the bare frame and of the linearised coupled system, Eq. 12 to 14, without damping." + note,
+            Table("Modes (predicted, from the specimen's nominal values; shapes scaled to u₁ = 1)", columns, rows),
             Picture(
                 modes_figure(arrays(table), specimen),
                 "Modes of the bare frame and of the linearised coupled system (predicted).",
                 "Drawings of frame, spring and block, at rest and displaced, for each mode, with its frequency.",
             ),
-            Table("Modes (predicted, from the specimen's nominal values; shapes scaled to u₁ = 1)", columns, rows),
         ],
     )
 
 
-def _parameters(specimen: Specimen, uncertainty: SpecimenUncertainty | None) -> Table:
+def _parameters(specimen: Specimen, uncertainty: SpecimenUncertainty | None, measured: Sequence[str] = ()) -> Table:
     widths: dict[str, float] = {}
     if uncertainty is not None:
         widths = {
@@ -98,13 +107,22 @@ def _parameters(specimen: Specimen, uncertainty: SpecimenUncertainty | None) -> 
                 continue
             width = widths.get(entry.name)
             half = "not stated" if width is None else f"± {100.0 * width:g} %"
+            half = "measured" if entry.name in measured else half
             part = "all" if entry.name == "g" else owner
             rows.append(
-                [SYMBOLS.get(entry.name, entry.name), part, entry.description, plain(value, 6), entry.unit, half]
+                [
+                    SYMBOLS.get(entry.name, entry.name),
+                    part,
+                    typeset(entry.description),
+                    plain(value, 6),
+                    unit_text(entry.unit),
+                    half,
+                ]
             )
     if uncertainty is not None:
         half = f"± {100.0 * uncertainty.spring:g} %"
-        rows.append(["k_C", "spring", "stiffness of the spring", "β k₁", "N/m", half])
+        others = " that was not measured" if any(spring_label(name) for name in measured) else ""
+        rows.append(["k_C", "spring", f"stiffness of the spring{others}", "β k₁", "N/m", half])
     columns = [
         Column("symbol", words=True),
         Column("part", words=True),
@@ -118,6 +136,29 @@ def _parameters(specimen: Specimen, uncertainty: SpecimenUncertainty | None) -> 
     return Table(
         "Parameters of the specimen, and the half widths within which every value is equally likely", columns, rows
     )
+
+
+def finding_label(name: str) -> str:
+    """How the quantity of a finding is written."""
+    label = spring_label(name)
+    return SYMBOLS.get(name, name) if label is None else f"k_C, spring of β = {label:g}"
+
+
+def findings_table(identified: Identified, title: str = "What was identified of the specimen") -> Table:
+    """Findings with their expanded uncertainties and where they are from."""
+    columns = [
+        Column("quantity", words=True),
+        Column("measured"),
+        Column("unit", words=True),
+        Column("from", words=True),
+        Column("date", words=True),
+    ]
+    rows: list[list[str]] = []
+    for found in identified.findings:
+        name = finding_label(found.name)
+        value = with_uncertainty(found.value, 2.0 * found.standard_uncertainty)
+        rows.append([name, value, unit_text(found.unit), typeset(found.source), moment(found.date.isoformat())])
+    return Table(f"{title} (expanded uncertainties, k = 2)", columns, rows)
 
 
 def _derived(specimen: Specimen) -> Table:

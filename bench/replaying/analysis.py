@@ -70,7 +70,7 @@ def follow(
     Raises NotComparable when this software does not come to the recorded points with the recorded settings: what
     other settings would show would be mixed with what the software changed.
     """
-    signals = SignalMap(record.channels, configuration.laser_reference)
+    signals = SignalMap(record.channels, configuration.laser_reference, configuration.calibrated)
     follower = make(signals)
     led = _Led(experiment, configuration, follower)
     clock = VirtualClock()

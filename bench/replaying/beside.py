@@ -3,7 +3,6 @@
 The campaign's file is never written: its checksums stay what they were.
 """
 
-import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -13,15 +12,16 @@ from pathlib import Path
 from bench.config.model import BenchConfiguration
 from bench.provenance import software
 from bench.record import hdf5
+from bench.record.checksums import Checksums
 from bench.record.errors import RecordError, reason
 from bench.record.fields import fields_of
 from bench.record.layout import now, software_version
+from bench.record.opening import ANALYSIS, ANALYSIS_VERSION
 from bench.record.reader import Record
+from bench.record.reanalysis import file_hash
 from bench.record.rows import Rows
 from sim.errors import InvalidInput
 from sim.parameters import Parameters
-
-FORMAT, FORMAT_VERSION = "rocking-bench analysis", 1
 
 
 @dataclass(frozen=True)
@@ -36,12 +36,6 @@ class Analysis:
     settings: Mapping[str, object]
     used: Parameters
     configuration: BenchConfiguration
-
-
-def file_hash(path: Path) -> str:
-    """SHA-256 of a file, in hexadecimal digits."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def write_analysis(original: Path, record: Record, analysis: Analysis, out: Path | None = None) -> Path:
@@ -77,7 +71,7 @@ def _names(original: Path) -> Iterator[Path]:
 
 def _fill(file: hdf5.File, original: Path, digest: str, record: Record, analysis: Analysis) -> None:
     file.attrs["NX_class"], file.attrs["default"] = "NXroot", "entry"
-    file.attrs["format"], file.attrs["format_version"] = FORMAT, FORMAT_VERSION
+    file.attrs["format"], file.attrs["format_version"] = ANALYSIS, ANALYSIS_VERSION
     entry = hdf5.create_group(file, "entry", "NXentry")
     hdf5.write_text(entry, "title", f"re-analysis of {record.title}")
     process = hdf5.create_group(entry, "process", "NXprocess")
@@ -109,3 +103,4 @@ def _fill(file: hdf5.File, original: Path, digest: str, record: Record, analysis
     for row in stored:
         before.add(*(row[field.name] for field in known))
     before.write()
+    Checksums(entry, ())

@@ -11,7 +11,7 @@ from bench.events import Acquired, Event, PointFinished
 from bench.record.declared import OWN_TABLES
 from bench.record.fields import TEXT_WIDTH
 from bench.record.hdf5 import clip_text
-from bench.record.journal import NOT_JOURNALLED, text_of
+from bench.record.journal import text_of
 from bench.record.reader import Record
 from bench.replaying.course import RecordedCourse
 
@@ -61,7 +61,7 @@ class Comparison:
         if type(event) in OWN_TABLES:
             name, fields = OWN_TABLES[type(event)]
             self._own[name] += _rows_of({each.name: getattr(event, each.name) for each in fields})
-        if isinstance(event, NOT_JOURNALLED):
+        if not self._course.journalled(event):
             return
         text = text_of(event)
         if isinstance(event, PointFinished):
@@ -89,6 +89,10 @@ class Comparison:
             "passes": record.passes,
             "table_response": _as_rows(record.table_response),
         }
+        if self._course.twin_in_time:
+            said = _as_rows(record.twin)
+            # a killed program's last samples may be lost, although what the twin said of them is not
+            own["twin"] = said if broken_off is None else said[: len(self._own["twin"])]
         for name, stored in own.items():
             _compare_rows(found, name.replace("_", " "), stored, self._own[name])
         return found

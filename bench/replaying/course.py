@@ -9,9 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.engine.requests import Requests
-from bench.events import Acquired, Event, LimitExceeded, OperatorAnswered, OperatorAsked, StateChanged, Warned
+from bench.events import (
+    Acquired,
+    Event,
+    LimitExceeded,
+    OperatorAnswered,
+    OperatorAsked,
+    SpecimenMounted,
+    StateChanged,
+    Warned,
+)
 from bench.record.journal import NOT_JOURNALLED
 from bench.record.reader import Record, RecordedEvent
+from bench.twin.beside import BEHIND
 from drivers.rig import Alignment
 
 _ASKED = re.compile(r"-> [^:]+: (stop|abort|halt) was asked for")
@@ -46,7 +56,12 @@ class RecordedCourse:
         self._rate = record.sample_rate
         self._alignments = record.alignments
         self.in_place: tuple[str, ...] = ()
-        self.journal = self._without_timing(record.events)
+        events = [each for each in record.events if not _twin_behind(each)]
+        self.twin_in_time = len(events) == len(record.events) and len({*record.twin.get("members", ())}) <= 1
+        """Whether the model beside the test kept up; else it said what a replay, which waits for it, does not say."""
+        self.journal = self._without_timing(events)
+        kinds = {each.kind for each in self.journal}
+        self._unknown = () if SpecimenMounted.__name__ in kinds else (SpecimenMounted,)
         self._block_times = blocks["time"]
         self._opened: dict[int, tuple[int, list[str]]] = {}
         for entry in self.journal:
@@ -76,6 +91,10 @@ class RecordedCourse:
         """The safety inputs that were not good then."""
         since, names = self._opened.get(run, (0, []))
         return names if samples >= since else ()
+
+    def journalled(self, event: Event) -> bool:
+        """Whether what was recorded has an entry for such an event: older files know of fewer kinds."""
+        return not isinstance(event, (*NOT_JOURNALLED, *self._unknown))
 
     def alignments(self, run: int) -> tuple[Alignment, ...]:
         """How sensors with clocks of their own were placed in `run`."""
@@ -108,6 +127,10 @@ class RecordedCourse:
         return int(np.searchsorted(self._block_times, entry.time, side="right"))
 
 
+def _twin_behind(entry: RecordedEvent) -> bool:
+    return entry.kind == Warned.__name__ and entry.text.startswith(BEHIND)
+
+
 def _is_timing(entry: RecordedEvent) -> bool:
     return entry.text.startswith(_TIMING)
 
@@ -117,12 +140,12 @@ class AskingAgain:
 
     def __init__(self, course: RecordedCourse, requests: Requests) -> None:
         self._waiting = deque(course.requests)
-        self._requests = requests
+        self._course, self._requests = course, requests
         self._blocks = self._entries = 0
 
     def __call__(self, event: Event) -> None:
         self._blocks += isinstance(event, Acquired)
-        self._entries += not isinstance(event, NOT_JOURNALLED)
+        self._entries += self._course.journalled(event)
         while self._waiting:
             place, word = self._waiting[0]
             if self._blocks < place.blocks or self._entries < place.entries:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol, cast
+from typing import Protocol
 
 from bench.analysis.signals import SignalMap
 from bench.config.model import BenchConfiguration
@@ -12,13 +12,14 @@ from bench.engine.steps import Plan
 from bench.engine.stream import Stream
 from bench.events import Event, PointFinished, Subscriber, Warned
 from bench.guard.guard import Guard
-from bench.provenance import software
+from bench.provenance import revision, software
 from bench.record.reader import Record
 from bench.record.replayed import ReplayedRecord
 from bench.replaying.compare import DRIVE, ENDING, Comparison, Difference, Found
 from bench.replaying.course import AskingAgain, RecordedCourse, RecordedOperator
+from bench.twin.beside import twin_beside
 from drivers.clock import Clock
-from drivers.replay import Recording, ReplayRig
+from drivers.replay import ReplayRig
 from sim.parameters import Parameters
 
 UNFINISHED = "running"
@@ -73,8 +74,7 @@ class Replayed:
 
 def stored_configuration(record: Record) -> BenchConfiguration:
     """The configuration of the bench that was recorded. Raises InvalidInput where there is none, or an unknown one."""
-    ReplayedRecord(record)
-    return BenchConfiguration.model_validate_json(record.metadata["configuration"])
+    return ReplayedRecord(record).configuration
 
 
 def replay(
@@ -92,8 +92,7 @@ def replay(
     the file cannot be played, or the experiment not be planned.
     """
     experiment.check(configuration)
-    # a cached property does not count as a property where a protocol is matched
-    recording, course = cast(Recording, ReplayedRecord(record)), RecordedCourse(record)
+    recording, course = ReplayedRecord(record), RecordedCourse(record)
     comparison, points = Comparison(record, course), list[Parameters]()
 
     def keep(event: Event) -> None:
@@ -105,10 +104,11 @@ def replay(
         # who asks comes last: what was said before is with everybody by then
         heard = [comparison, keep, *subscribers, AskingAgain(course, requests)]
         stream = Stream(clock, heard)
+        signals = signals or SignalMap(rig.channels, configuration.laser_reference, configuration.calibrated)
         engine = Engine(
             rig,
             Guard(rig, configuration.limits, configuration.ramps, configuration.mover),
-            signals or SignalMap(rig.channels, configuration.laser_reference),
+            signals,
             stream,
             requests,
             RecordedOperator(course),
@@ -116,7 +116,8 @@ def replay(
         )
         for warning in course.first_warnings:
             stream.say(Warned(0.0, warning))
-        ending = engine.run(experiment.plan(configuration))
+        with twin_beside(stream, rig, configuration, signals, requests, patient=True):
+            ending = engine.run(experiment.plan(configuration))
         over = rig.over
     broke_off = _broke_off(record, over)
     found = comparison.finish(ending.reason.partition("; then ")[0] if broke_off else None)
@@ -145,13 +146,23 @@ def _broke_off(record: Record, over: str | None) -> str | None:
     """Where the recording ends although its plan would go on, and why; None when the replay ended by itself."""
     if record.status == UNFINISHED:
         return f"{over or 'it ends'}: the program that wrote it was killed, or still writes"
-    if over is None or record.status not in ("failed", "halted"):
+    if over is None or record.status not in ("failed", "halted", "interrupted"):
         return None
     return f"{over}: the run {record.status} there, {record.summary}"
 
 
 def _changed(metadata: dict[str, str]) -> tuple[str, ...]:
-    """Software that numbers depend on and that is of another version than when the file was written."""
+    """Software that numbers depend on and that is another than when the file was written: by version or git hash."""
     now = software()
     known = {name: metadata.get(name, "unknown") for name in now}
-    return tuple(f"{name} was {known[name]} and is {now[name]}" for name in now if known[name] != now[name])
+    versions = (f"{name} was {known[name]} and is {now[name]}" for name in now if known[name] != now[name])
+    return (*versions, *_changed_files(metadata.get("git", "unknown"), revision()))
+
+
+def _changed_files(was: str, now: str) -> tuple[str, ...]:
+    """What the git hashes tell: nothing where a file had been changed since its hash ("+") or there is none."""
+    if was != now:
+        return (f"git was {was} and is {now}",)
+    if now == "unknown" or now.endswith("+"):
+        return (f"git is {now} as it was, which does not tell whether the files are the same",)
+    return ()

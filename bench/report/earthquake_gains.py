@@ -60,10 +60,11 @@ def _draw_curve(panel: "Axes", beta: NDArray[Any], alpha_2: NDArray[Any]) -> Non
     if toppled.size:
         panel.plot(
             toppled,
-            np.full(toppled.size, 0.985),
+            np.full(toppled.size, 0.96),
             "|",
             color=BLUE,
-            ms=5.0,
+            ms=6.0,
+            markeredgewidth=1.2,
             transform=panel.get_xaxis_transform(),
             label="predicted to topple, asked motion",
         )

@@ -6,7 +6,7 @@ matplotlib's keyword arguments have no types, hence the first line.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,8 +54,8 @@ def motion_figure(motions: Sequence[MotionPicture]) -> "Figure":
         panel.plot(time, motion.asked, color=SKY, linewidth=1.6, label="asked")
         panel.plot(time, motion.achieved, color=BLUE, linewidth=0.6, label="achieved, bare frame (as measured)")
         error = motion.achieved - motion.asked
-        panel.plot(time, error, color=VERMILLION, linewidth=0.6, label="achieved - asked")
-        _dress(panel, motion.name, r"$a_g$  [m/s$^2$]", max(_most(motion.asked), _most(motion.achieved)))
+        panel.plot(time, error, color=VERMILLION, linewidth=0.6, label="achieved − asked")
+        _dress(panel, motion.name, "$a_g$  [m/s²]", max(_most(motion.asked), _most(motion.achieved)))
         panel.set_xlim(0.0, float(time[-1]))
     _finish(figure, panels, len(motions))
     return figure
@@ -115,12 +115,16 @@ def _finish(figure: "Figure", panels: "Sequence[Axes]", count: int) -> None:
         panels[0].text(0.5, 0.5, "no record was played", ha="center", va="center")
         return
     panels[-1].set_xlabel(r"$t$  [s]", fontsize=8)
-    handles, labels = panels[0].get_legend_handles_labels()
+    # a record that toppled the block, or was not played, lacks curves that others have
+    entries: dict[str, Any] = {}
+    for panel in panels[:count]:
+        for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
+            entries.setdefault(label, handle)
     figure.legend(
-        handles,
-        labels,
+        list(entries.values()),
+        list(entries),
         loc="outside lower center",
-        ncols=len(labels) if len(labels) < 4 else 2,
+        ncols=len(entries) if len(entries) < 4 else 2,
         fontsize=8,
         frameon=False,
     )

@@ -25,10 +25,14 @@ MARGIN = 1.1
 
 MARKERS = {"steady": ("o", VERMILLION), "modulated": ("D", PURPLE), "resting": ("s", GREEN), "overturned": ("X", BLACK)}
 
+BAND = "what is left open of the specimen (k = 2)"
+BAND_SHADE = 0.18
+
 LEGEND = (
     "predicted, block rocking",
     "predicted, block rocking, unstable",
     "predicted, block resting",
+    BAND,
     r"$\alpha_2$ = 1: the block has no effect",
     *(f"measured, {status}" for status in MARKERS),
     "no gain measured",
@@ -41,7 +45,8 @@ FLOOR, CEILING = 0.01, 20.0
 """Predicted gains outside do not widen the axis: no bench can tell them from 0 or from a resonance."""
 
 Prediction = Mapping[str, NDArray[Any]]
-"""Arrays of one length: omega [rad/s], beta, alpha_2, stable (truth values), layer ("rocking" or "resting")."""
+"""Arrays of one length: omega [rad/s], beta, alpha_2, stable (truth values), layer ("rocking" or "resting"), and where
+it is known the band of alpha_2: alpha_2_low, alpha_2_high."""
 
 
 def gain_spectra(points: Sequence[PointLike], prediction: Prediction, *, title: str = "") -> "Figure":
@@ -86,6 +91,17 @@ def _draw_prediction(panel: "Axes", prediction: Mapping[str, NDArray[Any]]) -> N
         stable = prediction["stable"][rows].astype(np.bool_)
         if not omega.size:
             continue
+        if {"alpha_2_low", "alpha_2_high"} <= prediction.keys():
+            low, high = (prediction[f"alpha_2_{end}"][rows].astype(np.float64) for end in ("low", "high"))
+            panel.fill_between(
+                omega,
+                np.where(stable, low, np.nan),
+                np.where(stable, high, np.nan),
+                color=colour,
+                alpha=BAND_SHADE,
+                linewidth=0.0,
+                label=BAND,
+            )
         # an unstable stretch reaches to its stable neighbours, so that the branch has no gaps
         near = ~stable | np.append(~stable[1:], False) | np.append(False, ~stable[:-1])
         panel.plot(

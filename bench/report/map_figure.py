@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.report.gain_levels import least_over_omega, levels_for
+from bench.report.gain_surface import CEILING, FLOOR, draw_surface
 from bench.report.style import BLACK, BLUE, GREEN, PURPLE, VERMILLION, new_figure
 
 if TYPE_CHECKING:
@@ -21,11 +23,6 @@ Floats = NDArray[np.float64]
 
 LEVELS = (0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 5.0, 10.0, 20.0, 50.0)
 """Gains at which contours are drawn."""
-
-HEIGHTS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
-"""Gains that are written along the height of a surface."""
-
-FEWEST_LEVELS = 4
 
 GAINING, LOSING = "#DCEBF5", "#B9B9B9"
 """Light where the block reduces the response, dark where it does not."""
@@ -42,9 +39,6 @@ MARK: Mapping[str, Any] = {
     "markeredgewidth": 1.6,
 }
 """How measured points look: with a gain, without one, and in common."""
-
-FLOOR, CEILING = 0.01, 100.0
-"""Gains beyond are cut off in the surfaces."""
 
 SYMBOLS = {"alpha_1": r"$\alpha_1$", "alpha_2": r"$\alpha_2$"}
 
@@ -99,7 +93,9 @@ def map_figure(
     grid = figure.add_gridspec(1 + len(layers), 2, height_ratios=(1.15, *(1.0 for _ in layers)))
     for column, (name, symbol) in enumerate(SYMBOLS.items()):
         surface: Any = figure.add_subplot(grid[0, column], projection="3d", computed_zorder=False)
-        _draw_surface(surface, omegas, betas, rocking.gains[name])
+        draw_surface(surface, omegas, betas, rocking.gains[name])
+        if name == "alpha_2":
+            _draw_on_surface(surface, [point for point in measured if point.layer != "resting"])
         surface.set_title(f"(a)  {symbol}, block rocking", fontsize=10, loc="left")
         for row, (letter, words, layer) in enumerate(layers, start=1):
             panel = figure.add_subplot(grid[row, column])
@@ -121,7 +117,7 @@ def _draw_measured(panel: "Axes", points: Sequence[MapPoint]) -> None:
     top = panel.get_ylim()[1]
     for point in points:
         lost = point.alpha_2 is None
-        panel.plot(point.omega, point.beta, marker=LOST if lost else FOUND, zorder=6, **MARK)
+        panel.plot(point.omega, point.beta, marker=LOST if lost else FOUND, zorder=6, clip_on=False, **MARK)
         text = panel.annotate(
             "no gain" if lost else f"{point.alpha_2:.3g}",
             (point.omega, point.beta),
@@ -142,6 +138,13 @@ def _halo() -> Any:
     from matplotlib.patheffects import withStroke
 
     return withStroke(linewidth=2.0, foreground="white")
+
+
+def _draw_on_surface(panel: Any, points: Sequence[MapPoint]) -> None:
+    for point in points:
+        if point.alpha_2 is not None:
+            height = np.log10(np.clip(point.alpha_2, FLOOR, CEILING))
+            panel.plot([point.omega], [point.beta], [height], marker=FOUND, zorder=6, **{**MARK, "markersize": 4})
 
 
 def _draw_map(panel: "Axes", omegas: Floats, betas: Floats, layer: Layer, name: str, resting_margin: Floats) -> None:
@@ -176,67 +179,6 @@ def _draw_map(panel: "Axes", omegas: Floats, betas: Floats, layer: Layer, name: 
 
 def _crosses_zero(margin: Floats) -> bool:
     return bool((margin > 0.0).any() and (margin < 0.0).any())
-
-
-def least_over_omega(omegas: Floats, gain: Floats) -> Floats:
-    """Frequency [rad/s] inside the range at which the gain, shape (n, m), is least, shape (n,).
-
-    From a parabola through three points of log(gain); NaN where the least value lies on the edge or its neighbours
-    are absent.
-    """
-    places = np.full(len(gain), np.nan)
-    for i, row in enumerate(np.log(gain)):
-        if np.isnan(row).all():
-            continue
-        k = int(np.nanargmin(row))
-        if 0 < k < len(omegas) - 1 and np.isfinite(row[k - 1 : k + 2]).all():
-            fit = np.asarray(np.polyfit(omegas[k - 1 : k + 2] - omegas[k], row[k - 1 : k + 2], 2), dtype=np.float64)
-            places[i] = omegas[k] - 0.5 * float(fit[1] / fit[0]) if fit[0] > 0.0 else omegas[k]
-    return places
-
-
-def levels_for(gain: Floats, usual: Sequence[float]) -> list[float]:
-    """The `usual` levels that a gain crosses, ascending; where those are few, round numbers between its extremes."""
-    from matplotlib.ticker import MaxNLocator
-
-    finite = gain[np.isfinite(gain)]
-    if not finite.size:
-        return [1.0]
-    low, high = float(finite.min()), float(finite.max())
-    levels = [level for level in usual if low <= level <= high]
-    if len(levels) < FEWEST_LEVELS:
-        rounds = (float(level) for level in MaxNLocator(6, steps=[1, 2, 5, 10]).tick_values(low, high))
-        levels = [level for level in rounds if low <= level <= high and level > 0.0]
-    return levels or [low]
-
-
-def _draw_surface(panel: Any, omegas: Floats, betas: Floats, gain: Floats) -> None:
-    """The gain on a logarithmic height, with a line at unity."""
-    from matplotlib.ticker import MaxNLocator
-
-    height = np.log10(np.clip(gain, FLOOR, CEILING))
-    x, y = np.meshgrid(omegas, betas)
-    panel.plot_surface(
-        x,
-        y,
-        height,
-        rstride=max(1, len(betas) // 40),
-        cstride=max(1, len(omegas) // 60),
-        cmap="cividis",
-        linewidth=0.15,
-        edgecolor="#00000040",
-        antialiased=True,
-    )
-    panel.contour(x, y, height, levels=[0.0], colors=BLACK, linewidths=1.8, zorder=5)
-    panel.view_init(elev=28, azim=-122)
-    panel.set_xlabel(r"$\Omega$  [rad/s]", fontsize=8)
-    panel.set_ylabel(r"$\beta$", fontsize=8)
-    for axis in (panel.xaxis, panel.yaxis):
-        axis.set_major_locator(MaxNLocator(5))
-    panel.tick_params(labelsize=7, pad=1)
-    shown = levels_for(10.0**height, HEIGHTS)
-    panel.set_zticks(np.log10(shown), [f"{level:g}" for level in shown])
-    panel.set_box_aspect((1.3, 1.0, 0.8), zoom=1.05)
 
 
 def _add_legend(figure: "Figure", unstable: bool, boundary: bool, measured: Sequence[MapPoint]) -> None:

@@ -6,7 +6,7 @@ matplotlib's keyword arguments have no types, hence the first line.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,9 @@ WIDTH, ROW = 9.0, 4.2
 
 HEADROOM = 1.12
 """Of the greatest value, to the edge of a panel."""
+
+LATE = 0.8
+"""Share of a history from which on the value stands before its mark: after it there is no room."""
 
 MOST_POINTS = 4000
 """Points of a history that are drawn: longer ones are drawn as the least and the greatest of as many intervals."""
@@ -49,6 +52,9 @@ class RecordPicture:
 def record_figure(records: Sequence[RecordPicture]) -> "Figure":
     """Draw every record: three histories on the left, its spectrum on the right."""
     figure = new_figure(WIDTH, ROW * len(records))
+    # the spectrum's label must not meet the histories
+    layout: Any = figure.get_layout_engine()
+    layout.set(w_pad=0.1)
     grid = figure.add_gridspec(len(records), 1)
     for row, record in enumerate(records):
         _draw(figure.add_subfigure(grid[row, 0]), record)
@@ -58,7 +64,7 @@ def record_figure(records: Sequence[RecordPicture]) -> "Figure":
 def _draw(part: "SubFigure", record: RecordPicture) -> None:
     grid = part.add_gridspec(3, 2, width_ratios=(1.9, 1.0))
     histories = (
-        (record.acceleration, BLACK, r"$a_g$  [m/s$^2$]"),
+        (record.acceleration, BLACK, "$a_g$  [m/s²]"),
         (100.0 * record.velocity, BLUE, r"$v_g$  [cm/s]"),
         (100.0 * record.displacement, GREEN, r"$d_g$  [cm]"),
     )
@@ -81,7 +87,7 @@ def _draw(part: "SubFigure", record: RecordPicture) -> None:
     spectrum.set_ylim(0.0, HEADROOM * float(record.spectrum.max()))
     spectrum.set_title(f"pseudo-acceleration, {100.0 * record.damping:g} % damping", loc="right", fontsize=8)
     spectrum.set_xlabel(r"$T$  [s]", fontsize=9)
-    spectrum.set_ylabel(r"$S_a$  [m/s$^2$]", fontsize=9)
+    spectrum.set_ylabel("$S_a$  [m/s²]", fontsize=9)
     set_grid(spectrum)
 
 
@@ -90,12 +96,14 @@ def _draw_history(panel: "Axes", values: Array, dt: float, colour: str) -> None:
     time, shown = _thinned(values, dt)
     panel.plot(time, shown, color=colour, linewidth=0.7)
     at = int(np.abs(values).argmax())
+    late = at > LATE * values.size
     panel.plot(dt * at, values[at], marker="o", markersize=4, color=GREY, fillstyle="none")
     panel.annotate(
-        f"{values[at]:.4g}",
+        f"{values[at]:.4g}".replace("-", "−"),
         (dt * at, float(values[at])),
-        xytext=(6, 0),
+        xytext=(-6 if late else 6, 0),
         textcoords="offset points",
+        horizontalalignment="right" if late else "left",
         verticalalignment="top" if values[at] > 0.0 else "bottom",
         fontsize=8,
         color=GREY,

@@ -24,6 +24,8 @@ COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK)
 DASHES = ("-", "--", "-.", ":")
 MARKERS = "osD^v<>"
 
+BAND_SHADE = 0.15
+
 WIDTH, HEIGHT, ROW = 7.5, 6.4, 0.16
 """Inches: width, height without the strip of the toppled, and what each record adds to that."""
 
@@ -31,7 +33,7 @@ WIDTH, HEIGHT, ROW = 7.5, 6.4, 0.16
 @dataclass(frozen=True, eq=False)
 class GainCurve:
     """One record: `beta`, `alpha_1` and `alpha_2`, shape (n,), ascending in beta; NaN where the run did not end by
-    itself, which `toppled`, shape (n,), explains.
+    itself, which `toppled`, shape (n,), explains. `band`: where 95 % of alpha_2 begin and end, shape (n,) each.
     """
 
     name: str
@@ -39,6 +41,7 @@ class GainCurve:
     alpha_1: NDArray[np.float64]
     alpha_2: NDArray[np.float64]
     toppled: NDArray[np.bool_]
+    band: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
 
 
 def seismic_figure(curves: Sequence[GainCurve], band: str) -> "Figure":
@@ -56,6 +59,8 @@ def seismic_figure(curves: Sequence[GainCurve], band: str) -> "Figure":
             panel.plot(
                 curve.beta, gain, color=colour, linestyle=dash, linewidth=1.2, marker=marker, ms=2.5, label=curve.name
             )
+        if curve.band is not None:
+            upper.fill_between(curve.beta, *curve.band, color=colour, alpha=BAND_SHADE, linewidth=0.0)
         where = curve.beta[curve.toppled]
         fallen.plot(where, np.full(where.size, k), color=colour, linestyle="", marker="x", ms=4.0)
     _finish(upper, r"$\alpha_2$")

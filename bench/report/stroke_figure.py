@@ -59,7 +59,7 @@ def stroke_figure(title: str, histories: Sequence[History], spectra: Spectra, re
         for panel, values in zip(panels, series, strict=True):
             panel.plot(history.time, values, color=colour, linewidth=0.8, label=history.name)
     for panel, label, limit in zip(
-        panels, ("a  [m/s$^2$]", "v  [m/s]", "d  [mm]"), (None, reach[1], 1e3 * reach[0]), strict=True
+        panels, ("a  [m/s²]", "v  [m/s]", "d  [mm]"), (None, reach[1], 1e3 * reach[0]), strict=True
     ):
         panel.set_ylabel(label)
         panel.set_xlim(histories[0].time[0], histories[0].time[-1])
@@ -86,6 +86,6 @@ def _draw_spectra(upper: "Axes", lower: "Axes", spectra: Spectra) -> None:
         for period in spectra.own:
             panel.axvline(float(period), color=PALE, linewidth=2.5, zorder=0.5)
     upper.set_ylim(bottom=0.0)
-    upper.set_ylabel("pseudo-acceleration  [m/s$^2$]", fontsize=8)
+    upper.set_ylabel("pseudo-acceleration  [m/s²]", fontsize=8)
     lower.set_ylabel("change  [%]", fontsize=8)
     lower.set_xlabel("period  [s]")

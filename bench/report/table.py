@@ -1,6 +1,7 @@
 """The points of a campaign as text for the terminal."""
 
 import textwrap
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -43,11 +44,25 @@ def _remarks(rows: list[dict[str, Any]]) -> list[str]:
     disagreeing = sum(row.get("agrees") is False for row in rows)
     compared = sum(row.get("agrees") is not None for row in rows)
     lines = ["", f"{compared} of {len(rows)} points compared with the prediction, {disagreeing} disagree."]
+    lines += _uncertainty(rows)
     for row in rows:
         if row.get("reason"):
             head = f"omega {row['omega_rad_s']:g} rad/s, beta {row['beta']:g}: "
             lines += textwrap.wrap(head + str(row["reason"]), WIDTH, subsequent_indent="    ")
     return lines
+
+
+def _uncertainty(rows: list[dict[str, Any]]) -> list[str]:
+    """How uncertain the gains are, and what counts most in it; nothing where no budget is kept."""
+    known = [row for row in rows if row.get("dominating") and row.get("alpha_2")]
+    if not known:
+        return []
+    sizes = [100.0 * row["alpha_2_uncertainty"] / row["alpha_2"] for row in known]
+    most = Counter(str(row["dominating"]) for row in known).most_common()
+    named = ", ".join(f"{name} ({number})" for name, number in most)
+    return textwrap.wrap(
+        f"alpha_2 is uncertain by {min(sizes):.2f} to {max(sizes):.2f} % (k = 2); the largest parts: {named}.", WIDTH
+    )
 
 
 def _number(name: str, form: str) -> Callable[[dict[str, Any]], str]:

@@ -7,6 +7,7 @@ import sys
 import tracemalloc
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pyarrow.parquet
 import pytest
@@ -308,6 +309,22 @@ def test_nothing_is_overwritten_and_nothing_left_half_done(
     assert main(["export", str(campaign), "--to", "xls"]) == 2
 
 
+def test_what_failed_its_checksum_is_told_and_travels_with_the_export(
+    campaign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "damaged.h5"
+    path.write_bytes(campaign.read_bytes())
+    with h5py.File(path, "r+") as file:
+        counts = file["entry/instrument/laser_1/counts"]
+        counts[3] += 1
+    assert main(["export", str(path), "--to", "csv", "--out", str(tmp_path / "out")]) == 0
+    assert "laser_1/counts is not what was written" in capsys.readouterr().err
+    assert "laser_1/counts" in (tmp_path / "out" / "DAMAGED.txt").read_text(encoding="utf-8")
+    assert main(["export", str(campaign), "--to", "csv", "--out", str(tmp_path / "whole")]) == 0
+    assert capsys.readouterr().err == ""
+    assert not (tmp_path / "whole" / "DAMAGED.txt").exists()
+
+
 @pytest.mark.parametrize(("to", "module"), [("uff", "pyuff"), ("parquet", "pyarrow")])
 def test_a_missing_library_is_named_with_the_extra(
     campaign: Path, tmp_path: Path, to: str, module: str, monkeypatch: pytest.MonkeyPatch
@@ -333,6 +350,7 @@ def test_memory_does_not_grow_with_the_run(
 ) -> None:
     monkeypatch.setattr(content, "ROWS_AT_ONCE", piece)
     monkeypatch.setattr(f"bench.export.{module}.ROWS_AT_ONCE", piece)
+    monkeypatch.setattr("bench.record.checksums.ROWS_AT_ONCE", piece)
     peaks: list[int] = []
     for number, pieces in enumerate((2, 2, 12)):
         path = tmp_path / f"{number}.h5"

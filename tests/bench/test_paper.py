@@ -8,6 +8,7 @@ import pytest
 from bench.cli.main import main
 from bench.prediction.statements import harmonic_statements
 from bench.prediction.verdicts import Check, Statement, Verdict
+from bench.provenance import revision
 from sim.specimen import Specimen
 
 A_S = 1.238512
@@ -68,7 +69,9 @@ def test_a_quick_paper_has_what_was_asked_for(tmp_path: Path, capsys: pytest.Cap
     tree = ElementTree.fromstring(html.read_text(encoding="utf-8").removeprefix("<!DOCTYPE html>\n"))
     keys = [each.get("id") for each in tree.iter("section")]
     assert keys == ["modes", "seismic", "specimen", "provenance"]
-    assert "SYNTHETIC" in "".join(tree.itertext())
+    text = "".join(tree.itertext())
+    assert "SYNTHETIC" in text
+    assert f"git {revision().removesuffix('+')}" in text
     assert main(["paper", *only]) == 2
 
 

@@ -20,7 +20,9 @@ from bench.engine.requests import Requests
 from bench.engine.steps import Arm, Calibrate, Dwell, Follow, Handle, Measured, Plan, RampOut, Say
 from bench.events import Acquired, Estimate, Event, PointFinished, Warned
 from bench.guard.limits import Limits
+from bench.provenance import software
 from bench.record.reader import open_record
+from bench.replaying import session
 from bench.replaying.compare import DRIVE, JOURNAL, POINTS
 from bench.replaying.pace import PacedClock
 from bench.replaying.session import Replayed, replay, stored_configuration
@@ -256,6 +258,24 @@ def test_what_is_not_as_recorded_is_told(
     assert said in str(replayed.parted(part))
 
 
+@pytest.mark.parametrize(
+    ("was", "now", "said"),
+    [
+        ("abc", "abc", ()),
+        ("abc", "abd", ("git was abc and is abd",)),
+        ("abc", "abc+", ("git was abc and is abc+",)),
+        # files that were changed since the hash may be any
+        ("abc+", "abc+", ("git is abc+ as it was, which does not tell whether the files are the same",)),
+        (None, "abc", ("git was unknown and is abc",)),
+    ],
+)
+def test_other_software_is_told_by_its_git_hash_where_the_versions_are_the_same(
+    was: str | None, now: str, said: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(session, "revision", lambda: now)
+    assert session._changed(software() | ({} if was is None else {"git": was})) == said
+
+
 def test_rounding_is_told_from_difference(tmp_path: Path) -> None:
     path = made(tmp_path / "run.h5")
     with h5py.File(path, "r") as file:
@@ -327,6 +347,7 @@ def test_a_difference_is_an_exit_code_and_a_line(
     shown = capsys.readouterr()
     content = json.loads(shown.out)
     assert not content["identical"]
+    assert not any(each.startswith("git was") for each in content["software_changed"])
     assert content["samples"]["played"] == content["samples"]["recorded"]
     assert "verdict was 'failed' and is 'passed'" in shown.err.splitlines()[-1]
 

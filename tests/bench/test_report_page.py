@@ -1,19 +1,26 @@
 """A report as one HTML file and as PDF: complete, valid, self-contained, and with nothing lost between the two."""
 
 import re
+import subprocess
 import zlib
 from html.parser import HTMLParser
 from pathlib import Path
+from shutil import which
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from matplotlib.figure import Figure
 
 from bench.publication.numbers import percent, plain, with_uncertainty
-from bench.report.page.document import Column, Document, Listing, Notice, Picture, Section, Table
+from bench.publication.typography import counted, listed, moment, typeset, unit_text
+from bench.report.page.compositor import composed
+from bench.report.page.document import Column, Document, Listing, Notice, Part, Picture, Section, Table
 from bench.report.page.html import html_page
 from bench.report.page.pdf import write_pdf
+from bench.report.page.sheet import BOTTOM, HEIGHT, MARGIN, MEASURE, WIDTH, Line, Placed
 from bench.report.page.typeset import Font, grid_of
 from bench.report.style import new_figure
 
@@ -34,7 +41,7 @@ def document(rows: int = 3) -> Document:
     columns = [Column("name <b>", words=True), Column("α₂", "1"), Column("what & why", words=True)]
     table = Table("Values", columns, [[f"row {k}", "0.184 ± 0.002", "words " * 12] for k in range(rows)])
     first = Section("first", "First <part>", ["A paragraph & more.", Notice("Look here."), table])
-    pictures = [Picture(drawing(), "A curve.", "What it shows"), Picture(drawing(11.0, 4.0), "A wide one.", "Wide")]
+    pictures = [Picture(drawing(), "A curve.", "What it shows"), Picture(drawing(11.0, 6.0), "A wide one.", "Wide")]
     second = Section("second", "Second", [*pictures, Listing(["one", "two"])])
     return Document("A title & a half", ["Summary."], [first, second], "made today")
 
@@ -107,25 +114,83 @@ def boxes(content: bytes) -> list[tuple[int, int]]:
     return [(round(float(width)), round(float(height))) for width, height in found]
 
 
-def test_the_pdf_has_a4_pages_upright_and_across_and_the_figures_keep_their_size(tmp_path: Path) -> None:
-    made, path = document(), tmp_path / "report.pdf"
+@pytest.fixture(scope="module")
+def printed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Document, Path]:
+    made, path = document(), tmp_path_factory.mktemp("pdf") / "report.pdf"
     write_pdf(path, made)
+    return made, path
+
+
+def test_the_pdf_has_several_figures_on_a4_pages_and_the_figures_keep_their_size(
+    printed: tuple[Document, Path],
+) -> None:
+    made, path = printed
     content = path.read_bytes()
     assert content.startswith(b"%PDF-")
-    # the first figure stands below the text of the first page, the wide one lies across a second page
-    upright, across = (595, 842), (842, 595)
-    assert boxes(content) == [upright, across, upright]
-    assert page_count(content) == 3
+    # text, a table and the first figure fill the first page; the wide one is drawn anew at the width of the second
+    assert boxes(content) == [(595, 842)] * 2
+    assert page_count(content) == 2
+    placed = [mark for sheet in composed(made) for mark in sheet.marks if isinstance(mark, Placed)]
+    sizes = [size for each in placed for size in (each.width, each.height)]
+    assert sizes == pytest.approx([5.0, 3.0, MEASURE, 6.0 * (MEASURE / 11.0) ** 0.5])
     picture = made.sections[1].parts[0]
     assert isinstance(picture, Picture)
     assert tuple(picture.figure.get_size_inches()) == (5.0, 3.0)
     assert not picture.figure.texts
 
 
-def test_a_long_table_goes_on_with_its_heading_on_the_next_page(tmp_path: Path) -> None:
-    path = tmp_path / "long.pdf"
-    write_pdf(path, document(rows=60))
-    assert page_count(path.read_bytes()) > 3
+def test_the_pages_of_the_pdf_are_what_a_reader_program_sees(printed: tuple[Document, Path]) -> None:
+    """The text on each page by poppler, a library of others."""
+    if which("pdftotext") is None:
+        pytest.skip("pdftotext of poppler is not installed")
+    command = ["pdftotext", "-layout", str(printed[1]), "-"]
+    text = subprocess.run(command, capture_output=True, text=True, check=True, encoding="utf-8").stdout
+    first, second, _ = text.split("\f")
+    assert "A title & a half" in first
+    assert "Fig. 1. A curve." in first
+    assert "Fig. 2. A wide one." in second
+    assert re.search(r"row 2 +0\.184 ± 0\.002", first)
+    assert "2 of 2" in second
+
+
+PARTS = st.one_of(
+    st.integers(1, 150).map(lambda n: "some words " * n),
+    st.integers(1, 80).map(lambda n: Notice("look here " * n)),
+    st.integers(1, 70).map(lambda n: Table("t", [Column("a", words=True), Column("b", "m")], [["x", "1"]] * n)),
+    st.tuples(st.floats(1.0, 12.0), st.floats(0.5, 14.0)).map(lambda size: Picture(new_figure(*size), "c", "d")),
+)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.lists(st.lists(PARTS, min_size=1, max_size=5), min_size=1, max_size=4))
+def test_nothing_overlaps_and_nothing_is_lost_or_beyond_the_margins(sections: list[list[Part]]) -> None:
+    made = Document("Title", [], [Section("s", f"Section {k}", parts) for k, parts in enumerate(sections)], "made")
+    sheets = composed(made)
+    asked = [part.figure for parts in sections for part in parts if isinstance(part, Picture)]
+    assert [mark.figure for sheet in sheets for mark in sheet.marks if isinstance(mark, Placed)] == asked
+    lines = [mark.text for sheet in sheets for mark in sheet.marks if isinstance(mark, Line)]
+    rows = sum(len(part.rows) for parts in sections for part in parts if isinstance(part, Table))
+    assert lines.count("x") == rows
+    for sheet in sheets:
+        figures = [mark for mark in sheet.marks if isinstance(mark, Placed)]
+        for k, each in enumerate(figures):
+            assert each.x >= MARGIN - 1e-9
+            assert each.x + each.width <= WIDTH - MARGIN + 1e-9
+            assert each.y >= BOTTOM - 1e-9
+            assert each.y + each.height <= HEIGHT - MARGIN + 1e-9
+            assert all(each.y >= other.y + other.height for other in figures[:k] if other.y < each.y)
+        for line in (mark for mark in sheet.marks if isinstance(mark, Line)):
+            assert BOTTOM - 0.3 <= line.y <= HEIGHT - MARGIN
+            assert not any(each.y - 0.02 < line.y < each.y + each.height for each in figures)
+
+
+def test_a_long_table_goes_on_with_its_heading_on_the_next_page() -> None:
+    sheets = composed(document(rows=60))
+    heads = [sum(mark.text == "α₂ [1]" for mark in sheet.marks if isinstance(mark, Line)) for sheet in sheets]
+    rows = [sum(mark.text == "0.184 ± 0.002" for mark in sheet.marks if isinstance(mark, Line)) for sheet in sheets]
+    assert sum(rows) == 60
+    assert len(sheets) >= 3
+    assert heads == [int(count > 0) for count in rows]
 
 
 def test_words_break_and_numbers_do_not() -> None:
@@ -151,12 +216,35 @@ def test_a_row_of_another_length_is_refused() -> None:
         (with_uncertainty(-123.4, 12.0), "−123 ± 12"),
         (with_uncertainty(0.5, None), "0.5"),
         (with_uncertainty(None, 0.1), "–"),
-        (plain(1.23456e-7), "1.235·10^−7"),
+        (plain(1.23456e-7), "1.235·10⁻⁷"),
         (plain(float("nan")), "–"),
         (percent(-0.0123), "−1.23"),
     ],
 )
 def test_numbers_have_the_digits_that_their_uncertainty_leaves(shown: str, expected: str) -> None:
+    assert shown == expected
+
+
+@pytest.mark.parametrize(
+    ("shown", "expected"),
+    [
+        (unit_text("m/s2"), "m/s²"),
+        (unit_text("kg/m3"), "kg/m³"),
+        (unit_text("m/s2/Hz^0.5"), "m/s²/√Hz"),
+        (unit_text("V s2/m"), "V s²/m"),
+        (typeset("start 1 of beta = 0.4 at omega = 16 rad/s"), "start 1 of β = 0.4 at Ω = 16 rad/s"),
+        (typeset("alpha_2 1.2, 6 m/s2. 10% of the draws, +-10 V"), "α₂ 1.2, 6 m/s². 10 % of the draws, ±10 V"),
+        # keys, flags and the masses of the storeys are no symbols or units
+        (typeset("specimen.beta, --beta, beta: `omega` and m2"), "specimen.beta, --beta, beta: `omega` and m2"),
+        (moment("2026-11-21T17:29:11.216+00:00"), "2026-11-21 17:29:11 UTC"),
+        (moment("2026-11-21T17:29:11+01:00"), "2026-11-21 17:29:11 UTC+01:00"),
+        (moment(""), ""),
+        (counted(1, "test"), "1 test"),
+        (counted(12, "point was", "points were"), "12 points were"),
+        (listed(["a", "b", "c"]), "a, b and c"),
+    ],
+)
+def test_words_and_units_are_printed_as_in_print(shown: str, expected: str) -> None:
     assert shown == expected
 
 

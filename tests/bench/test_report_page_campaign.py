@@ -16,6 +16,7 @@ from bench.publication.cycles import PERIODS, SAMPLES, Dwells
 from bench.publication.report import campaign_report
 from bench.record.reader import open_record
 from bench.report.page.document import Document, Picture, Section, Table
+from protocols.harmonic.parameters import HarmonicParameters
 from sim.gain import predict_gain
 
 SHORT = ["--omega", "20", "--beta", "0.25", "--ramp-time", "2", "--measured-cycles", "8"]
@@ -34,7 +35,7 @@ def document(file: Path) -> Iterator[Document]:
     with pytest.MonkeyPatch.context() as patch, open_record(file) as record:
         patch.setattr(predicted, "STEP", 1.0)
         patch.setattr(predicted, "BETA_STEP", 0.2)
-        yield campaign_report(Campaign(file, record))
+        yield campaign_report(Campaign(file, record, HarmonicParameters))
 
 
 def section(document: Document, key: str) -> Section:
@@ -50,17 +51,18 @@ def pictures(document: Document, key: str) -> list[Picture]:
     return [part for part in section(document, key).parts if isinstance(part, Picture)]
 
 
-def test_every_section_is_there_and_says_what_the_file_does_not_have(document: Document) -> None:
+def test_sections_are_those_that_the_file_has_and_one_line_says_what_it_lacks(document: Document) -> None:
     keys = [each.key for each in document.sections]
-    assert keys == ["results", "spectra", "map", "histories", "seismic", "specimen", "modes", "limits", "provenance"]
-    assert section(document, "seismic").parts == ["There is no seismic test in this file."]
+    assert keys == ["results", "spectra", "map", "histories", "specimen", "modes", "limits", "provenance"]
+    assert document.summary[-1] == "The file holds no earthquake test."
     assert "20 rad/s" in str(document.summary[0])
     assert "simulated" in str(document.summary[1])
+    assert "1 point was tested" in str(section(document, "results").parts[0])
 
 
 def test_the_results_are_those_of_the_summary_with_their_uncertainties(document: Document, file: Path) -> None:
     (point,) = json.loads((file.parent / "summary.json").read_text(encoding="utf-8"))["points"]
-    gains, conditions = tables(document, "results")
+    gains, conditions, budget = tables(document, "results")
     row = dict(zip([column.title for column in gains.columns], gains.rows[0], strict=True))
     value, uncertainty = (float(part) for part in row["α₂ measured"].split(" ± "))
     assert value == pytest.approx(point["alpha_2"], abs=0.001)
@@ -70,6 +72,11 @@ def test_the_results_are_those_of_the_summary_with_their_uncertainties(document:
     assert row["agrees"] == "yes"
     row = dict(zip([column.title for column in conditions.columns], conditions.rows[0], strict=True))
     assert float(row["peak drift, coupled"]) == pytest.approx(1e3 * point["drift_peak_m"], rel=1e-3)
+    parts = json.loads(point["uncertainty_parts"])
+    assert [column.title for column in budget.columns][2:] == list(parts)
+    shown = [float(cell) for cell in budget.rows[0][1:]]
+    assert shown[0] == pytest.approx(2.0 * np.hypot.reduce(shown[1:]), abs=0.006)
+    assert shown[1:] == pytest.approx([100.0 * value / point["alpha_2"] for value in parts.values()], abs=6e-4)
 
 
 def test_the_drawn_cycles_are_the_measured_ones_in_the_phase_of_the_model(file: Path) -> None:
@@ -110,8 +117,10 @@ def test_limits_and_provenance_name_file_hash_versions_and_seed(document: Docume
     facts = {row[0]: row[1] for table in tables(document, "provenance") for row in table.rows}
     assert facts["SHA-256 of the file"] == sha256(file.read_bytes()).hexdigest()
     assert facts["seed of the simulation"] == "7"
-    assert "numba" in facts["versions when recorded"]
-    assert facts["omega"] == "20.0"
+    assert "numba" in facts["libraries when recorded"]
+    rows = {row[1]: row for row in tables(document, "provenance")[1].rows}
+    assert rows["omega"][2:] == ["20", "rad/s"]
+    assert rows["settle_limit"][2:] == ["240", "s"]
     captions = [table.caption for table in tables(document, "limits")]
     assert any("preflight" in caption for caption in captions)
     assert any("guard" in caption for caption in captions)
@@ -132,7 +141,7 @@ def test_the_command_writes_both_forms_and_overwrites_only_when_asked(
     assert main([*arguments, "--overwrite"]) == 0
     text = html.read_text(encoding="utf-8")
     assert text.startswith("<!DOCTYPE html>")
-    assert text.count("<svg ") == 4
+    assert text.count("<svg ") == 5
     content = pdf.read_bytes()
     assert content.startswith(b"%PDF-")
     # every figure brings a page at least, and the tables fill more

@@ -11,10 +11,10 @@ from bench.report.page.svg import inline_svg
 STYLE = """
 :root { color-scheme: light; }
 body { font: 16px/1.5 "DejaVu Sans", "Segoe UI", Helvetica, Arial, sans-serif; color: #111; background: #fff;
-  max-width: 62rem; margin: 0 auto; padding: 1.5rem; }
+  max-width: 64rem; margin: 0 auto; padding: 1.5rem; }
 h1 { font-size: 1.7rem; line-height: 1.25; margin: 0 0 .3rem; }
 h2 { font-size: 1.25rem; margin: 2.2rem 0 .5rem; padding-top: .4rem; border-top: 2px solid #0072b2; }
-p, ul { margin: .5rem 0; max-width: 48rem; }
+p, ul { margin: .5rem 0; max-width: 56rem; }
 .made { color: #444; font-size: .9rem; }
 nav ul { columns: 2; padding-left: 1.2rem; font-size: .95rem; }
 a { color: #00547f; }
@@ -25,12 +25,14 @@ caption { text-align: left; font-size: .9rem; padding-bottom: .3rem; }
 caption b, figcaption b { font-weight: 700; }
 th, td { padding: .22rem .6rem; border-bottom: 1px solid #ccc; text-align: right; vertical-align: top; }
 thead th { border-bottom: 1.5px solid #333; vertical-align: bottom; }
-.words { text-align: left; overflow-wrap: anywhere; }
+th, td { white-space: nowrap; }
+thead th { white-space: normal; }
+.words { text-align: left; white-space: normal; overflow-wrap: break-word; min-width: 4.5rem; max-width: 34rem; }
 tbody th { font-weight: 400; }
 figure { margin: 1.2rem 0; }
-figure svg { max-width: 100%; height: auto; display: block; }
+figure svg { max-width: 100%; height: auto; display: block; margin: 0 auto; }
 figure svg * { stroke-linejoin: round; stroke-linecap: butt; }
-figcaption { font-size: .9rem; max-width: 52rem; margin-top: .3rem; }
+figcaption { font-size: .9rem; max-width: 56rem; margin-top: .3rem; }
 @media print {
   @page { size: A4; margin: 16mm; }
   body { font-size: 10pt; max-width: none; padding: 0; }
@@ -42,6 +44,8 @@ figcaption { font-size: .9rem; max-width: 52rem; margin-top: .3rem; }
   figure svg { max-height: 230mm; }
   .wide { overflow: visible; }
   table { font-size: 8pt; }
+  th, td { padding: .2em .5em; }
+  .words { overflow-wrap: anywhere; min-width: 3.5rem; }
 }
 """
 

@@ -24,8 +24,8 @@ GAP = 0.13
 ROUNDING = 1e-6
 """What the sums of widths may be off."""
 
-NARROWEST = 0.75
-"""A column of words is not made narrower than this while others can be."""
+NARROWEST, LONGEST_WORD = 0.75, 1.7
+"""A column of words is not made narrower than this while others can be, nor than its longest word up to that."""
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,11 @@ def _widths(table: Table, font: Font, width: float) -> list[float]:
         heading = max(bold.width(word) for word in column.heading.split())
         whole = max([heading, min(bold.width(column.heading), 1.1), *cells]) + GAP
         natural.append(whole)
-        least.append(min(whole, max(heading, NARROWEST) + GAP) if column.words else max([heading, *cells]) + GAP)
+        if not column.words:
+            least.append(max([heading, *cells]) + GAP)
+            continue
+        longest = max((font.width(word) for row in table.rows for word in row[k].split()), default=0.0)
+        least.append(min(whole, max(heading, NARROWEST, min(longest, LONGEST_WORD)) + GAP))
     spare = width - sum(least)
     wanted = sum(natural) - sum(least)
     share = 1.0 if wanted <= 0.0 else min(1.0, max(0.0, spare / wanted))
