@@ -2,24 +2,25 @@
 
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from types import FrameType, TracebackType
+from types import FrameType
 
 from PySide6.QtCore import QSettings
 from PySide6.QtWidgets import QApplication
 
 from bench.cli.catalogue import Entry
-from bench.cli.scene import Notice
 from bench.config.model import BenchConfiguration
-from bench.gui import texts
 from bench.gui.controller import Controller
+from bench.gui.own_errors import OwnErrors
 from bench.gui.palette import Theme, desktop_theme, qt_palette, style_sheet
-from bench.gui.stop import StopKey
+from bench.gui.stop import StopFilter
 from bench.gui.window import Window
 
 
-def open_window(configuration: BenchConfiguration, entries: Sequence[Entry], path: Path | None) -> int:
+def open_window(
+    configuration: BenchConfiguration, entries: Sequence[Entry], path: Path | None, queue: Path | None
+) -> int:
     """Show the window until it is closed; returns the exit code of Qt's main loop."""
     application = QApplication(sys.argv[:1])
     application.setOrganizationName("rocking-bench")
@@ -27,30 +28,48 @@ def open_window(configuration: BenchConfiguration, entries: Sequence[Entry], pat
     theme = desktop_theme()
     dress(application, theme)
     controller = Controller()
-    application.installEventFilter(StopKey(controller))
-    window = Window(controller, configuration, entries, theme, path=path, settings=QSettings(), tour=path is None)
-    _keep_going(controller, application)
+    window = Window(
+        controller, configuration, entries, theme, path=path, settings=QSettings(), queue=queue, tour=path is None
+    )
+    undo = attend(window, controller, application)
+    _follow_desktop(window, application)
     window.show()
     code = application.exec()
     controller.close()
+    undo()
     return code
 
 
-def _keep_going(controller: Controller, application: QApplication) -> None:
-    """An error of the window is a line of its log and no end of anything; Ctrl-C in the terminal closes the window."""
-    before = sys.excepthook
-
-    def tell(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
-        before(kind, error, trace)
-        text = texts.OWN_ERROR.format(error=f"{kind.__name__}: {error}")
-        controller.noticed.emit(Notice(controller.scene.time, "window", text, grave=True))
-
-    sys.excepthook = tell
+def attend(window: Window, controller: Controller, application: QApplication) -> Callable[[], None]:
+    """What belongs to the whole program: the filter of STOP, errors of the window itself, and Ctrl-C in the terminal,
+    which closes the window. Returns what undoes it.
+    """
+    stop = StopFilter(controller, window.header.stop)
+    application.installEventFilter(stop)
+    forget = OwnErrors(controller, window.trouble).install()
 
     def close(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - the signature is Python's
         application.quit()
 
-    signal.signal(signal.SIGINT, close)
+    before = signal.signal(signal.SIGINT, close)
+
+    def undo() -> None:
+        application.removeEventFilter(stop)
+        forget()
+        signal.signal(signal.SIGINT, before)
+
+    return undo
+
+
+def _follow_desktop(window: Window, application: QApplication) -> None:
+    """Light or dark as the desktop has it, also when that changes while the window is open."""
+
+    def follow() -> None:
+        theme = desktop_theme()
+        dress(application, theme)
+        window.use_theme(theme)
+
+    application.styleHints().colorSchemeChanged.connect(follow)
 
 
 def dress(application: QApplication, theme: Theme) -> None:

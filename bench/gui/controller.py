@@ -4,7 +4,8 @@ It holds no knowledge of experiments: whatever it does, the command line does to
 """
 
 from collections.abc import Mapping
-from typing import Literal
+from contextlib import suppress
+from math import inf
 
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
 
@@ -15,6 +16,7 @@ from bench.gui.standing import DRIVEN, Standing, standing
 from bench.link.client import Link
 from bench.link.messages import (
     BEAT,
+    SILENCE,
     Beat,
     Ended,
     FromSession,
@@ -30,7 +32,10 @@ from bench.link.messages import (
 from drivers.clock import now
 
 PERIOD = 28
-"""Between two looks at the link, and between two drawings [ms]: a little over thirty a second."""
+"""Between two drawings [ms]: a little over thirty a second; and at most between two looks at the link."""
+
+DELIBERATE = 0.7
+"""After the first press of STOP the next counts from so many seconds on: a double click is one press."""
 
 
 class Controller(QObject):
@@ -46,29 +51,40 @@ class Controller(QObject):
     """An event of the engine."""
     asked = Signal(object)
     """A `Question`, or None when it stands no longer."""
-    surveyed = Signal(object)
-    """`Surveyed` or `Refused`: the answer to `survey`."""
+    surveyed = Signal(object, object)
+    """`Surveyed` or `Refused`, and who asked: the answer to `survey`."""
     began = Signal(object)
     """The `Run` that was just started."""
     ended = Signal(object)
     """`Ended` or `Refused`: how the run ended."""
+    _heard = Signal()
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._link: Link | None = None
+        self._surveys: dict[object, Link] = {}
         self._running = False
         self._question: Question | None = None
         self._spoken = self._started = 0.0
         self._stopped_at: float | None = None
         self.scene = Scene()
         self.inputs: Mapping[str, bool] = {}
+        self._inputs_heard: float | None = None
+        self.driven = False
+        """Whether the rig was armed in the run that is under way, or was the last."""
+        self.held = ""
+        """Why nobody but the queue may start a run; empty when anybody may."""
         self.lost = (0, 0)
+        self._quiet, self._longest_quiet = 0.0, inf
         self._failure = ""
         self.latched = False
         """STOP was pressed and not cleared since."""
+        self._pressed_at = 0.0
         self._timer = QTimer(self, interval=PERIOD, timerType=Qt.TimerType.PreciseTimer)
         self._timer.timeout.connect(self._look)
         self._timer.start()
+        self._called = False
+        self._heard.connect(self._hear, Qt.ConnectionType.QueuedConnection)
 
     @property
     def running(self) -> bool:
@@ -78,7 +94,14 @@ class Controller(QObject):
     @property
     def busy(self) -> bool:
         """Whether a run or a survey is under way."""
-        return self._link is not None
+        return self._link is not None or bool(self._surveys)
+
+    @property
+    def inputs_age(self) -> float | None:
+        """Seconds since the safety inputs of the run that is under way were heard of; None when they never were."""
+        if not self._running or self._inputs_heard is None:
+            return None
+        return now() - self._inputs_heard
 
     @property
     def armed(self) -> bool:
@@ -100,29 +123,45 @@ class Controller(QObject):
             return Standing(texts.FAILED_WORD, self._failure, "alarm", "cross")
         if link is None:
             return standing("over" if self._started else "none", scene.state, scene.reason, 0.0)
+        if link.standing == "linked" and scene.state in DRIVEN and self._quiet > self._longest_quiet:
+            # the process lives, its engine does not turn: the last known state says nothing of the bench
+            return standing("no link", scene.state, scene.reason, self._quiet)
         return standing(link.standing, scene.state, scene.reason, link.silence)
 
-    def survey(self, asked: Survey) -> None:
-        """Have the plan computed; `surveyed` brings the answer. A survey under way is given up."""
-        if not self._running:
-            self._let_go()
-            self._link = Link(asked)
+    def survey(self, asked: Survey, by: object) -> None:
+        """Have a plan computed, also while a run is under way; `surveyed` brings the answer.
+
+        An earlier one that was asked for `by` the same is given up.
+        """
+        self.give_up(by)
+        self._surveys[by] = Link(asked, self._call)
+
+    def give_up(self, by: object) -> None:
+        """Forget what was asked for `by` somebody."""
+        if (link := self._surveys.pop(by, None)) is not None:
+            link.leave()
 
     def start(self, run: Run) -> None:
         """Start a run. Nothing happens while one is under way or STOP is latched."""
         if self._running or self.latched:
             return
-        self._let_go()
         self.scene, self.inputs, self.lost, self._failure = Scene(), {}, (0, 0), ""
-        self._link, self._running = Link(run), True
+        self._inputs_heard, self.driven = None, False
+        # a simulated bench that does not keep the pace of the clock is as late as its model
+        paced = run.realtime or run.configuration.backend != "simulated"
+        self._quiet, self._longest_quiet = 0.0, SILENCE + run.configuration.acquisition.block_duration if paced else inf
+        self._link, self._running = Link(run, self._call), True
         self._started, self._stopped_at = now(), None
         self.began.emit(run)
         self.changed.emit()
 
     def press_stop(self) -> None:
-        """STOP: the first press ramps out fast, the next cuts the enable line. It latches."""
-        if self._link is not None and self._running:
-            self._link.ask("halt" if self.latched else "abort")
+        """STOP: the first press ramps out fast, one at least `DELIBERATE` later cuts the enable line. It latches."""
+        first = not self.latched
+        if first:
+            self._pressed_at = now()
+        if self._link is not None and (first or now() - self._pressed_at >= DELIBERATE):
+            self._link.ask("abort" if first else "halt")
         self.latched = True
         self.changed.emit()
 
@@ -133,7 +172,7 @@ class Controller(QObject):
 
     def ramp_out(self) -> None:
         """End the run gently."""
-        if self._link is not None and self._running:
+        if self._link is not None:
             self._link.ask("stop")
 
     def answer(self, *, agreed: bool) -> None:
@@ -146,26 +185,46 @@ class Controller(QObject):
     def close(self) -> None:
         """Leave the session to itself: it ramps out, unless it was told to go on."""
         self._timer.stop()
-        self._let_go()
-
-    def _let_go(self) -> None:
+        for by in list(self._surveys):
+            self.give_up(by)
         link, self._link, self._running = self._link, None, False
         if link is not None:
             link.leave()
 
+    def _call(self) -> None:
+        """In a thread of the link: there is something to take. One call waits at a time."""
+        if not self._called:
+            self._called = True
+            # the window may be gone already
+            with suppress(RuntimeError):
+                self._heard.emit()
+
+    def _hear(self) -> None:
+        self._called = False
+        self._look()
+
     def _look(self) -> None:
-        link = self._link
-        if link is None:
-            return
-        if now() - self._spoken >= BEAT / 2:
+        links = [*self._surveys.values(), *([self._link] if self._link is not None else [])]
+        if links and now() - self._spoken >= BEAT / 2:
             self._spoken = now()
-            link.alive()
+            for link in links:
+                link.alive()
             self.changed.emit()
-        messages = link.take()
+        for by, link in list(self._surveys.items()):
+            for message in link.take():
+                self._take_answer(by, message)
+        if self._link is None:
+            return
+        messages = self._link.take()
         if traces := [message for message in messages if isinstance(message, Traces)]:
             self.traced.emit(traces)
         for message in messages:
             self._take(message)
+
+    def _take_answer(self, by: object, message: FromSession) -> None:
+        if isinstance(message, Surveyed | Refused) and self._surveys.pop(by, None) is not None:
+            self.surveyed.emit(message, by)
+            self.changed.emit()
 
     def _take(self, message: FromSession) -> None:
         match message:
@@ -175,19 +234,17 @@ class Controller(QObject):
                 if notice is not None:
                     self.noticed.emit(notice)
                 if isinstance(event, StateChanged):
-                    self._left_waiting(event.after)
+                    self._entered(event.after)
             case Beat():
                 # also true when the change itself was lost on the way
                 self.scene.state, self.scene.reason, self.scene.time = message.state, message.reason, message.time
-                self.lost = (message.lost_events, message.lost_traces)
+                self.driven = self.driven or message.state in DRIVEN
+                self.lost, self._quiet = (message.lost_events, message.lost_traces), message.quiet
             case Question():
                 self._question = message
                 self.asked.emit(message)
             case SafetyInputs():
-                self.inputs = message.good
-            case Surveyed():
-                self._let_go()
-                self.surveyed.emit(message)
+                self.inputs, self._inputs_heard = message.good, now()
             case Ended():
                 self._over(message, Notice(self.scene.time, "end", f"{message.status}: {message.reason}"))
             case Refused():
@@ -196,18 +253,15 @@ class Controller(QObject):
                 return
         self.changed.emit()
 
-    def _left_waiting(self, after: State) -> None:
-        if after is not State.WAITING and self._question is not None:
+    def _entered(self, state: State) -> None:
+        self.driven = self.driven or state in DRIVEN
+        if state is not State.WAITING and self._question is not None:
             self._question = None
             self.asked.emit(None)
 
     def _over(self, message: Ended | Refused, notice: Notice) -> None:
-        was: Literal["run", "survey"] = "run" if self._running else "survey"
         self._link, self._running, self._question = None, False, None
         self._stopped_at = now()
-        if was == "survey":
-            self.surveyed.emit(message)
-            return
         if isinstance(message, Refused):
             self.scene.state = State.CLOSED
             self.scene.reason = message.text

@@ -1,5 +1,6 @@
 """A form made from the declaration of a protocol's parameters: nothing is declared twice."""
 
+from collections.abc import Mapping
 from typing import Any
 
 from PySide6.QtCore import Signal
@@ -23,7 +24,7 @@ class Form(QWidget):
 
     edited = Signal()
 
-    def __init__(self, model: type[Parameters], values: dict[str, Any] | None = None) -> None:
+    def __init__(self, model: type[Parameters], values: Mapping[str, Any] | None = None) -> None:
         super().__init__()
         self._model = model
         self.fields: dict[str, Field] = {}
@@ -126,6 +127,9 @@ def _name(entry: Declared) -> str:
 
 def _tip(entry: Declared) -> str:
     """What it is, between which limits, and what stands for an empty line."""
-    lines = [f"{entry.description[:1].upper()}{entry.description[1:]}.", f"It must be {entry.allowed_in_unit}."]
+    lines = [
+        f"{entry.description[:1].upper()}{entry.description[1:]}.",
+        texts.MUST_BE.format(allowed=entry.allowed_in_unit),
+    ]
     default = _typed(entry, entry.default)
     return "\n".join([*lines, texts.DEFAULT_TIP.format(default=default)] if default else lines)

@@ -1,96 +1,214 @@
 # pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false
 # pyright: reportMissingTypeStubs=false
-"""The gain spectrum: measured points filling up on the predicted lines."""
+"""The gain spectrum, or the gain curves under records: measured points filling up on the predicted lines."""
 
 from collections.abc import Mapping, Sequence
-from math import isfinite
+from math import ceil, floor, isfinite, log10
 from typing import Any
 
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QColor
 
-from bench.events import Estimate
+from bench.events import Estimate, RunningGain
 from bench.gui import texts
+from bench.gui.axes import colour_axes, round_down
+from bench.gui.gain_lines import LEAST, Kind, Line, Mark, kind_of, lines_of, mark_of
 from bench.gui.palette import Theme
 from bench.record.tables import Table
 
 DASHES = (Qt.PenStyle.SolidLine, Qt.PenStyle.DashLine, Qt.PenStyle.DotLine, Qt.PenStyle.DashDotLine)
-SYMBOLS = ("o", "s", "t", "d", "+")
-NEEDED = frozenset({"omega", "beta", "alpha_2", "layer"})
-"""Columns of a prediction that can be drawn here."""
+SYMBOLS = ("o", "s", "t", "d", "star")
+ASIDE = 0.008
+"""How far the points of each further run stand beside those of the first, in the width of the lines."""
+TICKS = [[(log10(digit) + decade, f"{digit * 10.0**decade:g}") for decade in range(-3, 3) for digit in (1, 2, 5)]]
+"""Places and labels of a logarithmic axis; over less than `NARROW` decades they are evenly spaced gains instead."""
+NARROW = 0.7
+PALE = 48
+GROUND = 150
+"""Opacity of a band and of the legend's ground, of 255."""
 
 
 class GainPlot(pg.PlotWidget):
-    """One colour, dash and symbol per stiffness; logarithmic gain, so that 1/5 and 5 are seen alike."""
+    """One colour and dash per stiffness or record, one symbol per run.
+
+    The gain of a spectrum is logarithmic, so that 1/5 and 5 are seen alike.
+    """
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
-        self._theme = theme
-        self._betas: list[float] = []
-        self._points: list[tuple[float, float]] = []
-        self.setBackground(theme.raised)
-        self.setAccessibleName("gain spectrum")
-        item: Any = self.getPlotItem()
-        item.setLogMode(x=False, y=True)
-        item.setLabel("bottom", texts.OMEGA_AXIS, color=theme.text)
-        item.setLabel("left", texts.GAIN_AXIS, color=theme.text)
-        item.showGrid(x=True, y=True, alpha=0.25)
-        item.setMenuEnabled(False)
-        for side in ("left", "bottom"):
-            item.getAxis(side).setPen(theme.faint)
-            item.getAxis(side).setTextPen(theme.text)
-            item.getAxis(side).enableAutoSIPrefix(False)
-        self._legend = item.addLegend(offset=(-8, 8), labelTextColor=theme.text)
-        self._now = pg.ScatterPlotItem(size=16, pen=pg.mkPen(theme.alarm, width=2), brush=None, symbol="o")
+        self._prediction: Table = {}
+        self._added: list[tuple[Mapping[str, Any], int]] = []
+        self._kind: Kind = "spectrum"
+        self._groups: list[float | str] = []
+        self._marks: list[Mark] = []
+        self._ends: list[float] = []
+        self._top = 1.0
+        self.bands = 0
+        """How many bands are drawn."""
+        self.setAccessibleName("gain plot")
+        self._item: Any = self.getPlotItem()
+        self._item.showGrid(x=True, y=True, alpha=0.25)
+        self._item.setMenuEnabled(False)
+        self._item.sigYRangeChanged.connect(self._tick)
+        self._legend = self._item.addLegend(offset=(-8, 8), labelTextSize="9pt")
+        # one item for all points and one for all of their uncertainties: an item each takes half a millisecond a frame
+        self._points, self._spreads = pg.ScatterPlotItem(size=11), pg.PlotCurveItem(connect="pairs")
+        self._bars: list[tuple[float, float, float]] = []
+        self._now = pg.ScatterPlotItem(size=18, brush=None, symbol="o")
+        self.use_theme(theme)
 
     @property
     def measured(self) -> list[tuple[float, float]]:
-        """Frequency [rad/s] and gain of the points that are drawn."""
-        return list(self._points)
+        """Place on the axis [SI] and gain of the points that are drawn."""
+        return [(mark.x, mark.gain) for mark in self._marks if mark.gain is not None]
+
+    def use_theme(self, theme: Theme) -> None:
+        """Take these colours, and draw again what was drawn."""
+        self._theme = theme
+        self.setBackground(theme.raised)
+        colour_axes(self._item, theme)
+        self._item.setLabel("left", texts.GAIN_AXIS, color=theme.text)
+        ground = QColor(theme.raised)
+        ground.setAlpha(GROUND)
+        self._legend.setBrush(pg.mkBrush(ground))
+        self._legend.setLabelTextColor(theme.text)
+        self._now.setPen(pg.mkPen(theme.alarm, width=2))
+        self._spreads.setPen(pg.mkPen(theme.text, width=2))
+        added = self._added
+        self.predict(self._prediction)
+        self._draw(added)
 
     def predict(self, prediction: Table) -> None:
         """Begin anew with these lines; a prediction of another shape leaves the plot empty."""
         self.clear()
-        self._points = []
-        self._betas = []
-        if prediction.keys() >= NEEDED:
-            omega, gain, beta, layer = (prediction[name].values for name in ("omega", "alpha_2", "beta", "layer"))
-            self._betas = sorted({round(float(each), 6) for each in beta})
-            for k, each in enumerate(self._betas):
-                for kind in ("rocking", "resting"):
-                    rows = np.flatnonzero((np.abs(beta - each) < 1e-6) & (layer == kind))
-                    rows = rows[np.argsort(omega[rows])]
-                    if rows.size:
-                        width = 2 if kind == "rocking" else 1
-                        pen = pg.mkPen(self._colour(k), width=width, style=DASHES[k % len(DASHES)])
-                        name = f"{texts.PREDICTED}, β = {each:g}, {kind}"
-                        self.plot(omega[rows], np.maximum(gain[rows].astype(float), 1e-3), pen=pen, name=name)
-        self.addItem(self._now)
+        self.setToolTip("")
+        self._prediction, self._added = prediction, []
+        self._marks, self._groups, self.bands = [], [], 0
+        self._set_axes(kind_of(prediction) or "spectrum")
+        lines = lines_of(prediction)
+        self._groups = list(dict.fromkeys(line.group for line in lines))
+        for line in lines:
+            self._draw_line(line)
+        self._ends = []
+        self._widen(*(x for line in lines for x in (line.x[0], line.x[-1])))
+        self._top = max((float(np.nanmax(line.gain)) for line in lines if np.isfinite(line.gain).any()), default=1.0)
+        unity = pg.InfiniteLine(0.0 if self._log else 1.0, angle=0, pen=pg.mkPen(self._theme.faint, width=1))
+        self._item.addItem(unity, ignoreBounds=True)
+        self._bars.clear()
+        self._points.clear()
+        self._draw_spreads()
+        for item in (self._spreads, self._points, self._now):
+            self.addItem(item)
         self._now.setData([], [])
 
-    def add(self, point: Mapping[str, Any]) -> None:
-        """Draw a finished point, as large as its uncertainty; one without a gain is not drawn."""
-        omega, gain, beta = (point.get(name) for name in ("omega_rad_s", "alpha_2", "beta"))
+    def add(self, point: Mapping[str, Any], run: int = 0) -> None:
+        """Draw a finished point, as large as its uncertainty; one without a gain is a cross at the upper edge."""
+        self._draw([(point, run)])
+
+    def _draw(self, points: Sequence[tuple[Mapping[str, Any], int]]) -> None:
+        """Draw all of these at once."""
         self._now.setData([], [])
-        if omega is None or gain is None or not gain > 0.0:
-            return
-        k = self._betas.index(round(beta, 6)) if beta is not None and round(beta, 6) in self._betas else 0
-        spread = float(point.get("alpha_2_uncertainty") or 0.0)
-        low, high = max(gain - spread, 1e-3), gain + spread
-        self.plot([omega, omega], [low, high], pen=pg.mkPen(self._theme.text, width=2))
-        self.plot([omega], [gain], pen=None, symbol=SYMBOLS[k % 5], symbolSize=11, symbolBrush=self._colour(k))
-        self._points.append((omega, gain))
+        self._points.addPoints([spot for point, run in points for spot in self._spot(point, run)])
+        self._draw_spreads()
 
-    def add_all(self, points: Sequence[Mapping[str, Any]]) -> None:
-        """Draw several."""
-        for point in points:
-            self.add(point)
+    def _spot(self, point: Mapping[str, Any], run: int) -> list[dict[str, Any]]:
+        """The symbol of a point, whose uncertainty is kept for `_draw_spreads`; none for what is no point of gain."""
+        mark = mark_of(point)
+        if mark is None:
+            return []
+        self._added.append((point, run))
+        if not self._groups and isinstance(mark.group, str):
+            self._set_axes("curve")
+        if mark.group not in self._groups:
+            self._groups.append(mark.group)
+        self._marks.append(mark)
+        self._widen(mark.x)
+        x, colour = mark.x + ASIDE * (self._ends[1] - self._ends[0]) * run, self._colour(mark.group)
+        if mark.gain is None:
+            pen = pg.mkPen(self._theme.text, width=2)
+            return [{"pos": (x, self._place(self._top)), "symbol": "x", "size": 12, "pen": pen, "brush": colour}]
+        low, high = max(mark.gain - mark.spread, LEAST), mark.gain + mark.spread
+        self._bars.append((x, self._place(low), self._place(high)))
+        pen = pg.mkPen(self._theme.text, width=1)
+        symbol = SYMBOLS[run % len(SYMBOLS)]
+        return [{"pos": (x, self._place(mark.gain)), "symbol": symbol, "size": 11, "pen": pen, "brush": colour}]
 
-    def show_running(self, estimate: Estimate) -> None:
+    def add_all(self, points: Sequence[Mapping[str, Any]], run: int = 0, name: str = "") -> None:
+        """Draw the points of a run, which the legend calls `name`."""
+        self._draw([(point, run) for point in points])
+        if name:
+            sample = pg.ScatterPlotItem(
+                size=11, symbol=SYMBOLS[run % len(SYMBOLS)], brush=None, pen=pg.mkPen(self._theme.text, width=1)
+            )
+            self._legend.addItem(sample, name)
+
+    def show_running(self, event: Estimate | RunningGain) -> None:
         """Where the point that is being measured stands now."""
-        if isfinite(estimate.alpha_2) and estimate.alpha_2 > 0.0:
-            self._now.setData([estimate.omega], [float(np.log10(estimate.alpha_2))])
+        x = event.omega if isinstance(event, Estimate) else event.beta
+        if x is not None and isfinite(event.alpha_2) and event.alpha_2 > 0.0:
+            self._now.setData([x], [self._place(event.alpha_2)])
 
-    def _colour(self, k: int) -> str:
-        return self._theme.lines[1 + k % (len(self._theme.lines) - 1)]
+    @property
+    def _log(self) -> bool:
+        return self._kind == "spectrum"
+
+    def _place(self, gain: float) -> float:
+        """Where a gain stands on its axis: single points, unlike lines, know nothing of a logarithmic one."""
+        return log10(gain) if self._log else gain
+
+    def _draw_spreads(self) -> None:
+        bars = np.array(self._bars).reshape(-1, 3)
+        self._spreads.setData(np.repeat(bars[:, 0], 2), bars[:, 1:].ravel())
+
+    def _set_axes(self, kind: Kind) -> None:
+        self._kind = kind
+        self._item.setLogMode(x=False, y=self._log)
+        self._tick()
+        label = texts.OMEGA_AXIS if kind == "spectrum" else texts.BETA_AXIS
+        self._item.setLabel("bottom", label, color=self._theme.text)
+
+    def _tick(self) -> None:
+        ticks = None
+        if self._log:
+            low, high = self._item.viewRange()[1]
+            ticks = TICKS if high - low > NARROW else [evenly(10.0**low, 10.0**high)]
+        self._item.getAxis("left").setTicks(ticks)
+
+    def _widen(self, *places: float) -> None:
+        """Have the horizontal axis reach these places too."""
+        every = [*self._ends, *map(float, places)]
+        if every and self._ends != [min(every), max(every)]:
+            self._ends = [min(every), max(every)]
+            width = self._ends[1] - self._ends[0]
+            self._item.setXRange(self._ends[0] - 0.05 * width, self._ends[1] + 0.05 * width, padding=0.0)
+
+    def _draw_line(self, line: Line) -> None:
+        colour, dash = self._colour(line.group), DASHES[self._groups.index(line.group) % len(DASHES)]
+        pen = pg.mkPen(colour, width=2 if line.strong else 1, style=dash)
+        self.plot(line.x, line.gain, pen=pen, name=line.name, connect="finite")
+        if line.band is None:
+            return
+        pale = QColor(colour)
+        pale.setAlpha(PALE)
+        known = np.flatnonzero(np.isfinite(line.band).all(axis=0))
+        for part in np.split(known, np.flatnonzero(np.diff(known) > 1) + 1):
+            edges = [
+                pg.PlotCurveItem(line.x[part], np.log10(edge[part]) if self._log else edge[part]) for edge in line.band
+            ]
+            # a wide band must not hide the points: it widens no axis
+            self._item.addItem(pg.FillBetweenItem(*edges, brush=pg.mkBrush(pale)), ignoreBounds=True)
+        self.bands += 1
+        self.setToolTip(texts.BAND)
+
+    def _colour(self, group: float | str) -> str:
+        place = self._groups.index(group)
+        return self._theme.lines[1 + place % (len(self._theme.lines) - 1)]
+
+
+def evenly(low: float, high: float) -> list[tuple[float, str]]:
+    """Some four evenly spaced gains between two, with their places on a logarithmic axis."""
+    step = round_down((high - low) / 3.0)
+    gains = [step * k for k in range(ceil(low / step), floor(high / step) + 1)]
+    return [(log10(gain), f"{gain:g}") for gain in gains if gain > 0.0]

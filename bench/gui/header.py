@@ -11,6 +11,8 @@ from bench.gui.palette import Theme
 from bench.gui.standing import Shape
 from bench.gui.stop import StopButton
 
+STALE = 2.0
+"""Safety inputs that were heard of longer ago are unknown [s]."""
 SIDE, HEIGHT = 56, 136
 """Side of the shape, and height of the header [px]: STOP stays where it is whatever the header says."""
 
@@ -30,21 +32,25 @@ class Lamp(QWidget):
         super().__init__()
         self._theme = theme
         self.shape: Shape = "ring"
-        self._colour = theme.calm
+        self._level = "calm"
         self.setFixedSize(SIDE, SIDE)
 
     def show_as(self, shape: Shape, level: str) -> None:
         """Change shape and colour."""
-        colour = str(getattr(self._theme, level))
-        if (shape, colour) != (self.shape, self._colour):
-            self.shape, self._colour = shape, colour
+        if (shape, level) != (self.shape, self._level):
+            self.shape, self._level = shape, level
             self.update()
+
+    def use_theme(self, theme: Theme) -> None:
+        """Take the colours of another theme."""
+        self._theme = theme
+        self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002 - the signature is Qt's
         """Draw the shape."""
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        colour = QColor(self._colour)
+        colour = QColor(str(getattr(self._theme, self._level)))
         painter.setPen(QPen(colour, 6))
         painter.setBrush(colour if self.shape not in ("ring", "cross") else Qt.BrushStyle.NoBrush)
         box = QRectF(6, 6, SIDE - 12, SIDE - 12)
@@ -76,10 +82,11 @@ class Header(QWidget):
         self._controller = controller
         self.lamp = Lamp(theme)
         self.word, self.reason = _label("word"), _label("faint")
-        self.word.setAccessibleName("state of the bench")
+        self.word.setAccessibleName(texts.NAMES["state"])
         self.reason.setWordWrap(True)
         self.inputs, self.step = _label(""), _label("")
         self.elapsed, self.remaining = _label("value"), _label("value")
+        self.inputs.setToolTip(texts.INPUTS_TIP.format(stale=STALE))
         self.progress = QProgressBar(maximum=1000, textVisible=False)
         self.progress.setMaximumHeight(8)
         self.stop = StopButton(controller)
@@ -123,9 +130,29 @@ class Header(QWidget):
         self.step.setText(" · ".join(part for part in (scene.step, scene.activity) if part) or "–")
         self.progress.setValue(round(1000 * scene.fraction))
         self.stop.setText(texts.STOP_AGAIN if controller.latched and controller.running else texts.STOP)
-        good = [f"{name} {texts.INPUT_GOOD if ok else texts.INPUT_OPEN}" for name, ok in controller.inputs.items()]
-        self.inputs.setText(", ".join(good) or texts.NO_INPUTS)
-        set_level(self.inputs, "calm" if all(controller.inputs.values()) else "alarm")
+        self._show_inputs()
+
+    def use_theme(self, theme: Theme) -> None:
+        """Take the colours of another theme."""
+        self.lamp.use_theme(theme)
+
+    def _show_inputs(self) -> None:
+        """As they were read within the last seconds; what is older is not known, whatever it was."""
+        controller = self._controller
+        age, wired = controller.inputs_age, controller.inputs
+        known = age is not None and age <= STALE
+        if not controller.running:
+            text = texts.INPUTS_UNREAD
+        elif age is not None and not wired:
+            text = texts.NO_INPUTS
+        elif known:
+            words = (texts.INPUT_OPEN, texts.INPUT_GOOD)
+            text = ", ".join(f"{name} {words[good]}" for name, good in wired.items())
+        else:
+            text = ", ".join(f"{name} {texts.INPUT_UNKNOWN}" for name in wired) or texts.INPUT_UNKNOWN
+        self.inputs.setText(text)
+        unknown = controller.running and not known and (bool(wired) or age is None)
+        set_level(self.inputs, "wait" if unknown else "calm" if all(wired.values()) or not known else "alarm")
 
 
 def _label(role: str, text: str = "") -> QLabel:

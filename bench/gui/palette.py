@@ -29,7 +29,7 @@ LIGHT = Theme(
     lines=("#000000", "#0072B2", "#b34700", "#00694d", "#8a4a70"),
 )
 DARK = Theme(
-    *("#1e1e1e", "#2a2a2a", "#f0f0f0", "#a8a8a8", "#a8a8a8", "#009E73", "#56B4E9", "#E69F00"),
+    *("#1e1e1e", "#2a2a2a", "#f0f0f0", "#a8a8a8", "#a8a8a8", "#00AB7D", "#56B4E9", "#E69F00"),
     lines=("#f0f0f0", "#56B4E9", "#E69F00", "#F0E442", "#CC79A7"),
 )
 
@@ -49,6 +49,7 @@ def qt_palette(theme: Theme) -> QPalette:
         ((role.WindowText, role.Text, role.ButtonText, role.ToolTipText), theme.text),
         ((role.PlaceholderText,), theme.faint),
         ((role.Highlight,), theme.wait),
+        ((role.HighlightedText,), theme.raised),
     ):
         for each in roles:
             palette.setColor(each, QColor(colour))
@@ -72,8 +73,9 @@ def style_sheet(theme: Theme) -> str:
     QLabel[level="wait"] {{ color: {theme.wait}; }}
     QLabel[level="alarm"] {{ color: {theme.alarm}; font-weight: bold; }}
     QFrame#prompt {{ border: 3px solid {theme.wait}; background: {theme.raised}; }}
+    QFrame#trouble {{ border: 3px solid {theme.alarm}; background: {theme.raised}; }}
     QFrame#welcome {{ border: 1px solid {theme.faint}; background: {theme.raised}; }}
     QPushButton#stop {{ background: #b30000; color: white; font-size: {BANNER}pt; font-weight: bold;
-        min-width: 170px; min-height: 84px; border: 3px solid {theme.text}; border-radius: 8px; }}
+        min-width: 250px; min-height: 84px; border: 3px solid {theme.text}; border-radius: 8px; }}
     QPushButton#stop:pressed {{ background: #700000; }}
     """

@@ -24,22 +24,30 @@ class PlanView(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self.verdict, self.details = QLabel(wordWrap=True), QLabel(wordWrap=True)
+        self.verdict, self.details, self.warning = (QLabel(wordWrap=True) for _ in range(3))
+        self.warning.hide()
+        set_level(self.warning, "alarm")
         self.table = QTableWidget(0, len(texts.MARGINS))
         self.table.setHorizontalHeaderLabels(texts.MARGINS)
         self.table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
         self.table.verticalHeader().hide()
+        self.table.setWordWrap(False)
         self.table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         self.table.horizontalHeader().setStretchLastSection(True)
-        self.table.setAccessibleName("margins")
+        self.table.setAccessibleName(texts.NAMES["margins"])
         # the whole of it is shown: the table scrolls, this does not
         self.details.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Minimum)
         self.table.setMinimumHeight(120)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
-        for part in (self.verdict, self.table, self.details):
+        for part in (self.warning, self.verdict, self.table, self.details):
             layout.addWidget(part)
-        layout.setStretch(1, 1)
+        layout.setStretch(2, 1)
+
+    def warn(self, text: str) -> None:
+        """Say something whatever the plan comes to; empty: nothing."""
+        self.warning.setText(f"▲ {text}")
+        self.warning.setVisible(bool(text))
 
     def say(self, text: str) -> None:
         """Nothing is known but `text`."""

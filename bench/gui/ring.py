@@ -1,5 +1,7 @@
 """The last minute of traces in fixed memory, and what of it a plot of so many pixels needs."""
 
+from math import ceil
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -42,29 +44,35 @@ class Ring:
         self._append(times, traces.low, traces.high)
 
     def window(self, seconds: float, buckets: int) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
-        """The last `seconds` as a line through the extremes of at most `buckets` parts.
+        """The last `seconds` as a line through the extremes of parts of equal length, `buckets` of them
+        and the one in which they begin, which is drawn whole.
 
         Times before the newest sample [s], shape (n,), not above zero; values of shape (n, n_signals), least and
-        largest of each part in turn. Parts begin at fixed places of the ring: a line that scrolls does not flicker.
+        largest of each part in turn. Parts begin at multiples of their length in bench time, whatever the blocks were:
+        a line that scrolls does not flicker.
         """
-        first = self._end - self._size
-        time = self._time[first : self._end]
-        begin = first + int(np.searchsorted(time, self.newest - seconds)) if self._size else first
-        width = -(-(self._end - begin) // buckets) if self._end > begin else 1
-        starts = np.arange(begin, self._end, width) - begin
-        if not starts.size:
+        if not self._size:
             return np.zeros(0), np.zeros((0, self._low.shape[1]), dtype=np.float32)
-        kept = slice(begin, self._end)
+        first, length = self._end - self._size, seconds / buckets
+        parts: NDArray[np.float64] = np.ceil(self._time[first : self._end] / length)
+        whole = int(np.searchsorted(parts, ceil((self.newest - seconds) / length)))
+        starts = np.flatnonzero(np.concatenate(([True], parts[whole + 1 :] > parts[whole:-1])))
+        kept = slice(first + whole, self._end)
         values = np.empty((2 * starts.size, self._low.shape[1]), dtype=np.float32)
         values[0::2] = np.minimum.reduceat(self._low[kept], starts, axis=0)
         values[1::2] = np.maximum.reduceat(self._high[kept], starts, axis=0)
         return np.repeat(self._time[kept][starts] - self.newest, 2), values
 
-    def last(self) -> NDArray[np.float64]:
-        """The middle of the newest bin, shape (n_signals,)."""
+    def at(self, time: float) -> NDArray[np.float64]:
+        """The middle of the bin at bench time `time` [s], shape (n_signals,): the newest one after it, the oldest
+        before all of them, zero while there is none.
+        """
         if not self._size:
             return np.zeros(self._low.shape[1])
-        return 0.5 * (self._low[self._end - 1].astype(np.float64) + self._high[self._end - 1])
+        first = self._end - self._size
+        place = first + int(np.searchsorted(self._time[first : self._end], time))
+        place = min(place, self._end - 1)
+        return 0.5 * (self._low[place].astype(np.float64) + self._high[place])
 
     def _append(self, time: NDArray[np.float64], low: NDArray[np.float32], high: NDArray[np.float32]) -> None:
         n = len(time)

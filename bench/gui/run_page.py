@@ -1,24 +1,40 @@
-"""The run while it goes on: traces, the running gain beside its prediction, the spectrum, the log."""
+"""The run while it goes on: traces, the running gain beside its prediction, what is steady, the gains, the log."""
 
 from math import isfinite
 
 from PySide6.QtCore import Qt, QTimer
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QPlainTextEdit, QPushButton, QSplitter, QVBoxLayout, QWidget
+from PySide6.QtWidgets import (
+    QHBoxLayout,
+    QLabel,
+    QPlainTextEdit,
+    QPushButton,
+    QSizePolicy,
+    QSplitter,
+    QVBoxLayout,
+    QWidget,
+)
 
 from bench.cli.scene import Notice
-from bench.cli.words import clock, difference, gain, number
-from bench.events import Estimate, Event, PointFinished, RunningGain
+from bench.cli.words import ABSENT, clock, difference, gain, number
+from bench.events import Estimate, Event, PointFinished, RunningGain, StepStarted, TwinEstimate
 from bench.gui import texts
+from bench.gui.buttons import give_key
 from bench.gui.controller import PERIOD, Controller
 from bench.gui.gain_plot import GainPlot
 from bench.gui.header import set_level
+from bench.gui.model_block import ModelBlock
 from bench.gui.palette import Theme
 from bench.gui.physical import PhysicalPicture
+from bench.gui.steady_view import SteadyView
 from bench.gui.traces import TracePlot
 from bench.link.messages import Run, Traces
 from bench.record.tables import Table
 
 LOG_LINES = 2000
+GAINS_HEIGHT = 170
+"""The least that the gains are drawn in [px]: in less their axis cannot be read."""
+OLD = 0.5
+"""Age of the newest sample from which it is told while a run goes on [s]."""
 
 
 class RunPage(QWidget):
@@ -27,17 +43,21 @@ class RunPage(QWidget):
     def __init__(self, controller: Controller, theme: Theme) -> None:
         super().__init__()
         self._controller = controller
-        self.traces, self.gains = TracePlot(theme), GainPlot(theme)
-        self.picture = PhysicalPicture(theme)
+        self._run: Run | None = None
+        self.traces, self.gains, self.steady = TracePlot(theme), GainPlot(theme), SteadyView()
+        self.picture, self.block = PhysicalPicture(theme), ModelBlock()
         self.alpha = QLabel(texts.NO_GAIN)
         self.alpha.setProperty("role", "value")
-        self.alpha.setAccessibleName("running gain")
-        self.predicted, self.lost = QLabel(), QLabel()
+        self.alpha.setAccessibleName(texts.NAMES["alpha"])
+        self.predicted, self.lost = QLabel(wordWrap=True), QLabel(wordWrap=True)
+        self.twin = QLabel()
+        # one line whatever it says: nothing below may jump
+        self.twin.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.log = QPlainTextEdit(readOnly=True, maximumBlockCount=LOG_LINES)
-        self.log.setAccessibleName("event log")
+        self.log.setAccessibleName(texts.NAMES["log"])
         self.ramp_out = QPushButton(texts.RAMP_OUT)
         self.ramp_out.setToolTip(texts.RAMP_OUT_TIP)
-        self.ramp_out.setShortcut("Ctrl+E")
+        give_key(self.ramp_out, "Ctrl+E")
         self.ramp_out.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.ramp_out.clicked.connect(controller.ramp_out)
         self._arrange()
@@ -50,6 +70,11 @@ class RunPage(QWidget):
         self._timer.timeout.connect(self._draw)
         self._timer.start()
         self._refresh()
+
+    def use_theme(self, theme: Theme) -> None:
+        """Take these colours."""
+        for part in (self.traces, self.gains, self.picture):
+            part.use_theme(theme)
 
     def predict(self, prediction: Table) -> None:
         """The lines on which the points of the next run belong."""
@@ -64,45 +89,74 @@ class RunPage(QWidget):
         row.addWidget(self.alpha, 1)
         row.addWidget(self.ramp_out)
         column.addLayout(row)
-        column.addWidget(self.predicted)
-        column.addWidget(self.lost)
-        for part in (numbers, self.gains, self.picture, self.log):
+        for part in (self.predicted, self.twin, self.steady, self.lost):
+            column.addWidget(part)
+        self.gains.setMinimumHeight(GAINS_HEIGHT)
+        for part in (self.gains, self.picture, self.log):
             right.addWidget(part)
-        right.setSizes([90, 300, 210, 130])
+        right.setSizes([280, 260, 90])
+        column.addWidget(right, 1)
         whole = QSplitter()
         whole.addWidget(self.traces)
-        whole.addWidget(right)
-        whole.setSizes([640, 620])
+        whole.addWidget(numbers)
+        whole.setSizes([600, 660])
         QVBoxLayout(self).addWidget(whole)
 
     def _begin(self, run: Run) -> None:
+        self._run = run
         self.traces.clear()
         self.log.clear()
         self.alpha.setText(texts.NO_GAIN)
         self.predicted.setText("")
-        self.picture.use(run.configuration.specimen)
+        self.picture.use(run.configuration.known_specimen)
+        self.steady.begin(run)
+        self.block.close()
+        self.block = ModelBlock()
 
     def _trace(self, traces: list[Traces]) -> None:
         self.traces.add(traces)
+        self.steady.add(traces)
+        for block in traces:
+            self.block.add(block)
+        # at once, not with the next tick: what is new waits for nothing
+        self._draw()
 
     def _draw(self) -> None:
         if self.isVisible():
             self.traces.draw()
-            self.picture.move_to(self.traces.ring.last())
+            moment = self.block.nearest(self.traces.moment)
+            self.picture.move_to(self.traces.ring.at(moment), self.block.at(moment))
 
     def _tell(self, event: Event) -> None:
         match event:
             case Estimate():
-                self._show(event.alpha_2, event.uncertainty, event.predicted, f"{event.cycles} cycles")
+                self._show(event.alpha_2, event.uncertainty, event.predicted, texts.CYCLES.format(cycles=event.cycles))
                 self.gains.show_running(event)
-                self.picture.coupled = event.beta is not None
+                self.steady.point(event.omega, event.beta)
+                self._couple(event.beta)
             case RunningGain():
-                self._show(event.alpha_2, None, event.predicted, f"{event.seconds:.1f} s of {event.record}")
-                self.picture.coupled = event.beta is not None
+                self._show(
+                    event.alpha_2,
+                    None,
+                    event.predicted,
+                    texts.SO_FAR.format(seconds=event.seconds, record=event.record),
+                )
+                self.gains.show_running(event)
+                self._couple(event.beta)
             case PointFinished():
                 self.gains.add(event.point.model_dump())
+            case StepStarted():
+                self.steady.over()
+            case TwinEstimate():
+                self._show_twin()
             case _:
                 pass
+
+    def _couple(self, beta: float | None) -> None:
+        self.picture.couple(beta is not None)
+        if self._run is not None:
+            specimen = self._run.configuration.known_specimen
+            self.block.couple(specimen.bare() if beta is None else specimen.coupled(beta))
 
     def _show(self, value: float, uncertainty: float | None, predicted: float, effort: str) -> None:
         known = isfinite(value)
@@ -116,6 +170,14 @@ class RunPage(QWidget):
 
     def _refresh(self) -> None:
         events, traces = self._controller.lost
-        self.lost.setText(texts.LOST.format(events=events, traces=traces) if events or traces else "")
+        said = [texts.LOST.format(events=events, traces=traces)] if events or traces else []
+        if self._controller.armed and self.traces.age > OLD:
+            said.append(texts.DATA_AGE.format(age=self.traces.age))
+        self.lost.setText(" ".join(said))
+        self.lost.setVisible(bool(said))
         set_level(self.lost, "wait")
+        self._show_twin()
         self.ramp_out.setEnabled(self._controller.running)
+
+    def _show_twin(self) -> None:
+        self.twin.setText(f"{texts.TWIN}: {self._controller.scene.twin or ABSENT}")

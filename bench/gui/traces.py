@@ -10,55 +10,91 @@ from numpy.typing import NDArray
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from bench.gui import texts
+from bench.gui.axes import colour_axes, round_down
 from bench.gui.palette import Theme
 from bench.gui.ring import Ring
 from bench.link.messages import Traces
 from bench.link.reduction import TRACES as NAMES
+from drivers.clock import now
 
 SHOWN = ("drive", "acceleration", "u1", "u2", "drift")
 """The columns that are drawn, as `texts.TRACES` labels them."""
 WINDOW, BUCKETS = 10.0, 700
 """Seconds that are shown, and parts of them with two points each."""
-HEADROOM, LEAST = 1.15, 1e-3
-"""The axis reaches so far beyond the largest value, and at least this far in screen units."""
+AHEAD = 0.5
+"""Longest time [s] that the axis runs on without a new sample: then it stands, and the age of the newest is told."""
+HEADROOM, WIDE, LEAST = 1.15, 2.0, 1e-3
+"""The axis reaches so far beyond the largest value; so much too far it is narrowed; at least so far in screen units."""
 
 
 class TracePlot(QWidget):
-    """Five curves one above the other over the same seconds."""
+    """Five curves one above the other over the same seconds.
+
+    Samples come in blocks; between two blocks the axis runs on with the clock, so that the curves scroll evenly and
+    every sample is shown as soon as it is known.
+    """
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self.ring = Ring(len(NAMES))
         self._columns = [NAMES.index(name) for name in SHOWN]
         self._fresh = False
+        self._read: float | None = None
+        self._length = 0.0
+        self._shift = 0.0
         self._reach = np.full(len(SHOWN), LEAST)
-        self._view: Any = pg.GraphicsLayoutWidget()
-        self._view.setBackground(theme.raised)
-        self._view.setAccessibleName("live traces")
-        self.plots, self.curves = list[Any](), list[Any]()
-        for row, ((label, unit, _), colour) in enumerate(zip(texts.TRACES, theme.lines, strict=True)):
-            plot = self._view.addPlot(row=row, col=0)
-            _dress(plot, f"{label} [{unit}]", theme, last=row == len(SHOWN) - 1)
-            self.plots.append(plot)
-            self.curves.append(plot.plot(pen=pg.mkPen(colour, width=1), antialias=False))
+        self.view: Any = pg.GraphicsLayoutWidget()
+        self.view.setAccessibleName(texts.NAMES["traces"])
+        self.plots: list[Any] = [self.view.addPlot(row=row, col=0) for row in range(len(SHOWN))]
+        self.curves: list[Any] = [plot.plot(antialias=False) for plot in self.plots]
+        for plot in self.plots:
+            _arrange(plot, last=plot is self.plots[-1])
+        self.use_theme(theme)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(self._view)
+        layout.addWidget(self.view)
+
+    def use_theme(self, theme: Theme) -> None:
+        """Take these colours."""
+        self.view.setBackground(theme.raised)
+        for plot, curve, (label, unit, _), colour in zip(
+            self.plots, self.curves, texts.TRACES, theme.lines, strict=True
+        ):
+            plot.setTitle(f"{label} [{unit}]", color=theme.text, size="10pt", justify="left")
+            colour_axes(plot, theme)
+            curve.setPen(pg.mkPen(colour, width=1))
+        self.plots[-1].setLabel("bottom", texts.SECONDS, color=theme.text)
 
     def clear(self) -> None:
         """A new run begins."""
         self.ring.clear()
         self._reach[:] = LEAST
-        self._fresh = True
+        self._read, self._fresh = None, True
+
+    @property
+    def age(self) -> float:
+        """Seconds since the newest block had been read; 0 while there is none."""
+        return 0.0 if self._read is None else max(now() - self._read, 0.0)
+
+    @property
+    def moment(self) -> float:
+        """Bench time [s] that a picture of one moment shows: a block behind, so that it moves evenly through it."""
+        return self.ring.newest - max(self._length - self.age, 0.0)
 
     def add(self, traces: list[Traces]) -> None:
         """Take in blocks; they are drawn by the next `draw`."""
         for block in traces:
             self.ring.add(block)
+            self._read, self._length = block.read, block.step * len(block.low)
         self._fresh = True
 
     def draw(self) -> None:
-        """Bring the curves up to date; nothing is done while nothing is new."""
+        """Bring the curves up to date; only moved where nothing is new, left alone where nothing has come for long."""
+        shift = min(self.age, AHEAD)
+        if shift != self._shift:
+            self._shift = shift
+            for curve in self.curves:
+                curve.setPos(-shift, 0.0)
         if not self._fresh:
             return
         self._fresh = False
@@ -72,26 +108,20 @@ class TracePlot(QWidget):
     def _fit(self, k: int, plot: Any, line: NDArray[np.float64]) -> None:
         """Widen the axis at once, narrow it only when it is much too wide: every change redraws it."""
         most = max(float(np.nanmax(np.abs(line))) if np.isfinite(line).any() else 0.0, LEAST)
-        if not most <= self._reach[k] <= 4.0 * most:
+        if not most <= self._reach[k] <= WIDE * most:
             self._reach[k] = HEADROOM * most
-            plot.setYRange(-self._reach[k], self._reach[k], padding=0.0)
+            reach = float(self._reach[k])
+            plot.setYRange(-reach, reach, padding=0.0)
+            mark = round_down(0.75 * reach)
+            plot.getAxis("left").setTicks([[(at, f"{at:g}") for at in (-mark, 0.0, mark)]])
 
 
-def _dress(plot: Any, title: str, theme: Theme, *, last: bool) -> None:
-    plot.setTitle(title, color=theme.text, size="10pt", justify="left")
+def _arrange(plot: Any, *, last: bool) -> None:
     plot.setXRange(-WINDOW, 0.0, padding=0.0)
     plot.setYRange(-1.0, 1.0, padding=0.0)
     plot.setMouseEnabled(x=False, y=False)
     plot.setMenuEnabled(False)
     plot.hideButtons()
     plot.showGrid(y=True, alpha=0.25)
-    for side in ("left", "bottom"):
-        axis = plot.getAxis(side)
-        axis.setPen(theme.faint)
-        axis.setTextPen(theme.text)
-        axis.enableAutoSIPrefix(False)
     plot.getAxis("left").setWidth(58)
-    plot.getAxis("left").setStyle(maxTickLevel=0)
     plot.getAxis("bottom").setStyle(showValues=last)
-    if last:
-        plot.setLabel("bottom", texts.SECONDS, color=theme.text)

@@ -8,6 +8,7 @@ from queue import Empty, SimpleQueue
 
 from bench.engine.requests import Requests
 from bench.events import Acquired, Event, State, StateChanged, Warned
+from bench.link.inputs import SafetyWatch
 from bench.link.messages import (
     BEAT,
     PATIENCE,
@@ -20,14 +21,13 @@ from bench.link.messages import (
     Opened,
     Question,
     Refused,
-    SafetyInputs,
     Surveyed,
     Told,
 )
 from bench.link.outbox import Outbox
 from bench.link.reduction import Reduction
 from drivers.clock import now
-from drivers.rig import Rig, RigError
+from drivers.rig import Rig
 
 _LOOK = 0.1
 """How often a wait for the operator's answer looks for another reason to end [s]."""
@@ -42,15 +42,18 @@ class Host:
     def __init__(self, connection: Connection, requests: Requests, lost: Callable[[str], None]) -> None:
         self._connection, self._requests, self._lost = connection, requests, lost
         self.outbox = Outbox()
+        self.inputs = SafetyWatch(self.outbox)
         self.answers = SimpleQueue[Answer]()
         self.connected = True
         self._sent = threading.Event()
         self._state, self._reason, self._time = State.IDLE, "", 0.0
+        self._noted = now()
         for work in (self._send, self._hear):
             threading.Thread(target=work, name=work.__name__.strip("_"), daemon=True).start()
 
     def note(self, event: Event) -> None:
         """Keep what every beat tells, however much of the rest is lost on the way."""
+        self._noted = now()
         self._time = max(self._time, event.time)
         if isinstance(event, StateChanged):
             self._state, self._reason = event.after, event.reason
@@ -75,7 +78,8 @@ class Host:
 
     def _beat(self) -> FromSession:
         outbox = self.outbox
-        return Beat(self._state, self._reason, self._time, outbox.lost_events, outbox.lost_traces)
+        quiet = now() - self._noted
+        return Beat(self._state, self._reason, self._time, outbox.lost_events, outbox.lost_traces, quiet)
 
     def _hear(self) -> None:
         try:
@@ -126,6 +130,8 @@ class AtTheClient:
                 answer = self._host.answers.get(timeout=_LOOK)
                 if answer.number == self._number:
                     return answer.agreed
+            # the engine's thread waits here, and somebody has their hands on the bench
+            self._host.inputs.look()
         return False
 
 
@@ -134,24 +140,25 @@ class Teller:
 
     def __init__(self, host: Host, reduction: Callable[[Rig], Reduction]) -> None:
         self._host, self._make = host, reduction
-        self._rig: Rig | None = None
         self._reduction: Reduction | None = None
 
     def opened(self, rig: Rig) -> None:
         """The rig's channels decide what the traces are made of."""
-        self._rig, self._reduction = rig, self._make(rig)
+        self._reduction = self._make(rig)
         names = tuple(channel.name for channel in rig.channels)
         self._host.outbox.put(Opened(names, rig.sample_rate, rig.description), always=True)
-        self._tell_inputs(0.0)
+        self._host.inputs.watch(rig)
 
     def __call__(self, event: Event) -> None:
         self._host.note(event)
-        if not isinstance(event, Acquired):
+        if isinstance(event, Acquired):
+            if self._reduction is not None:
+                self._trace(self._reduction, event)
+            self._host.inputs.look_driven(event.time)
+        else:
             self._host.outbox.put(Told(event))
             if isinstance(event, StateChanged):
-                self._tell_inputs(event.time)
-        elif self._reduction is not None:
-            self._trace(self._reduction, event)
+                self._host.inputs.look(event.time, at_once=True)
 
     def _trace(self, reduction: Reduction, event: Acquired) -> None:
         try:
@@ -160,9 +167,3 @@ class Teller:
             # what is shown never ends what is measured
             self._reduction = None
             self._host.outbox.put(Told(Warned(event.time, f"no traces are shown from here on: {error}")))
-
-    def _tell_inputs(self, time: float) -> None:
-        # a rig that has failed says nothing of its inputs; what it failed with is told elsewhere
-        if self._rig is not None:
-            with suppress(RigError):
-                self._host.outbox.put(SafetyInputs(time, dict(self._rig.interlocks())))

@@ -42,8 +42,9 @@ class Survey:
 class Run(Survey):
     """The run itself; its results go to `out`.
 
-    `person` says that the client answers the questions; else the bench does the hand work itself. With `keep_going` a
-    lost client does not end the run. `about` is kept in the data file.
+    `person` says that the client answers the questions; else a bench that serves itself does the hand work, and on any
+    other one every question is answered with yes. With `keep_going` a lost client does not end the run. `about` is kept
+    in the data file.
     """
 
     realtime: bool = False
@@ -141,8 +142,9 @@ class Traces:
 
 @dataclass(frozen=True)
 class Beat:
-    """The session's process lives: the engine's state, bench time [s], and what did not pass so far for want of a
-    reader: events, and blocks of traces.
+    """The session's process lives: the engine's state, bench time [s], what did not pass so far for want of a reader
+    (events, and blocks of traces), and for how many seconds the engine has said nothing: while the rig is armed it
+    tells of every block.
     """
 
     state: State
@@ -150,6 +152,7 @@ class Beat:
     time: float
     lost_events: int
     lost_traces: int
+    quiet: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -165,11 +168,15 @@ class Ended:
 
 @dataclass(frozen=True)
 class Refused:
-    """Nothing was started, or the program failed (`failed`): `text` says what, of which `item` where it is known."""
+    """Nothing was started, or something failed (`failed`): `text` says what, of which `item` where it is known.
+
+    `details` are for whoever looks after the program, and may be long.
+    """
 
     text: str
     item: str = ""
     failed: bool = False
+    details: str = ""
 
 
 FromSession = Surveyed | Opened | Told | Question | SafetyInputs | Traces | Beat | Ended | Refused

@@ -3,7 +3,8 @@
 import threading
 from collections import deque
 
-from bench.link.messages import FromSession, Traces
+from bench.events import TwinEstimate
+from bench.link.messages import FromSession, Told, Traces
 
 EVENTS, TRACES = 5000, 64
 """How many messages, and how many blocks of traces, may wait: a block is worth a tenth of a second."""
@@ -12,12 +13,13 @@ EVENTS, TRACES = 5000, 64
 class Outbox:
     """Filled by the engine's thread without waiting, emptied by the sender's.
 
-    Of traces the oldest go first where there is no room: the present is what a person wants to see. Of events the
-    newest are left out, and counted: the file has them all.
+    Of traces and of what the twin says the oldest go first where there is no room: the present is what a person wants
+    to see. Of other events the newest are left out, and counted: the file has them all.
     """
 
     def __init__(self, events: int = EVENTS, traces: int = TRACES) -> None:
         self._events, self._traces = deque[FromSession](), deque[Traces]()
+        self._twin = deque[FromSession](maxlen=traces)
         self._most_events, self._most_traces = events, traces
         self._changed = threading.Condition()
         self.lost_events = 0
@@ -31,6 +33,8 @@ class Outbox:
                 if len(self._traces) > self._most_traces:
                     self._traces.popleft()
                     self.lost_traces += 1
+            elif isinstance(message, Told) and isinstance(message.event, TwinEstimate):
+                self._twin.append(message)
             elif always or len(self._events) < self._most_events:
                 self._events.append(message)
             else:
@@ -40,9 +44,10 @@ class Outbox:
     def take(self, timeout: float) -> list[FromSession]:
         """All that waits, events first; empty when nothing has come within `timeout` seconds."""
         with self._changed:
-            if not self._events and not self._traces:
+            if not (self._events or self._twin or self._traces):
                 self._changed.wait(timeout)
-            taken = [*self._events, *self._traces]
+            taken = [*self._events, *self._twin, *self._traces]
             self._events.clear()
+            self._twin.clear()
             self._traces.clear()
         return taken

@@ -4,12 +4,15 @@ It reads the client's address and key from standard input, connects, is given on
 """
 
 import json
+import os
 import signal
 import sys
+import traceback
 from multiprocessing.connection import Client, Connection
 from types import FrameType
 
 from bench.analysis.signals import SignalMap
+from bench.config.model import BenchConfiguration
 from bench.engine.operator import Unattended
 from bench.engine.requests import Requests
 from bench.link.host import AtTheClient, Host, Teller
@@ -49,14 +52,16 @@ def serve(connection: Connection) -> None:
     except InvalidInput as error:
         last = Refused(str(error), error.item)
     except (RockbenchError, OSError) as error:
-        last = Refused(str(error), failed=True)
+        last = Refused(str(error), failed=True, details=traceback.format_exc())
     except Exception as error:
-        host.close(Refused(f"{type(error).__name__}: {error}", failed=True), FAREWELL)
+        text = f"{type(error).__name__}: {error}"
+        host.close(Refused(text, failed=True, details=traceback.format_exc()), FAREWELL)
         raise
     host.close(last, FAREWELL)
 
 
 def _survey(asked: Survey) -> FromSession:
+    _give_way()
     experiment = asked.make(asked.parameters)
     experiment.check(asked.configuration)
     found = compile_run(experiment, asked.configuration, asked.out)
@@ -78,20 +83,31 @@ def _run(asked: Run, host: Host, requests: Requests) -> FromSession:
     _abort_on_terminate(requests)
 
     def reduction(rig: Rig) -> Reduction:
-        signals = SignalMap(rig.channels, configuration.laser_reference)
+        signals = SignalMap(rig.channels, configuration.laser_reference, configuration.calibrated)
         return Reduction(rig.channels, rig.sample_rate, signals)
 
     ended = run_session(
         asked.make(asked.parameters),
         configuration,
         out=asked.out,
-        operator=AtTheClient(host, requests) if asked.person else Unattended("the bench itself"),
+        operator=AtTheClient(host, requests) if asked.person else Unattended(_policy(configuration)),
         subscribers=[Teller(host, reduction)],
         requests=requests,
         realtime=asked.realtime,
         about=asked.about,
     )
     return Ended(ended.status, ended.reason, ended.summary, ended.table, asked.out)
+
+
+def _policy(configuration: BenchConfiguration) -> str:
+    """Who is said to have answered when no person does."""
+    return "the bench itself" if configuration.serves_itself else "unattended run (chosen at the window)"
+
+
+def _give_way() -> None:
+    """Another session may be driving the table: it goes first. Windows was told when the process was made."""
+    if sys.platform != "win32":
+        os.nice(10)
 
 
 def _abort_on_terminate(requests: Requests) -> None:

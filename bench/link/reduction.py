@@ -36,7 +36,7 @@ class Reduction:
     def __init__(self, channels: tuple[Channel, ...], sample_rate: float, signals: SignalMap) -> None:
         self._channels, self._rate, self._signals = channels, sample_rate, signals
         self._width = max(round(BIN * sample_rate), 1)
-        self._run = 0
+        self._run, self._origin = 0, 0.0
         self._rest: list[NDArray[np.float64]] = []
 
     def __call__(self, event: Acquired) -> Traces:
@@ -44,6 +44,9 @@ class Reduction:
         values = np.column_stack(
             [channel.to_unit(event.block.counts[:, k]) for k, channel in enumerate(self._channels)]
         )
+        if event.run != self._run:
+            # the samples follow one another evenly; the moments at which blocks are read do not
+            self._origin = event.time - (event.block.first + len(values)) / self._rate
         self._tare(event.run, values)
         signals = self._signals.of(values)
         chosen = np.column_stack(
@@ -55,7 +58,7 @@ class Reduction:
             )
         )
         low, high = extremes(chosen, self._width)
-        begin = event.time - len(values) / self._rate
+        begin = self._origin + event.block.first / self._rate
         return Traces(event.run, begin, self._width / self._rate, low, high, now())
 
     def _tare(self, run: int, values: NDArray[np.float64]) -> None:

@@ -1,17 +1,17 @@
 """A window on a link that a test speaks for; and one on real sessions."""
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from pathlib import Path
 
 import pytest
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QWidget
 from pytestqt.qtbot import QtBot
 
 from bench.cli.catalogue import CATALOGUE, Entry
 from bench.gui.app import dress
 from bench.gui.controller import Controller
 from bench.gui.palette import LIGHT
-from bench.gui.stop import StopKey
+from bench.gui.stop import StopFilter
 from bench.gui.window import Window
 from bench.link.messages import FromSession, Survey
 from tests.link.experiment import Shaking, ShakingParameters, bench
@@ -26,7 +26,7 @@ class SpokenLink:
 
     latest: "SpokenLink"
 
-    def __init__(self, assignment: Survey) -> None:
+    def __init__(self, assignment: Survey, heard: Callable[[], None]) -> None:  # noqa: ARG002 - the timer looks anyway
         self.assignment = assignment
         self.said: list[FromSession] = []
         self.asked: list[object] = []
@@ -56,15 +56,32 @@ def spoken(monkeypatch: pytest.MonkeyPatch) -> type[SpokenLink]:
     return SpokenLink
 
 
+class NoPlots(QWidget):
+    """Stands in for the pages with plots, which take most of the time that a window needs to come."""
+
+    def __init__(self, *_given: object) -> None:
+        super().__init__()
+        self.predicted: list[object] = []
+
+    def predict(self, prediction: object) -> None:
+        self.predicted.append(prediction)
+
+
+@pytest.fixture
+def without_plots(monkeypatch: pytest.MonkeyPatch) -> None:
+    for page in ("RunPage", "ResultsPage"):
+        monkeypatch.setattr(f"bench.gui.window.{page}", NoPlots)
+
+
 @pytest.fixture
 def window(qtbot: QtBot, qapp: QApplication, tmp_path: Path) -> Generator[Window, None, None]:
-    """The window, in front, with the key filter that the application has."""
+    """The window, in front, with the filter of STOP that the application has."""
     before = qapp.styleSheet()
     dress(qapp, LIGHT)
     controller = Controller()
-    key = StopKey(controller)
-    qapp.installEventFilter(key)
     shown = Window(controller, bench(), (SHAKING, *CATALOGUE), LIGHT)
+    key = StopFilter(controller, shown.header.stop)
+    qapp.installEventFilter(key)
     shown.protocol.folder.setText(str(tmp_path / "run"))
     qtbot.addWidget(shown)
     shown.show()

@@ -8,31 +8,53 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from contextlib import chdir
 from math import isfinite
 from pathlib import Path
 
 from PySide6.QtWidgets import QApplication
 
 from bench.cli.catalogue import CATALOGUE
-from bench.config.model import BenchConfiguration
+from bench.cli.queueing import queued
+from bench.config.model import BenchConfiguration, Simulation
 from bench.events import Estimate, Event
 from bench.gui.app import dress
 from bench.gui.controller import Controller
 from bench.gui.palette import DARK, LIGHT
 from bench.gui.window import Window
 from bench.link.messages import Question
+from bench.queue.queued import Stage
+from bench.results import FILE
+from protocols.harmonic.parameters import HarmonicParameters
 
-LONG = 180.0
+LONG = 120.0
 SIZE = (1280, 800)
 
 
 def main(folder: Path) -> None:
     """Take them all; raises AssertionError when the run does not come so far."""
+    folder = folder.resolve()
+    # whatever is not told where to go goes there too
+    with tempfile.TemporaryDirectory() as out, chdir(out):
+        take(folder)
+
+
+def take(folder: Path) -> None:
+    """Pictures go to `folder`, results of the runs to a folder beside the present one."""
     application = QApplication([])
-    for theme, suffix in ((LIGHT, ""), (DARK, "-dark")):
+    ended: list[Path] = []
+    for seed, (theme, suffix) in enumerate(((DARK, "-dark"), (LIGHT, ""))):
         dress(application, theme)
         controller = Controller()
-        window = Window(controller, BenchConfiguration(), CATALOGUE, theme, tour=True)
+        simulation = Simulation(seed=seed)
+        window = Window(
+            controller,
+            BenchConfiguration(simulation=simulation),
+            CATALOGUE,
+            theme,
+            queue=Path("runs", "queue.json"),
+            tour=True,
+        )
         window.resize(*SIZE)
         window.show()
 
@@ -59,34 +81,71 @@ def main(folder: Path) -> None:
             if isinstance(event, Estimate) and event.beta is not None and isfinite(event.alpha_2):
                 seen.append(event)
                 if len(seen) == 20:
-                    window.run.traces.draw()
+                    # the model of the block computes beside the window
+                    end = time.monotonic() + LONG
+                    while window.run.block.at(window.run.traces.ring.newest - 0.01) is None:
+                        assert time.monotonic() < end
+                        time.sleep(0.01)
+                    window.run._draw()
                     window.header.refresh()
                     window.grab().save(str(folder / f"window-run{suffix}.png"))
 
         controller.told.connect(measuring)
         asked: list[Question] = []
         controller.asked.connect(lambda question, asked=asked: asked.append(question) if question else None)
-        window.pages.setCurrentWidget(window.setup)
-        application.processEvents()
-        picture("setup")
         window.pages.setCurrentWidget(window.protocol)
         window.protocol.realtime.setChecked(False)
         window.protocol.person.setChecked(True)
+        ended.append(Path("runs") / ("monday" if suffix else "tuesday"))
+        window.protocol.folder.setText(str(ended[-1]))
         window.protocol.survey()
         until(lambda: window.protocol.start.isEnabled())  # noqa: B023
         picture("protocol")
-        with tempfile.TemporaryDirectory() as out:
-            window.protocol.folder.setText(str(Path(out) / "run"))
-            window.protocol.begin()
-            until(lambda: asked)  # noqa: B023
-            picture("prompt")
-            controller.answer(agreed=True)
-            until(lambda: len(asked) > 1)  # noqa: B023
-            controller.answer(agreed=True)
-            until(lambda: not controller.running)  # noqa: B023
-            application.processEvents()
-            picture("results")
+        window.protocol.begin()
+        until(lambda: asked)  # noqa: B023
+        picture("prompt")
+        controller.answer(agreed=True)
+        until(lambda: len(asked) > 1)  # noqa: B023
+        controller.answer(agreed=True)
+        until(lambda: not controller.running)  # noqa: B023
+        application.processEvents()
+        window.pages.setCurrentWidget(window.results)
+        picture("results")
+        if len(ended) > 1:
+            results = window.results
+            results.show_file(ended[0] / FILE)
+            results.parts.setCurrentWidget(results.differences)
+            picture("compare")
+            results.parts.setCurrentWidget(results.histories)
+            results.histories.run.setCurrentIndex(results.histories.run.count() - 1)
+            results.histories.channel.setCurrentText("laser_2")
+            until(lambda: (shown := results.histories.shown) is not None and shown.channel == "laser_2")  # noqa: B023
+            picture("samples")
+            fill(window)
+            picture("queue")
+            window.pages.setCurrentWidget(window.setup)
+            window.setup.loop.start()
+            until(lambda: window.setup.loop.lines and not controller.running)  # noqa: B023
+            picture("setup")
         window.close()
+
+
+def fill(window: Window) -> None:
+    """A queue with something of everything; nothing of it is run."""
+    window.welcome.hide()
+    window.pages.setCurrentWidget(window.queue)
+    for omega, stage, told in (
+        (14.0, Stage.DONE, "completed: the plan was carried out"),
+        (15.0, Stage.FAILED, "aborted: drift 0.0812 m exceeds 0.08 m"),
+        (16.0, Stage.WAITING, ""),
+        (17.0, Stage.WAITING, ""),
+        (18.0, Stage.SKIPPED, ""),
+    ):
+        asked = HarmonicParameters(omega=(omega,), beta=(0.4,), starts=3)
+        test = queued(CATALOGUE[0], asked, Path("runs", f"omega-{omega:g}"), realtime=True)
+        window.runner.queue.add(test.model_copy(update={"stage": stage, "told": told}))
+    window.runner.changed.emit()
+    window.queue.table.setCurrentCell(2, 0)
 
 
 if __name__ == "__main__":

@@ -12,11 +12,14 @@ from pytestqt.qtbot import QtBot
 
 from bench.events import Estimate, PointFinished, State, StateChanged, Warned
 from bench.gui.ring import Ring
+from bench.gui.run_page import GAINS_HEIGHT
+from bench.gui.traces import AHEAD, LEAST
 from bench.gui.window import Window
-from bench.link.messages import Beat, Question, Told, Traces
+from bench.link.messages import Beat, Ended, Question, Surveyed, Told, Traces
 from bench.link.reduction import TRACES
 from bench.record.tables import Column
 from protocols.harmonic.point import HarmonicPoint, PointStatus
+from tests.bench.twin_bench import estimate
 from tests.gui.conftest import SpokenLink
 from tests.link.experiment import order
 
@@ -46,13 +49,32 @@ def test_a_ring_keeps_the_extremes_of_the_window(sizes: list[int], buckets: int,
     assert len(ring) == min(len(every), 200)
     assert ring.newest == pytest.approx(begin)
     time, drawn = ring.window(seconds, buckets)
-    ends = STEP * (np.arange(len(every)) + 1.0) - begin
-    inside = every[-len(ring) :][ends[-len(ring) :] >= -seconds - 1e-9]
-    edge = every[-len(ring) :][ends[-len(ring) :] >= -seconds + 1e-9]
-    assert drawn.max() in (pytest.approx(inside.max() + 0.5), pytest.approx(edge.max() + 0.5))
-    assert drawn.min() in (pytest.approx(inside.min() - 0.5), pytest.approx(edge.min() - 0.5))
-    assert len(time) == len(drawn) <= 2 * buckets
+    ends = (STEP * (np.arange(len(every)) + 1.0) - begin)[-len(ring) :]
+    inside = every[-len(ring) :][ends >= -seconds + 1e-9]
+    # the part in which the window begins is drawn whole
+    around = every[-len(ring) :][ends >= -seconds * (1.0 + 1.0 / buckets) - 1e-9]
+    assert inside.max() - 1e-6 <= drawn.max() - 0.5 <= around.max() + 1e-6
+    assert around.min() - 1e-6 <= drawn.min() + 0.5 <= inside.min() + 1e-6
+    assert len(time) == len(drawn) <= 2 * (buckets + 1)
     assert (np.diff(time) >= 0).all()
+
+
+@settings(max_examples=40, deadline=None)
+@given(sizes=st.lists(st.integers(1, 90), min_size=4, max_size=40), seed=st.integers(0, 2**31))
+def test_a_line_that_scrolls_does_not_flicker(sizes: list[int], seed: int) -> None:
+    """Whatever comes in, a point that was drawn stays as it was: all but the last part, which still fills up."""
+    rng = np.random.default_rng(seed)
+    ring, begin, seen = Ring(1, capacity=10_000), 0.0, dict[float, tuple[float, float]]()
+    for size in sizes:
+        ring.add(_block(begin, rng.normal(size=(size, 1))))
+        begin += size * STEP
+        time, drawn = ring.window(0.3, 20)
+        places = np.round((time + ring.newest) / STEP)
+        now = {float(places[k]): (float(drawn[k, 0]), float(drawn[k + 1, 0])) for k in range(0, len(time) - 2, 2)}
+        assert {at: seen[at] for at in now if at in seen} == {at: now[at] for at in now if at in seen}
+        # nor does another point appear between those that were drawn
+        assert all(at in seen for at in now if seen and at < max(seen) and at >= min(seen))
+        seen = now
 
 
 def test_a_gap_breaks_the_line() -> None:
@@ -95,6 +117,28 @@ def test_curves_hold_what_was_measured_in_the_unit_of_their_axis(window: Window,
     assert high >= 4.0
 
 
+def test_the_axis_runs_on_between_blocks_and_stands_when_nothing_comes(
+    window: Window, link: SpokenLink, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Block of 0.1 s read at 50 s of the clock: the newest sample is as far from the right edge as it is old."""
+    clock = 50.0
+    monkeypatch.setattr("bench.gui.traces.now", lambda: clock)
+    still = np.zeros((50, len(TRACES)), np.float32)
+    still[:, TRACES.index("u1")] = np.arange(50)
+    link.said = [Traces(1, 3.0, STEP, still, still, 50.0), Beat(State.RUNNING, "", 3.1, 0, 0)]
+    window._controller._look()
+    traces = window.run.traces
+    for clock, place in ((50.0, 0.0), (50.03, -0.03), (50.09, -0.09), (58.0, -AHEAD)):
+        traces.draw()
+        assert [curve.pos().x() for curve in traces.curves] == pytest.approx([place] * 5)
+        # one moment is shown a block behind, and so moves evenly through it
+        moment = min(3.0 + clock - 50.0, 3.1)
+        assert traces.moment == pytest.approx(moment)
+        assert traces.ring.at(traces.moment)[TRACES.index("u1")] == pytest.approx((moment - 3.0) / STEP, abs=1.1)
+    window.run._refresh()
+    assert window.run.lost.text() == "newest sample 8.0 s old"
+
+
 def test_the_running_gain_and_the_finished_point(window: Window, link: SpokenLink) -> None:
     point = HarmonicPoint(
         omega_rad_s=16.0, beta=0.4, status=PointStatus.STEADY, layer="rocking", alpha_2=0.21, alpha_2_uncertainty=0.01
@@ -106,7 +150,51 @@ def test_the_running_gain_and_the_finished_point(window: Window, link: SpokenLin
     link.said = [Told(PointFinished(2.0, point)), Told(Warned(3.0, "drift comes near"))]
     window._controller._look()
     assert window.run.gains.measured == [(16.0, 0.21)]
+    assert window.run.picture.canvas.coupled
     assert "▲ warning: drift comes near" in window.run.log.toPlainText()
+
+
+def test_points_stay_until_something_else_begins(window: Window, link: SpokenLink, spoken: type[SpokenLink]) -> None:
+    """A plan that is checked leaves them; a loop check, which has no gains, begins with an empty plot."""
+    point = HarmonicPoint(omega_rad_s=16.0, beta=0.4, status=PointStatus.STEADY, layer="rocking", alpha_2=0.21)
+    link.said = [Told(PointFinished(2.0, point)), Ended("completed", "the plan was carried out", {}, "", Path("never"))]
+    window._controller._look()
+    window.protocol.survey()
+    spoken.latest.said = [Surveyed((), None, (), 60.0, 1e6, 1e9, "hash", {})]
+    window._controller._look()
+    assert window.protocol.why_not == ""
+    assert window.run.gains.measured == [(16.0, 0.21)]
+    window.setup.loop.start()
+    assert window._controller.running
+    assert window.run.gains.measured == []
+
+
+def test_an_axis_that_is_twice_too_wide_is_narrowed(window: Window, link: SpokenLink) -> None:
+    traces = window.run.traces
+    for largest, reach in ((0.010, 11.5), (0.006, 11.5), (0.005, 5.75), (0.020, 23.0)):
+        traces.clear()
+        values = np.zeros((50, len(TRACES)), np.float32)
+        values[0, TRACES.index("u1")] = largest
+        link.said = [Traces(1, 0.0, STEP, values, values, 0.0)]
+        before = 11.5 if largest < 0.010 else LEAST
+        traces._reach[2] = before
+        window._controller._look()
+        traces.draw()
+        assert traces._reach[2] == pytest.approx(reach, rel=1e-5)
+    window.resize(window.minimumSize())
+    window.pages.setCurrentWidget(window.run)
+    assert window.run.gains.height() >= GAINS_HEIGHT
+
+
+def test_the_model_beside_the_test_is_told_while_the_bench_is_driven(window: Window, link: SpokenLink) -> None:
+    assert window.run.twin.text().endswith(": -")
+    link.said = [Told(estimate(drift_peak=0.01819, drift_peak_measured=0.01822, residual=0.003))]
+    window._controller._look()
+    assert "drift peak 18.22 mm, model 18.19 mm; residual 0.3 %" in window.run.twin.text()
+    link.said = [Told(StateChanged(1.0, State.STOPPING, State.IDLE, "the output is at zero"))]
+    window._controller._look()
+    window.run._refresh()
+    assert window.run.twin.text().endswith(": -")
 
 
 def test_a_question_is_inline_and_answered_once(window: Window, link: SpokenLink, qtbot: QtBot) -> None:
@@ -118,6 +206,7 @@ def test_a_question_is_inline_and_answered_once(window: Window, link: SpokenLink
     assert window.prompt.isVisible()
     assert window.prompt.request.text() == "Mount the spring of beta = 0.4."
     assert QApplication.activeModalWidget() is None
+    qtbot.waitUntil(window.prompt.done.isEnabled)
     qtbot.mouseClick(window.prompt.done, Qt.MouseButton.LeftButton)
     qtbot.mouseClick(window.prompt.done, Qt.MouseButton.LeftButton)
     assert link.asked == [(7, True)]

@@ -26,6 +26,7 @@ def test_from_the_form_to_the_file(window: Window, qtbot: QtBot, tmp_path: Path)
     qtbot.mouseClick(page.start, Qt.MouseButton.LeftButton)
     qtbot.waitUntil(window.prompt.isVisible, timeout=LONG)
     assert window.header.word.text() == "WAITING"
+    qtbot.waitUntil(window.prompt.done.isEnabled)
     qtbot.mouseClick(window.prompt.done, Qt.MouseButton.LeftButton)
     qtbot.waitUntil(lambda: window.pages.currentWidget() is window.results, timeout=LONG)
     assert "The run was completed" in window.results.told.text()

@@ -5,11 +5,13 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import QEvent, Qt, QTimer
 from PySide6.QtGui import QKeyEvent
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QDialog, QLineEdit, QVBoxLayout
 from pytestqt.qtbot import QtBot
 
 from bench.events import State
 from bench.gui import texts
+from bench.gui.controller import DELIBERATE
 from bench.gui.stop import KEY
 from bench.gui.window import Window
 from bench.link.messages import Beat, Ended
@@ -32,7 +34,14 @@ def test_the_button_aborts_and_the_next_press_halts(window: Window, link: Spoken
     qtbot.mousePress(stop, Qt.MouseButton.LeftButton)
     assert link.asked == ["abort"]
     assert stop.text() == texts.STOP_AGAIN
+    assert stop.text().startswith("STOP"), "it is never called anything else"
     qtbot.mouseRelease(stop, Qt.MouseButton.LeftButton)
+    # a double click is one press; and so is a key that bounces
+    qtbot.mouseDClick(stop, Qt.MouseButton.LeftButton)
+    qtbot.keyClick(window, KEY)
+    assert link.asked == ["abort"]
+    qtbot.wait(round(1000 * DELIBERATE) + 20)
+    assert stop.fontMetrics().horizontalAdvance(max(stop.text().splitlines(), key=len)) < stop.width()
     qtbot.mousePress(stop, Qt.MouseButton.LeftButton)
     assert link.asked == ["abort", "halt"]
     assert stop.isEnabled()
@@ -59,6 +68,21 @@ def test_the_key_works_behind_a_modal_dialog(window: Window, link: SpokenLink, q
     QTimer.singleShot(50, press)
     dialog.exec()
     assert link.asked == ["abort"]
+
+
+def test_a_press_counts_beside_a_list_that_is_open(window: Window, link: SpokenLink, qtbot: QtBot) -> None:
+    """As the window system delivers it: to whatever has the mouse then, which is the list."""
+    window.pages.setCurrentWidget(window.protocol)
+    handle, stop = window.windowHandle(), window.header.stop
+    window.protocol.choice.showPopup()
+    qtbot.waitUntil(lambda: QApplication.activePopupWidget() is not None)
+    beside = window.header.lamp
+    for part, asked in ((stop, ["abort"]), (beside, ["abort"])):
+        QTest.mouseClick(handle, Qt.MouseButton.LeftButton, pos=part.mapTo(window, part.rect().center()))
+        QApplication.processEvents()
+        assert link.asked == asked
+        window.protocol.choice.showPopup()
+    window.protocol.choice.hidePopup()
 
 
 def test_a_key_that_is_held_counts_once(window: Window, link: SpokenLink, qapp: QApplication) -> None:

@@ -1,11 +1,13 @@
 """What passes over the link, both ways, in the order in which a person would meet it."""
 
+import threading
 import time
 from collections.abc import Callable
 from multiprocessing import Pipe
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from bench.engine.operator import Unattended
 from bench.engine.requests import Requests
@@ -222,3 +224,61 @@ def test_extremes_are_those_of_each_bin() -> None:
     low, high = extremes(values, 2)
     np.testing.assert_array_equal(low[:, 0], [1.0, -2.0, np.nan, 7.0])
     np.testing.assert_array_equal(high[:, 0], [1.0, 3.0, np.nan, 7.0])
+
+
+def test_whoever_waits_is_called_when_there_is_something_to_take(tmp_path: Path) -> None:
+    called = threading.Event()
+    link = Link(Survey(Shaking, ShakingParameters(), bench(), tmp_path / "run"), called.set)
+    assert called.wait(60.0)
+    assert link.take()
+
+
+def test_a_link_that_is_over_leaves_no_thread_and_no_handle(tmp_path: Path) -> None:
+    before = set(threading.enumerate())
+    client = Client(Link(Survey(Shaking, ShakingParameters(), bench(), tmp_path / "run")))
+    assert isinstance(client.until_over(), Surveyed)
+    end = time.monotonic() + 5.0
+    while (left := set(threading.enumerate()) - before) and time.monotonic() < end:
+        time.sleep(0.01)
+    assert not left
+
+
+def test_a_run_whose_last_word_was_lost_is_told_by_its_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As for a client that stood still at the end of a run that goes on without it."""
+    keep, lost = Link._keep, list[FromSession]()
+
+    def forgetful(self: Link, message: FromSession) -> None:
+        if isinstance(message, Ended) and not lost:
+            lost.append(message)
+        else:
+            keep(self, message)
+
+    monkeypatch.setattr(Link, "_keep", forgetful)
+    ended = Client(begun(tmp_path / "run", realtime=False, cycles=6)).until_over()
+    assert isinstance(ended, Ended)
+    (true,) = lost
+    assert isinstance(true, Ended)
+    assert (ended.status, ended.reason, ended.summary) == (true.status, true.reason, true.summary)
+
+
+def test_a_beat_tells_for_how_long_the_engine_has_been_quiet() -> None:
+    here, there = Pipe()
+    host = Host(there, Requests(), print)
+
+    def quiet() -> float:
+        while here.poll(5.0):
+            beat = here.recv()
+            if isinstance(beat, Beat):
+                return beat.quiet
+        raise AssertionError
+
+    began = time.monotonic()
+    host.note(StepStarted(0.0, "the last that is heard of the engine"))
+    while (told := quiet()) < 0.6:
+        assert told <= time.monotonic() - began + 0.1
+    again = time.monotonic()
+    host.note(StepStarted(1.0, "it turns again"))
+    # beats of before may still be on their way
+    while quiet() > time.monotonic() - again:
+        assert time.monotonic() - again < 5.0
+    here.close()

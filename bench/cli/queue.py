@@ -1,0 +1,172 @@
+"""`rockbench queue FILE`: runs the tests of a queue, one after the other."""
+
+import json
+import sys
+from contextlib import nullcontext, redirect_stdout
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import App, Parameter
+
+from bench.cli.inputs import Seed, SpecimenFile
+from bench.cli.plan_table import plans_text, tests_text
+from bench.cli.refusal import tell
+from bench.cli.run import Start, carry_out
+from sim.errors import InvalidInput
+
+if TYPE_CHECKING:
+    from bench.config.model import BenchConfiguration
+    from bench.engine.operator import Operator
+    from bench.preflight.compiled import Preflight
+    from bench.queue.queue import Queue
+    from bench.queue.queued import Queued
+
+
+def queue_app(start: Start | None = None) -> App:
+    """`rockbench queue`; `start` as for `run_app`."""
+    app = App(name="queue", version_flags=())
+
+    def queue(
+        file: Annotated[Path, Parameter(metavar="FILE", help="The queue (JSON).", negative=())],
+        /,
+        *,
+        config: Annotated[
+            Path | None,
+            Parameter(
+                metavar="FILE",
+                help="Configuration of the bench (TOML), the same for every test.",
+                show_default="the paper's specimen on the simulated bench",
+            ),
+        ] = None,
+        seed: Seed = None,
+        specimen: SpecimenFile = None,
+        dry_run: Annotated[
+            bool,
+            Parameter(negative=(), show_default=False, help="Check every plan, print what it comes to, and stop."),
+        ] = False,
+        yes: Annotated[
+            bool,
+            Parameter(
+                negative=(), show_default=False, help="Answer yes to the operator's questions: an unattended run."
+            ),
+        ] = False,
+        as_json: Annotated[
+            bool, Parameter(name="--json", negative=(), show_default=False, help="Print one JSON object.")
+        ] = False,
+    ) -> int:
+        """Check every test that waits, then run them from the top; the file says what became of each.
+
+        `rockbench run PROTOCOL ... --queue FILE` adds a test; the operator's window keeps its queue in such a file too.
+        Nothing starts when one of the plans is refused. A test that fails or is stopped ends it: what waits goes on
+        waiting, and the same command goes on with it. The exit code is 0 when every test that waited was carried out,
+        1 when not, 2 when something was refused before anything began, 130 after Ctrl-C.
+        """
+        from bench.cli.inputs import configuration_from
+        from bench.cli.queueing import ENTRIES, all_ready, room_refusal
+        from bench.preflight.compiled import compile_run
+        from bench.queue.file import ITEM, QueueFile
+        from bench.queue.owner import owned
+        from bench.queue.queue import Queue
+
+        configuration = configuration_from(config, seed, specimen)
+        if not file.exists():
+            raise InvalidInput(
+                ITEM, str(file), "there is no such file; `rockbench run PROTOCOL --queue FILE` makes one"
+            )
+        # what only looks owns nothing
+        with nullcontext() if dry_run else owned(file, "`rockbench queue`"):
+            store = QueueFile(file)
+            tests = Queue(store.read(), store.write)
+            with redirect_stdout(sys.stderr):
+                found = {
+                    index: compile_run(each.experiment, configuration, Path(tests.tests[index].out or "runs"))
+                    for index, each in all_ready(tests.tests, ENTRIES, configuration).items()
+                }
+            refused = _refusal(found) or room_refusal([each.room for each in found.values()])
+            if dry_run:
+                print(plans_text(tests.tests, found, as_json=as_json))
+            if refused is not None:
+                raise refused
+            if dry_run:
+                return 0
+            for test in tests.tests:
+                # nobody to answer is found before the first one begins
+                _operator(test, configuration, yes)
+            code = _run_all(tests, configuration, yes, start)
+        print(json.dumps(_content(tests.tests), allow_nan=False) if as_json else tests_text(tests.tests))
+        return code
+
+    app.default(queue)
+    return app
+
+
+def _refusal(found: "dict[int, Preflight]") -> InvalidInput | None:
+    for index, plan in found.items():
+        if (refused := plan.refusal) is not None:
+            return InvalidInput(f"test {index + 1}: {refused.item}", refused.value, refused.allowed)
+    return None
+
+
+def _run_all(tests: "Queue", configuration: "BenchConfiguration", yes: bool, start: Start | None) -> int:
+    """Run what waits until it is over or one does not come to a good end; returns the exit code."""
+    while (index := tests.next) is not None:
+        code = _run_one(tests, index, configuration, yes, start)
+        if code is not None:
+            return code
+    return 0
+
+
+def _run_one(
+    tests: "Queue", index: int, configuration: "BenchConfiguration", yes: bool, start: Start | None
+) -> int | None:
+    """Run a test; None when the next may follow, else the exit code of the whole."""
+    from bench.cli.queueing import ENTRIES, own_folder, ready
+
+    test = tests.tests[index]
+    interrupted: int | None = None
+    good, told = False, "the program failed"
+    try:
+        each = ready(test, index + 1, ENTRIES, configuration)
+        operator = _operator(test, configuration, yes)
+        out = own_folder(test, datetime.now(), tests.tests)
+        print(f"test {index + 1} of {len(tests.tests)}: {test.protocol}, results in {out}", file=sys.stderr)
+        tests.begin(index, str(out))
+        ended, interrupted = carry_out(
+            each.entry,
+            each.experiment,
+            configuration,
+            out,
+            operator,
+            realtime=test.realtime,
+            about=test.about,
+            start=start,
+        )
+        if isinstance(ended, Exception):
+            told = f"failed: {ended}"
+        else:
+            passed = each.entry.passed(ended.summary)
+            good = ended.status in ("completed", "stopped") and passed
+            told = f"{ended.status}: {ended.reason}" if passed else f"{ended.status}, but not passed"
+            if ended.status == "completed" and good:
+                return None
+    except InvalidInput as refused:
+        told = f"refused: {refused}"
+    except KeyboardInterrupt:
+        told, interrupted = "ended before anything moved", 130
+    finally:
+        tests.finish(index, good=good, told=told)
+    tell(f"test {index + 1} {told}")
+    return interrupted or 1
+
+
+def _operator(test: "Queued", configuration: "BenchConfiguration", yes: bool) -> "Operator":
+    from bench.cli.operator import choose
+
+    yes = yes or test.unattended
+    asks, terminal = test.ask and not yes, sys.stdin.isatty()
+    return choose(serves_itself=configuration.serves_itself, yes=yes, ask=asks, terminal=terminal)
+
+
+def _content(tests: "tuple[Queued, ...]") -> dict[str, object]:
+    return {"tests": [test.model_dump(mode="json") for test in tests]}

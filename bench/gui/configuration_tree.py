@@ -1,0 +1,105 @@
+"""A configuration as a tree: every key with its value and unit, and what it means in its tooltip."""
+
+from typing import cast
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QHeaderView, QTreeWidget, QTreeWidgetItem
+
+from bench.cli.flags import in_words
+from bench.cli.words import ABSENT
+from bench.config.declared import Declared, declared, summary
+from bench.config.model import BenchConfiguration
+from bench.gui import texts
+from sim.parameters import Parameters
+
+
+class ConfigurationTree(QTreeWidget):
+    """Read only. What differs from its default is bold, and whatever holds it is open."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setColumnCount(len(texts.CONFIGURATION_TITLES))
+        self.setHeaderLabels(texts.CONFIGURATION_TITLES)
+        self.setAccessibleName(texts.NAMES["configuration"])
+        self.setAlternatingRowColors(True)
+        self.header().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+
+    def use(self, configuration: BenchConfiguration) -> None:
+        """Show this one. What no other backend needs of the simulated one is left out, and the other way round."""
+        self.clear()
+        unused = "hardware" if configuration.backend == "simulated" else "simulation"
+        values, groups = list[QTreeWidgetItem](), list[QTreeWidgetItem]()
+        for of in declared(BenchConfiguration):
+            if of.name != unused:
+                line = _line(of, getattr(configuration, of.name))
+                (groups if line.childCount() else values).append(line)
+        self.addTopLevelItems([*values, *groups])
+        for item in self._all():
+            if item.childCount():
+                item.setExpanded(item.parent() is None or item.data(0, Qt.ItemDataRole.UserRole) is True)
+
+    def value(self, *path: str) -> str:
+        """What stands beside a key, and its unit. Raises KeyError when there is no such key."""
+        items = [self.topLevelItem(k) for k in range(self.topLevelItemCount())]
+        found: QTreeWidgetItem | None = None
+        for key in path:
+            found = next((item for item in items if item is not None and item.text(0) == key), None)
+            if found is None:
+                raise KeyError(".".join(path))
+            items = [found.child(k) for k in range(found.childCount())]
+        return "" if found is None else f"{found.text(1)} {found.text(2)}".strip()
+
+    def _all(self) -> list[QTreeWidgetItem]:
+        waiting = [self.topLevelItem(k) for k in range(self.topLevelItemCount())]
+        found: list[QTreeWidgetItem] = []
+        while waiting:
+            item = waiting.pop()
+            if item is not None:
+                found.append(item)
+                waiting += [item.child(k) for k in range(item.childCount())]
+        return found
+
+
+def _line(of: Declared, value: object) -> QTreeWidgetItem:
+    """A key with all that is below it; the first column remembers whether anything there differs from its default."""
+    changed = value != of.default
+    item = QTreeWidgetItem([of.name, "", ""])
+    if isinstance(value, Parameters):
+        _fill(item, value)
+        tip = of.description or summary(type(value))
+    elif groups := _groups(value):
+        for number, each in enumerate(groups):
+            below = QTreeWidgetItem([str(number + 1), "", ""])
+            _fill(below, each)
+            item.addChild(below)
+        tip = of.description
+    else:
+        item.setText(1, _words(value))
+        item.setText(2, "" if of.unit == "1" or value is None else of.unit)
+        tip = f"{of.description}\n{texts.MUST_BE.format(allowed=of.allowed_in_unit)}"
+    for column in range(3):
+        item.setToolTip(column, tip[:1].upper() + tip[1:])
+    item.setData(0, Qt.ItemDataRole.UserRole, changed)
+    font = item.font(1)
+    font.setBold(changed)
+    item.setFont(1, font)
+    return item
+
+
+def _fill(item: QTreeWidgetItem, group: Parameters) -> None:
+    for of in declared(type(group)):
+        item.addChild(_line(of, getattr(group, of.name)))
+
+
+def _groups(value: object) -> list[Parameters]:
+    """Several groups of parameters, where that is what stands there."""
+    several = cast(tuple[object, ...], value) if isinstance(value, tuple) else ()
+    return [each for each in several if isinstance(each, Parameters)]
+
+
+def _words(value: object) -> str:
+    if value is None:
+        return ABSENT
+    if isinstance(value, tuple):
+        return " ".join(in_words(each) for each in cast(tuple[object, ...], value)) or ABSENT
+    return in_words(getattr(value, "value", value))

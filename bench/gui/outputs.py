@@ -1,0 +1,104 @@
+"""Report and export of a file, by the same commands as in a terminal; nothing is ever overwritten."""
+
+from pathlib import Path
+
+from PySide6.QtCore import QUrl
+from PySide6.QtGui import QDesktopServices
+from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QPushButton, QSizePolicy, QWidget
+
+from bench.gui import texts
+from bench.gui.background import Command
+from bench.gui.header import set_level
+
+FORMS = {"HTML": ("report", "--html"), "PDF": ("report", "--pdf")}
+FORMATS = {"MATLAB": "mat", "CSV": "csv", "UFF": "uff", "Parquet": "parquet"}
+
+
+def free(path: Path) -> Path:
+    """`path`, or the first of path-2, path-3, and so on that is not there yet."""
+    number, found = 1, path
+    while found.exists():
+        number += 1
+        found = path.with_name(f"{path.stem}-{number}{path.suffix}")
+    return found
+
+
+class Outputs(QWidget):
+    """A row: what to make, the buttons that make it, what became of it."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._file: Path | None = None
+        self._made: Path | None = None
+        self._command: Command | None = None
+        self.form, self.format = QComboBox(), QComboBox()
+        self.form.addItems(list(FORMS))
+        self.form.setAccessibleName(texts.REPORT)
+        self.format.addItems(list(FORMATS))
+        self.format.setAccessibleName(texts.EXPORT)
+        self.report, self.export = QPushButton(texts.REPORT), QPushButton(texts.EXPORT)
+        self.report.setToolTip(texts.REPORT_TIP)
+        self.export.setToolTip(texts.EXPORT_TIP)
+        self.told, self.open_made = QLabel(wordWrap=True), QPushButton(texts.OPEN_MADE)
+        self.told.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self.report.clicked.connect(self._report)
+        self.export.clicked.connect(self._export)
+        self.open_made.clicked.connect(self._open)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        for part in (self.form, self.report, self.format, self.export):
+            row.addWidget(part)
+        row.addWidget(self.told, 1)
+        row.addWidget(self.open_made)
+        self.open_made.hide()
+        self._refresh()
+
+    def use(self, file: Path | None) -> None:
+        """What is made from now on is made of this file."""
+        self._file = file
+        self._refresh()
+
+    def _report(self) -> None:
+        file = self._file
+        if file is not None:
+            command, flag = FORMS[self.form.currentText()]
+            ending = flag.removeprefix("--")
+            self._run(free(file.with_suffix(f".report.{ending}")), command, str(file), flag)
+
+    def _export(self) -> None:
+        file = self._file
+        if file is not None:
+            to = FORMATS[self.format.currentText()]
+            self._run(free(file.with_name(f"{file.stem}-{to}")), "export", str(file), "--to", to, "--out")
+
+    def _run(self, made: Path, *arguments: str) -> None:
+        self._made = made
+        self._command = Command([*arguments, str(made)], self)
+        self._command.over.connect(self._over)
+        self._say(texts.MAKING.format(path=made), "calm")
+        self.open_made.hide()
+        self._refresh()
+
+    def _over(self, code: int, text: str) -> None:
+        done = code == 0 and self._made is not None and self._made.exists()
+        self._say(
+            texts.MADE.format(path=self._made) if done else texts.NOT_MADE.format(text=text),
+            "calm" if done else "alarm",
+        )
+        self.open_made.setVisible(done)
+        if self._command is not None:
+            self._command.deleteLater()
+        self._command = None
+        self._refresh()
+
+    def _open(self) -> None:
+        if self._made is not None:
+            QDesktopServices.openUrl(QUrl.fromLocalFile(str(self._made.resolve())))
+
+    def _say(self, text: str, level: str) -> None:
+        self.told.setText(f"▲ {text}" if level == "alarm" else text)
+        set_level(self.told, level)
+
+    def _refresh(self) -> None:
+        for button in (self.report, self.export):
+            button.setEnabled(self._file is not None and self._command is None)

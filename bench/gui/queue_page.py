@@ -1,0 +1,222 @@
+"""The queue: its tests in order, what has become of each, and what may be done with them."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import cast
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QHBoxLayout,
+    QHeaderView,
+    QLabel,
+    QPushButton,
+    QSpinBox,
+    QTableWidget,
+    QTableWidgetItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from bench.cli.catalogue import Entry
+from bench.cli.flags import in_words
+from bench.cli.words import ABSENT
+from bench.config.declared import Declared, declared
+from bench.gui import texts
+from bench.gui.buttons import give_key
+from bench.gui.controller import Controller
+from bench.gui.header import set_level
+from bench.gui.queue_runner import QueueRunner
+from bench.queue.queue import MOST_COPIES
+from bench.queue.queued import OPEN, Queued, Stage
+
+
+class QueuePage(QWidget):
+    """Everything works from the keyboard: the test that is selected in the list is the one that is meant."""
+
+    edit_asked = Signal(object, int)
+    """A `Queued` that has not begun, and its number."""
+
+    def __init__(self, controller: Controller, runner: QueueRunner, entries: Sequence[Entry]) -> None:
+        super().__init__()
+        self._controller, self._runner = controller, runner
+        self._entries = {entry.name: entry for entry in entries}
+        self.status, self.kept = QLabel(wordWrap=True), QLabel(wordWrap=True)
+        self.kept.setProperty("role", "faint")
+        self.start = QPushButton(texts.QUEUE_STARTS)
+        self.copies = QSpinBox(minimum=1, maximum=MOST_COPIES, value=1, prefix="× ")
+        self.buttons = {name: QPushButton(label) for name, label, _, _ in texts.QUEUE_ACTIONS}
+        self.table = QTableWidget(0, len(texts.QUEUE_TITLES))
+        self._arrange()
+        self.start.clicked.connect(self._start_or_pause)
+        self.table.itemSelectionChanged.connect(self._refresh_actions)
+        self.table.itemActivated.connect(self._edit)
+        for name, act in (
+            ("up", lambda: self._move(-1)),
+            ("down", lambda: self._move(1)),
+            ("repeat", self._repeat),
+            ("skip", self._skip),
+            ("edit", self._edit),
+            ("remove", self._remove),
+        ):
+            self.buttons[name].clicked.connect(act)
+        runner.changed.connect(self.refresh)
+        controller.changed.connect(self._refresh_start)
+        self.refresh()
+
+    @property
+    def selected(self) -> int | None:
+        """Index of the test that is selected."""
+        row = self.table.currentRow()
+        return row if 0 <= row < len(self._runner.queue.tests) else None
+
+    def refresh(self) -> None:
+        """Show the queue as it is."""
+        tests, row = self._runner.queue.tests, self.table.currentRow()
+        self.table.setRowCount(len(tests))
+        for index, test in enumerate(tests):
+            for column, text in enumerate(self._cells(index, test)):
+                item = QTableWidgetItem(text)
+                item.setToolTip(self._all_of(test) if column == 3 else text)
+                self.table.setItem(index, column, item)
+        if tests:
+            self.table.setCurrentCell(min(max(row, 0), len(tests) - 1), 0)
+        self._refresh_start()
+        self._refresh_actions()
+
+    def _refresh_start(self) -> None:
+        runner = self._runner
+        why = "" if runner.going else runner.why_not
+        self.start.setText(texts.QUEUE_PAUSES if runner.going else texts.QUEUE_STARTS)
+        self.start.setEnabled(not why)
+        self.start.setToolTip(why or (texts.QUEUE_PAUSES_TIP if runner.going else texts.QUEUE_STARTS_TIP))
+        n, running = runner.queue.waiting, runner.queue.running
+        if runner.checking is not None:
+            text = texts.QUEUE_CHECKING.format(number=runner.checking + 1, n=n)
+        elif runner.going or running is not None:
+            text = (texts.QUEUE_GOING if runner.going else texts.QUEUE_LAST).format(n=n)
+        elif runner.why:
+            text = texts.QUEUE_PAUSED.format(why=runner.why, n=n)
+        else:
+            text = texts.QUEUE_IDLE.format(n=n) if runner.queue.tests else texts.QUEUE_EMPTY
+        self.status.setText(text)
+        set_level(self.status, "alarm" if runner.why and not runner.going else "good" if runner.going else "calm")
+
+    def _refresh_actions(self) -> None:
+        index, tests = self.selected, self._runner.queue.tests
+        test = None if index is None else tests[index]
+        begun = test is None or test.stage not in OPEN
+        running = test is None or test.stage is Stage.RUNNING
+        known = test is not None and test.protocol in self._entries
+        for name, possible in (
+            ("up", not begun and index != 0),
+            ("down", not begun and index != len(tests) - 1),
+            ("repeat", test is not None),
+            ("skip", not begun),
+            ("edit", not begun and known),
+            ("remove", not running),
+        ):
+            self.buttons[name].setEnabled(possible)
+        skipped = test is not None and test.stage is Stage.SKIPPED
+        self.buttons["skip"].setText(texts.TAKE_IN if skipped else texts.QUEUE_ACTIONS[3][1])
+
+    def _cells(self, index: int, test: Queued) -> tuple[str, ...]:
+        told = test.told or self._options_of(test)
+        return (str(index + 1), texts.STAGES[test.stage], test.protocol, self._asked_of(test), test.out or ABSENT, told)
+
+    def _asked_of(self, test: Queued) -> str:
+        """What differs from the defaults."""
+        return ", ".join(_said(of, value) for of, value in self._values(test) if value != _plain(of.default))
+
+    def _all_of(self, test: Queued) -> str:
+        return "\n".join(_said(of, value) for of, value in self._values(test))
+
+    def _values(self, test: Queued) -> list[tuple[Declared, object]]:
+        entry = self._entries.get(test.protocol)
+        fields = () if entry is None else declared(entry.parameters)
+        return [(of, test.parameters[of.name]) for of in fields if of.name in test.parameters]
+
+    def _options_of(self, test: Queued) -> str:
+        return ", ".join(word for name, word in texts.OPTIONS.items() if getattr(test, name))
+
+    def _start_or_pause(self) -> None:
+        if self._runner.going:
+            self._runner.pause()
+        else:
+            self._runner.start()
+
+    def _move(self, by: int) -> None:
+        index, queue = self.selected, self._runner.queue
+        if index is not None and self._runner.do(lambda: queue.move(index, by)):
+            self.table.setCurrentCell(min(max(index + by, 0), len(queue.tests) - 1), 0)
+
+    def _repeat(self) -> None:
+        index, times = self.selected, self.copies.value()
+        if index is not None:
+            self._runner.do(lambda: self._runner.queue.repeat(index, times))
+
+    def _skip(self) -> None:
+        index = self.selected
+        if index is not None:
+            self._runner.do(lambda: self._runner.queue.skip(index))
+
+    def _remove(self) -> None:
+        index = self.selected
+        if index is not None:
+            self._runner.do(lambda: self._runner.queue.remove(index))
+
+    def _edit(self) -> None:
+        index = self.selected
+        if index is not None and self.buttons["edit"].isEnabled():
+            self.edit_asked.emit(self._runner.queue.tests[index], index + 1)
+
+    def _arrange(self) -> None:
+        self.table.setHorizontalHeaderLabels(texts.QUEUE_TITLES)
+        self.table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self.table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        self.table.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
+        self.table.setAccessibleName(texts.NAMES["queue"])
+        self.table.setToolTip(texts.QUEUE_TIP)
+        self.table.verticalHeader().hide()
+        self.table.setWordWrap(False)
+        header = self.table.horizontalHeader()
+        header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        header.setSectionResizeMode(3, QHeaderView.ResizeMode.Stretch)
+        header.setStretchLastSection(True)
+        give_key(self.start, "Ctrl+Shift+Q")
+        self.start.setMinimumHeight(48)
+        # a key that was meant for the list must not start a run
+        self.start.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.copies.setToolTip(texts.COPIES_TIP)
+        self.copies.setAccessibleName(texts.COPIES)
+        path: Path | None = self._runner.path
+        self.kept.setText(texts.QUEUE_UNKEPT if path is None else texts.QUEUE_FILE.format(path=path))
+        top, row = QHBoxLayout(), QHBoxLayout()
+        top.addWidget(self.status, 1)
+        top.addWidget(self.start)
+        for name, _, key, tip in texts.QUEUE_ACTIONS:
+            button = self.buttons[name]
+            give_key(button, key)
+            button.setToolTip(f"{tip} ({key}).")
+            row.addWidget(button)
+            if name == "repeat":
+                row.addWidget(self.copies)
+        row.addStretch(1)
+        column = QVBoxLayout(self)
+        column.addLayout(top)
+        column.addWidget(self.table, 1)
+        column.addLayout(row)
+        column.addWidget(self.kept)
+
+
+def _plain(default: object) -> object:
+    """A default as a file holds it."""
+    return [*cast(tuple[object, ...], default)] if isinstance(default, tuple) else getattr(default, "value", default)
+
+
+def _said(of: Declared, value: object) -> str:
+    """A parameter, its value and its unit, as one would type them."""
+    values = cast(list[object], value) if isinstance(value, list) else [value]
+    text = " ".join(in_words(each) for each in values)
+    unit = "" if of.unit in ("", "1") else f" {of.unit}"
+    return f"{of.name.replace('_', ' ')} {text}{unit}"

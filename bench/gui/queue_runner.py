@@ -1,0 +1,203 @@
+"""Runs a queue at the window: every plan checked before the first begins, one session after the other, never anything
+after a STOP.
+"""
+
+from collections.abc import Callable, Sequence
+from datetime import datetime
+
+from PySide6.QtCore import QObject, QTimer, Signal
+
+from bench.cli.catalogue import Entry
+from bench.cli.queueing import own_folder
+from bench.config.model import BenchConfiguration
+from bench.gui import texts
+from bench.gui.controller import Controller
+from bench.gui.queue_check import Checked, QueueCheck
+from bench.gui.troubles import Trouble
+from bench.link.messages import Ended, Refused, Run
+from bench.queue.file import QueueFile
+from bench.queue.owner import Owner
+from bench.queue.queue import Queue
+from bench.queue.queued import Queued, Stage
+from sim.errors import RockbenchError
+
+GOOD = ("completed", "stopped")
+
+
+class QueueRunner(QObject):
+    """The queue, and what runs of it. A `store` is owned until `close`; without one the queue is not kept.
+
+    Raises InvalidInput for a store that cannot be read, or that somebody else owns.
+    """
+
+    changed = Signal()
+    """A test, or whether the queue goes on."""
+    troubled = Signal(object)
+    """A `Trouble`: the queue could not be kept, or a change was refused."""
+    predicted = Signal(object)
+    """The prediction of the test that is about to begin."""
+
+    def __init__(
+        self,
+        controller: Controller,
+        configuration: BenchConfiguration,
+        entries: Sequence[Entry],
+        store: QueueFile | None = None,
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._controller = controller
+        self.configuration = configuration
+        self.path = None if store is None else store.path
+        self._owner = None if store is None else Owner(store.path, texts.QUEUE_OWNER)
+        self.going = False
+        """Whether another test begins when the one that runs is over."""
+        self.why = ""
+        """Why the queue was paused; empty when nothing is wrong."""
+        try:
+            self.queue = Queue() if store is None else Queue(store.read(), store.write)
+        except RockbenchError:
+            self.close()
+            raise
+        self._begun: tuple[Run, Checked] | None = None
+        self._check = QueueCheck(controller, entries, self)
+        self._check.good.connect(self._next)
+        self._check.refused.connect(self._refused)
+        self._check.changed.connect(self.changed)
+        controller.began.connect(self._began)
+        controller.ended.connect(self._ended)
+        controller.changed.connect(self._heed_stop)
+
+    @property
+    def why_not(self) -> str:
+        """Why the queue cannot be started now; empty when it can."""
+        if self._controller.latched:
+            return texts.LATCHED
+        if self._controller.running and self.queue.running is None:
+            return texts.START_BUSY
+        return "" if self.queue.next is not None else texts.QUEUE_EMPTY
+
+    @property
+    def checking(self) -> int | None:
+        """Index of the test whose plan is being checked."""
+        return None if self._check.test is None else self._place(self._check.test)
+
+    def close(self) -> None:
+        """Begin nothing more, and let go of the file."""
+        self.going = False
+        if self._owner is not None:
+            self._owner.release()
+
+    def do(self, change: Callable[[], object]) -> bool:
+        """Make a change to the queue; one that is refused or cannot be kept is told, and pauses it."""
+        try:
+            change()
+        except RockbenchError as error:
+            self.pause()
+            self.troubled.emit(Trouble(str(error), texts.QUEUE_DID, texts.QUEUE_NOW))
+            return False
+        finally:
+            self.changed.emit()
+        return True
+
+    def replace(self, old: Queued, new: Queued) -> bool:
+        """Another test in place of `old`, wherever that is by now; told and not done when `old` is no longer there as
+        it was: it has begun, or was skipped or removed.
+        """
+        index = self._place(old)
+        if index is None:
+            self.troubled.emit(Trouble(texts.QUEUE_GONE, texts.QUEUE_GONE_DID, texts.QUEUE_GONE_NOW))
+            return False
+        return self.do(lambda: self.queue.replace(index, new))
+
+    def start(self) -> None:
+        """Check every plan that waits, then begin with the first."""
+        if not self.going and not self.why_not:
+            self.going, self.why = True, ""
+            self._check.forget()
+            self._controller.held = texts.QUEUE_HOLDS
+            if self.queue.running is None:
+                self._next()
+            self.changed.emit()
+
+    def pause(self, why: str = "") -> None:
+        """Begin nothing more. A test that runs goes on; checking is given up."""
+        self._check.give_up()
+        self.going, self.why = False, why or self.why
+        self._controller.held = ""
+        self.changed.emit()
+        self._controller.changed.emit()
+
+    def _heed_stop(self) -> None:
+        if self.going and self._controller.latched:
+            self.pause(texts.QUEUE_STOPPED)
+
+    def _place(self, test: Queued) -> int | None:
+        """Where this very test is: a copy may be its equal."""
+        return next((i for i, each in enumerate(self.queue.tests) if each is test), None)
+
+    def _next(self) -> None:
+        index = self.queue.next
+        if not self.going or self._controller.running or index is None:
+            self.pause()
+            return
+        tests, configuration = self.queue.tests, self.configuration
+        known = [self._check.known(test, configuration) for test in tests if test.stage is Stage.WAITING]
+        first = known[0]
+        if first is None or None in known:
+            self._check.begin(tests, configuration)
+        else:
+            self._begin(index, first)
+
+    def _refused(self, test: Queued | None, why: str) -> None:
+        index = None if test is None else self._place(test)
+        if index is None:
+            self.pause(f"{why}.")
+        else:
+            self._over(index, good=False, told=f"refused: {why}", why=texts.QUEUE_REFUSED.format(number=index + 1))
+
+    def _begin(self, index: int, each: Checked) -> None:
+        test, plan = each.test, each.plan
+        out = own_folder(test, datetime.now(), self.queue.tests)
+        if not self.do(lambda: self.queue.begin(index, str(out))):
+            return
+        self.predicted.emit(each.found.prediction)
+        run = Run(
+            plan.make,
+            plan.parameters,
+            plan.configuration,
+            out,
+            realtime=test.realtime,
+            person=(test.ask or not plan.configuration.serves_itself) and not test.unattended,
+            keep_going=test.keep_going,
+            about=test.about,
+        )
+        self._begun = run, each
+        self._controller.start(run)
+        self.changed.emit()
+
+    def _began(self, run: Run) -> None:
+        if self._begun is not None and run is not self._begun[0]:
+            self._begun = None
+
+    def _ended(self, ended: Ended | Refused) -> None:
+        index, begun = self.queue.running, self._begun
+        if index is None or begun is None:
+            return
+        self._begun = None
+        if isinstance(ended, Refused):
+            status, good, told = ("failed" if ended.failed else "refused"), False, ended.text
+        else:
+            passed = begun[1].ready.entry.passed(ended.summary)
+            status, good = ended.status, passed and ended.status in GOOD
+            told = ended.reason if passed else "not passed"
+        why = "" if status == "completed" and good else texts.QUEUE_ENDED.format(number=index + 1, status=status)
+        self._over(index, good=good, told=f"{status}: {told}", why=why)
+
+    def _over(self, index: int, *, good: bool, told: str, why: str) -> None:
+        kept = self.do(lambda: self.queue.finish(index, good=good, told=told))
+        if why or not kept:
+            self.pause(self.why if self._controller.latched else why)
+        elif self.going:
+            # whoever else hears of the end does so before the next begins
+            QTimer.singleShot(0, self._next)

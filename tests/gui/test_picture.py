@@ -1,0 +1,158 @@
+"""The picture: measured frame, modelled block, and how large the motion is drawn."""
+
+from math import pi
+from unittest.mock import MagicMock
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint, QPointF, QRectF, Qt
+from PySide6.QtGui import QWheelEvent
+from PySide6.QtWidgets import QApplication
+from pytestqt.qtbot import QtBot
+
+from bench.gui import texts
+from bench.gui.drawing import FLASH, Drawing, Pose
+from bench.gui.model_block import ModelBlock
+from bench.gui.palette import LIGHT
+from bench.gui.physical import FACTOR, LARGEST, PhysicalPicture
+from bench.link.messages import Traces
+from bench.link.reduction import TRACES
+from sim.excitation import SampledRecord
+from sim.rocking import simulate
+from sim.specimen import Specimen
+
+STEP = 0.002
+COUPLED = Specimen().coupled(0.4)
+
+
+def _blocks(acceleration: np.ndarray, begin: float, run: int = 1) -> list[Traces]:
+    values = np.zeros((acceleration.size, len(TRACES)), np.float32)
+    values[:, TRACES.index("acceleration")] = acceleration
+    return [
+        Traces(run, begin + STEP * first, STEP, values[first : first + 50], values[first : first + 50], 0.0)
+        for first in range(0, acceleration.size, 50)
+    ]
+
+
+def test_the_block_moves_as_the_model_does_under_the_measured_table(qtbot: QtBot) -> None:
+    """Against one integration of the whole record."""
+    time = STEP * np.arange(1500)
+    acceleration = (1.3 * COUPLED.uplift_acceleration * np.sin(16.0 * time) * np.minimum(time, 1.0)).astype(np.float32)
+    expected = simulate(COUPLED, SampledRecord(acceleration.astype(float), STEP), sample_times=time).samples
+    assert expected is not None
+    assert np.abs(expected[:, 4]).max() > 0.01, "it rocks"
+    block = ModelBlock()
+    blocks = _blocks(acceleration, 7.0)
+    for each in blocks[:20]:
+        block.add(each)
+    assert block.at(7.5) is None
+    assert block.nearest(7.5) == 7.5
+    block.couple(COUPLED)
+    for each in blocks[20:]:
+        block.add(each)
+    end = 7.0 + STEP * (time.size - 0.5)
+    qtbot.waitUntil(lambda: block.at(end) is not None, timeout=60_000)
+    assert block.nearest(end + 1.0) == pytest.approx(end)
+    crossings = np.flatnonzero(np.sign(expected[1:, 4]) != np.sign(expected[:-1, 4])) + 1
+    for k in range(700, 1500, 7):
+        found = block.at(7.0 + STEP * (k + 0.5) + 1e-6)
+        assert found is not None
+        assert found[0] == pytest.approx(expected[k, 4], abs=1e-5)
+        since = STEP * (k - crossings[crossings <= k].max())
+        assert found[1] == pytest.approx(since, abs=1.5 * STEP)
+    # what follows a gap, and another run, is not known
+    block.add(_blocks(acceleration, 90.0)[0])
+    block.add(_blocks(acceleration, 95.0, run=2)[0])
+    block.close()
+    assert block.at(90.05) is None
+    assert block._thread is not None
+    block._thread.join(10.0)
+    assert block.at(95.05) is None
+
+
+@pytest.fixture
+def picture(qtbot: QtBot) -> PhysicalPicture:
+    shown = PhysicalPicture(LIGHT)
+    qtbot.addWidget(shown)
+    shown.resize(500, 260)
+    shown.show()
+    return shown
+
+
+def _motion(**values: float) -> np.ndarray:
+    motion = np.zeros(len(TRACES))
+    for name, value in values.items():
+        motion[TRACES.index(name)] = value
+    return motion
+
+
+def test_motion_is_drawn_larger_by_key_wheel_and_field(picture: PhysicalPicture, qtbot: QtBot) -> None:
+    picture.use(COUPLED)
+    picture.couple(True)
+    picture.move_to(_motion(displacement=0.01, u1=0.002, u2=-0.003), (0.02, 1.0))
+    pose = picture.pose
+    assert (pose.ground, pose.first, pose.second, pose.angle) == pytest.approx((0.05, 0.01, -0.015, 0.1))
+    assert picture.source.text() == texts.FRAME_AND_BLOCK
+    qtbot.keyClick(picture.canvas, Qt.Key.Key_Plus)
+    assert picture.factor.value() == FACTOR + 1
+    qtbot.keyClick(picture.canvas, Qt.Key.Key_Minus)
+    at = QPointF(10, 10)
+    turn = QWheelEvent(
+        at, at, QPoint(), QPoint(0, 120), Qt.MouseButton.NoButton, Qt.KeyboardModifier.NoModifier,
+        Qt.ScrollPhase.NoScrollPhase, False,
+    )  # fmt: skip
+    QApplication.sendEvent(picture.canvas, turn)
+    assert picture.pose.ground == pytest.approx(0.06)
+    picture.factor.setValue(LARGEST + 10)
+    assert picture.factor.value() == LARGEST
+
+
+def test_contact_impact_and_what_is_not_known_look_different(picture: PhysicalPicture) -> None:
+    picture.use(COUPLED)
+
+    def drawn(block: tuple[float, float] | None, coupled: bool = True) -> bytes:
+        picture.couple(coupled)
+        picture.move_to(_motion(u1=0.001), block)
+        return bytes(picture.canvas.grab().toImage().constBits())
+
+    looks = [
+        drawn(None, coupled=False),
+        drawn(None),
+        drawn((0.0, 9.0)),
+        drawn((0.02, 9.0)),
+        drawn((-0.02, 9.0)),
+        drawn((-0.02, 0.5 * FLASH)),
+    ]
+    assert len(set(looks)) == len(looks)
+    assert drawn((0.02, 9.0)) == looks[3]
+    # a block that has fallen is drawn on its side at most
+    assert len(drawn((pi, 9.0))) == len(looks[0])
+
+
+@pytest.mark.parametrize("angle", [0.2, -0.2])
+def test_the_block_turns_about_the_corner_it_stands_on(angle: float) -> None:
+    """Against a rotation by complex numbers: theta > 0 about the corner on the frame's side, the top towards it."""
+    painter = MagicMock()
+    drawing = Drawing(painter, LIGHT, COUPLED, QRectF(0, 0, 500, 260))
+    drawing.draw_block(Pose())
+    drawing.draw_block(Pose(angle=angle))
+    rest, turned = (
+        np.array([complex(at.x(), -at.y()) for at in call.args[0]])
+        for call in painter.drawPolygon.call_args_list
+        if len(call.args[0]) == 4
+    )
+    lower_left, lower_right = rest[0], rest[1]
+    corner = lower_left if angle > 0.0 else lower_right
+    np.testing.assert_allclose(turned, corner + (rest - corner) * np.exp(1j * angle), atol=1e-9)
+    assert (turned[2:].real < rest[2:].real).all() == (angle > 0.0)
+    assert turned.imag.min() == pytest.approx(corner.imag), "no part of it is below the table"
+
+
+def test_without_the_model_it_says_so(picture: PhysicalPicture) -> None:
+    picture.use(COUPLED)
+    picture.couple(True)
+    picture.move_to(_motion(), None)
+    assert picture.source.text() == texts.FRAME_ONLY
+    picture.couple(False)
+    picture.move_to(_motion(u1=1e-3), None)
+    assert picture.source.text() == texts.FRAME

@@ -1,0 +1,160 @@
+"""Whatever goes wrong is told in one panel: what happened, what the bench did, what to do now."""
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from PySide6.QtCore import Qt
+from pytestqt.qtbot import QtBot
+
+from bench.events import LimitExceeded, State, StateChanged
+from bench.gui import texts
+from bench.gui.header import STALE
+from bench.gui.troubles import advice, trouble_of
+from bench.gui.window import Window
+from bench.link.messages import Ended, Refused, SafetyInputs, Told
+from bench.preflight.disk import Room
+from drivers.clock import now
+from sim.errors import InvalidInput
+from tests.gui.conftest import SpokenLink
+from tests.link.experiment import order
+
+pytestmark = pytest.mark.usefixtures("without_plots")
+
+OUT = Path("runs", "one")
+
+
+@pytest.mark.parametrize(
+    ("reason", "fits"),
+    [
+        ("abort was asked for", "Clear STOP"),
+        ("the operator declined: Mount the spring.", "Do what was asked"),
+        ("emergency stop, over-travel opened", "See at the bench why it opened"),
+        ("runs/one/campaign.h5: No space left on device", "Free space"),
+        (
+            "x.h5 is not recorded further, its disk is 4096 events behind: what was written before is readable",
+            "Free space",
+        ),
+        (str(Room(Path("runs"), 10, 1).refusal()), "Free space"),
+        ("cDAQ1Mod1 is gone: check power and cables, then open a new session (code -88709)", "look for devices"),
+        ("laser_1 on COM3 has not answered for 1 s", "look for devices"),
+        ("something that nobody thought of", "Look at the bench"),
+        # as the drivers, the guard and the recorder put it
+        ("emergency stop opened; then reading the safety inputs failed", "See at the bench why it opened"),
+        ("arming is refused: over-travel 1 open; close it, then begin again", "See at the bench why it opened"),
+        (
+            "prepare is refused: amplifier ready not good 2 s after the enable line was closed",
+            "See at the bench why it opened",
+        ),
+        (str(InvalidInput("record", "one.h5", "it cannot be opened (Permission denied)")), "Look at the bench"),
+        ("the device file could not be opened", "look for devices"),
+        ("laser_1 on COM3 did not answer GETINFO within 1 s; check its power and cable, and open it anew", "devices"),
+        ("no gRPC device server answers at crio.local:31763: start ni_grpc_device_server there", "look for devices"),
+        ("the workspace of the solver is too small", "Look at the bench"),
+        ("the spectrum has no answer in this spacing of the lines, nor a powerful one", "Look at the bench"),
+        ("the drive was written too late: give it more lead (code -200290)", "Look at the bench"),
+        ("report.pdf: what was asked for cannot be made", "Look at the bench"),
+    ],
+)
+def test_advice_follows_the_kind_of_what_happened(reason: str, fits: str) -> None:
+    assert fits in advice(reason)
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    status=st.sampled_from(["completed", "stopped", "aborted", "halted", "failed"]),
+    reason=st.text(min_size=1),
+    driven=st.booleans(),
+)
+def test_every_bad_end_has_all_three_answers_and_no_good_one_has_any(status: str, reason: str, driven: bool) -> None:
+    trouble = trouble_of(Ended(status, reason, {}, "", OUT), driven=driven, limit=None)
+    assert (trouble is None) == (status in ("completed", "stopped"))
+    if trouble is not None:
+        assert reason in trouble.what
+        assert str(OUT) in trouble.did
+        assert (texts.DID_NOTHING in trouble.did) == (not driven)
+        assert trouble.now
+
+
+@pytest.fixture
+def link(window: Window, spoken: type[SpokenLink]) -> SpokenLink:
+    window._controller.start(order(OUT))
+    return spoken.latest
+
+
+def _said(window: Window) -> list[str]:
+    return [label.text() for label in window.trouble.answers]
+
+
+def test_a_limit_says_what_the_bench_did_and_where_the_data_are(window: Window, link: SpokenLink) -> None:
+    link.said = [
+        Told(StateChanged(1.0, State.ARMED, State.RUNNING, "driving")),
+        Told(LimitExceeded(2.0, "drift", 0.081, 0.08, "m")),
+        Ended("aborted", "drift 0.081 m exceeds 0.08 m", {}, "", OUT),
+    ]
+    window._controller._look()
+    assert window.trouble.isVisible()
+    what, did, now_ = _said(window)
+    assert "drift 0.081 m exceeds 0.08 m" in what
+    assert "fast ramp" in did
+    assert str(OUT) in did
+    assert "drift" in now_
+    assert not window.trouble.more.isVisible(), "there are no details to show"
+
+
+def test_a_failed_start_has_its_details_on_request(window: Window, link: SpokenLink, qtbot: QtBot) -> None:
+    link.said = [Refused("cDAQ1 is not there: `rockbench devices` lists what is there", failed=True, details="Trace")]
+    window._controller._look()
+    panel = window.trouble
+    assert _said(window)[1] == texts.DID_NOT_START
+    assert "look for devices" in _said(window)[2]
+    assert not panel.details.isVisible()
+    qtbot.mouseClick(panel.more, Qt.MouseButton.LeftButton)
+    assert panel.details.isVisible()
+    assert panel.details.toPlainText() == "Trace"
+    window._controller.start(order(OUT))
+    assert not panel.isVisible(), "a new run begins clean"
+
+
+def test_a_refused_start_says_that_nothing_happened(window: Window, link: SpokenLink) -> None:
+    link.said = [Refused("limits.drift = 0.08 is refused: too near", "limits.drift")]
+    window._controller._look()
+    assert _said(window) == ["limits.drift = 0.08 is refused: too near", texts.DID_REFUSE, texts.NOW_REFUSED]
+
+
+def test_a_session_that_dies_while_it_drives_sends_to_the_bench(window: Window, link: SpokenLink) -> None:
+    link.said = [
+        Told(StateChanged(1.0, State.ARMED, State.RUNNING, "driving")),
+        Refused("the session's process ended without a word (exit code -9)", failed=True),
+    ]
+    window._controller._look()
+    assert _said(window)[1:] == [texts.DID_LOSE, texts.NOW_LOOK]
+    assert "emergency stop" in _said(window)[2]
+
+
+def test_a_good_end_says_nothing(window: Window, link: SpokenLink) -> None:
+    link.said = [Ended("completed", "the plan was carried out", {}, "", OUT)]
+    window._controller._look()
+    assert not window.trouble.isVisible()
+
+
+def test_safety_inputs_that_are_old_are_unknown(
+    window: Window, link: SpokenLink, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    header, controller = window.header, window._controller
+    assert (header.inputs.text(), header.inputs.property("level")) == (texts.INPUT_UNKNOWN, "wait")
+    link.said = [SafetyInputs(1.0, {"emergency stop": True, "over-travel": False})]
+    controller._look()
+    assert header.inputs.text() == "emergency stop good, over-travel OPEN"
+    later = now() + STALE + 0.1
+    monkeypatch.setattr("bench.gui.controller.now", lambda: later)
+    header.refresh()
+    assert header.inputs.text() == "emergency stop unknown, over-travel unknown"
+    assert header.inputs.property("level") == "wait"
+    link.said = [SafetyInputs(2.0, {})]
+    controller._look()
+    assert header.inputs.text() == texts.NO_INPUTS
+    link.said = [Ended("completed", "over", {}, "", OUT)]
+    controller._look()
+    assert header.inputs.text() == texts.INPUTS_UNREAD
