@@ -11,6 +11,7 @@ from cyclopts import App, Parameter
 
 from bench.cli.analyse_output import side_by_side
 from bench.cli.analyse_settings import Choice, choice_of, listed
+from bench.cli.prose import prose
 from bench.cli.refusal import tell
 from sim.errors import InvalidInput
 from sim.parameters import Parameters
@@ -18,11 +19,12 @@ from sim.parameters import Parameters
 if TYPE_CHECKING:
     from bench.record.reader import Record
     from bench.replaying.session import Replayed
+    from bench.session import Experiment
 
 
 def analyse_app() -> App:
     """`rockbench analyse`."""
-    app = App(name="analyse", version_flags=())
+    app = App(name="analyse", help=prose(analyse), version_flags=())
     app.default(analyse)
     return app
 
@@ -49,6 +51,14 @@ def analyse(
             help="Configuration (TOML) whose tables analysis, specimen and uncertainty replace the recorded ones.",
         ),
     ] = None,
+    specimen: Annotated[
+        Path | None,
+        Parameter(
+            name="--specimen",
+            metavar="FILE",
+            help="Specimen file (JSON) of what has been identified, in place of what was known at the campaign.",
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
         Parameter(name="--out", metavar="FILE", help="File to write.", show_default="<name>.analysis-<n>.h5 beside it"),
@@ -63,7 +73,8 @@ def analyse(
     """Compute every result of a recorded campaign anew from its samples, with other settings.
 
     The new results are written to a file of their own beside the recorded one, with its name, its SHA-256 and the
-    settings, and are printed beside the old. A setting that would have changed how the table was driven is refused:
+    settings, and are printed beside the old. A protocol that identifies the specimen leaves `<name>.specimen.json` for
+    other runs besides. A setting that would have changed how the table was driven is refused:
     the recorded samples say nothing about that.
 
     The exit code is 0 when the results were written, 1 when the recorded samples do not answer what was asked, 2 when
@@ -76,13 +87,13 @@ def analyse(
     if out is not None and out.exists():
         raise InvalidInput("--out", str(out), "the file exists and is never overwritten; name another")
     with open_record(file) as record:
-        choice = choice_of(record, set_, config)
+        choice = choice_of(record, set_, config, specimen)
         if list_:
             print(listed(choice))
             return 0
         try:
             with choice.entry.progress(sys.stderr, False) as progress, redirect_stdout(sys.stderr):
-                replayed, points = _points(record, choice, [progress])
+                experiment, replayed, points = _carried_out(record, choice, [progress])
         except NotComparable as error:
             tell(error)
             return 1
@@ -92,23 +103,41 @@ def analyse(
         kind = choice.entry.campaign(choice.asked).point_type
         analysis = Analysis(points, kind, choice.given, choice.settings, choice.changed)
         written = write_analysis(file, record, analysis, out)
+        kept = _kept(experiment, written)
         stored = record.points
     new = [point.model_dump(mode="json") for point in points]
     if as_json:
-        print(json.dumps({"file": str(written), "settings": choice.given, "recorded": stored, "points": new}))
+        said = {"file": str(written), "settings": choice.given, "recorded": stored, "points": new}
+        print(json.dumps(said | ({} if kept is None else {"kept": str(kept)})))
     else:
         print(side_by_side(kind, stored, new))
         if replayed.ended is not None:
             print(f"The recording breaks off: {replayed.ended}")
         print(f"Written to {written}")
+        if kept is not None:
+            print(f"For other runs: {kept}")
     return 0
 
 
-def _points(record: "Record", choice: Choice, subscribers: Sequence[Any]) -> "tuple[Replayed, tuple[Parameters, ...]]":
+def _kept(experiment: "Experiment", written: Path) -> Path | None:
+    """The file for other runs that an identifying protocol leaves beside its result, such as a specimen file."""
+    from bench.session import Keeping
+
+    if not isinstance(experiment, Keeping):
+        return None
+    path = written.with_name(f"{written.stem}.{experiment.kept_name}")
+    experiment.keep(path)
+    return path if path.exists() else None
+
+
+def _carried_out(
+    record: "Record", choice: Choice, subscribers: Sequence[Any]
+) -> "tuple[Experiment, Replayed, tuple[Parameters, ...]]":
+    from bench.cli.recorded import experiment_of
     from bench.replaying.analysis import carry_out, follow
 
     if choice.follower is None:
-        experiment = choice.entry.campaign(choice.settings)
-        return carry_out(record, experiment, choice.recorded, choice.changed, subscribers)
-    experiment = choice.entry.campaign(choice.asked)
-    return follow(record, experiment, choice.recorded, choice.follower, subscribers)
+        experiment = experiment_of(record, choice.entry, choice.settings)
+        return experiment, *carry_out(record, experiment, choice.recorded, choice.changed, subscribers)
+    experiment = experiment_of(record, choice.entry, choice.asked)
+    return experiment, *follow(record, experiment, choice.recorded, choice.follower, subscribers)

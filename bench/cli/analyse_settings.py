@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from functools import reduce
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 
 SECTIONS = ("analysis", "specimen", "uncertainty")
 """Parts of the configuration that say how the measurement is understood, not how the bench is driven."""
+
+LIST = "--list shows all of them with their values and units"
 
 
 @dataclass(frozen=True)
@@ -39,8 +42,9 @@ class Choice:
     follower: "Callable[[SignalMap], Follower] | None" = None
 
 
-def choice_of(record: "Record", changes: Sequence[str], config: Path | None) -> Choice:
-    """The settings for an open file: the recorded ones, those of a file, and `changes`, KEY=VALUE, each over the last.
+def choice_of(record: "Record", changes: Sequence[str], config: Path | None, specimen: Path | None = None) -> Choice:
+    """The settings for an open file: the recorded ones, those of a file, what a file says of the specimen, and
+    `changes`, KEY=VALUE, each over the last.
 
     Raises InvalidInput for what there is not, or what may not be changed after a measurement.
     """
@@ -48,35 +52,44 @@ def choice_of(record: "Record", changes: Sequence[str], config: Path | None) -> 
     from bench.config.model import BenchConfiguration
     from bench.config.validation import dotted, validated
     from bench.replaying.session import stored_configuration
+    from protocols.harmonic.parameters import HarmonicParameters
+    from protocols.harmonic.reanalysis import HarmonicFollower, HarmonicSettings
 
     entry, recorded = entry_of(record), stored_configuration(record)
     asked = parameters_of(record, entry)
     data: dict[str, Any] = recorded.model_dump(mode="json")
     given = _from_file(config, data) if config is not None else {}
+    if specimen is not None:
+        from bench.config.specimen_file import read_specimen
+
+        given["identified"] = read_specimen(specimen).model_dump(mode="json")
     data |= given
     own: dict[str, Any] = {}
     for change in changes:
         key, equals, text = change.partition("=")
         if not (key and equals):
-            raise InvalidInput("--set", change, "KEY=VALUE")
+            raise InvalidInput("--set", change, f"it must be KEY=VALUE; {LIST}")
         value = given[key] = _value(text)
         section, *path = key.split(".")
         if section in SECTIONS and path:
             _put(data, [section, *path], value)
         elif path:
-            raise InvalidInput("--set", key, f"of the configuration only {', '.join(SECTIONS)} can be changed here")
+            tables = ", ".join(SECTIONS)
+            raise InvalidInput(f"--set {key}", value, f"of the configuration only {tables} can be changed; {LIST}")
         else:
             own[key] = value
+    _require_known(own, HarmonicSettings if entry.name == "harmonic" else entry.parameters)
 
     def named(path: tuple[str | int, ...]) -> str:
         return f"--set {dotted(path)}"
 
     changed = validated(BenchConfiguration, data, named)
+    if changed.identified is not None:
+        # what is set here by hand goes before what was identified
+        by_hand = (key.rpartition(".")[2] for key in given if key.startswith("specimen."))
+        changed = changed.model_copy(update={"identified": changed.identified.without(*by_hand)})
     if entry.name != "harmonic":
         return Choice(entry, recorded, changed, asked, parameters_of(record, entry, own), given)
-    from protocols.harmonic.parameters import HarmonicParameters
-    from protocols.harmonic.reanalysis import HarmonicFollower, HarmonicSettings
-
     settings = validated(HarmonicSettings, own, named)
     parameters = HarmonicParameters.model_validate(asked.model_dump())
 
@@ -87,11 +100,10 @@ def choice_of(record: "Record", changes: Sequence[str], config: Path | None) -> 
 
 
 def listed(choice: Choice) -> str:
-    """Every setting that can be changed, with its value and unit."""
-    from bench.cli.predict_text import aligned
+    """Every setting that can be changed: value as it is now, unit, and what it is."""
     from bench.config.declared import at, keys
 
-    rows = [["KEY", "NOW", "UNIT"], ["", "", ""]]
+    rows = [("KEY", "NOW", "UNIT", "MEANING")]
     groups: list[tuple[str, Parameters]] = [("", choice.settings)]
     groups += [(f"{name}.", getattr(choice.changed, name)) for name in SECTIONS]
     for prefix, group in groups:
@@ -99,9 +111,23 @@ def listed(choice: Choice) -> str:
             path = key.split(".")
             entry = at(type(group), tuple(path))
             if entry is not None and entry.group is None:
-                value = reduce(getattr, path, group)
-                rows.append([f"{prefix}{key}", json.dumps(value, default=str), entry.unit])
-    return aligned([[row[k] for row in rows] for k in range(3)])
+                value = json.dumps(reduce(getattr, path, group), default=str)
+                rows.append((f"{prefix}{key}", value, entry.unit, entry.description))
+    widths = [max(len(row[k]) for row in rows) for k in range(3)]
+    return "\n".join(
+        f"{key:{widths[0]}}  {value:>{widths[1]}}  {unit:{widths[2]}}  {meaning}" for key, value, unit, meaning in rows
+    )
+
+
+def _require_known(own: Mapping[str, Any], kind: type[Parameters]) -> None:
+    """Raise InvalidInput for a setting that is none of the protocol's, with all that there are."""
+    for key, value in own.items():
+        if key not in kind.model_fields:
+            near = get_close_matches(key, kind.model_fields, n=1)
+            nearest = f"the nearest is {near[0]}; " if near else ""
+            tables = ", ".join(f"{name}.KEY" for name in SECTIONS)
+            known = ", ".join(kind.model_fields)
+            raise InvalidInput(f"--set {key}", value, f"{nearest}the keys are {known}, and {tables}: {LIST}")
 
 
 def _from_file(config: Path, data: Mapping[str, Any]) -> dict[str, Any]:
@@ -109,7 +135,7 @@ def _from_file(config: Path, data: Mapping[str, Any]) -> dict[str, Any]:
     from bench.config.toml import read_configuration
 
     other = read_configuration(config).model_dump(mode="json")
-    return {name: other[name] for name in SECTIONS if other[name] != data[name]}
+    return {name: other[name] for name in (*SECTIONS, "identified") if other[name] != data[name]}
 
 
 def _value(text: str) -> Any:

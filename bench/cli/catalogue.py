@@ -5,9 +5,13 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TextIO
 
+from protocols.coupling_stiffness.parameters import CouplingStiffnessParameters
 from protocols.earthquake.parameters import EarthquakeParameters
+from protocols.free_rocking.parameters import FreeRockingParameters
+from protocols.free_vibration.parameters import FreeVibrationParameters
 from protocols.harmonic.parameters import HarmonicParameters
 from protocols.identify.parameters import IdentifyParameters
+from protocols.laser_calibration.parameters import LaserCalibrationParameters
 from sim.parameters import Parameters
 
 if TYPE_CHECKING:
@@ -64,6 +68,30 @@ def _earthquake(parameters: EarthquakeParameters) -> "Experiment":
     return EarthquakeCampaign(parameters)
 
 
+def _free_vibration(parameters: FreeVibrationParameters) -> "Experiment":
+    from protocols.free_vibration.experiment import FreeVibration
+
+    return FreeVibration(parameters)
+
+
+def _coupling_stiffness(parameters: CouplingStiffnessParameters) -> "Experiment":
+    from protocols.coupling_stiffness.experiment import CouplingStiffness
+
+    return CouplingStiffness(parameters)
+
+
+def _free_rocking(parameters: FreeRockingParameters) -> "Experiment":
+    from protocols.free_rocking.experiment import FreeRockingTest
+
+    return FreeRockingTest(parameters)
+
+
+def _laser_calibration(parameters: LaserCalibrationParameters) -> "Experiment":
+    from protocols.laser_calibration.experiment import LasersCalibrated
+
+    return LasersCalibrated(parameters)
+
+
 CATALOGUE = (
     Entry(
         name="harmonic",
@@ -100,5 +128,52 @@ CATALOGUE = (
         parameters=EarthquakeParameters,
         campaign=_earthquake,
         positional="records",
+    ),
+    Entry(
+        name="free-vibration",
+        summary="Free decay of the bare frame: stiffness and damping with their covariance, given the weighed masses.",
+        details=(
+            "A short pulse of the table, or a hand on a locked table, sets the bare frame ringing. The exact response "
+            "to the measured motion of the table is fitted to both lasers, several times. The result, specimen.json, "
+            "is what other runs load in place of what is assumed of the specimen. Without options: five decays after "
+            "pulses, about ten minutes."
+        ),
+        parameters=FreeVibrationParameters,
+        campaign=_free_vibration,
+    ),
+    Entry(
+        name="coupling-stiffness",
+        summary="Stiffness of mounted springs, from the shift of the frame's modes with the block held.",
+        details=(
+            "Decays of the bare frame, then with each spring mounted and its block clamped to the table: the spring "
+            "adds to the stiffness of the first storey. Its stiffness is the difference, and beta as mounted follows. "
+            "The result, specimen.json, is what other runs load."
+        ),
+        parameters=CouplingStiffnessParameters,
+        campaign=_coupling_stiffness,
+    ),
+    Entry(
+        name="free-rocking",
+        summary="Free rocking of the block: restitution of its impacts, measured over theoretical.",
+        details=(
+            "The stand-alone block is tilted by hand and let go on a locked table, a laser on its face, several times. "
+            "The exact nonlinear motion is fitted to each recording, and the sizes of the swings tell the restitution "
+            "again, impact by impact. The result, specimen.json, is what other runs load. Nothing is driven. Without "
+            "options: three tilts to either side, about five minutes."
+        ),
+        parameters=FreeRockingParameters,
+        campaign=_free_rocking,
+    ),
+    Entry(
+        name="laser-calibration",
+        summary="Calibrate both lasers, and the table's sensors, against one slow motion with the frame locked.",
+        details=(
+            "The storeys are clamped to the table, which moves slowly over the range that the tests see. Scale, smooth "
+            "linearity error and delay of each laser follow, and how far the two agree. The result, "
+            "laser_calibration.json, is what `laser_calibration` in the configuration of other runs names. Without "
+            "options: six passes of 50 mm, about two minutes."
+        ),
+        parameters=LaserCalibrationParameters,
+        campaign=_laser_calibration,
     ),
 )

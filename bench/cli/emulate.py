@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import App, Parameter
 
-from bench.cli.inputs import configuration_from
+from bench.cli.inputs import Seed, configuration_from
 from sim.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -45,9 +45,7 @@ def emulate(
             show_default="as the simulation's",
         ),
     ] = None,
-    seed: Annotated[
-        str | None, Parameter(metavar="INT", help="Seed of the simulation, in place of the configuration's.")
-    ] = None,
+    seed: Seed = None,
     clock_error: Annotated[
         tuple[float, float, float] | None,
         Parameter(

@@ -5,12 +5,13 @@ from typing import Annotated, Literal
 
 from cyclopts import App, Parameter
 
-from bench.cli.refusal import tell
+from bench.cli.prose import prose
+from bench.cli.refusal import tell, warn
 
 
 def export_app() -> App:
     """`rockbench export`."""
-    app = App(name="export", version_flags=())
+    app = App(name="export", help=prose(export), version_flags=())
     app.default(export)
     return app
 
@@ -41,8 +42,9 @@ def export(
     """Write a recorded campaign for other programs: one file per run with every channel and the drive, names and units
     kept, and the tables of results beside them.
 
-    What is no measurement is NaN. The exit code is 0 when everything was written, 1 when the disk failed, 2 when
-    something was refused; nothing is left behind then.
+    What is no measurement is NaN. Every dataset is held against its checksum; where one fails, that is told, and the
+    folder gets a file DAMAGED.txt that names it. The exit code is 0 when everything was written, 1 when the disk
+    failed, 2 when something was refused; nothing is left behind then.
     """
     from bench.export.folder import export as write
     from bench.record.reader import open_record
@@ -50,13 +52,15 @@ def export(
     out = out or file.with_name(f"{file.stem}-{to}")
     try:
         with open_record(file) as record:
-            written = write(record, file, to, out, raw=raw)
+            written, integrity = write(record, file, to, out, raw=raw)
     except OSError as error:
         tell(f"{out} could not be written ({error.strerror or error}): see to the disk")
         return 1
     except KeyboardInterrupt:
         tell("the export was interrupted; nothing was left behind")
         return 130
+    if integrity.failing:
+        warn(f"{file}: {integrity}")
     size = sum(each.stat().st_size for each in written)
     print(f"{len(written)} files, {size / 1e6:.1f} MB, are in {out}")
     return 0

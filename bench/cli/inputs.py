@@ -2,7 +2,9 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+
+from cyclopts import Parameter
 
 from bench.cli.flags import flag, given
 from bench.config.validation import dotted, validated
@@ -13,6 +15,16 @@ if TYPE_CHECKING:
     from bench.config.model import BenchConfiguration
 
 P = TypeVar("P", bound=Parameters)
+
+Seed = Annotated[str | None, Parameter(metavar="INT", help="Seed of the simulation, in place of the configuration's.")]
+SpecimenFile = Annotated[
+    Path | None,
+    Parameter(
+        metavar="FILE",
+        help="Specimen file (JSON) of what has been identified.",
+        show_default="the configuration's specimen_file",
+    ),
+]
 
 
 def parameters_from(model: type[P], arguments: Mapping[str, Any], file: Path | None) -> P:
@@ -30,12 +42,18 @@ def parameters_from(model: type[P], arguments: Mapping[str, Any], file: Path | N
     return validated(model, {**table, **flags}, named)
 
 
-def configuration_from(file: Path | None, seed: str | None) -> "BenchConfiguration":
-    """The configuration of the bench, with the simulation's seed replaced by `seed` if given. Raises InvalidInput."""
+def configuration_from(file: Path | None, seed: str | None, specimen: Path | None = None) -> "BenchConfiguration":
+    """The configuration of the bench, with the simulation's `seed` and what the file `specimen` says is identified in
+    place of its own, where they are given. Raises InvalidInput.
+    """
     from bench.config.model import BenchConfiguration, Simulation
-    from bench.config.toml import read_configuration
+    from bench.config.toml import read_configuration, with_identified
 
     configuration = read_configuration(file) if file is not None else BenchConfiguration()
+    if specimen is not None:
+        from bench.config.specimen_file import read_specimen
+
+        configuration = with_identified(configuration, read_specimen(specimen))
     if seed is None:
         return configuration
     if configuration.backend != "simulated":

@@ -1,5 +1,6 @@
 """The command `rockbench`."""
 
+import os
 import sys
 from collections.abc import Sequence
 from importlib.metadata import version
@@ -17,6 +18,7 @@ from bench.cli.export import export_app
 from bench.cli.file import file_app
 from bench.cli.paper import paper_app
 from bench.cli.predict import predict_app
+from bench.cli.queue import queue_app
 from bench.cli.records import records_app
 from bench.cli.refusal import tell
 from bench.cli.replay import replay_app
@@ -32,7 +34,14 @@ def run() -> None:
         if isinstance(stream, TextIOWrapper):
             # a console that cannot show a character shows another, and the run goes on
             stream.reconfigure(errors="replace")
-    sys.exit(main())
+    try:
+        code = main()
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # the reader, such as `head`, has seen enough; what is still held back has nowhere to go at exit either
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = 1
+    sys.exit(code)
 
 
 def main(argv: Sequence[str] | None = None, start: Start | None = None) -> int:
@@ -53,6 +62,7 @@ def main(argv: Sequence[str] | None = None, start: Start | None = None) -> int:
     )
     app.command(run_app(start))
     app.command(check_app(start))
+    app.command(queue_app(start))
     app.command(gui_app())
     app.command(devices_app())
     app.command(emulate_app())

@@ -25,6 +25,16 @@ class Options:
             show_default="the paper's specimen on the simulated bench",
         ),
     ] = None
+    specimen: Annotated[
+        Path | None,
+        Parameter(
+            name="--specimen",
+            metavar="FILE",
+            group=_RUN,
+            help="Specimen file (JSON) of what has been identified: it goes before what the configuration assumes.",
+            show_default="the configuration's specimen_file",
+        ),
+    ] = None
     protocol_file: Annotated[
         Path | None,
         Parameter(
@@ -64,6 +74,15 @@ class Options:
             help="Something to remember; kept in the data file. May be given several times.",
         ),
     ] = ()
+    queue: Annotated[
+        Path | None,
+        Parameter(
+            name="--queue",
+            metavar="FILE",
+            group=_RUN,
+            help="Do not run it: check the plan and add it at the end of this queue, which `rockbench queue` runs.",
+        ),
+    ] = None
     dry_run: Annotated[
         bool,
         Parameter(

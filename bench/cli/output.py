@@ -4,8 +4,20 @@ import tempfile
 from collections.abc import Iterable
 from datetime import datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from bench.results import FILE, SUMMARY
 from sim.errors import InvalidInput
+
+if TYPE_CHECKING:
+    from bench.session import Experiment
+
+
+def result_names(experiment: "Experiment") -> tuple[str, ...]:
+    """File names of everything that a run of `experiment` leaves in its folder."""
+    kept = getattr(experiment, "kept_name", None)
+    further = getattr(experiment, "further_figures", ())
+    return (FILE, experiment.figure_name, *further, SUMMARY, *([kept] if kept else []))
 
 
 def default_folder(protocol: str, now: datetime) -> Path:

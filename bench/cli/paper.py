@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 
 from cyclopts import App, Parameter
 
+from bench.cli.prose import prose
 from bench.cli.report import HTML, OVERWRITE, PDF, check_outputs, written
 
 BAND = "1.5:25"
@@ -15,7 +16,7 @@ Part = Literal["statements", "modes", "map", "histories", "spectra", "records", 
 
 def paper_app() -> App:
     """`rockbench paper`, a command of its own."""
-    app = App(name="paper", help="Reproduce the paper from simulation alone, statement by statement.", version_flags=())
+    app = App(name="paper", help=prose(paper), version_flags=())
     app.default(paper)
     return app
 
@@ -54,7 +55,7 @@ def paper(
         Parameter(
             name="--specimen",
             metavar="FILE",
-            help="Specimen (TOML, keys as in [specimen] of a configuration).",
+            help="Specimen: TOML with keys as in [specimen] of a configuration, or a specimen file (.json).",
             show_default="the paper's specimen",
         ),
     ] = None,

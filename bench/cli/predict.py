@@ -22,12 +22,13 @@ from sim.errors import InvalidInput
 
 if TYPE_CHECKING:
     from bench.cli.predict_output import Result
+    from sim.knowledge import SpecimenKnowledge
     from sim.specimen import Specimen
 
 MOST_HISTORIES = 6
 """Points that a figure of histories can show."""
 
-Make = Callable[[Any, "Specimen"], "Result"]
+Make = Callable[[Any, "Specimen", "SpecimenKnowledge"], "Result"]
 
 
 @dataclass(frozen=True)
@@ -69,52 +70,53 @@ def _command(prediction: Prediction) -> Callable[..., int]:
 
 
 def _perform(prediction: Prediction, arguments: dict[str, Any]) -> int:
-    from bench.cli.predict_inputs import request_from, specimen_from
+    from bench.cli.predict_inputs import known_from, request_from, specimen_from
     from bench.cli.predict_output import carried_out, check_files
 
     options = ResultOptions(**taken(arguments, ResultOptions))
     chosen = SpecimenOptions(**taken(arguments, SpecimenOptions))
     request = request_from(prediction.request, arguments)
-    specimen = specimen_from(chosen.specimen, chosen.distance, chosen.restitution_factor)
-    if specimen.beta is not None and arguments.get("beta") is None and not isinstance(request, MapRequest):
-        request = request.model_copy(update={"beta": (specimen.beta,)})
+    known = known_from(chosen.specimen, chosen.restitution_factor)
+    specimen = specimen_from(chosen.specimen, chosen.distance, chosen.restitution_factor, known=known)
+    if specimen.label is not None and arguments.get("beta") is None and not isinstance(request, MapRequest):
+        request = request.model_copy(update={"beta": (specimen.label,)})
     check_files(options)
     if options.plot is not None and prediction.drawable is not None and isinstance(request, SineRequest):
         points = len(request.omega) * len(request.beta)
         if points > prediction.drawable:
             allowed = f"at most {prediction.drawable} points fit in this figure; ask for fewer"
             raise InvalidInput("--plot", f"{points} points", allowed)
-    return carried_out(lambda: prediction.make(request, specimen), options)
+    return carried_out(lambda: prediction.make(request, specimen, known), options)
 
 
-def _modes(request: ModesRequest, specimen: "Specimen") -> "Result":
+def _modes(request: ModesRequest, specimen: "Specimen", _known: "SpecimenKnowledge") -> "Result":
     from bench.cli.predict_modes import modes
 
     return modes(request, specimen)
 
 
-def _history(request: HistoryRequest, specimen: "Specimen") -> "Result":
+def _history(request: HistoryRequest, specimen: "Specimen", _known: "SpecimenKnowledge") -> "Result":
     from bench.cli.predict_history import history
 
     return history(request, specimen)
 
 
-def _steady(request: SteadyRequest, specimen: "Specimen") -> "Result":
+def _steady(request: SteadyRequest, specimen: "Specimen", known: "SpecimenKnowledge") -> "Result":
     from bench.cli.predict_gain import steady
 
-    return steady(request, specimen)
+    return steady(request, specimen, known)
 
 
-def _spectrum(request: SpectrumRequest, specimen: "Specimen") -> "Result":
+def _spectrum(request: SpectrumRequest, specimen: "Specimen", known: "SpecimenKnowledge") -> "Result":
     from bench.cli.predict_gain import spectrum
 
-    return spectrum(request, specimen)
+    return spectrum(request, specimen, known)
 
 
-def _map(request: MapRequest, specimen: "Specimen") -> "Result":
+def _map(request: MapRequest, specimen: "Specimen", known: "SpecimenKnowledge") -> "Result":
     from bench.cli.predict_gain import gain_map
 
-    return gain_map(request, specimen)
+    return gain_map(request, specimen, known)
 
 
 PREDICTIONS = (
@@ -141,7 +143,8 @@ PREDICTIONS = (
         _steady,
         "Steady motions at single points: gain coefficients, peaks, impacts, Floquet multipliers.",
         "Motions of the drive's period are solved for, not waited for. Up to two exist at a point: the block rocks, or "
-        "it never lifts. Each is an entry. The figure shows two periods of each.",
+        "it never lifts. Each is an entry, its alpha_2 with a band: expanded uncertainty (k = 2) to first order, or "
+        "95 % of a Monte Carlo with --members. The figure shows two periods of each.",
         drawable=MOST_HISTORIES,
     ),
     Prediction(
@@ -149,7 +152,7 @@ PREDICTIONS = (
         SpectrumRequest,
         _spectrum,
         "Gain spectra: alpha_1 and alpha_2 against frequency for each stiffness, both layers.",
-        "The figure is like the paper's Fig. 6, without measurements.",
+        "Every alpha_2 has a band, as in `steady`. The figure is like the paper's Fig. 6, without measurements.",
     ),
     Prediction(
         "map",

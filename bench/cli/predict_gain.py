@@ -9,11 +9,12 @@ import numpy as np
 from bench.cli.predict_output import Result
 from bench.cli.predict_text import extremes, text_table
 from bench.prediction.files import provenance, rows_of
-from bench.prediction.requests import HistoryRequest, MapRequest, SineRequest, SpectrumRequest, SteadyRequest
+from bench.prediction.requests import GainRequest, HistoryRequest, MapRequest, SpectrumRequest, SteadyRequest
 from bench.prediction.steady import predict_points, predict_spectra, steady_table
 from bench.record.tables import Table, arrays
 from sim.errors import RockbenchError
 from sim.gain import GainPrediction
+from sim.knowledge import SpecimenKnowledge
 from sim.specimen import Specimen
 
 if TYPE_CHECKING:
@@ -27,16 +28,19 @@ _SHOWN = {
     "layer": "layer",
     "alpha_1": "alpha_1",
     "alpha_2": "alpha_2",
+    "alpha_2_low": "from",
+    "alpha_2_high": "to",
     "theta_max_rad": "max theta",
     "impacts_per_period": "impacts",
     "floquet_modulus": "Floquet",
     "stable": "stable",
+    "status": "status",
 }
 
 
-def steady(request: SteadyRequest, specimen: Specimen) -> Result:
+def steady(request: SteadyRequest, specimen: Specimen, known: SpecimenKnowledge) -> Result:
     """Steady motions at single points."""
-    table = _table(request, specimen, predict_points(specimen, request))
+    table = _table(request, specimen, known, predict_points(specimen, request))
 
     def figure() -> "Figure":
         from bench.cli.predict_history import figure_of
@@ -45,13 +49,13 @@ def steady(request: SteadyRequest, specimen: Specimen) -> Result:
         shared = request.model_dump(include={"omega", "beta", "amplitude_factor"})
         return figure_of(histories(specimen, HistoryRequest(**shared, steady=True, periods=2)))
 
-    shown = {**_SHOWN, "status": "status"} if "status" in table else _SHOWN
-    return _result("steady motions under a sine", request, specimen, table, text_table(table, shown), figure)
+    shown = {name: heading for name, heading in _SHOWN.items() if name in table}
+    return _result("steady motions under a sine", request, specimen, known, table, text_table(table, shown), figure)
 
 
-def spectrum(request: SpectrumRequest, specimen: Specimen) -> Result:
+def spectrum(request: SpectrumRequest, specimen: Specimen, known: SpecimenKnowledge) -> Result:
     """Gain spectra, one for each stiffness."""
-    table = _table(request, specimen, predict_spectra(specimen, request))
+    table = _table(request, specimen, known, predict_spectra(specimen, request))
 
     def figure() -> "Figure":
         from bench.report.figure import gain_spectra
@@ -59,18 +63,18 @@ def spectrum(request: SpectrumRequest, specimen: Specimen) -> Result:
         columns = arrays(table)
         return gain_spectra([], {**columns, "omega": columns["omega_rad_s"]})
 
-    return _result("gain spectra", request, specimen, table, extremes(table), figure)
+    return _result("gain spectra", request, specimen, known, table, extremes(table), figure)
 
 
-def gain_map(request: MapRequest, specimen: Specimen) -> Result:
+def gain_map(request: MapRequest, specimen: Specimen, known: SpecimenKnowledge) -> Result:
     """Gain maps."""
     from bench.prediction.gain_map import grids, map_table, resting_margin
 
     if request.solver == "taylor":
-        table = map_table(specimen, request)
+        table = map_table(specimen, request, known if request.band or request.members else None)
         _tell_lost(len(request.omega) * len(request.beta) - int((table["layer"].values == "rocking").sum()))
     else:
-        table = _table(request, specimen, predict_spectra(specimen, request), request.scheduler)
+        table = _table(request, specimen, known, predict_spectra(specimen, request), request.scheduler)
 
     def figure() -> "Figure":
         from bench.report.map_figure import Layer, map_figure
@@ -84,15 +88,19 @@ def gain_map(request: MapRequest, specimen: Specimen) -> Result:
         axes = np.sort(request.omega), np.sort(request.beta)
         return map_figure(*axes, layer("rocking"), layer("resting"), resting_margin(specimen, request))
 
-    return _result("gain maps", request, specimen, table, extremes(table), figure)
+    return _result("gain maps", request, specimen, known, table, extremes(table), figure)
 
 
 def _table(
-    request: SineRequest, specimen: Specimen, predictions: list[GainPrediction], scheduler: str | None = None
+    request: GainRequest,
+    specimen: Specimen,
+    known: SpecimenKnowledge,
+    predictions: list[GainPrediction],
+    scheduler: str | None = None,
 ) -> Table:
     _tell_lost(sum(prediction.rocking is None for prediction in predictions))
     if request.solver == "taylor":
-        return steady_table(predictions)
+        return steady_table(predictions, known=known, members=request.members)
     from bench.prediction.timed import timed_gains
 
     return steady_table(predictions, timed_gains(specimen, request, predictions, scheduler))
@@ -104,7 +112,13 @@ def _tell_lost(points: int) -> None:
 
 
 def _result(
-    title: str, request: SineRequest, specimen: Specimen, table: Table, text: str, figure: "Callable[[], Figure]"
+    title: str,
+    request: GainRequest,
+    specimen: Specimen,
+    known: SpecimenKnowledge,
+    table: Table,
+    text: str,
+    figure: "Callable[[], Figure]",
 ) -> Result:
     exists = bool(table["layer"].values.size)
 
@@ -118,6 +132,6 @@ def _result(
         tables={"points": table},
         content={"points": rows_of(table)},
         text=text if exists else "no steady motion was found",
-        metadata=provenance(request, specimen),
+        metadata=provenance(request, specimen, known),
         figure=drawn,
     )

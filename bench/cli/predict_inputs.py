@@ -10,12 +10,17 @@ from sim.errors import InvalidInput
 from sim.parameters import Parameters
 
 if TYPE_CHECKING:
+    from bench.config.model import BenchConfiguration
+    from sim.knowledge import SpecimenKnowledge
     from sim.specimen import Specimen
 
 P = TypeVar("P", bound=Parameters)
 
 MOST_VALUES, MOST_POINTS = 10_000, 1_000_000
 """Of a range, and of all ranges together: more is a slip of the finger."""
+
+SPECIMEN_FILE = ".json"
+"""Ending of a specimen file: what has been identified, as opposed to what is assumed."""
 
 _AXES = ("omega", "beta", "corner")
 
@@ -58,15 +63,38 @@ def expanded(item: str, tokens: Sequence[str]) -> list[str | float]:
     return values
 
 
+def known_from(
+    file: Path | None, restitution_factor: str | None, configuration: "BenchConfiguration | None" = None
+) -> "SpecimenKnowledge":
+    """How well the specimen is known: from a specimen file, else from the configuration. Raises InvalidInput."""
+    from bench.config.model import BenchConfiguration
+    from bench.config.specimen_file import read_specimen
+    from sim.identified import Identified
+
+    known = (configuration or BenchConfiguration()).known
+    if file is not None:
+        identified = read_specimen(file) if file.suffix == SPECIMEN_FILE else Identified()
+        known = known.model_copy(update={"identified": identified})
+    if restitution_factor is None:
+        return known
+    return known.model_copy(update={"identified": known.identified.without("restitution_factor")})
+
+
 def specimen_from(
-    file: Path | None, distance: str | None, restitution_factor: str | None, assumed: "Specimen | None" = None
+    file: Path | None,
+    distance: str | None,
+    restitution_factor: str | None,
+    assumed: "Specimen | None" = None,
+    known: "SpecimenKnowledge | None" = None,
 ) -> "Specimen":
-    """The specimen: flags win over the file, the file over the `assumed` one or the paper's. Raises InvalidInput."""
+    """The specimen: flags win over the file, the file over the `assumed` one or the paper's; what is identified, as
+    `known_from` has it, goes before what is assumed. Raises InvalidInput.
+    """
     from bench.config.toml import read_table
     from sim.specimen import Block, Specimen
 
     table = assumed.model_dump(mode="json") if assumed is not None else {}
-    if file is not None:
+    if file is not None and file.suffix != SPECIMEN_FILE:
         table = read_table(file, "--specimen")
     if distance is not None:
         table["d"] = given(Specimen, {"d": distance})["d"]
@@ -83,7 +111,9 @@ def specimen_from(
             return _OF_SPECIMEN[path]
         return f"{file.name}: {dotted(path)}" if file is not None else dotted(path)
 
-    return validated(Specimen, table, named)
+    specimen = validated(Specimen, table, named)
+    identified = known_from(file, restitution_factor).identified if known is None else known.identified
+    return identified.applied(specimen)
 
 
 def _range(item: str, token: str) -> tuple[float, ...]:

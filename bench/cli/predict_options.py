@@ -27,7 +27,8 @@ class SpecimenOptions:
             name="--specimen",
             metavar="FILE",
             group=_SPECIMEN,
-            help="Specimen (TOML, keys as in [specimen] of a configuration); flags win over the file.",
+            help="Specimen: TOML with keys as in [specimen] of a configuration, or a specimen file (.json) of what has "
+            "been identified; flags win over the file.",
             show_default="the paper's specimen",
         ),
     ] = None

@@ -18,9 +18,10 @@ if TYPE_CHECKING:
     from bench.accelerograms.accelerogram import Accelerogram
     from bench.cli.predict_output import Result
     from bench.config.model import BenchConfiguration
+    from sim.knowledge import SpecimenKnowledge
     from sim.specimen import Specimen
 
-Make = Callable[[Any, "Specimen", "Sequence[Accelerogram]", "BenchConfiguration"], "Result"]
+Make = Callable[[Any, "Specimen", "SpecimenKnowledge", "Sequence[Accelerogram]", "BenchConfiguration"], "Result"]
 
 _FILES = Argument(
     "files",
@@ -82,20 +83,22 @@ def records_command(prediction: RecordsPrediction) -> Callable[..., int]:
 
 def _perform(prediction: RecordsPrediction, files: Sequence[str], arguments: dict[str, Any]) -> int:
     from bench.cli.inputs import configuration_from
-    from bench.cli.predict_inputs import request_from, specimen_from
+    from bench.cli.predict_inputs import known_from, request_from, specimen_from
     from bench.cli.predict_output import carried_out, check_files
 
     options = ResultOptions(**taken(arguments, ResultOptions))
     chosen = SpecimenOptions(**taken(arguments, SpecimenOptions))
     configuration = configuration_from(arguments.pop("config", None), None)
     request = request_from(prediction.request, arguments)
-    specimen = specimen_from(chosen.specimen, chosen.distance, chosen.restitution_factor, configuration.specimen)
+    known = known_from(chosen.specimen, chosen.restitution_factor, configuration)
+    assumed = configuration.specimen
+    specimen = specimen_from(chosen.specimen, chosen.distance, chosen.restitution_factor, assumed, known)
     check_files(options)
     records = records_from(files)
     if options.plot is not None and len(records) > prediction.drawable:
         allowed = f"at most {prediction.drawable} fit in this figure; give fewer"
         raise InvalidInput("--plot", f"{len(records)} records", allowed)
-    return carried_out(lambda: prediction.make(request, specimen, records, configuration), options)
+    return carried_out(lambda: prediction.make(request, specimen, known, records, configuration), options)
 
 
 def records_from(files: Sequence[str]) -> "tuple[Accelerogram, ...]":
@@ -110,17 +113,19 @@ def records_from(files: Sequence[str]) -> "tuple[Accelerogram, ...]":
 def _seismic(
     request: SeismicRequest,
     specimen: "Specimen",
+    known: "SpecimenKnowledge",
     records: "Sequence[Accelerogram]",
     configuration: "BenchConfiguration",
 ) -> "Result":
     from bench.cli.predict_seismic import seismic
 
-    return seismic(request, specimen, records, configuration)
+    return seismic(request, specimen, known, records, configuration)
 
 
 def _band_study(
     request: BandStudyRequest,
     specimen: "Specimen",
+    _known: "SpecimenKnowledge",
     records: "Sequence[Accelerogram]",
     configuration: "BenchConfiguration",
 ) -> "Result":

@@ -18,6 +18,7 @@ from bench.prediction.seismic_tables import gains_table, motions_table
 from bench.record.tables import Column, Table
 from bench.report.band_figure import BandCurve, band_figure
 from bench.report.seismic_figure import GainCurve, seismic_figure
+from sim.knowledge import SpecimenKnowledge
 from sim.specimen import Specimen
 
 if TYPE_CHECKING:
@@ -48,10 +49,14 @@ _STUDY_SHOWN = {
 
 
 def seismic(
-    request: SeismicRequest, specimen: Specimen, records: Sequence[Accelerogram], configuration: BenchConfiguration
+    request: SeismicRequest,
+    specimen: Specimen,
+    known: SpecimenKnowledge,
+    records: Sequence[Accelerogram],
+    configuration: BenchConfiguration,
 ) -> Result:
     """Gain curves, one for each record."""
-    curves = seismic_curves(specimen, records, request, configuration)
+    curves = seismic_curves(specimen, records, request, configuration, known)
     band = band_of(request.table_band, configuration)
     words = "none, the records as they are" if band is None else f"{band[0]:g} to {band[1]:g} Hz"
     drawn = [
@@ -61,6 +66,7 @@ def seismic(
             alpha_1=_known([gain.alpha_1 for gain in curve.gains]),
             alpha_2=_known([gain.alpha_2 for gain in curve.gains]),
             toppled=np.array([gain.motion.overturned is not None for gain in curve.gains]),
+            band=None if curve.bands is None else (curve.bands.low, curve.bands.high),
         )
         for curve in curves
     ]
@@ -76,6 +82,7 @@ def seismic(
         words,
         text_table(summary, _SHOWN),
         lambda: seismic_figure(drawn, words),
+        known if request.members else None,
     )
 
 
@@ -116,6 +123,7 @@ def _result(
     band: str,
     text: str,
     figure: "Callable[[], Figure]",
+    known: SpecimenKnowledge | None = None,
 ) -> Result:
     gains, motions = gains_table(curves), motions_table(curves)
     peak = request.peak_factor * specimen.uplift_acceleration
@@ -125,7 +133,7 @@ def _result(
         tables={"gains": gains, "motions": motions},
         content={"table_band": band, "motions": rows_of(motions), "gains": rows_of(gains)},
         text=f"{conditions}\n\n{text}",
-        metadata={**provenance(request, specimen), "table_band": band},
+        metadata={**provenance(request, specimen, known), "table_band": band},
         figure=figure,
     )
 

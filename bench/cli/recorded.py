@@ -11,6 +11,7 @@ from sim.parameters import Parameters
 
 if TYPE_CHECKING:
     from bench.record.reader import Record
+    from bench.session import Experiment
 
 
 def entry_of(record: "Record") -> Entry:
@@ -20,6 +21,24 @@ def entry_of(record: "Record") -> Entry:
     if name not in entries:
         raise InvalidInput("protocol of the record", name, "this software knows " + ", ".join(entries))
     return entries[name]
+
+
+def experiment_of(record: "Record", entry: Entry, parameters: Parameters) -> "Experiment":
+    """The experiment with `parameters`; what it read of other files comes from the open file."""
+    from bench.session import Sourced
+
+    experiment = entry.campaign(parameters)
+    if isinstance(experiment, Sourced):
+        experiment.restore(record.tables)
+    return experiment
+
+
+def declared_parameters(record: "Record") -> type[Parameters] | None:
+    """How the parameters of the file's protocol are declared; None where this software does not have it."""
+    try:
+        return entry_of(record).parameters
+    except InvalidInput:
+        return None
 
 
 def parameters_of(record: "Record", entry: Entry, changed: dict[str, Any] | None = None) -> Parameters:

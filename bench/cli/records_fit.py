@@ -111,7 +111,7 @@ def _perform(file: str, arguments: dict[str, Any]) -> int:
         from bench.cli.records_fit_output import content_of
         from bench.prediction.files import provenance
 
-        print(json.dumps({**content_of(fits), **provenance(request, configuration.specimen)}, allow_nan=False))
+        print(json.dumps({**content_of(fits), **provenance(request, configuration.known_specimen)}, allow_nan=False))
     else:
         from bench.cli.records_fit_output import text_of
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Parameter
 
+from bench.cli.prose import prose
 from bench.cli.refusal import tell
 from bench.cli.words import one_line
 from sim.errors import InvalidInput
@@ -24,7 +25,7 @@ MOST_TOLD = 12
 
 def replay_app() -> App:
     """`rockbench replay`."""
-    app = App(name="replay", version_flags=())
+    app = App(name="replay", help=prose(replay), version_flags=())
     app.default(replay)
     return app
 
@@ -41,13 +42,13 @@ def replay(
     """Play a recorded campaign again: its blocks through the same engine, guard, analysis and screens.
 
     The stored plan is carried out on the stored blocks, which lead it along the same path; questions are answered as
-    they were, an end that was asked for is asked for again. No device is opened. Every drive sample, journal entry and
-    result is compared with the file, which is only read.
+    they were, an end that was asked for is asked for again. No device is opened and no other file is read. Every drive
+    sample, journal entry and result is compared with the file.
 
     The exit code is 0 when everything came as recorded but for rounding, also where a recording breaks off; 1 when
     something differs, which is told; 2 when the file cannot be played; 130 after Ctrl-C.
     """
-    from bench.cli.recorded import entry_of, parameters_of
+    from bench.cli.recorded import entry_of, experiment_of, parameters_of
     from bench.record.reader import open_record
     from bench.replaying.session import replay as play
     from bench.replaying.session import stored_configuration
@@ -56,7 +57,7 @@ def replay(
     with open_record(file) as record:
         entry = entry_of(record)
         configuration = stored_configuration(record)
-        experiment = entry.campaign(parameters_of(record, entry))
+        experiment = experiment_of(record, entry, parameters_of(record, entry))
         try:
             with entry.progress(sys.stderr, False) as progress, redirect_stdout(sys.stderr):
                 replayed = play(record, experiment, configuration, clock=clock, subscribers=[progress])
@@ -108,7 +109,7 @@ def _text(replayed: "Replayed", table: str) -> str:
 def _software(replayed: "Replayed") -> str:
     if replayed.changed:
         return f"Since the recording: {'; '.join(replayed.changed)}"
-    return "The versions of the software are those of the recording"
+    return "The software is that of the recording: the git hash and every version are the same"
 
 
 def _first(replayed: "Replayed") -> str:

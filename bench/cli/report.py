@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, Parameter
 
-from bench.cli.refusal import tell
+from bench.cli.prose import prose
+from bench.cli.refusal import tell, warn
 from sim.errors import InvalidInput, RockbenchError
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ OVERWRITE = Annotated[
 
 def report_app() -> App:
     """`rockbench report`, a command of its own."""
-    app = App(name="report", help="Make a report of a campaign from its data file.", version_flags=())
+    app = App(name="report", help=prose(report), version_flags=())
     app.default(report)
     return app
 
@@ -38,10 +39,12 @@ def report(
     """Make a report of a campaign from its data file.
 
     One self-contained page: what was tested on what, figures like the paper's Fig. 3 to 9 from this file's data, tables
-    with uncertainties, measured against predicted, limits and warnings, provenance. Without --html and --pdf: HTML
-    beside FILE, with the ending .report.html. The exit code is 0 when it was made, 1 when it could not be written, 2
+    with uncertainties, measured against predicted, limits and warnings, provenance. Every dataset is held against its
+    checksum first; the report begins with what fails. Without --html and --pdf: HTML beside FILE, with the ending
+    .report.html. The exit code is 0 when it was made, 1 when it could not be written, 2
     when something was refused before. Files that exist are kept unless --overwrite is given.
     """
+    from bench.cli.recorded import declared_parameters
     from bench.publication.campaign import Campaign
     from bench.publication.report import campaign_report
     from bench.record.reader import open_record
@@ -50,7 +53,11 @@ def report(
         html = file.with_suffix(".report.html")
     check_outputs(html, pdf, overwrite=overwrite)
     with open_record(file) as record:
-        document = campaign_report(Campaign(file, record))
+        campaign = Campaign(file, record, declared_parameters(record))
+        document = campaign_report(campaign)
+        integrity = campaign.integrity
+    if integrity.failing:
+        warn(f"{file}: {integrity}")
     return written(document, html, pdf, overwrite=overwrite)
 
 

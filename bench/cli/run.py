@@ -2,7 +2,7 @@
 
 import json
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import redirect_stdout
 from dataclasses import fields
 from datetime import datetime
@@ -17,7 +17,6 @@ from bench.cli.catalogue import CATALOGUE, Entry
 from bench.cli.flags import arguments_of
 from bench.cli.options import Options, arguments_of_options
 from bench.cli.refusal import tell
-from bench.results import FILE, SUMMARY
 from sim.errors import InvalidInput, RockbenchError
 
 if TYPE_CHECKING:
@@ -82,17 +81,17 @@ def command_of(entry: Entry, start: Start | None) -> Callable[..., int]:
 
 def _perform(entry: Entry, arguments: dict[str, Any], options: Options, start: Start | None) -> int:
     from bench.cli.inputs import configuration_from, parameters_from
-    from bench.cli.interrupt import interruptible
-    from bench.cli.operator import AtTheConsole, choose
-    from bench.cli.output import check_folder, default_folder
-    from bench.engine.requests import Requests
+    from bench.cli.operator import choose
+    from bench.cli.output import check_folder, default_folder, result_names
 
     experiment = entry.campaign(parameters_from(entry.parameters, arguments, options.protocol_file))
-    configuration = configuration_from(options.config, options.seed)
+    configuration = configuration_from(options.config, options.seed, options.specimen)
     out = options.out or default_folder(entry.name, datetime.now())
-    kept = getattr(experiment, "kept_name", None)
-    further = getattr(experiment, "further_figures", ())
-    check_folder(out, (FILE, experiment.figure_name, *further, SUMMARY, *([kept] if kept else [])))
+    check_folder(out, result_names(experiment))
+    if options.queue is not None:
+        from bench.cli.queueing import add_to_queue
+
+        return add_to_queue(options.queue, entry, experiment, configuration, options)
     if options.dry_run:
         from bench.cli.dry_run import dry_run
 
@@ -100,11 +99,38 @@ def _perform(entry: Entry, arguments: dict[str, Any], options: Options, start: S
     operator = choose(
         serves_itself=configuration.serves_itself, yes=options.yes, ask=options.ask, terminal=sys.stdin.isatty()
     )
+    ended, interrupted = carry_out(
+        entry, experiment, configuration, out, operator, realtime=options.realtime, about=options.about, start=start
+    )
+    if isinstance(ended, Exception):
+        tell(ended)
+        return interrupted or 1
+    return _report(entry, ended, out, options.json, interrupted)
+
+
+def carry_out(
+    entry: Entry,
+    experiment: "Experiment",
+    configuration: "BenchConfiguration",
+    out: Path,
+    operator: "Operator",
+    *,
+    realtime: bool,
+    about: Mapping[str, str],
+    start: Start | None,
+) -> "tuple[SessionResult | Exception, int | None]":
+    """Run an experiment and show how it goes. Returns its end, or what it failed with, and the exit code of a signal
+    that asked for its end, or None. Raises InvalidInput when the session refuses it.
+    """
+    from bench.cli.interrupt import interruptible
+    from bench.cli.operator import AtTheConsole
+    from bench.engine.requests import Requests
+
     person = operator if isinstance(operator, AtTheConsole) else None
     if start is None:
         from bench.session import run_session
 
-        start = partial(run_session, about=options.about)
+        start = partial(run_session, about=about)
     requests = Requests()
     with (
         interruptible(requests, asking=lambda: person is not None and person.asking) as interrupts,
@@ -120,16 +146,13 @@ def _perform(entry: Entry, arguments: dict[str, Any], options: Options, start: S
                 operator=operator,
                 subscribers=[progress],
                 requests=requests,
-                realtime=options.realtime,
+                realtime=realtime,
             )
         except InvalidInput:
             raise
         except (RockbenchError, OSError) as error:
             ended = error
-    if isinstance(ended, Exception):
-        tell(ended)
-        return interrupts.exit_code or 1
-    return _report(entry, ended, out, options.json, interrupts.exit_code)
+    return ended, interrupts.exit_code
 
 
 def _report(entry: Entry, result: "SessionResult", out: Path, as_json: bool, interrupted: int | None) -> int:

@@ -5,10 +5,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from bench.cli.twin_line import twin_line
 from bench.cli.words import ABSENT, difference, gain, number, one_line, setting
 from bench.events import (
     Estimate,
     Event,
+    FitFinished,
     LimitExceeded,
     OperatorAnswered,
     OperatorAsked,
@@ -20,6 +22,7 @@ from bench.events import (
     StateChanged,
     StepStarted,
     TableIdentified,
+    TwinEstimate,
     Warned,
 )
 
@@ -126,6 +129,8 @@ def notice_of(event: Event) -> Notice | None:
             return Notice(event.time, "point", text, grave=point.get("status") == "overturned")
         case PassFinished():
             return Notice(event.time, "pass", one_line(f"{event.motion}: {event.text}"))
+        case FitFinished():
+            return Notice(event.time, "fit", one_line(f"{event.name}: {event.text}"))
         case TableIdentified():
             return Notice(event.time, "table", one_line(event.text))
         case Warned():
@@ -156,6 +161,7 @@ class Scene:
     remaining: float = float("nan")
     rows: list[Row] = field(default_factory=list[Row])
     running: Row | None = None
+    twin: str = ""
     notices: deque[Notice] = field(default_factory=lambda: deque[Notice](maxlen=NOTICES))
 
     def update(self, event: Event) -> Notice | None:
@@ -164,6 +170,9 @@ class Scene:
         match event:
             case StateChanged():
                 self.state, self.reason = event.after, one_line(event.reason)
+                self.twin = "" if event.after in (State.IDLE, State.HALTED, State.CLOSED) else self.twin
+            case TwinEstimate():
+                self.twin = twin_line(event)
             case StepStarted():
                 self.step, self.running = one_line(event.text), None
             case Progress():

@@ -7,7 +7,7 @@ from cyclopts import App, Parameter
 
 from bench.cli.catalogue import CATALOGUE
 from bench.cli.check import CHECK
-from bench.cli.inputs import configuration_from
+from bench.cli.inputs import Seed, SpecimenFile, configuration_from
 
 
 def gui_app() -> App:
@@ -27,17 +27,19 @@ def gui(
             show_default="the paper's specimen on the simulated bench, with a first minute that is guided",
         ),
     ] = None,
-    seed: Annotated[
-        str | None, Parameter(metavar="INT", help="Seed of the simulation, in place of the configuration's.")
-    ] = None,
+    seed: Seed = None,
+    specimen: SpecimenFile = None,
+    queue: Annotated[
+        Path, Parameter(metavar="FILE", help="File that keeps the queue; `rockbench queue` runs the same one.")
+    ] = Path("runs", "queue.json"),
 ) -> int:
     """Open the operator's window.
 
     Runs go on in a process of their own: a window that is closed or dies lets them ramp out. Its STOP asks the
     program; the emergency stop is the red button at the bench.
     """
-    configuration = configuration_from(config, seed)
+    configuration = configuration_from(config, seed, specimen)
 
     from bench.gui.app import open_window
 
-    return open_window(configuration, (*CATALOGUE, CHECK), config)
+    return open_window(configuration, (*CATALOGUE, CHECK), config, queue)

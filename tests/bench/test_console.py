@@ -1,3 +1,4 @@
+import dataclasses
 import re
 import threading
 import time
@@ -32,6 +33,7 @@ from bench.events import (
 from drivers.rig import Block
 from protocols.harmonic.point import HarmonicPoint, PointStatus
 from protocols.identify.point import IdentifiedBand
+from tests.bench.twin_bench import estimate
 
 NAN = float("nan")
 STEADY = HarmonicPoint(
@@ -263,3 +265,15 @@ def test_passes_and_running_gains_are_shown_and_bands_are_no_points() -> None:
         for event in (found, PointFinished(9.0, band), passed, running):
             plain(event)
     assert [line.split()[3] for line in out.getvalue().splitlines()] == ["table", "pass"]
+
+
+def test_the_twin_has_a_line_while_the_bench_is_driven() -> None:
+    said = estimate(residual=0.0031, excess=NAN, drift_peak=0.01819, drift_peak_measured=0.01822, alpha_2=NAN)
+    scene = scene_after([*CAMPAIGN, said])
+    line = line_with(rendered(scene), "twin")
+    assert line == "twin  drift peak 18.22 mm, model 18.19 mm; residual 0.3 %, outside the band -"
+    known = {"alpha_2": 0.3074, "alpha_2_low": 0.222, "alpha_2_high": 0.442, "alpha_2_measured": 0.3071}
+    scene.update(dataclasses.replace(said, standing=0.975, **known))
+    line_with(rendered(scene, width=160), "alpha_2 0.3071, model 0.3074 (0.2220 to 0.4420); blocks standing 98%")
+    scene.update(StateChanged(1600.0, State.STOPPING, State.IDLE, "the output is at zero"))
+    assert not [line for line in rendered(scene) if line.startswith("twin")]

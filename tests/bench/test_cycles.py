@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bench.analysis.cycles import CycleAnalyser, fit_cycle, mean_cycle
+from bench.analysis.cycles import CycleAnalyser, fit_cycle, mean_waves
 
 
 def _signal(t: np.ndarray, omega: float) -> np.ndarray:
@@ -19,7 +19,7 @@ def test_a_fit_recovers_mean_fundamental_and_harmonics() -> None:
     assert cycle is not None
     assert cycle.coefficients[0, 0] == pytest.approx(0.3, abs=1e-12)
     assert cycle.fundamental[0] == pytest.approx(2.0 * np.exp(0.4j), abs=1e-12)
-    assert mean_cycle([cycle])[2][0] == pytest.approx(0.125, abs=1e-12)
+    assert mean_waves([cycle]).harmonics[0] == pytest.approx(0.125, abs=1e-12)
     assert cycle.noise[0] < 1e-12
 
 
@@ -77,7 +77,8 @@ def test_the_mean_of_noisy_cycles_has_no_bias_where_the_mean_of_their_peaks_has_
         cycle = fit_cycle(k, omega * t, (np.cos(omega * t) + sigma * noise.standard_normal(t.size))[:, None])
         assert cycle is not None
         cycles.append(cycle)
-    peaks, there, _ = mean_cycle(cycles)
+    waves = mean_waves(cycles)
+    peaks, there = waves.peaks, waves.there
     error = there.std() / 20.0
     assert peaks[0] == pytest.approx(1.0, abs=3.0 * error)
     assert there.mean() == pytest.approx(peaks[0], rel=1e-4)

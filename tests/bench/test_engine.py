@@ -380,6 +380,21 @@ def test_an_operator_who_declines_aborts_the_campaign() -> None:
     assert bench.rig.done == []
 
 
+def test_the_question_says_of_which_kind_the_work_is_before_it_is_asked() -> None:
+    bench, known = Bench(), list[Handwork | None]()
+
+    class Watches:
+        name = "somebody"
+
+        def confirm(self, request: str) -> bool:  # noqa: ARG002
+            known.extend(event.work for event in bench.events if isinstance(event, OperatorAsked))
+            return True
+
+    bench.engine._operator = Watches()  # pyright: ignore[reportPrivateUsage]
+    bench.run(_plan(MOUNT, Handle(Handwork.LOCK_FRAME, COUPLED, "clamp it")))
+    assert known == [Handwork.MOUNT_SPRING, Handwork.MOUNT_SPRING, Handwork.LOCK_FRAME]
+
+
 def test_what_a_plan_says_is_stamped_with_the_time_of_the_bench() -> None:
     bench = Bench()
     bench.run(_plan(MOUNT, Arm(1.0), Say(StepStarted(-1.0, "now")), RampOut()))

@@ -182,7 +182,7 @@ def test_a_spectrum_has_its_least_gain_near_the_second_mode_of_the_bare_frame(
 
 def test_map_spectrum_and_steady_agree_and_the_map_is_in_order(capsys: pytest.CaptureFixture[str]) -> None:
     axes = ("--omega", "20", "17.55", "13.95", "--beta", "0.4", "0.25")
-    points = predicted(capsys, "map", *axes)["points"]
+    points = predicted(capsys, "map", *axes, "--band")["points"]
     places = [(point["beta"], point["omega_rad_s"]) for point in points]
     assert list(dict.fromkeys(places)) == [(beta, omega) for beta in (0.25, 0.4) for omega in (13.95, 17.55, 20.0)]
     for command in ("steady", "spectrum"):

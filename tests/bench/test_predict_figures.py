@@ -14,8 +14,9 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from bench.cli.main import main
+from bench.report.gain_levels import least_over_omega, levels_for
 from bench.report.history_figure import Motion, history_figure
-from bench.report.map_figure import Layer, least_over_omega, levels_for, map_figure
+from bench.report.map_figure import Layer, map_figure
 from bench.report.modes_figure import modes_figure
 from bench.report.style import GREEN, PURPLE, VERMILLION, new_figure, write_figure
 from sim.errors import InvalidInput
