@@ -1,4 +1,4 @@
-"""Speed of the window: `QT_QPA_PLATFORM=offscreen python -m tests.benchmarks.window [SECONDS [BLOCK]]`.
+"""Speed of the window: `python -m tests.benchmarks.window [SECONDS [BLOCK]]`; without a screen unless told otherwise.
 
 Six channels of 20 000 samples/s in blocks of 100 ms (or BLOCK seconds) are reduced and sent by a process of its own at
 the pace of the clock, as the process of a session does, and shown by the whole window on its Run page. Printed, each
@@ -242,6 +242,7 @@ def hour(application: QApplication, controller: Controller, length: float) -> No
 
 def main(seconds: float, length: float) -> None:
     """Measure and print."""
+    os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
     for name, code in (("window", OURS), ("peer: bare PySide6 and pyqtgraph", PEER)):
         wall, processor = start_up(code)
         print(
