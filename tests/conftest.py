@@ -39,6 +39,18 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:  # noqa: ARG001
     return (os.cpu_count() or 1) + 1
 
 
+_gives_way = False
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Beside others, a process with tests that no clock paces gives way to the one with those of REAL_TIME."""
+    global _gives_way
+    beside = "PYTEST_XDIST_WORKER" in os.environ and hasattr(os, "nice")
+    if beside and not _gives_way and not item.nodeid.startswith(REAL_TIME):
+        os.nice(10)
+        _gives_way = True
+
+
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> object:
     """A file stays in one process, so that what its fixtures made is made once; all of REAL_TIME stays in one."""

@@ -8,7 +8,7 @@ have one of their attributes and of where their links lead: what is plotted, and
 import json
 from collections.abc import Iterable, Iterator, Mapping
 from hashlib import sha256
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,12 +28,12 @@ class Checksums:
 
     def __init__(self, entry: hdf5.Group, changing: Iterable[str]) -> None:
         """`changing` are the paths of what is not yet as it will be: its checksums stay empty until `seal`."""
-        stored = list(hdf5.datasets(entry))
+        stored, groups = list[hdf5.Dataset](), {"/": of_group(hdf5.group(entry, "/"))}
+        _walk(entry, stored, groups)
         later = {*changing}
         self._entry, self._paths = entry, [each.name for each in stored]
         self._values = {each.name: "" if each.name in later else of_values(each) for each in stored}
         attributes = [of_attributes(each) for each in stored]
-        groups = {each.name: of_group(each) for each in covered_groups(entry)}
         group = hdf5.create_group(entry, GROUP, "NXcollection")
         hdf5.write_texts(group, "dataset", self._paths, description="path of each dataset but these")
         self._stored = hdf5.write_texts(
@@ -74,8 +74,25 @@ def of_attributes(stored: hdf5.Dataset) -> str:
 
 def of_group(group: hdf5.Group) -> str:
     """SHA-256 of a group's attributes and of the paths that its links lead to, both by name, as JSON."""
-    links = {name: target for name, target in hdf5.members(group) if isinstance(target, str)}
+    return _of_contents(group, {name: target for name, target in hdf5.members(group) if isinstance(target, str)})
+
+
+def _of_contents(group: hdf5.Group, links: Mapping[str, str]) -> str:
     return _of_json({"attributes": _attributes(group), "links": links})
+
+
+def _walk(group: hdf5.Group, stored: list[hdf5.Dataset], groups: dict[str, str]) -> None:
+    """Gather every dataset and the checksum of every group: opening an object is what takes the time, so once each."""
+    links = dict[str, str]()
+    groups[group.name] = ""
+    for name, member in hdf5.members(group):
+        if isinstance(member, str):
+            links[name] = member
+        elif hdf5.is_dataset(member):
+            stored.append(member)
+        else:
+            _walk(cast(hdf5.Group, member), stored, groups)
+    groups[group.name] = _of_contents(group, links)
 
 
 def covered_groups(entry: hdf5.Group) -> Iterator[hdf5.Group]:

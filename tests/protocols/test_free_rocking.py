@@ -115,7 +115,7 @@ def test_the_files_say_what_was_found(session: Session) -> None:
         assert len(record.tables["prediction"]["impact"].values) > 40
         section = rocking_section(Campaign(out / FILE, record))
     assert section is not None
-    assert [type(part).__name__ for part in section.parts] == ["str", "Table", "Table", "Picture"]
+    assert [type(part).__name__ for part in section.parts] == ["str", "Table", "Table", "Picture", "Picture"]
     assert list(fits) == [event.name for event in events if isinstance(event, FitFinished)]
     motion, impacts = fits["tilt 1"], fits["impacts of tilt 1"]
     left = motion.columns["measured"].values - motion.columns["fitted"].values
