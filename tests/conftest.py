@@ -24,6 +24,10 @@ REAL_TIME = (
 """Tests that emulated instruments or a person's clock pace: one after the other, or they hold each other up."""
 
 
+SPREAD = "tests/faults/test_matrix.py"
+"""The longest file of all; its tests share nothing, so they fill every process at the end."""
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Long tests are left out unless they are asked for."""
     if "soak" in config.option.markexpr:
@@ -53,11 +57,13 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> object:
-    """A file stays in one process, so that what its fixtures made is made once; all of REAL_TIME stays in one."""
+    """A file stays in one process, so that what its fixtures made is made once; all of REAL_TIME stays in one too."""
     from xdist.scheduler import LoadScopeScheduling
 
     class Together(LoadScopeScheduling):
         def _split_scope(self, nodeid: str) -> str:
+            if nodeid.startswith(SPREAD):
+                return nodeid
             return "real time" if nodeid.startswith(REAL_TIME) else nodeid.split("::")[0]
 
     return Together(config, log)
