@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from math import tau
 
 from bench.analysis.rounding import plus_minus
+from bench.report.columns import right_aligned
 from protocols.coupling_stiffness.point import SpringPoint
 
 _TITLES = ("spring", "decays", "k1 + kC", "kC", "nominal kC", "beta", "k2", "f1", "f2")
@@ -15,10 +16,7 @@ def springs_table(points: Sequence[SpringPoint]) -> str:
     together = [point for point in points if point.decay == 0]
     if not together:
         return "Nothing was identified."
-    rows = [_TITLES, _UNITS, *(_cells(point) for point in together)]
-    widths = [max(len(row[column]) for row in rows) for column in range(len(_TITLES))]
-    lines = ["  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in rows]
-    lines.insert(2, "-" * len(lines[0]))
+    lines = right_aligned(_TITLES, _UNITS, (_cells(point) for point in together))
     return "\n".join([*lines, "", "+- is the expanded uncertainty, k = 2."])
 
 

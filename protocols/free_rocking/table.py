@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from math import degrees, log10
 
+from bench.report.columns import right_aligned
 from protocols.free_rocking.point import ALL, RockingPoint
 
 _TITLES = ("", "tilt", "impacts", "r", "U (k=2)", "r / r_th", "U (k=2)", "r, amplitudes", "U (k=2)", "residual")
@@ -13,10 +14,7 @@ def rocking_table(points: Sequence[RockingPoint]) -> str:
     """One row for each tilt and one for all, and below what the motion says of the block."""
     if not points:
         return "No tilt could be used."
-    rows = [_TITLES, _UNITS, *(_cells(point) for point in points)]
-    widths = [max(len(row[column]) for row in rows) for column in range(len(_TITLES))]
-    lines = ["  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in rows]
-    lines.insert(2, "-" * len(lines[0]))
+    lines = right_aligned(_TITLES, _UNITS, (_cells(point) for point in points))
     combined = next((point for point in points if point.part == ALL), None)
     return "\n".join(lines if combined is None else [*lines, "", *_of_all(combined)])
 

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from math import tau
 
 from bench.analysis.rounding import plus_minus
+from bench.report.columns import right_aligned
 from protocols.free_vibration.point import DecayPoint
 from protocols.free_vibration.results import FrameResult
 
@@ -15,10 +16,7 @@ def decays_table(points: Sequence[DecayPoint], result: FrameResult | None) -> st
     """One row for each decay, the last for all of them, with expanded uncertainties (k = 2); then the correlations."""
     if not points:
         return "Nothing was identified."
-    rows = [_TITLES, _UNITS, *(_cells(point) for point in points)]
-    widths = [max(len(row[column]) for row in rows) for column in range(len(_TITLES))]
-    lines = ["  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in rows]
-    lines.insert(2, "-" * len(lines[0]))
+    lines = right_aligned(_TITLES, _UNITS, (_cells(point) for point in points))
     return "\n".join([*lines, *(_notes(points[-1], result) if result is not None else ())])
 
 

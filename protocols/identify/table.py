@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from math import degrees
 
+from bench.report.columns import right_aligned
 from protocols.identify.point import IdentifiedBand
 
 _TITLES = ("frequency", "gain", "phase", "U (k=2)", "distortion", "noise", "coherence", "lines")
@@ -13,11 +14,7 @@ def bands_table(points: Sequence[IdentifiedBand]) -> str:
     """One row for each third of an octave."""
     if not points:
         return "Nothing was identified."
-    rows = [_TITLES, _UNITS, *(_cells(point) for point in points)]
-    widths = [max(len(row[column]) for row in rows) for column in range(len(_TITLES))]
-    lines = ["  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in rows]
-    lines.insert(2, "-" * len(lines[0]))
-    return "\n".join(lines)
+    return "\n".join(right_aligned(_TITLES, _UNITS, (_cells(point) for point in points)))
 
 
 def _cells(point: IdentifiedBand) -> tuple[str, ...]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from bench.report.columns import right_aligned
 from protocols.laser_calibration.point import CalibratedSensor
 
 _TITLES = ("sensor", "scale - 1", "U (k=2)", "covered", "order", "largest error", "left, U", "delay")
@@ -12,11 +13,7 @@ def sensors_table(points: Sequence[CalibratedSensor]) -> str:
     """One row for each sensor; "-" stands where a value is absent."""
     if not points:
         return "Nothing was calibrated."
-    rows = [_TITLES, _UNITS, *(_cells(point) for point in points)]
-    widths = [max(len(row[column]) for row in rows) for column in range(len(_TITLES))]
-    lines = ["  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in rows]
-    lines.insert(2, "-" * len(lines[0]))
-    return "\n".join(lines)
+    return "\n".join(right_aligned(_TITLES, _UNITS, (_cells(point) for point in points)))
 
 
 def _cells(point: CalibratedSensor) -> tuple[str, ...]:
