@@ -5,8 +5,9 @@ its own thread, in the order of their subscription, so a subscriber that has wor
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
+from math import nan
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,9 +33,12 @@ class State(StrEnum):
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened at `time`: seconds of the bench's clock since the session began."""
+    """Something that happened at `time`: seconds of the bench's clock since the session began.
 
-    time: float
+    The stream stamps the time of publication on an event that has none (NaN).
+    """
+
+    time: float = field(default=nan, kw_only=True)
 
 
 @dataclass(frozen=True)

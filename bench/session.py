@@ -209,7 +209,7 @@ def run_session(
             )
             strange = configuration.calibrated.strange(rig.description) if configuration.calibrated else ()
             for warning in (*strange, *preflight.warnings):
-                stream.say(Warned(0.0, warning))
+                stream.publish(Warned(warning))
             # as long as the model takes, a bench in virtual time stands still
             patient = isinstance(rig.clock, VirtualClock)
             with twin_beside(stream, rig, configuration, signals, requests, patient=patient):

@@ -67,7 +67,7 @@ def replicate(
     achieved: Array | None = None
     lost = 0
     while not replication.finished:
-        yield Say(StepStarted(0.0, f"{name}: pass {len(replication.passes) + 1} of {parameters.passes} at most"))
+        yield Say(StepStarted(f"{name}: pass {len(replication.passes) + 1} of {parameters.passes} at most"))
         yield Arm(REST)
         outcome = yield Play(replication.drive)
         fell = isinstance((yield RampOut(fast=isinstance(outcome, Fallen))), Fallen)
@@ -78,7 +78,7 @@ def replicate(
         if lost:
             if again or fell:
                 return _replicated(replication, achieved, fell=fell, lost=lost)
-            yield Say(Warned(0.0, f"{name}: {lost} samples of the table's motion are missing, the pass is repeated"))
+            yield Say(Warned(f"{name}: {lost} samples of the table's motion are missing, the pass is repeated"))
             continue
         report = replication.learn(moved[:, 0], moved[:, 1])
         if report.accepted:
@@ -114,7 +114,6 @@ def _replicated(replication: Replication, achieved: Array | None, *, fell: bool,
 
 def _finished(name: str, report: Pass) -> PassFinished:
     return PassFinished(
-        0.0,
         motion=name,
         number=report.number,
         error=report.error,

@@ -52,7 +52,7 @@ def recorded(
         configuration.block_samples,
     )
     for event in first:
-        stream.say(event)
+        stream.publish(event)
     with twin_beside(stream, rig, configuration, signals, requests, patient=True):
         ending = engine.run(plan)
     recorder.close(ending.status, ending.reason)

@@ -107,7 +107,7 @@ class Engine:
                 self._sines.forget()
                 return self._player.play(step)
             case Say():
-                self._stream.say(step.event)
+                self._stream.publish(step.event)
             case Trim():
                 self._sines.trim(step)
             case Calibrate():
@@ -127,7 +127,7 @@ class Engine:
         machine = self._output.machine
         self._turns.heed_requests()
         machine.go(State.WAITING, step.request)
-        self._stream.say(OperatorAsked(0.0, step.request, step.work))
+        self._stream.publish(OperatorAsked(step.request, step.work))
         agreed = self._operator.confirm(step.request)
         machine.go(State.IDLE, "the operator answered")
         self._turns.heed_requests()
@@ -137,5 +137,5 @@ class Engine:
         self._specimen = step.specimen
         if step.work in (Handwork.WATCH_BLOCK, Handwork.WATCH_STOREYS):
             self._rest.sees_storeys = step.work is Handwork.WATCH_STOREYS
-        self._stream.say(OperatorAnswered(0.0, step.request, self._operator.name))
-        self._stream.say(SpecimenMounted(0.0, step.specimen, step.work, step.amount))
+        self._stream.publish(OperatorAnswered(step.request, self._operator.name))
+        self._stream.publish(SpecimenMounted(step.specimen, step.work, step.amount))

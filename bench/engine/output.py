@@ -64,7 +64,7 @@ class Output:
         exchange = self._guard.exchange(self.source.next(self.block))
         self.read = exchange.block.first + len(exchange.block)
         self.drive = exchange.drive
-        self._stream.publish(Acquired(self._stream.now(), self._run, exchange.block, exchange.drive))
+        self._stream.publish(Acquired(self._run, exchange.block, exchange.drive))
         if exchange.opened:
             raise Ended(self.cut(Ending("halted", f"{', '.join(exchange.opened)} opened")))
         return exchange
@@ -116,4 +116,4 @@ class Output:
                 error.add_note(f"then {type(another).__name__}: {another}")
 
     def _announce(self, before: State, after: State, reason: str) -> None:
-        self._stream.publish(StateChanged(self._stream.now(), before, after, reason))
+        self._stream.publish(StateChanged(before, after, reason))

@@ -25,7 +25,7 @@ class Placements:
         try:
             alignments = self._rig.alignments
         except RockbenchError as error:
-            self._stream.say(Warned(0.0, f"how the sensors' clocks ran in run {run} is not known: {error}"))
+            self._stream.publish(Warned(f"how the sensors' clocks ran in run {run} is not known: {error}"))
             return
         if alignments:
-            self._stream.say(SensorsAligned(0.0, run, alignments))
+            self._stream.publish(SensorsAligned(run, alignments))

@@ -52,4 +52,4 @@ class Player:
     def _show(self, step: Play, signals: Array) -> None:
         event = step.watch(signals) if step.watch is not None else None
         if event is not None:
-            self._stream.say(event)
+            self._stream.publish(event)

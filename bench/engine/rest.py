@@ -61,7 +61,7 @@ class Rest:
                 return values
             waited += step.rest
             if waited >= step.patience:
-                self._stream.say(Warned(0.0, f"the storeys are not still after {waited:g} s; zero taken anyway"))
+                self._stream.publish(Warned(f"the storeys are not still after {waited:g} s; zero taken anyway"))
                 return values
 
     def _blocks(self, duration: float) -> int:

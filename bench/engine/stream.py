@@ -2,13 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import isnan
 
 from bench.events import Event, Subscriber
 from drivers.clock import Clock
 
 
 class Stream:
-    """Stamps events with the bench's time since the session began and hands them to the subscribers in order."""
+    """Stamps events with the bench's time since the session began and passes them to the subscribers in order."""
 
     def __init__(self, clock: Clock, subscribers: Sequence[Subscriber]) -> None:
         self._clock = clock
@@ -24,10 +25,8 @@ class Stream:
         return self._clock.now() - self._origin
 
     def publish(self, event: Event) -> None:
-        """Hand `event` to every subscriber."""
+        """Pass `event` to every subscriber, with the present time unless it has a time of its own."""
+        if isnan(event.time):
+            event = replace(event, time=self.now())
         for subscriber in self._subscribers:
             subscriber(event)
-
-    def say(self, event: Event) -> None:
-        """Publish `event` with the present time."""
-        self.publish(replace(event, time=self.now()))

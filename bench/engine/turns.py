@@ -39,7 +39,7 @@ class Turns:
         """One turn: the channels' values, shape (block, n_channels)."""
         exchange = self.output.exchange()
         for near in exchange.warnings:
-            self._stream.say(Warned(0.0, f"{near.quantity} {near.value:.4g} {near.unit} comes near {near.limit:.4g}"))
+            self._stream.publish(Warned(f"{near.quantity} {near.value:.4g} {near.unit} comes near {near.limit:.4g}"))
         self._runaway = exchange.runaway
         if exchange.violation is not None and self._over is None:
             self._exceeded(exchange.violation)
@@ -86,7 +86,7 @@ class Turns:
     def _exceeded(self, over: Violation) -> None:
         """The first limit that is exceeded since arming ends the run; a fast ramp that has begun goes on."""
         self._over = over
-        self._stream.say(LimitExceeded(0.0, over.quantity, over.value, over.limit, over.unit))
+        self._stream.publish(LimitExceeded(over.quantity, over.value, over.limit, over.unit))
         if self.output.state is not State.ABORTING:
             self._end(State.ABORTING, Ending("aborted", str(over)))
 

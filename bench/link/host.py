@@ -166,4 +166,4 @@ class Teller:
         except Exception as error:
             # what is shown never ends what is measured
             self._reduction = None
-            self._host.outbox.put(Told(Warned(event.time, f"no traces are shown from here on: {error}")))
+            self._host.outbox.put(Told(Warned(f"no traces are shown from here on: {error}", time=event.time)))

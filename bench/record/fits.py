@@ -67,7 +67,7 @@ def read(entry: hdf5.Group, whole: int) -> list[FitFinished]:
             for one in parameters[parameter : parameter + fit["parameters"]]
         }
         column, parameter = column + len(own), parameter + len(known)
-        found.append(FitFinished(fit["time"], fit["name"], fit["text"], series, known))
+        found.append(FitFinished(fit["name"], fit["text"], series, known, time=fit["time"]))
     return found
 
 

@@ -115,7 +115,7 @@ def replay(
             configuration.block_samples,
         )
         for warning in course.first_warnings:
-            stream.say(Warned(0.0, warning))
+            stream.publish(Warned(warning))
         with twin_beside(stream, rig, configuration, signals, requests, patient=True):
             ending = engine.run(experiment.plan(configuration))
         over = rig.over

@@ -166,14 +166,14 @@ class Twin:
 
     def _give_up(self, now: float, why: str) -> None:
         self._leave()
-        self._publish(Warned(now, why))
+        self._publish(Warned(why, time=now))
 
     def _judge(self, run: _Run, estimate: TwinEstimate, now: float) -> None:
         excess, seconds = estimate.excess, estimate.seconds
         what = f"drift outside the twin's band, rms over 1 s: {excess:.3g} of the drift's"
         if run.warn.exceeded(excess, seconds) and self._warned_of != self._standing.specimen:
             self._warned_of = self._standing.specimen
-            self._publish(Warned(now, f"{what}, limit {run.warn.limit:g}: is it the specimen that is configured?"))
+            self._publish(Warned(f"{what}, limit {run.warn.limit:g}: is it the specimen that is configured?", time=now))
         if run.stop.exceeded(excess, seconds):
             self._requests.stop(f"{what}, limit {run.stop.limit:g}")
 

@@ -32,7 +32,7 @@ def check_plan(parameters: CheckParameters, configuration: BenchConfiguration) -
     """The whole check as steps; every line is published as a point as soon as it is known."""
     bare = configuration.known_specimen.bare()
     yield Handle(Handwork.LOCK_FRAME, bare, _CLAMP)
-    yield Say(StepStarted(0.0, "listen at rest"))
+    yield Say(StepStarted("listen at rest"))
     heard = yield Listen(parameters.rest)
     if not isinstance(heard, Heard):
         raise TypeError(f"listening came to {heard}")
@@ -70,4 +70,4 @@ def _motion(parameters: CheckParameters, configuration: BenchConfiguration) -> G
 
 def _say(lines: Iterator[CheckLine] | list[CheckLine]) -> Generator[Step, Outcome, None]:
     for line in lines:
-        yield Say(PointFinished(0.0, line))
+        yield Say(PointFinished(line))

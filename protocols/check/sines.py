@@ -43,7 +43,7 @@ class Sines:
 def measured_sines(parameters: CheckParameters) -> Generator[Step, Outcome, Sines]:
     """Calibrate the drive carefully, then drive and measure. Raises Unmeasurable where the signals show too little."""
     omegas = sorted(parameters.omega)
-    yield Say(StepStarted(0.0, "calibrate the drive"))
+    yield Say(StepStarted("calibrate the drive"))
     # at the highest frequency the table goes least far
     probed = yield from probed_drive(omegas[-1])
     calibration = yield from calibrate_drive(omegas, parameters.velocity * omegas[0], probed)
@@ -52,7 +52,7 @@ def measured_sines(parameters: CheckParameters) -> Generator[Step, Outcome, Sine
     yield Calibrate(calibration)
     found: list[NDArray[np.complex128]] = []
     for place, omega in enumerate(omegas):
-        yield Say(StepStarted(0.0, f"common motion at {omega:g} rad/s"))
+        yield Say(StepStarted(f"common motion at {omega:g} rad/s"))
         yield Say(_progress(omegas, place, parameters))
         yield Follow((Leg(CHANGE_TIME, parameters.velocity * omega, omega),))
         outcome = yield Dwell(SETTLING + parameters.cycles)
@@ -75,4 +75,4 @@ def measured_sines(parameters: CheckParameters) -> Generator[Step, Outcome, Sine
 def _progress(omegas: list[float], place: int, parameters: CheckParameters) -> Progress:
     lengths = [CHANGE_TIME + (SETTLING + parameters.cycles) * 2.0 * np.pi / omega for omega in omegas]
     left = float(sum(lengths[place:]))
-    return Progress(0.0, 1.0 - left / float(sum(lengths)), left, f"common motion at {omegas[place]:g} rad/s")
+    return Progress(1.0 - left / float(sum(lengths)), left, f"common motion at {omegas[place]:g} rad/s")

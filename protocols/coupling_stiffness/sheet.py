@@ -76,8 +76,8 @@ def coupling_stiffness_plan(
         bench.bare = yield from _decays(parameters, configuration, known.bare(), "bare frame", setting, pace)
         reference = reference_of(bench.bare)
         if (off := changed(bench.bare, configuration.identified)) is not None:
-            yield Say(Warned(0.0, f"the bare frame is not what it was when it was identified: {off}"))
-        yield Say(PointFinished(0.0, bare_point(bench.bare, 0)))
+            yield Say(Warned(f"the bare frame is not what it was when it was identified: {off}"))
+        yield Say(PointFinished(bare_point(bench.bare, 0)))
     if reference is None:
         raise AssertionError("a run without a reference is refused beforehand")
     failed: RockbenchError | None = None
@@ -88,7 +88,7 @@ def coupling_stiffness_plan(
             bench.springs.append(spring)
             identified = configuration.identified or Identified()
             found = spring_findings(bench.bare, bench.springs, identified)
-            yield Say(SpecimenIdentified(0.0, identified.extended(*found)))
+            yield Say(SpecimenIdentified(identified.extended(*found)))
     except RockbenchError as error:
         failed = error
     yield Handle(Handwork.REMOVE_BLOCK, known.bare(), "Take the clamp, the spring and the block off the table.")
@@ -121,12 +121,11 @@ def _spring(
     if abs(spring.k2_apart) > SIGNIFICANT:
         yield Say(
             Warned(
-                0.0,
                 f"{name}: k2 is {spring.k2_apart:+.1f} standard uncertainties off that of the bare frame: see whether"
                 " the block, its clamp or the spring touch the second storey, or give under the spring",
             )
         )
-    yield Say(PointFinished(0.0, told(held, 0)))
+    yield Say(PointFinished(told(held, 0)))
     return spring
 
 
@@ -144,5 +143,5 @@ def _decays(
     decays = yield from pulsed_decays(parameters, configuration, found, setting, pace, name, told=told or bare_point)
     result = result_of(decays, setting.masses, setting.weighed)
     if result.nonlinear.any():
-        yield Say(Warned(0.0, f"{name}: {nonlinear_text(result)}"))
+        yield Say(Warned(f"{name}: {nonlinear_text(result)}"))
     return result

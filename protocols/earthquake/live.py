@@ -77,7 +77,6 @@ class Watch:
         bare = nan if self._bare is None else float(self._bare[min(self._peak.samples, self._bare.size) - 1])
         place = round(seconds / STEP)
         return RunningGain(
-            0.0,
             record=self._record,
             beta=self._beta,
             seconds=seconds,

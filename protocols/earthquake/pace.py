@@ -43,4 +43,4 @@ class Pace:
         """Where the campaign stands."""
         played = sum(count * self._each[record] for record, count in self._played.items())
         gone = min(self._identified + played, self.total)
-        return Progress(0.0, gone / self.total, self.total - gone, activity)
+        return Progress(gone / self.total, self.total - gone, activity)

@@ -87,17 +87,17 @@ class EarthquakeSheet:
             learned = yield from replicate(shaking.target, model, limits, self._learning(), shaking.name, passed)
         except InvalidInput as beyond:
             # what one record asks beyond the limits does not keep the others from being played
-            yield Say(Warned(0.0, f"{shaking.name} is not played: {beyond}"))
+            yield Say(Warned(f"{shaking.name} is not played: {beyond}"))
             return f"the table cannot make it: {beyond}"
         if learned.fell:
             raise RigError(NO_BLOCK)
         if (reason := refused(learned, p)) is not None:
-            yield Say(Warned(0.0, f"{shaking.name} is not played: {reason}"))
+            yield Say(Warned(f"{shaking.name} is not played: {reason}"))
             return reason
         if lacking := shortfall(learned, p, shaking.target.band[0]):
             self._shortfalls[shaking.name] = lacking
-            yield Say(Warned(0.0, f"{shaking.name} is played with the best drive so far: {lacking}"))
-        yield Say(StepStarted(0.0, f"{shaking.name}, bare frame"))
+            yield Say(Warned(f"{shaking.name} is played with the best drive so far: {lacking}"))
+        yield Say(StepStarted(f"{shaking.name}, bare frame"))
         watch = Watch(shaking.name, None, shaking.target.sample_rate)
         outcome = yield from self._play(shaking, learned.drive, watch)
         if not isinstance(outcome, Played):
@@ -106,7 +106,7 @@ class EarthquakeSheet:
         try:
             observed = observe(outcome.signals, shaking.target.rest, rate)
         except InvalidInput as lost:
-            yield Say(Warned(0.0, f"{shaking.name}, bare frame, shows no peak: {lost}"))
+            yield Say(Warned(f"{shaking.name}, bare frame, shows no peak: {lost}"))
             return f"the bare frame shows no peak: {lost}"
         self._histories.bare(shaking, outcome.signals, History.of(self._specimen.bare(), observed.base).drift)
         return BareTest(
@@ -138,10 +138,10 @@ class EarthquakeSheet:
                 point = not_played(shaking, specimen.label or 0.0, self._target(shaking, specimen), None, bare)
             self._pace.played(shaking.name)
             yield Say(self._pace.progress(f"finished {shaking.name}, beta = {specimen.label:g}"))
-            yield Say(PointFinished(0.0, point))
+            yield Say(PointFinished(point))
 
     def _point(self, shaking: Shaking, specimen: Specimen, bare: BareTest) -> Generator[Step, Outcome, EarthquakePoint]:
-        yield Say(StepStarted(0.0, f"{shaking.name}, beta = {specimen.label:g}"))
+        yield Say(StepStarted(f"{shaking.name}, beta = {specimen.label:g}"))
         outcome = yield from self._play(shaking, bare.drive, self._watch(shaking, specimen, bare))
         if isinstance(outcome, Fallen):
             yield Handle(Handwork.STAND_BLOCK_UP, specimen, FALLEN_REQUEST)

@@ -111,14 +111,14 @@ def _tilts(
     for number, tilt in enumerate(planned_tilts(parameters, configuration.specimen), 1):
         request = _tilting(parameters, configuration, number, tilt)
         for attempt in range(parameters.attempts):
-            yield Say(StepStarted(0.0, f"tilt {number}: {degrees(tilt):+.1f} degrees, block held and let go"))
+            yield Say(StepStarted(f"tilt {number}: {degrees(tilt):+.1f} degrees, block held and let go"))
             again = "" if attempt == 0 else "The last recording could not be used. "
             yield Handle(Handwork.TILT_BLOCK, configuration.specimen.coupled(0.0), again + request, tilt)
             outcome = yield from _recorded(parameters, configuration, number, tilt)
             try:
                 found = _analysed(outcome, parameters, configuration, tilt)
             except NotRocking as error:
-                yield Say(Warned(0.0, f"tilt {number} could not be used: {error}"))
+                yield Say(Warned(f"tilt {number} could not be used: {error}"))
                 continue
             bench.tilts.append(found)
             yield from _told(found, number, parameters, configuration)
@@ -153,7 +153,7 @@ def _progress(
         nonlocal taken
         taken += len(signals)
         now = min(gone + OVERHEAD + REST + taken / configuration.sample_rate, total)
-        return Progress(0.0, now / total, total - now, f"recording tilt {number}: let go, then touch nothing")
+        return Progress(now / total, total - now, f"recording tilt {number}: let go, then touch nothing")
 
     return look
 
@@ -184,7 +184,7 @@ def _told(
         remarks = (
             f"not let go from rest: the motion is that of a tilt {100.0 * found.push:+.0f} % larger than the hand's"
         )
-        yield Say(Warned(0.0, f"tilt {number}: {remarks}; the impacts count all the same"))
+        yield Say(Warned(f"tilt {number}: {remarks}; the impacts count all the same"))
     held, residual = found.swings.held, found.fit.rms
     row = point(
         f"tilt {number}",
@@ -196,7 +196,7 @@ def _told(
         push=found.push,
         remarks=remarks,
     )
-    yield Say(PointFinished(0.0, row))
+    yield Say(PointFinished(row))
 
 
 def _combined(
@@ -207,11 +207,11 @@ def _combined(
     row = point(ALL, bench.found, configuration.specimen, parameters, residual)
     found = doubts(row)
     for doubt in found:
-        yield Say(Warned(0.0, doubt))
-    yield Say(PointFinished(0.0, row.model_copy(update={"remarks": "; ".join(found)})))
+        yield Say(Warned(doubt))
+    yield Say(PointFinished(row.model_copy(update={"remarks": "; ".join(found)})))
     block, known = configuration.specimen.block, configuration.identified
     bench.identified = identified_of(bench.found, len(bench.tilts), block, known)
-    yield Say(SpecimenIdentified(0.0, bench.identified))
+    yield Say(SpecimenIdentified(bench.identified))
 
 
 def _findings(tilts: Sequence[Tilt], parameters: FreeRockingParameters, configuration: BenchConfiguration) -> Findings:

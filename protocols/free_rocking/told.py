@@ -38,7 +38,7 @@ def _motion(tilt: Tilt, uncertain: Array, number: int) -> FitFinished:
         for name, value, doubt in zip(NAMES, fit.values, uncertain, strict=True)
     }
     text = f"exact motion of tilt {number}: r = {r:.6f} +- {u:.1g} (k = 1) from {fit.impacts} impacts"
-    return FitFinished(0.0, f"tilt {number}", text, columns, parameters)
+    return FitFinished(f"tilt {number}", text, columns, parameters)
 
 
 def _impacts(tilt: Tilt, alone: Findings, number: int) -> FitFinished:
@@ -56,4 +56,4 @@ def _impacts(tilt: Tilt, alone: Findings, number: int) -> FitFinished:
     }
     text = f"impacts of tilt {number}: r = {relation.restitution:.5f} +- {alone.relation.uncertainty:.1g} (k = 1)"
     found = {"restitution": FittedParameter(relation.restitution, alone.relation.uncertainty, "1")}
-    return FitFinished(0.0, f"impacts of tilt {number}", text, columns, found)
+    return FitFinished(f"impacts of tilt {number}", text, columns, found)

@@ -42,7 +42,7 @@ def pulsed_decays(
 
     Raises Unmeasurable when none can be used.
     """
-    yield Say(StepStarted(0.0, f"{name}: {1e3 * found.drift:.3g} mm of drift, {_reason(found)}"))
+    yield Say(StepStarted(f"{name}: {1e3 * found.drift:.3g} mm of drift, {_reason(found)}"))
     pulse = found.pulse
     volts = yield from found_level(pulse, found.drift, configuration, pace)
 
@@ -84,16 +84,16 @@ def _repeated(
     decays: list[Decay] = []
     for number in range(1, parameters.repeats + 1):
         for attempt in range(_TRIES):
-            yield Say(StepStarted(0.0, f"{name} {number} of {parameters.repeats}: {how}"))
+            yield Say(StepStarted(f"{name} {number} of {parameters.repeats}: {how}"))
             try:
                 decay = yield from once(f"{name} {number} of {parameters.repeats}")
             except Unusable as refusal:
                 again = "it is repeated" if attempt + 1 < _TRIES else "it is left out"
-                yield Say(Warned(0.0, f"{name} {number}: {refusal}; {again}"))
+                yield Say(Warned(f"{name} {number}: {refusal}; {again}"))
                 continue
             decays.append(decay)
             yield Say(fit_finished(decay, f"{name} {number}"))
-            yield Say(PointFinished(0.0, told(result_of([decay], setting.masses, setting.weighed), number)))
+            yield Say(PointFinished(told(result_of([decay], setting.masses, setting.weighed), number)))
             break
     if not decays:
         raise Unmeasurable("no decay could be used: see the warnings of this run")

@@ -56,7 +56,7 @@ class Pace:
             nonlocal since
             since += len(signals)
             gone = min(self.gone + since / sample_rate, self.expected)
-            return Progress(0.0, gone / self.expected, self.expected - gone, activity)
+            return Progress(gone / self.expected, self.expected - gone, activity)
 
         return look
 
@@ -83,7 +83,7 @@ def found_level(
     """
     volts, seen, limit = PROBE, 0.0, _largest_drive(pulse, configuration)
     for probe in range(1, _MOST + 1):
-        yield Say(StepStarted(0.0, f"probe {probe}: a pulse of {volts:.3g} V"))
+        yield Say(StepStarted(f"probe {probe}: a pulse of {volts:.3g} V"))
         signals = yield from played(pulse.record(volts, _LISTENED), pulse.sample_rate, pace, "the pulse is probed")
         rest = round(QUIET * pulse.sample_rate)
         seen, noise = _peak(signals[:, DRIFT]), float(np.nanstd(signals[:rest, DRIFT]))
@@ -115,7 +115,7 @@ def _accepted(volts: float, seen: float, drift: float, binds: str) -> Generator[
             " another --pulse"
         )
     if seen < 0.9 * drift:
-        yield Say(Warned(0.0, f"{binds} leaves {1e3 * seen:.2g} mm of drift, {1e3 * drift:.2g} mm are asked for"))
+        yield Say(Warned(f"{binds} leaves {1e3 * seen:.2g} mm of drift, {1e3 * drift:.2g} mm are asked for"))
     return volts
 
 

@@ -80,12 +80,12 @@ def free_vibration_plan(parameters: FreeVibrationParameters, configuration: Benc
     result = result_of(decays, setting.masses, setting.weighed)
     bench.result = result
     if result.nonlinear.any():
-        yield Say(Warned(0.0, nonlinear_text(result)))
-    yield Say(PointFinished(0.0, point_of(result, 0)))
+        yield Say(Warned(nonlinear_text(result)))
+    yield Say(PointFinished(point_of(result, 0)))
     if (left_out := impossible(result)) is not None:
-        yield Say(Warned(0.0, left_out))
+        yield Say(Warned(left_out))
     known = configuration.identified or Identified()
-    yield Say(SpecimenIdentified(0.0, known.extended(*findings_of(result, known))))
+    yield Say(SpecimenIdentified(known.extended(*findings_of(result, known))))
 
 
 def _locked_decays(

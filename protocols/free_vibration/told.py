@@ -36,7 +36,7 @@ def fit_finished(decay: Decay, name: str) -> FitFinished:
         key: FittedParameter(float(value), float(size), unit)
         for key, value, size, unit in zip(NAMES, decay.quantities, sizes, UNITS, strict=True)
     }
-    return FitFinished(0.0, name, line_of(decay.quantities, sizes), columns, parameters)
+    return FitFinished(name, line_of(decay.quantities, sizes), columns, parameters)
 
 
 def line_of(values: np.ndarray, sizes: np.ndarray) -> str:

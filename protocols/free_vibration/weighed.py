@@ -48,7 +48,7 @@ def masses_told(configuration: BenchConfiguration) -> Generator[Step, Outcome, N
     if any(finding.value != getattr(frame, name) for name, finding in found.items()):
         asked = f"specimen.frame has m1 = {frame.m1:.6g} kg, m2 = {frame.m2:.6g} kg"
         text = f"the masses are those of the specimen file, {_text(known)}; {asked}, which does not count"
-        yield Say(Warned(0.0, text))
+        yield Say(Warned(text))
 
 
 def _text(known: Identified) -> str:

@@ -30,4 +30,4 @@ class Pace:
         """Where the campaign stands, `cycles` into a test at `omega`."""
         within = 0.0 if omega is None else min(cycles / CYCLES, 0.95) * self._expected(omega)
         gone = min(self._finished + within, self._total)
-        return Progress(0.0, gone / self._total, self._total - gone, activity)
+        return Progress(gone / self._total, self._total - gone, activity)

@@ -57,7 +57,7 @@ class HarmonicSheet:
     def _bare_frame(self) -> Generator[Step, Outcome, DriveCalibration]:
         yield Handle(Handwork.REMOVE_BLOCK, self._specimen.bare(), "Take the spring and the block off the table.")
         yield Arm(REST)
-        yield Say(StepStarted(0.0, "calibrate the drive, bare frame"))
+        yield Say(StepStarted("calibrate the drive, bare frame"))
         level = self._parameters.calibration_level * self._amplitude
         above = harmonic_frequencies(max(self._parameters.omega), self._parameters.harmonics)
         calibration = yield from calibrate_drive((*self._parameters.omega, *above), level, None)
@@ -66,13 +66,13 @@ class HarmonicSheet:
         yield Calibrate(calibration)
         duration = self._parameters.ramp_time
         for omega in self._parameters.omega:
-            yield Say(StepStarted(0.0, f"bare frame at {omega:g} rad/s"))
+            yield Say(StepStarted(f"bare frame at {omega:g} rad/s"))
             yield Follow((Leg(duration, self._amplitude, omega),))
             settled = yield from self._settle(omega, None, calibration)
             if isinstance(settled, Fallen):
                 raise RigError(NO_BLOCK)
             if not settled.steadiness.steady:
-                yield Say(Warned(0.0, f"the bare frame is not steady at {omega:g} rad/s: no gain can be stated there"))
+                yield Say(Warned(f"the bare frame is not steady at {omega:g} rad/s: no gain can be stated there"))
             self._bare[omega] = settled
             self._pace.finished(omega)
             duration = BARE_CHANGE
@@ -84,7 +84,7 @@ class HarmonicSheet:
         yield Handle(Handwork.MOUNT_SPRING, specimen, request)
         plans = {omega: self._starts(specimen, omega) for omega in self._parameters.omega}
         yield Arm(REST)
-        yield Say(StepStarted(0.0, f"calibrate the drive, beta = {specimen.label:g}"))
+        yield Say(StepStarted(f"calibrate the drive, beta = {specimen.label:g}"))
         starts = [start for each in plans.values() for start in each]
         wanted, level = spring_calibration(self._parameters, specimen, starts)
         measured = yield from calibrate_drive(wanted, level, calibration)
@@ -96,7 +96,7 @@ class HarmonicSheet:
             point = yield from self._point(specimen, omega, calibration, plans[omega])
             self._pace.finished(omega)
             yield Say(self._pace.progress(f"finished beta = {specimen.label:g} at {omega:g} rad/s"))
-            yield Say(PointFinished(0.0, point))
+            yield Say(PointFinished(point))
 
     def _point(
         self, specimen: Specimen, omega: float, calibration: DriveCalibration, starts: list[Start]
@@ -106,7 +106,7 @@ class HarmonicSheet:
         falls = 0
         for tried, start in enumerate(starts, 1):
             where = f"beta = {specimen.label:g} at {omega:g} rad/s, start {tried} of {len(starts)}: {start.name}"
-            yield Say(StepStarted(0.0, f"{where}, chance {start.chance:.0%}"))
+            yield Say(StepStarted(f"{where}, chance {start.chance:.0%}"))
             yield Arm(REST)
             yield Calibrate(calibration)
             settled: Settled | Fallen | None = None
@@ -183,7 +183,7 @@ class HarmonicSheet:
                 running = gain(peak, bare, self._configuration.sensors)
                 alpha_2, uncertainty = running.alpha_2, running.uncertainty
             beta = specimen.label if specimen else None
-            yield Say(Estimate(0.0, omega, beta, cycles_seen, peak.drift, alpha_2, uncertainty, predicted))
+            yield Say(Estimate(omega, beta, cycles_seen, peak.drift, alpha_2, uncertainty, predicted))
             yield Say(self._pace.progress(f"settling at {omega:g} rad/s", omega, cycles_seen))
 
         return look

@@ -52,7 +52,7 @@ class Rules:
             nonlocal since
             since += len(signals)
             gone = min(self.gone + since / self.sample_rate, self.expected)
-            return Progress(0.0, gone / self.expected, self.expected - gone, "the multisine is played")
+            return Progress(gone / self.expected, self.expected - gone, "the multisine is played")
 
         return look
 

@@ -46,7 +46,7 @@ def probed_response(motion: Complex, grid: Grid, rules: Rules) -> Generator[Step
     drive = motion * (PROBE / _peak(motion, short))
     for probe in range(1, _MOST + 1):
         rules.require_drive(short.record(drive))
-        yield Say(StepStarted(0.0, f"probe {probe}: {_peak(drive, short):.3g} V"))
+        yield Say(StepStarted(f"probe {probe}: {_peak(drive, short):.3g} V"))
         outcome = yield from played(short.record(drive), rules)
         if isinstance(outcome, Fallen):
             return outcome

@@ -55,13 +55,13 @@ def identify_plan(
         expected_duration(parameters, found),
     )
     yield _mounting(specimen)
-    yield Say(StepStarted(0.0, _level(found)))
+    yield Say(StepStarted(_level(found)))
     response = yield from probed_response(found.motions[0], found.grid, rules)
     if isinstance(response, Fallen):
         raise (yield from _fell(specimen))
     records: list[Played] = []
     for number, motion in enumerate(found.motions, 1):
-        yield Say(StepStarted(0.0, f"multisine {number} of {parameters.realisations}, {found.grid.duration:.0f} s"))
+        yield Say(StepStarted(f"multisine {number} of {parameters.realisations}, {found.grid.duration:.0f} s"))
         volts = found.grid.record(drive_for(motion, response, found.grid, rules.knee))
         rules.require_drive(volts)
         outcome = yield from played(volts, rules)
@@ -73,7 +73,7 @@ def identify_plan(
     keep(model)
     yield from _told(model, agreement)
     for point in thirds(model):
-        yield Say(PointFinished(0.0, point))
+        yield Say(PointFinished(point))
 
 
 def _mounting(specimen: Specimen) -> Handle:
@@ -101,7 +101,7 @@ def _warned(outcome: Played, specimen: Specimen, configuration: BenchConfigurati
     moved = outcome.signals[:, ACCELERATION]
     share = largest(moved, configuration.sample_rate, specimen, configuration).get(RESTING, 0.0)
     if share > 1.0:
-        yield Say(Warned(0.0, f"the block may have lifted: the moment came to {share:.2f} of that of its weight"))
+        yield Say(Warned(f"the block may have lifted: the moment came to {share:.2f} of that of its weight"))
 
 
 def _identified(
@@ -123,12 +123,11 @@ def _told(model: TableModel, agreement: tuple[float, float]) -> Generator[Step, 
     low, high = model.band
     text = f"{model.specimen}, {low:g} to {high:g} Hz, {len(model.frequency)} lines, {model.level:.3g} m/s2 rms"
     columns = ("frequency", "real", "imaginary", "uncertainty", "distortion", "coherence", "noise")
-    yield Say(TableIdentified(0.0, text, **{name: np.array(getattr(model, name)) for name in columns}))
+    yield Say(TableIdentified(text, *(np.array(getattr(model, name)) for name in columns)))
     gain, lead = agreement
     if abs(gain - 1.0) > SENSORS_AGREE or abs(2.0 * np.pi * low * lead) > SENSORS_AGREE:
         yield Say(
             Warned(
-                0.0,
                 f"table_displacement says {gain:.3f} times what table_acceleration says, {1e3 * lead:+.2f} ms apart:"
                 " see to both with `rockbench check`",
             )

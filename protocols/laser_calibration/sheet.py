@@ -83,7 +83,7 @@ def calibration_plan(
     """The whole calibration as steps; `keep` is given what was found."""
     bare = configuration.known_specimen.bare()
     yield Handle(Handwork.LOCK_FRAME, bare, _CLAMP)
-    yield Say(StepStarted(0.0, "the lasers at rest"))
+    yield Say(StepStarted("the lasers at rest"))
     heard = yield Listen(REST)
     if not isinstance(heard, Heard):
         raise TypeError(f"listening came to {heard}")
@@ -112,14 +112,14 @@ def calibration_plan(
     for number, (curve, laser) in enumerate(zip(curves, found.lasers, strict=True), 1):
         yield Say(_told(f"laser_{number}", curve, laser.delay, laser.delay_uncertainty))
     for point in sensors(found):
-        yield Say(PointFinished(0.0, point))
+        yield Say(PointFinished(point))
     yield Handle(Handwork.UNLOCK_FRAME, bare, _UNCLAMP)
 
 
 def _passes(parameters: LaserCalibrationParameters) -> Generator[Step, Outcome, list[Pass]]:
     """Calibrate the drive carefully, then drive and measure. Raises Unmeasurable where the signals show too little."""
     slow = 0.5 * parameters.omega
-    yield Say(StepStarted(0.0, "calibrate the drive"))
+    yield Say(StepStarted("calibrate the drive"))
     known: DriveCalibration = yield from probed_drive(slow)
     for share in LEVELS:
         measured = yield from calibrate_drive([slow, parameters.omega], share * parameters.amplitude * slow**2, known)
@@ -130,9 +130,9 @@ def _passes(parameters: LaserCalibrationParameters) -> Generator[Step, Outcome, 
     passes: list[Pass] = []
     for number, (omega, amplitude) in enumerate(passes_of(parameters), 1):
         text = f"pass {number} of {parameters.passes}: {1e3 * amplitude:.1f} mm at {omega:g} rad/s"
-        yield Say(StepStarted(0.0, text))
+        yield Say(StepStarted(text))
         share = (number - 1) / parameters.passes
-        yield Say(Progress(0.0, share, (1.0 - share) * expected_duration(parameters), text))
+        yield Say(Progress(share, (1.0 - share) * expected_duration(parameters), text))
         if passes and passes[-1].omega == omega:
             yield Follow((Leg(CHANGE, amplitude * omega**2, omega),))
         else:
@@ -168,7 +168,6 @@ def _told(name: str, curve: Fitted, delay: float, doubt: float) -> FitFinished:
         for number, each in enumerate(curve.without, 1)
     }
     return FitFinished(
-        0.0,
         f"error of {name}",
         f"{name}: order {curve.error.size - 1}, {1e6 * curve.uncertainty:.1f} um left open at one reading",
         {

@@ -54,7 +54,7 @@ class FakeSession:
             }
         )
         for subscriber in subscribers:
-            subscriber(StepStarted(0.0, "a step"))
+            subscriber(StepStarted("a step", time=0.0))
         self.during(requests)
         return SessionResult(self.status, "why it ended", {"points": [1]}, "the table", requests.strongest is not None)
 

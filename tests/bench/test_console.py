@@ -60,19 +60,19 @@ OVERTURNED = HarmonicPoint(
     reason="the block fell\nin each start",
 )
 CAMPAIGN: list[Event] = [
-    OperatorAsked(0.0, "Take the block off."),
-    OperatorAnswered(0.0, "Take the block off.", "the simulated bench"),
-    StepStarted(2.0, "bare frame at 12.5 rad/s"),
-    Estimate(60.0, 12.5, None, 80, 0.01, NAN, NAN, NAN),
-    Warned(300.0, "laser_1 lost\x1b[2J 12 samples"),
-    PointFinished(700.0, STEADY),
-    PointFinished(1200.0, OVERTURNED),
-    StateChanged(1400.0, State.ARMED, State.RUNNING, "at rest, zero taken"),
-    StepStarted(1430.0, "beta = 0.64 at 17.5 rad/s, start 1 of 6"),
-    Estimate(1500.0, 17.5, 0.64, 140, 0.01, 0.7312, 0.033, 0.7251),
-    Progress(1500.0, 0.45, 2200.0, "settling at 17.5 rad/s"),
+    OperatorAsked("Take the block off.", time=0.0),
+    OperatorAnswered("Take the block off.", "the simulated bench", time=0.0),
+    StepStarted("bare frame at 12.5 rad/s", time=2.0),
+    Estimate(12.5, None, 80, 0.01, NAN, NAN, NAN, time=60.0),
+    Warned("laser_1 lost\x1b[2J 12 samples", time=300.0),
+    PointFinished(STEADY, time=700.0),
+    PointFinished(OVERTURNED, time=1200.0),
+    StateChanged(State.ARMED, State.RUNNING, "at rest, zero taken", time=1400.0),
+    StepStarted("beta = 0.64 at 17.5 rad/s, start 1 of 6", time=1430.0),
+    Estimate(17.5, 0.64, 140, 0.01, 0.7312, 0.033, 0.7251, time=1500.0),
+    Progress(0.45, 2200.0, "settling at 17.5 rad/s", time=1500.0),
 ]
-BLOCK = Acquired(1.0, 1, Block(0, np.zeros((200, 4), dtype=np.int16)), np.zeros(200))
+BLOCK = Acquired(1, Block(0, np.zeros((200, 4), dtype=np.int16)), np.zeros(200), time=1.0)
 
 
 def rendered(scene: Scene, width: int = 110, height: int = 40) -> list[str]:
@@ -113,7 +113,7 @@ def test_a_narrow_terminal_loses_no_number():
 
 
 def test_many_points_leave_the_picture_within_the_terminal():
-    events: list[Event] = [PointFinished(0.0, STEADY) for _ in range(60)]
+    events: list[Event] = [PointFinished(STEADY, time=0.0) for _ in range(60)]
     lines = rendered(scene_after([*CAMPAIGN, *events]), height=30)
     assert len(lines) <= 30
     assert line_with(lines, "earlier points")
@@ -121,8 +121,8 @@ def test_many_points_leave_the_picture_within_the_terminal():
 
 
 def test_an_abort_is_told_in_words():
-    over = LimitExceeded(10.0, "table velocity", 0.71234, 0.6, "m/s")
-    abort = StateChanged(10.0, State.RUNNING, State.ABORTING, "table velocity 0.7123 m/s exceeds 0.6 m/s")
+    over = LimitExceeded("table velocity", 0.71234, 0.6, "m/s", time=10.0)
+    abort = StateChanged(State.RUNNING, State.ABORTING, "table velocity 0.7123 m/s exceeds 0.6 m/s", time=10.0)
     lines = rendered(scene_after([*CAMPAIGN, over, abort]))
     assert re.match(r" ABORTING +table velocity 0.7123 m/s exceeds", lines[0])
     assert line_with(lines, "LIMIT", "table velocity reached 0.7123 m/s, allowed 0.6 m/s")
@@ -178,7 +178,7 @@ def test_the_terminal_is_restored_after_an_exception_and_warnings_stay():
 
     def break_down() -> None:
         with LiveConsole(console) as live:
-            live(Warned(3.0, "the laser blinked"))
+            live(Warned("the laser blinked", time=3.0))
             assert HIDE in written(console)
             raise RuntimeError("the plan broke")
 
@@ -214,7 +214,7 @@ def test_nothing_is_drawn_without_a_change_and_at_most_eight_times_a_second():
         assert len(written(console)) == before
         begin, drawn = time.monotonic(), written(console).count("bench time")
         while (elapsed := time.monotonic() - begin) < 0.6:
-            live(Progress(elapsed, elapsed, 1.0, "settling"))
+            live(Progress(elapsed, 1.0, "settling", time=elapsed))
             time.sleep(0.001)
         assert 1 <= written(console).count("bench time") - drawn <= 8 * elapsed + 2
 
@@ -243,9 +243,9 @@ def test_numbers_and_texts_as_the_operator_reads_them(said: str, expected: str):
 
 
 def test_passes_and_running_gains_are_shown_and_bands_are_no_points() -> None:
-    running = RunningGain(31.0, "1999 Chi-Chi", 0.25, 12.34, 0.002, 0.8412, 0.8533)
-    passed = PassFinished(20.0, "1999 Chi-Chi", 2, 0.005, 0.003, 0.01, 0.01, True, "pass 2 (gain 1): error 0.50%")
-    found = TableIdentified(9.0, "bare frame, 0.5 to 200 Hz", *[np.zeros(3)] * 7)
+    running = RunningGain("1999 Chi-Chi", 0.25, 12.34, 0.002, 0.8412, 0.8533, time=31.0)
+    passed = PassFinished("1999 Chi-Chi", 2, 0.005, 0.003, 0.01, 0.01, True, "pass 2 (gain 1): error 0.50%", time=20.0)
+    found = TableIdentified("bare frame, 0.5 to 200 Hz", *[np.zeros(3)] * 7, time=9.0)
     band = IdentifiedBand(
         frequency_hz=1.0,
         gain_m_s2_v=0.3,
@@ -256,13 +256,13 @@ def test_passes_and_running_gains_are_shown_and_bands_are_no_points() -> None:
         coherence=0.999,
         lines=3,
     )
-    lines = rendered(scene_after([found, PointFinished(9.0, band), passed, running]))
+    lines = rendered(scene_after([found, PointFinished(band, time=9.0), passed, running]))
     line_with(lines, "table", "bare frame, 0.5 to 200 Hz")
     line_with(lines, "pass", "1999 Chi-Chi: pass 2 (gain 1): error 0.50%")
     line_with(lines, "1999 Chi-Chi", "0.25", "0.8412", "0.8533", "-1.4 %", "12.3 s")
     out = StringIO()
     with PlainLines(out) as plain:
-        for event in (found, PointFinished(9.0, band), passed, running):
+        for event in (found, PointFinished(band, time=9.0), passed, running):
             plain(event)
     assert [line.split()[3] for line in out.getvalue().splitlines()] == ["table", "pass"]
 
@@ -275,5 +275,5 @@ def test_the_twin_has_a_line_while_the_bench_is_driven() -> None:
     known = {"alpha_2": 0.3074, "alpha_2_low": 0.222, "alpha_2_high": 0.442, "alpha_2_measured": 0.3071}
     scene.update(dataclasses.replace(said, standing=0.975, **known))
     line_with(rendered(scene, width=160), "alpha_2 0.3071, model 0.3074 (0.2220 to 0.4420); blocks standing 98%")
-    scene.update(StateChanged(1600.0, State.STOPPING, State.IDLE, "the output is at zero"))
+    scene.update(StateChanged(State.STOPPING, State.IDLE, "the output is at zero", time=1600.0))
     assert not [line for line in rendered(scene) if line.startswith("twin")]

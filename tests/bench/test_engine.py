@@ -397,7 +397,7 @@ def test_the_question_says_of_which_kind_the_work_is_before_it_is_asked() -> Non
 
 def test_what_a_plan_says_is_stamped_with_the_time_of_the_bench() -> None:
     bench = Bench()
-    bench.run(_plan(MOUNT, Arm(1.0), Say(StepStarted(-1.0, "now")), RampOut()))
+    bench.run(_plan(MOUNT, Arm(1.0), Say(StepStarted("now")), RampOut()))
     said = next(event for event in bench.events if isinstance(event, StepStarted))
     assert said.time == pytest.approx(1.0)
 

@@ -81,16 +81,18 @@ def campaign(
         metadata={"configuration": BenchConfiguration().model_dump_json(), "protocol": "made"},
         tables={"prediction": table},
     )
-    recorder(StepStarted(0.0, WORDS))
+    recorder(StepStarted(WORDS, time=0.0))
     for run, values in counts.items():
         for first in range(0, len(values), 100):
             part = values[first : first + 100]
             # run 2 has a gap of 50 samples after 300
             index = first + (50 if run == 2 and first >= 300 else 0)
-            recorder(Acquired(first / RATE, run, Block(index, part), volts[first : first + len(part)].astype(float)))
-    recorder(Estimate(1.0, 12.5, None, 6, 0.005, np.nan, np.nan, 1.0))
+            recorder(
+                Acquired(run, Block(index, part), volts[first : first + len(part)].astype(float), time=first / RATE)
+            )
+    recorder(Estimate(12.5, None, 6, 0.005, np.nan, np.nan, 1.0, time=1.0))
     for point in POINTS:
-        recorder(PointFinished(2.0, point))
+        recorder(PointFinished(point, time=2.0))
     recorder.close("completed", WORDS)
     return path
 
@@ -356,7 +358,7 @@ def test_memory_does_not_grow_with_the_run(
         path = tmp_path / f"{number}.h5"
         recorder = Recorder(path, channels=CHANNELS, sample_rate=1e4, point_type=Found, metadata={}, hold_up=60.0)
         for first in range(0, pieces * piece, piece):
-            recorder(Acquired(first / 1e4, 1, Block(first, _counts(piece, 3)), np.zeros(piece)))
+            recorder(Acquired(1, Block(first, _counts(piece, 3)), np.zeros(piece), time=first / 1e4))
         recorder.close("completed")
         with open_record(path) as record:
             tracemalloc.start()

@@ -27,7 +27,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     recorder = begin(path, metadata=METADATA | {"operator": "Ω. Muster", "notes": "cold\nnew spring"})
     for first in range(0, ROWS, 500):
         recorder(block(first, 500, time=(first + 500) / RATE))
-    recorder(PointFinished(1.5, FULL))
+    recorder(PointFinished(FULL, time=1.5))
     recorder.close("completed", "all done")
     return path.read_bytes()
 
@@ -254,11 +254,11 @@ def rejected_again(capsys: pytest.CaptureFixture[str], path: Path) -> str:
 def test_events_that_the_file_lost_come_from_the_journal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path, old = tmp_path / "campaign.h5", tmp_path / "old.h5"
     recorder = begin(path)
-    recorder(Warned(0.5, "first"))
+    recorder(Warned("first", time=0.5))
     recorder.sync()
     old.write_bytes(path.read_bytes())
-    recorder(Warned(1.0, "second"))
-    recorder(PointFinished(1.5, FULL))
+    recorder(Warned("second", time=1.0))
+    recorder(PointFinished(FULL, time=1.5))
     recorder.close("completed")
     diary.beside(old).write_bytes(diary.beside(path).read_bytes() + b'{"time": 2.0, "ki')
     assert main(["file", "recover", str(old)]) == 0

@@ -21,7 +21,7 @@ def analysis(tmp_path: Path) -> Path:
     path = tmp_path / "campaign.h5"
     recorder = begin(path)
     recorder(block(0, 100))
-    recorder(PointFinished(1.0, FULL))
+    recorder(PointFinished(FULL, time=1.0))
     recorder.close("completed")
     new = FULL.model_copy(update={"alpha_2": 0.31})
     given = Analysis([new], HarmonicPoint, {"measured_cycles": 12}, FULL, BenchConfiguration())

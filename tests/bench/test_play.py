@@ -124,7 +124,7 @@ def test_what_the_watch_returns_is_published_in_order_and_on_time() -> None:
     def watch(signals: Array) -> Event | None:
         nonlocal seen
         seen += len(signals)
-        return Progress(-1.0, seen / 1537, 0.0, "playing") if seen > 800 else None
+        return Progress(seen / 1537, 0.0, "playing") if seen > 800 else None
 
     bench = Bench(rig_that())
     bench.run(Arm(0.2), Play(burst(), watch), RampOut())

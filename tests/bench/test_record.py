@@ -86,7 +86,7 @@ def block(first: int, n: int, *, run: int = 1, time: float = 0.0, seed: int = 0)
     """Random counts over the whole range of int16, which no rounding or scaling survives unnoticed."""
     rng = np.random.default_rng([seed, first])
     counts = rng.integers(-32768, 32768, (n, len(CHANNELS))).astype(np.int16)
-    return Acquired(time, run, Block(first, counts), rng.uniform(-8.0, 8.0, n))
+    return Acquired(run, Block(first, counts), rng.uniform(-8.0, 8.0, n), time=time)
 
 
 def record(recorder: Recorder, *events: Event) -> None:
@@ -115,7 +115,7 @@ def test_counts_and_drive_come_back_exactly_whatever_the_blocks(path: Path) -> N
 
 def test_values_are_in_units_and_nan_where_they_are_no_measurement(path: Path) -> None:
     counts = np.array([[0, 100, -32001], [-6554, 32767, 32000]], dtype=np.int16)
-    record(begin(path), Acquired(0.0, 1, Block(0, counts), np.zeros(2)))
+    record(begin(path), Acquired(1, Block(0, counts), np.zeros(2), time=0.0))
     with open_record(path) as kept:
         assert kept.channels == CHANNELS
         assert kept.sample_rate == RATE
@@ -145,7 +145,7 @@ def test_gaps_and_runs_are_visible(path: Path) -> None:
 
 
 def test_points_come_back_exactly(path: Path) -> None:
-    record(begin(path), PointFinished(5.0, FULL), PointFinished(9.0, EMPTY))
+    record(begin(path), PointFinished(FULL, time=5.0), PointFinished(EMPTY, time=9.0))
     with open_record(path) as kept:
         assert [HarmonicPoint.model_validate(point) for point in kept.points] == [FULL, EMPTY]
         assert list(kept.points[0]) == list(HarmonicPoint.model_fields)
@@ -158,7 +158,7 @@ def test_points_come_back_exactly(path: Path) -> None:
 
 
 def test_absent_values_are_nan_and_minus_one_for_plain_readers(path: Path) -> None:
-    record(begin(path), PointFinished(5.0, FULL), PointFinished(9.0, EMPTY))
+    record(begin(path), PointFinished(FULL, time=5.0), PointFinished(EMPTY, time=9.0))
     with h5py.File(path, "r") as file:
         points: Any = file["entry/points"]
         assert np.isnan(points["alpha_2"][1])
@@ -170,15 +170,15 @@ def test_absent_values_are_nan_and_minus_one_for_plain_readers(path: Path) -> No
 def test_journal_keeps_all_but_samples_progress_and_estimates(path: Path) -> None:
     record(
         begin(path),
-        StateChanged(0.0, State.IDLE, State.ARMED, "the operator armed"),
-        StepStarted(0.5, "dwell at 12.5 rad/s"),
-        Progress(0.6, 0.1, 100.0, "dwell"),
+        StateChanged(State.IDLE, State.ARMED, "the operator armed", time=0.0),
+        StepStarted("dwell at 12.5 rad/s", time=0.5),
+        Progress(0.1, 100.0, "dwell", time=0.6),
         block(0, 10),
-        Estimate(1.0, 12.5, 0.25, 8, 0.001, 0.5, 0.01, 0.51),
-        Estimate(1.5, 12.5, None, 9, 0.002, float("nan"), float("nan"), 0.51),
-        Warned(2.0, "a cycle was missed"),
-        LimitExceeded(3.0, "displacement", 0.0612, 0.06, "m"),
-        OperatorAnswered(4.0, "stand the block up", "unattended run"),
+        Estimate(12.5, 0.25, 8, 0.001, 0.5, 0.01, 0.51, time=1.0),
+        Estimate(12.5, None, 9, 0.002, float("nan"), float("nan"), 0.51, time=1.5),
+        Warned("a cycle was missed", time=2.0),
+        LimitExceeded("displacement", 0.0612, 0.06, "m", time=3.0),
+        OperatorAnswered("stand the block up", "unattended run", time=4.0),
     )
     with open_record(path) as kept:
         assert [(event.time, event.kind, event.text) for event in kept.events] == [
@@ -196,7 +196,7 @@ def test_journal_keeps_all_but_samples_progress_and_estimates(path: Path) -> Non
 
 
 def test_a_long_text_is_cut_between_characters_and_says_so(path: Path) -> None:
-    record(begin(path), Warned(0.0, "ü" * TEXT_WIDTH))
+    record(begin(path), Warned("ü" * TEXT_WIDTH, time=0.0))
     with open_record(path) as kept:
         text = kept.events[0].text
         assert text == "ü" * (len(text) - 1) + "…"
@@ -225,7 +225,7 @@ def test_metadata_tables_and_state_come_back(path: Path) -> None:
 
 
 def test_every_numeric_dataset_has_units_and_the_default_plot_resolves(path: Path) -> None:
-    record(begin(path), block(0, 3000), PointFinished(5.0, FULL), Warned(6.0, "text"))
+    record(begin(path), block(0, 3000), PointFinished(FULL, time=5.0), Warned("text", time=6.0))
     numeric, classes = dict[str, str](), dict[str, str]()
 
     def visit(name: str, item: Any) -> None:
@@ -280,7 +280,7 @@ def test_a_driver_may_use_its_buffers_again(path: Path) -> None:
     counts, drive = np.zeros((100, 3), dtype=np.int16), np.zeros(100)
     for k in range(50):
         counts[:], drive[:] = k, 0.1 * k
-        recorder(Acquired(0.1 * k, 1, Block(100 * k, counts), drive))
+        recorder(Acquired(1, Block(100 * k, counts), drive, time=0.1 * k))
     recorder.close("completed")
     with open_record(path) as kept:
         np.testing.assert_array_equal(kept.counts("table"), np.repeat(np.arange(50), 100))
@@ -293,7 +293,7 @@ def test_absent_whole_numbers_are_not_zero(path: Path) -> None:
 
     assert fields_of(Counted)[0].dtype.kind == "f"
     recorder = Recorder(path, channels=CHANNELS, sample_rate=RATE, point_type=Counted, metadata={})
-    record(recorder, PointFinished(0.0, Counted()), PointFinished(0.0, Counted(cycles=7)))
+    record(recorder, PointFinished(Counted(), time=0.0), PointFinished(Counted(cycles=7), time=0.0))
     with open_record(path) as kept:
         assert kept.points == [{"cycles": None}, {"cycles": 7}]
 
@@ -308,7 +308,7 @@ def test_a_laser_signal_takes_less_room_than_raw_and_samples_are_not_stored_twic
     recorder = begin(path)
     for first in range(0, t.size, 200):
         part = slice(first, first + 200)
-        recorder(Acquired(t[first], 1, Block(first, counts[part]), drive[part]))
+        recorder(Acquired(1, Block(first, counts[part]), drive[part], time=t[first]))
     recorder.close("completed")
     # the blocks' table adds 32 bytes per 200 rows, and the empty tables some kB
     assert path.stat().st_size < 0.7 * 18 * t.size

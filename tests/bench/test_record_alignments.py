@@ -17,7 +17,7 @@ SECOND = Alignment("storey 2", -1.5, 1.0 - 21e-6, 1.0e-6, 0.0035, 119_990, 0)
 
 def test_alignments_come_back_exactly_by_run(tmp_path: Path) -> None:
     path = tmp_path / "campaign.h5"
-    told = (SensorsAligned(1.0, 1, (FIRST, SECOND)), SensorsAligned(9.0, 3, (SECOND,)))
+    told = (SensorsAligned(1, (FIRST, SECOND), time=1.0), SensorsAligned(3, (SECOND,), time=9.0))
     record(begin(path), block(0, 10), *told)
     with open_record(path) as kept:
         assert kept.alignments == {1: (FIRST, SECOND), 3: (SECOND,)}
@@ -30,7 +30,7 @@ def test_alignments_come_back_exactly_by_run(tmp_path: Path) -> None:
 
 def test_the_table_says_its_units(tmp_path: Path) -> None:
     path = tmp_path / "campaign.h5"
-    record(begin(path), SensorsAligned(0.0, 1, (FIRST,)))
+    record(begin(path), SensorsAligned(1, (FIRST,), time=0.0))
     with h5py.File(path) as file:
         group = file["entry/instrument/alignments"]
         units = {name: group[name].attrs["units"] for name in group if name != "sensor"}
@@ -54,7 +54,7 @@ def test_alignments_can_be_read_while_the_file_is_written(tmp_path: Path) -> Non
     recorder = begin(path)
     with open_record(path) as kept:
         assert kept.alignments == {}
-        recorder(SensorsAligned(0.0, 1, (FIRST,)))
+        recorder(SensorsAligned(1, (FIRST,), time=0.0))
         recorder.sync()
         kept.refresh()
         assert kept.alignments == {1: (FIRST,)}
@@ -66,7 +66,7 @@ def test_wide_counts_their_polynomial_and_what_faults_mean_are_kept(tmp_path: Pa
     wide = Channel("wide", "acceleration", "m/s2", 1e-6, 0.5, (-8_000_000, 8_000_000), "24 bit", higher=(1e-15,))
     laser = Channel("laser", "displacement", "m", 3e-6, 0.0, (-32760, 32760), "serial", faults={32763: "no target"})
     counts = np.array([[7_999_999, 32763], [-8_000_001, 100]], dtype=np.int32)
-    record(begin(path, channels=(wide, laser)), Acquired(0.0, 1, Block(0, counts), np.zeros(2)))
+    record(begin(path, channels=(wide, laser)), Acquired(1, Block(0, counts), np.zeros(2), time=0.0))
     with h5py.File(path) as file:
         stored = file["entry/instrument/wide/counts"]
         assert stored.dtype == np.int32

@@ -25,7 +25,7 @@ def fit(name: str, rows: int = 700, scale: float = 1e-3) -> FitFinished:
         "damping": Series(np.full(rows, 0.01), "1", "damping ratio in a window"),
     }
     found = {"k1": FittedParameter(410.0, 0.3, "N/m"), "xi1": FittedParameter(0.01, float("nan"), "1")}
-    return FitFinished(12.5, name, f"{name}: ω₁ found", columns, found)
+    return FitFinished(name, f"{name}: ω₁ found", columns, found, time=12.5)
 
 
 def check(kept: Record, *fits: FitFinished) -> None:
@@ -95,9 +95,9 @@ def test_a_fit_that_cannot_be_kept_is_refused_where_it_is_made() -> None:
     good = fit("decay")
     short = {**good.columns, "u1": Series(np.zeros(3), "m", "too short")}
     with pytest.raises(ValueError, match="shapes"):
-        FitFinished(0.0, "decay", "", short, {})
+        FitFinished("decay", "", short, {}, time=0.0)
     with pytest.raises(ValueError, match="a/b"):
-        FitFinished(0.0, "a/b", "", good.columns, {})
+        FitFinished("a/b", "", good.columns, {}, time=0.0)
 
 
 def test_the_operator_sees_the_findings() -> None:

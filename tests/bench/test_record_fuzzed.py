@@ -25,10 +25,10 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> tuple[bytes, bytes]:
     """A small file as it was closed, and as its writer left it before."""
     path = tmp_path_factory.mktemp("whole") / "campaign.h5"
     recorder = begin(path, point_type=Small)
-    recorder(StateChanged(0.0, State.ARMED, State.RUNNING, "started"))
+    recorder(StateChanged(State.ARMED, State.RUNNING, "started", time=0.0))
     for k in range(20):
         recorder(block(100 * k, 100, time=100 * (k + 1) / RATE))
-    recorder(PointFinished(1.0, Small(number=1, alpha_2=0.5)))
+    recorder(PointFinished(Small(number=1, alpha_2=0.5), time=1.0))
     recorder.sync()
     left = path.read_bytes()
     recorder.close("completed", "all done")

@@ -30,7 +30,7 @@ LAST = Identified(
 @pytest.mark.parametrize("said", [(), (FIRST,), (FIRST, LAST), (LAST, FIRST)])
 def test_what_was_said_last_comes_back(said: tuple[Identified, ...], tmp_path: Path) -> None:
     path = tmp_path / "campaign.h5"
-    record(begin(path), *(SpecimenIdentified(1.0, each) for each in said))
+    record(begin(path), *(SpecimenIdentified(each, time=1.0) for each in said))
     with open_record(path) as kept:
         assert kept.identified == (said[-1] if said else None)
         assert [each.kind for each in kept.events] == ["SpecimenIdentified"] * len(said)

@@ -27,14 +27,14 @@ LONG = (pytest.mark.soak, pytest.mark.timeout(1200))
 def begin(path: Path) -> Recorder:
     channels = [Channel(name, "displacement", "m", 1e-6, 0.0, (-32768, 32767), "") for name in NAMES]
     recorder = Recorder(path, channels=channels, sample_rate=RATE, point_type=HarmonicPoint, metadata={"seed": "1"})
-    recorder(StateChanged(0.0, State.ARMED, State.RUNNING, "started"))
+    recorder(StateChanged(State.ARMED, State.RUNNING, "started", time=0.0))
     return recorder
 
 
 def hand_over(recorder: Recorder, k: int) -> None:
     rows = np.arange(k * BLOCK, (k + 1) * BLOCK)
     counts = np.stack([counts_of(rows, channel) for channel in range(len(NAMES))], axis=1)
-    recorder(Acquired(0.1 * (k + 1), 1, Block(int(rows[0]), counts), np.sin(0.01 * rows)))
+    recorder(Acquired(1, Block(int(rows[0]), counts), np.sin(0.01 * rows), time=0.1 * (k + 1)))
 
 
 def as_fast_as_it_can(path: Path, tell: Callable[[int, int], None]) -> None:
@@ -42,7 +42,7 @@ def as_fast_as_it_can(path: Path, tell: Callable[[int, int], None]) -> None:
     for k in range(100_000):
         hand_over(recorder, k)
         if k % 7 == 6:
-            recorder(PointFinished(0.1 * k, POINT))
+            recorder(PointFinished(POINT, time=0.1 * k))
             recorder.sync()
             tell((k + 1) * BLOCK, (k + 1) // 7)
 

@@ -17,7 +17,7 @@ CLASSES = {"NXroot", "NXentry", "NXinstrument", "NXsensor", "NXdata", "NXcollect
 def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("nexus") / "campaign.h5"
     recorder = begin(path, metadata=METADATA | {"operator": "A. Muster", "notes": "a note"})
-    record(recorder, block(0, 3000, time=1.5), PointFinished(5.0, FULL), Warned(6.0, "text"))
+    record(recorder, block(0, 3000, time=1.5), PointFinished(FULL, time=5.0), Warned("text", time=6.0))
     return path
 
 

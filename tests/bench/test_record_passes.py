@@ -10,8 +10,8 @@ from bench.events import Event, PassFinished, RunningGain
 from bench.record.reader import open_record
 from tests.bench.test_record import begin, block, record
 
-PASS = PassFinished(7.5, "Ω record", 1, 0.0381, 0.0379, 0.046, 1.0 / 3.0, True, "pass 1 (gain 1): error 3.81%")
-GAIN = RunningGain(9.0, "Ω record", 0.25, 4.2, 0.0031, 0.84, float("nan"))
+PASS = PassFinished("Ω record", 1, 0.0381, 0.0379, 0.046, 1.0 / 3.0, True, "pass 1 (gain 1): error 3.81%", time=7.5)
+GAIN = RunningGain("Ω record", 0.25, 4.2, 0.0031, 0.84, float("nan"), time=9.0)
 
 
 def stored(event: Event) -> dict[str, object]:

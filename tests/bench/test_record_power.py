@@ -36,7 +36,7 @@ def states(tmp_path_factory: pytest.TempPathFactory) -> list[bytes]:
         for k in range(BLOCKS):
             recorder(block(100 * k, 100, time=0.05 * (k + 1)))
             if k % 40 == 20:
-                recorder(PointFinished(0.05 * k, FULL))
+                recorder(PointFinished(FULL, time=0.05 * k))
             if k % 10 == 9:
                 recorder.sync()
         recorder.close("completed")

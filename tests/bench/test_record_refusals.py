@@ -70,11 +70,11 @@ def test_a_block_of_the_wrong_shape_is_refused(path: Path) -> None:
     recorder = begin(path)
     good = block(0, 10)
     with pytest.raises(RecordError, match="drive"):
-        recorder(Acquired(0.0, 1, good.block, np.zeros(9)))
+        recorder(Acquired(1, good.block, np.zeros(9), time=0.0))
     with pytest.raises(RecordError, match=r"\(10, 2\)"):
-        recorder(Acquired(0.0, 1, Block(0, good.block.counts[:, :2]), good.drive))
+        recorder(Acquired(1, Block(0, good.block.counts[:, :2]), good.drive, time=0.0))
     with pytest.raises(RecordError, match="Frame"):
-        recorder(PointFinished(0.0, _Frame()))
+        recorder(PointFinished(_Frame(), time=0.0))
     recorder.close("failed")
     with pytest.raises(RecordError, match="closed"):
         recorder(good)
@@ -89,7 +89,7 @@ class _Frame(Parameters):
 def test_a_failing_disk_is_told_once_and_what_was_written_stays(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     recorder = begin(path)
     recorder(block(0, 1500))
-    recorder(StateChanged(1.0, State.ARMED, State.RUNNING, "started"))
+    recorder(StateChanged(State.ARMED, State.RUNNING, "started", time=1.0))
     recorder.sync()
 
     def fail(*_: Any) -> None:
@@ -97,12 +97,12 @@ def test_a_failing_disk_is_told_once_and_what_was_written_stays(path: Path, monk
 
     with monkeypatch.context() as broken:
         broken.setattr(hdf5, "append", fail)
-        recorder(Warned(2.0, "this cannot be written"))
+        recorder(Warned("this cannot be written", time=2.0))
         with pytest.raises(RecordError, match="No space left") as caught:
             recorder.sync()
     assert "\n" not in str(caught.value)
     assert str(path) in str(caught.value)
-    recorder(StateChanged(3.0, State.RUNNING, State.ABORTING, "the disk is full"))
+    recorder(StateChanged(State.RUNNING, State.ABORTING, "the disk is full", time=3.0))
     recorder.close("aborted")
     with open_record(path) as kept:
         assert kept.status == "running"

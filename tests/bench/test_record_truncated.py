@@ -56,15 +56,15 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Written:
     """Two runs, of which the second has a gap, with events and points throughout."""
     path = tmp_path_factory.mktemp("whole") / "campaign.h5"
     recorder = begin(path, point_type=Small)
-    recorder(StateChanged(0.0, State.ARMED, State.RUNNING, "started"))
+    recorder(StateChanged(State.ARMED, State.RUNNING, "started", time=0.0))
     for k in range(BLOCKS):
         run, number = divmod(k, BLOCKS // 2)
         missing = 1000 if run and number > 100 else 0
         recorder(block(number * BLOCK + missing, BLOCK, run=run + 1, time=0.01 * (k + 1) + 3.0 * run, seed=run))
         if k % 6 == 0:
-            recorder(Warned(0.01 * k, f"warning {k}"))
+            recorder(Warned(f"warning {k}", time=0.01 * k))
         if k % 50 == 49:
-            recorder(PointFinished(0.01 * k, Small(number=k, alpha_2=1.0 / k)))
+            recorder(PointFinished(Small(number=k, alpha_2=1.0 / k), time=0.01 * k))
             recorder.sync()
     left = path.read_bytes()
     recorder.close("completed", "all done")

@@ -35,13 +35,13 @@ def write_for_ever(path: Path, pause: float) -> None:
     """The writing process. It prints how many rows and points are certain to be in the file."""
     channels = [Channel(name, "displacement", "m", 1e-6, 0.0, (-32768, 32767), "") for name in NAMES]
     recorder = Recorder(path, channels=channels, sample_rate=2000.0, point_type=HarmonicPoint, metadata={"seed": "1"})
-    recorder(StateChanged(0.0, State.ARMED, State.RUNNING, "started"))
+    recorder(StateChanged(State.ARMED, State.RUNNING, "started", time=0.0))
     for k in range(100_000):
         rows = np.arange(k * BLOCK, (k + 1) * BLOCK)
         counts = np.stack([counts_of(rows, channel) for channel in range(len(NAMES))], axis=1)
-        recorder(Acquired(0.1 * k, 1, Block(int(rows[0]), counts), np.sin(0.01 * rows)))
+        recorder(Acquired(1, Block(int(rows[0]), counts), np.sin(0.01 * rows), time=0.1 * k))
         if k % 25 == 24:
-            recorder(PointFinished(0.1 * k, POINT))
+            recorder(PointFinished(POINT, time=0.1 * k))
             recorder.sync()
             # the whole chunks of 1000 rows that were complete when the point came
             print((k + 1) * BLOCK // 1000 * 1000, (k + 1) // 25, flush=True)

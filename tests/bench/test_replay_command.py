@@ -67,8 +67,8 @@ class Two:
             outcome = yield Dwell(4)
             assert isinstance(outcome, Measured)
             peak = float(np.mean([cycle.peak[ACCELERATION] for cycle in outcome.cycles]))
-            yield Say(Estimate(0.0, OMEGA, None, 4, peak, math.nan, math.nan, 1.0))
-            yield Say(PointFinished(0.0, Found(peak=peak, reason="ä" * 400)))
+            yield Say(Estimate(OMEGA, None, 4, peak, math.nan, math.nan, 1.0, time=0.0))
+            yield Say(PointFinished(Found(peak=peak, reason="ä" * 400), time=0.0))
             yield RampOut()
             amplitude = 1.0 + peak / 3.0
 
@@ -136,7 +136,7 @@ def made(path: Path, do: Callable[[Mishap], None] | None = None, **person: bool)
         requests=requests,
         operator=Person(requests, **person),
         subscribers=[] if do is None else [Mishap(rig, requests, do)],
-        first=[Warned(0.0, "the stroke is nearly used up")],
+        first=[Warned("the stroke is nearly used up", time=0.0)],
     )
     return path
 

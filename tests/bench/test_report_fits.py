@@ -34,8 +34,8 @@ def test_fits_and_points_are_shown_with_their_units(tmp_path: Path) -> None:
     recorder = Recorder(
         tmp_path / "run.h5", channels=rig.channels, sample_rate=1000.0, point_type=Found, metadata={"protocol": "made"}
     )
-    recorder(FitFinished(1.0, "decay", "the decay fits", columns, found))
-    recorder(PointFinished(2.0, Found(frequency_hz=8.0, noise=1e-7, remark="beta = 0.4")))
+    recorder(FitFinished("decay", "the decay fits", columns, found, time=1.0))
+    recorder(PointFinished(Found(frequency_hz=8.0, noise=1e-7, remark="beta = 0.4"), time=2.0))
     recorder.close("completed")
     with open_record(tmp_path / "run.h5") as record:
         campaign = Campaign(tmp_path / "run.h5", record)
@@ -64,7 +64,7 @@ def test_columns_of_other_scales_have_panels_of_their_own_and_uncertainties_are_
         "residual": Series(1e-5 * np.cos(time), "m", "measured less fitted"),
         "angle": Series(0.05 * np.cos(time), "rad", "largest"),
     }
-    panels = fit_figure(FitFinished(0.0, "impacts", "", columns, {})).axes
+    panels = fit_figure(FitFinished("impacts", "", columns, {}, time=0.0)).axes
     assert [panel.get_ylabel() for panel in panels] == ["restitution", "speed", "residual  [µm]", "angle  [mrad]"]
     low, high = panels[0].get_ylim()
     assert high - low < 0.01

@@ -88,11 +88,11 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
         },
         tables={"prediction": prediction},
     )
-    recorder(Warned(61.5, "the table's temperature is near its limit"))
+    recorder(Warned("the table's temperature is near its limit", time=61.5))
     # a gain that was told although no sample came: nothing was played
-    recorder(RunningGain(1.0, NAME, 0.25, 1.0, 0.01, 0.8, 0.8))
-    recorder(PointFinished(2.0, point(0.64, None)))
-    recorder(PointFinished(3.0, point(0.25, 0.812)))
+    recorder(RunningGain(NAME, 0.25, 1.0, 0.01, 0.8, 0.8, time=1.0))
+    recorder(PointFinished(point(0.64, None), time=2.0))
+    recorder(PointFinished(point(0.25, 0.812), time=3.0))
     recorder.close("stopped", "the operator asked for it")
     return path
 

@@ -269,7 +269,7 @@ def test_a_recording_is_replayed_with_the_same_twin(tmp_path_factory: pytest.Tem
 def test_alpha_2_comes_with_the_measured_one_and_goes_with_the_test() -> None:
     """Under a record: over the peak drift of the bare frame under the same motion of the table."""
     bench = Beside(configuration(members=3))
-    bench.run(shaken(4.0, 2.5, stated=RunningGain(0.0, "a sine", 0.25, 0.0, 0.01, 0.42, 0.4)))
+    bench.run(shaken(4.0, 2.5, stated=RunningGain("a sine", 0.25, 0.0, 0.01, 0.42, 0.4, time=0.0)))
     truth = np.concatenate(bench.truth)
     peaks = [
         simulate(specimen, SampledRecord(truth[:, 0], 1.0 / RATE)).peaks.drift for specimen in (COUPLED, COUPLED.bare())
@@ -306,7 +306,7 @@ def test_it_is_silent_where_it_does_not_describe_what_stands_there(
     standing = Standing()
     assert standing.specimen is None
     for work in works:
-        standing.follow(SpecimenMounted(0.0, COUPLED, work))
+        standing.follow(SpecimenMounted(COUPLED, work, time=0.0))
     assert (standing.specimen is not None) == describes
     assert (standing.why_not == "") == describes
 

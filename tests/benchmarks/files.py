@@ -71,7 +71,7 @@ def ours(path: Path, bits: int, counts: NDArray[Any], drive: NDArray[np.float64]
     )
     for k in range(blocks):
         part = slice(k * BLOCK % len(counts), k * BLOCK % len(counts) + BLOCK)
-        recorder(Acquired((k + 1) * BLOCK / RATE, 1, Block(k * BLOCK, counts[part]), drive[part]))
+        recorder(Acquired(1, Block(k * BLOCK, counts[part]), drive[part], time=(k + 1) * BLOCK / RATE))
     recorder.close("completed", "")
 
 

@@ -100,16 +100,16 @@ def paced(bench: Recorded, enabled: bool) -> Paced:
     rest = bench.counts[: round(REST * rate)]
     signals.tare(np.column_stack([each.to_unit(rest[:, k]) for k, each in enumerate(bench.channels)]))
     with twin_beside(stream, bench, configuration, signals, Requests(), patient=False):  # type: ignore[arg-type]
-        stream.say(SpecimenMounted(0.0, COUPLED, Handwork.MOUNT_SPRING))
+        stream.publish(SpecimenMounted(COUPLED, Handwork.MOUNT_SPRING, time=0.0))
         time.sleep(2.0)
-        stream.say(StateChanged(0.0, State.ARMED, State.RUNNING, "at rest, zero taken"))
+        stream.publish(StateChanged(State.ARMED, State.RUNNING, "at rest, zero taken", time=0.0))
         begin, before = time.perf_counter(), time.process_time()
         for number, first in enumerate(range(0, len(bench.counts) - size + 1, size)):
             moment = begin + (first + size) / rate
             time.sleep(max(moment - time.perf_counter(), 0.0))
             due[float(number)] = moment
             block = Block(first, bench.counts[first : first + size])
-            stream.publish(Acquired(float(number), 1, block, np.zeros(size)))
+            stream.publish(Acquired(1, block, np.zeros(size), time=float(number)))
         processor = time.process_time() - before
     return Paced(processor, np.array(delays), len(due), members[-1] if members else 0)
 

@@ -180,7 +180,7 @@ def feed(connection: Connection, length: float, seconds: float) -> None:
     start, used = now(), time.process_time()
     for block in range(int(seconds / length)):
         time.sleep(max(start + (block + 1) * length - now(), 0.0))
-        connection.send(reduction(Acquired((block + 1) * length, 1, Block(block * n, counts), drive)))
+        connection.send(reduction(Acquired(1, Block(block * n, counts), drive, time=(block + 1) * length)))
     connection.send((time.process_time() - used) / seconds)
 
 
@@ -223,7 +223,7 @@ def hour(application: QApplication, controller: Controller, length: float) -> No
     """An hour of blocks as fast as they are taken, drawn thirty at a time; resident memory over its second half."""
     n = round(length * RATE)
     reduction, counts, drive = made(n)
-    low_high = reduction(Acquired(length, 1, Block(0, counts), drive))
+    low_high = reduction(Acquired(1, Block(0, counts), drive, time=length))
     begun, sizes, total = now(), list[tuple[float, float]](), int(HOUR / length)
     low, high, step = low_high.low, low_high.high, low_high.step
     for first in range(0, total, TOGETHER):

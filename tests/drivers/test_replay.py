@@ -42,7 +42,7 @@ def recorded(path: Path, volts: NDArray[np.float64], runs: int, configured: bool
     for run in range(1, runs + 1):
         given.append(play(started(rig), volts))
         for block in given[-1]:
-            recorder(Acquired(0.0, run, block, np.zeros(len(block))))
+            recorder(Acquired(run, block, np.zeros(len(block)), time=0.0))
         rig.stop()
     recorder.close("completed")
     return given
@@ -92,7 +92,7 @@ def test_gaps_between_recorded_blocks_are_gaps_between_stretches(tmp_path: Path)
     )
     blocks = play(started(rig), np.zeros(600))
     for block in (*blocks[:2], *blocks[4:]):
-        recorder(Acquired(0.0, 1, block, np.zeros(len(block))))
+        recorder(Acquired(1, block, np.zeros(len(block)), time=0.0))
     recorder.close("completed")
     with open_record(tmp_path / "gap.h5") as record:
         (run,) = ReplayedRecord(record).runs
@@ -173,7 +173,7 @@ def test_what_the_channels_say_of_their_counts_is_kept(tmp_path: Path) -> None:
     recorder = Recorder(
         tmp_path / "wide.h5", channels=made.channels, sample_rate=1000.0, point_type=Parameters, metadata=metadata
     )
-    recorder(Acquired(0.0, 1, Block(0, np.array([[70_000], [100_001]], dtype=np.int32)), np.zeros(2)))
+    recorder(Acquired(1, Block(0, np.array([[70_000], [100_001]], dtype=np.int32)), np.zeros(2), time=0.0))
     recorder.close("completed")
     with open_record(tmp_path / "wide.h5") as record, ReplayRig(ReplayedRecord(record), lead=0) as rig:
         assert rig.channels == made.channels

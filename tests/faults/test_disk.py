@@ -44,7 +44,7 @@ def _fill(recorder: Recorder) -> int:
 
 def _tell(recorder: Recorder, taken: list[int]) -> None:
     for k in range(SMALL + 3):
-        recorder(Warned(float(k), f"event {k}"))
+        recorder(Warned(f"event {k}", time=float(k)))
         taken.append(k)
 
 
@@ -61,7 +61,7 @@ def test_a_full_backlog_is_told_once_and_at_once(hung: tuple[Recorder, Disk]) ->
     # one event is in the hands of the thread, if it was quick
     assert _fill(recorder) in (SMALL, SMALL + 1)
     for k in range(100):
-        recorder(Warned(float(k), "after the failure"))
+        recorder(Warned("after the failure", time=float(k)))
     assert monotonic() - begin < SOON
     _finish_after_closing(recorder, disk)
 
@@ -76,7 +76,7 @@ def _finish_after_closing(recorder: Recorder, disk: Disk) -> None:
 )
 def test_nobody_waits_for_ever(end: Callable[[Recorder], None], hung: tuple[Recorder, Disk]) -> None:
     recorder, disk = hung
-    recorder(Warned(0.0, "one event"))
+    recorder(Warned("one event", time=0.0))
     begin = monotonic()
     with pytest.raises(RecordError, match="has not answered"):
         end(recorder)
@@ -106,7 +106,7 @@ def test_in_virtual_time_a_slow_disk_is_waited_for(tmp_path: Path, monkeypatch: 
     path = tmp_path / "c.h5"
     recorder = Recorder(path, channels=[channel], sample_rate=1e3, point_type=NoPoint, metadata={}, hold_up=SOON)
     for k in range(50 * SMALL):
-        recorder(Warned(float(k), f"event {k}"))
+        recorder(Warned(f"event {k}", time=float(k)))
     recorder.close("completed", "")
     with open_record(path) as record:
         assert len(record.events) == 50 * SMALL

@@ -78,7 +78,7 @@ def test_lines_are_ascending_and_one_for_each_record_or_layer() -> None:
 def test_points_of_records_stand_over_the_stiffness(plot: GainPlot) -> None:
     plot.predict(RECORDS)
     assert texts.BETA_AXIS in plot.getPlotItem().getAxis("bottom").labelText
-    plot.show_running(RunningGain(1.0, "Kobe", 0.4, 3.0, 0.01, 0.75, 0.7))
+    plot.show_running(RunningGain("Kobe", 0.4, 3.0, 0.01, 0.75, 0.7, time=1.0))
     assert plot._now.getData()[0].tolist() == [0.4]
     assert plot._now.getData()[1].tolist() == [0.75]
     plot.add(_earthquake(0.4, 0.72))
@@ -109,7 +109,7 @@ def test_the_gain_of_a_spectrum_is_logarithmic_and_bands_are_drawn_where_they_ar
     box = fills[0].boundingRect()
     assert (box.left(), box.right()) == pytest.approx((15.0, 16.0)), "the band ends where it is not known"
     assert (box.top(), box.bottom()) == pytest.approx((np.log10(0.19), np.log10(1.2 * 0.28)))
-    plot.show_running(Estimate(1.0, 16.0, 0.4, 12, 0.01, 0.1, 0.004, 0.2))
+    plot.show_running(Estimate(16.0, 0.4, 12, 0.01, 0.1, 0.004, 0.2, time=1.0))
     assert plot._now.getData()[1].tolist() == pytest.approx([-1.0])
     point = HarmonicPoint(
         omega_rad_s=16.0, beta=0.4, status=PointStatus.STEADY, layer="rocking", alpha_2=0.21, alpha_2_uncertainty=0.01

@@ -35,9 +35,9 @@ def link(window: Window, spoken: type[SpokenLink]) -> SpokenLink:
 def test_state_step_time_and_inputs_are_shown(window: Window, link: SpokenLink) -> None:
     header = window.header
     link.said = [
-        Told(StateChanged(1.0, State.ARMED, State.RUNNING, "the sine begins")),
-        Told(StepStarted(1.0, "bare frame at 16 rad/s")),
-        Told(Progress(1.0, 0.25, 125.0, "settling")),
+        Told(StateChanged(State.ARMED, State.RUNNING, "the sine begins", time=1.0)),
+        Told(StepStarted("bare frame at 16 rad/s", time=1.0)),
+        Told(Progress(0.25, 125.0, "settling", time=1.0)),
         SafetyInputs(1.0, {"end switch": True, "enable": False}),
     ]
     window._controller._look()
@@ -55,8 +55,8 @@ def test_stop_stays_in_its_place_whatever_is_said(window: Window, link: SpokenLi
     stop = window.header.stop
     place = stop.mapTo(window, stop.rect().topLeft())
     link.said = [
-        Told(StepStarted(1.0, "a step with very much to say " * 12)),
-        Told(StateChanged(1.0, State.ARMED, State.WAITING, "a reason with very much to say " * 8)),
+        Told(StepStarted("a step with very much to say " * 12, time=1.0)),
+        Told(StateChanged(State.ARMED, State.WAITING, "a reason with very much to say " * 8, time=1.0)),
         Question(1, "Mount the spring, and look at it from every side. " * 3),
     ]
     window._controller._look()

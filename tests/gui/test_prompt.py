@@ -31,7 +31,7 @@ def link(window: Window, spoken: type[SpokenLink]) -> SpokenLink:
 
 def _ask(window: Window, link: SpokenLink, number: int, work: Handwork | None = None) -> None:
     request = f"Do thing {number}."
-    link.said = [Told(OperatorAsked(1.0, request, work)), Question(number, request)]
+    link.said = [Told(OperatorAsked(request, work, time=1.0)), Question(number, request)]
     window._controller._look()
 
 

@@ -64,9 +64,9 @@ def _made(folder: Path, *points: HarmonicPoint) -> Path:
     for run in (1, 2):
         for first in range(0, N, 500):
             block = Block(first, _counts(run)[first : first + 500])
-            recorder(Acquired(first / RATE, run, block, np.full(500, 0.1 * run)))
+            recorder(Acquired(run, block, np.full(500, 0.1 * run), time=first / RATE))
     for point in points:
-        recorder(PointFinished(2.0, point))
+        recorder(PointFinished(point, time=2.0))
     recorder.close("completed", "the plan was carried out")
     return path
 

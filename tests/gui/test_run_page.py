@@ -143,11 +143,11 @@ def test_the_running_gain_and_the_finished_point(window: Window, link: SpokenLin
     point = HarmonicPoint(
         omega_rad_s=16.0, beta=0.4, status=PointStatus.STEADY, layer="rocking", alpha_2=0.21, alpha_2_uncertainty=0.01
     )
-    link.said = [Told(Estimate(1.0, 16.0, 0.4, 12, 0.01, 0.24, 0.0041, 0.2))]
+    link.said = [Told(Estimate(16.0, 0.4, 12, 0.01, 0.24, 0.0041, 0.2, time=1.0))]
     window._controller._look()
     assert "0.2400 ± 0.0041" in window.run.alpha.text()
     assert "+20.0 %" in window.run.predicted.text()
-    link.said = [Told(PointFinished(2.0, point)), Told(Warned(3.0, "drift comes near"))]
+    link.said = [Told(PointFinished(point, time=2.0)), Told(Warned("drift comes near", time=3.0))]
     window._controller._look()
     assert window.run.gains.measured == [(16.0, 0.21)]
     assert window.run.picture.canvas.coupled
@@ -157,7 +157,10 @@ def test_the_running_gain_and_the_finished_point(window: Window, link: SpokenLin
 def test_points_stay_until_something_else_begins(window: Window, link: SpokenLink, spoken: type[SpokenLink]) -> None:
     """A plan that is checked leaves them; a loop check, which has no gains, begins with an empty plot."""
     point = HarmonicPoint(omega_rad_s=16.0, beta=0.4, status=PointStatus.STEADY, layer="rocking", alpha_2=0.21)
-    link.said = [Told(PointFinished(2.0, point)), Ended("completed", "the plan was carried out", {}, "", Path("never"))]
+    link.said = [
+        Told(PointFinished(point, time=2.0)),
+        Ended("completed", "the plan was carried out", {}, "", Path("never")),
+    ]
     window._controller._look()
     window.protocol.survey()
     spoken.latest.said = [Surveyed((), None, (), 60.0, 1e6, 1e9, "hash", {})]
@@ -191,7 +194,7 @@ def test_the_model_beside_the_test_is_told_while_the_bench_is_driven(window: Win
     link.said = [Told(estimate(drift_peak=0.01819, drift_peak_measured=0.01822, residual=0.003))]
     window._controller._look()
     assert "drift peak 18.22 mm, model 18.19 mm; residual 0.3 %" in window.run.twin.text()
-    link.said = [Told(StateChanged(1.0, State.STOPPING, State.IDLE, "the output is at zero"))]
+    link.said = [Told(StateChanged(State.STOPPING, State.IDLE, "the output is at zero", time=1.0))]
     window._controller._look()
     window.run._refresh()
     assert window.run.twin.text().endswith(": -")
@@ -199,7 +202,7 @@ def test_the_model_beside_the_test_is_told_while_the_bench_is_driven(window: Win
 
 def test_a_question_is_inline_and_answered_once(window: Window, link: SpokenLink, qtbot: QtBot) -> None:
     link.said = [
-        Told(StateChanged(1.0, State.IDLE, State.WAITING, "a question")),
+        Told(StateChanged(State.IDLE, State.WAITING, "a question", time=1.0)),
         Question(7, "Mount the spring of beta = 0.4."),
     ]
     window._controller._look()
@@ -216,7 +219,7 @@ def test_a_question_is_inline_and_answered_once(window: Window, link: SpokenLink
 def test_a_question_goes_when_the_bench_no_longer_waits(window: Window, link: SpokenLink) -> None:
     link.said = [Question(1, "Stand the block up.")]
     window._controller._look()
-    link.said = [Told(StateChanged(1.0, State.WAITING, State.HALTED, "halt was asked for"))]
+    link.said = [Told(StateChanged(State.WAITING, State.HALTED, "halt was asked for", time=1.0))]
     window._controller._look()
     assert not window.prompt.isVisible()
 

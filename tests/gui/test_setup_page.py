@@ -172,7 +172,7 @@ def _check(window: Window, spoken: type[SpokenLink], qtbot: QtBot, lines: tuple[
     run = spoken.latest.assignment
     assert isinstance(run, Run)
     assert (run.make, run.parameters, run.person) == (CHECK.campaign, CHECK.parameters(), False)
-    spoken.latest.said = [Told(PointFinished(1.0, line)) for line in lines]
+    spoken.latest.said = [Told(PointFinished(line, time=1.0)) for line in lines]
     window._controller._look()
     spoken.latest.said = [Ended(status, "told", {"points": []}, "", run.out)]
     window._controller._look()

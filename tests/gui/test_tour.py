@@ -43,11 +43,11 @@ def test_steps_follow_what_was_done(controller: Controller) -> None:
     controller.surveyed.emit(FINE, None)
     assert _marks(tour) == DONE + NEXT + 2 * LATER
     controller.began.emit(order(Path("never")))
-    controller.told.emit(Warned(1.0, "of something"))
+    controller.told.emit(Warned("of something", time=1.0))
     assert _marks(tour) == 2 * DONE + NEXT + LATER
     assert tour.steps[2].property("level") == "wait"
     controller.surveyed.emit(TIGHT, None)
-    controller.told.emit(PointFinished(2.0, Parameters()))
+    controller.told.emit(PointFinished(Parameters(), time=2.0))
     assert _marks(tour) == 3 * DONE + NEXT
     controller.ended.emit(Ended("completed", "the plan was carried out", {}, "", Path("never")))
     assert _marks(tour) == 4 * DONE

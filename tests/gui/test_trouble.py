@@ -89,8 +89,8 @@ def _said(window: Window) -> list[str]:
 
 def test_a_limit_says_what_the_bench_did_and_where_the_data_are(window: Window, link: SpokenLink) -> None:
     link.said = [
-        Told(StateChanged(1.0, State.ARMED, State.RUNNING, "driving")),
-        Told(LimitExceeded(2.0, "drift", 0.081, 0.08, "m")),
+        Told(StateChanged(State.ARMED, State.RUNNING, "driving", time=1.0)),
+        Told(LimitExceeded("drift", 0.081, 0.08, "m", time=2.0)),
         Ended("aborted", "drift 0.081 m exceeds 0.08 m", {}, "", OUT),
     ]
     window._controller._look()
@@ -125,7 +125,7 @@ def test_a_refused_start_says_that_nothing_happened(window: Window, link: Spoken
 
 def test_a_session_that_dies_while_it_drives_sends_to_the_bench(window: Window, link: SpokenLink) -> None:
     link.said = [
-        Told(StateChanged(1.0, State.ARMED, State.RUNNING, "driving")),
+        Told(StateChanged(State.ARMED, State.RUNNING, "driving", time=1.0)),
         Refused("the session's process ended without a word (exit code -9)", failed=True),
     ]
     window._controller._look()

@@ -48,16 +48,16 @@ class Shaking:
 
     def plan(self, configuration: BenchConfiguration) -> Plan:
         yield Handle(Handwork.REMOVE_BLOCK, configuration.specimen, "Take the block off the table.")
-        yield Say(StepStarted(0.0, "shaking"))
+        yield Say(StepStarted("shaking", time=0.0))
         yield Arm(0.2, patience=5.0)
         yield Calibrate(CALIBRATION)
         yield Follow((Leg(0.25, self.parameters.amplitude, OMEGA),))
         for cycle in range(self.parameters.cycles):
             yield Dwell(1)
             for _ in range(self.parameters.gossip):
-                yield Say(Estimate(0.0, OMEGA, None, cycle, 0.001, float("nan"), float("nan"), float("nan")))
+                yield Say(Estimate(OMEGA, None, cycle, 0.001, float("nan"), float("nan"), float("nan"), time=0.0))
         yield RampOut()
-        yield Say(PointFinished(0.0, NoPoint(value=1.0)))
+        yield Say(PointFinished(NoPoint(value=1.0), time=0.0))
 
     def table(self, points: Sequence[Parameters]) -> str:
         return f"{len(points)} points"

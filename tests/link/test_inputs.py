@@ -59,7 +59,7 @@ def teller(host: Host, rig: Wired) -> Teller:
 
 
 def _block(second: float) -> Acquired:
-    return Acquired(second, 1, Block(0, np.zeros((10, 0), dtype=np.int16)), np.zeros(10))
+    return Acquired(1, Block(0, np.zeros((10, 0), dtype=np.int16)), np.zeros(10), time=second)
 
 
 @pytest.fixture
@@ -80,7 +80,7 @@ def test_blocks_ask_twice_a_second_and_a_change_of_state_at_once(
     # ten seconds of blocks, and the look when the rig was opened
     assert rig.asked - 1 == pytest.approx(10.0 / PERIOD, abs=1)
     before = rig.asked
-    teller(StateChanged(10.0, State.RUNNING, State.STOPPING, "over"))
+    teller(StateChanged(State.RUNNING, State.STOPPING, "over", time=10.0))
     assert rig.asked == before + 1
 
 
@@ -92,7 +92,7 @@ def test_inputs_that_cannot_be_read_end_what_is_driven_with_their_own_reason(
     with pytest.raises(RigError, match="the device is gone"):
         teller(_block(1.0))
     # what is told of a state does not end anything
-    teller(StateChanged(2.0, State.RUNNING, State.HALTED, "the device is gone"))
+    teller(StateChanged(State.RUNNING, State.HALTED, "the device is gone", time=2.0))
 
 
 @pytest.mark.usefixtures("teller")

@@ -194,7 +194,7 @@ def test_a_halt_is_heard_from_a_client_that_reads_nothing() -> None:
     host = Host(there, requests, print)
     start = time.monotonic()
     for number in range(50_000):
-        host.outbox.put(Told(StepStarted(float(number), "x" * 100)))
+        host.outbox.put(Told(StepStarted("x" * 100, time=float(number))))
     assert time.monotonic() - start < 5.0
     assert host.outbox.lost_events > 0
     here.send(Ask("halt"))
@@ -273,11 +273,11 @@ def test_a_beat_tells_for_how_long_the_engine_has_been_quiet() -> None:
         raise AssertionError
 
     began = time.monotonic()
-    host.note(StepStarted(0.0, "the last that is heard of the engine"))
+    host.note(StepStarted("the last that is heard of the engine", time=0.0))
     while (told := quiet()) < 0.6:
         assert told <= time.monotonic() - began + 0.1
     again = time.monotonic()
-    host.note(StepStarted(1.0, "it turns again"))
+    host.note(StepStarted("it turns again", time=1.0))
     # beats of before may still be on their way
     while quiet() > time.monotonic() - again:
         assert time.monotonic() - again < 5.0

@@ -46,7 +46,7 @@ def test_traces_hold_the_extremes_of_the_motion_that_was_made(reference: str) ->
     reduction = Reduction(CHANNELS, RATE, SignalMap(CHANNELS, reference))  # type: ignore[arg-type]
     traces = [
         reduction(
-            Acquired((first + BLOCK) / RATE, 1, Block(first, counts[first : first + BLOCK]), drive[first:][:BLOCK])
+            Acquired(1, Block(first, counts[first : first + BLOCK]), drive[first:][:BLOCK], time=(first + BLOCK) / RATE)
         )
         for first in range(0, N, BLOCK)
     ]
