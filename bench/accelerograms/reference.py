@@ -6,12 +6,12 @@ The options follow the last @, because a colon or a comma may stand in a path (`
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import isfinite
 from pathlib import Path
 
 from bench.accelerograms.accelerogram import Accelerogram
 from bench.accelerograms.read import read_accelerogram
 from bench.accelerograms.units import unit_of
+from bench.config.numbers import read_number
 from sim.errors import InvalidInput
 
 GRAMMAR = "FILE[@KEY=VALUE,...] with the keys unit, dt, channel, column and name, or synthetic:NAME[:SEED]"
@@ -49,7 +49,7 @@ class RecordReference:
         found = RecordReference(
             text,
             unit=None if unit is None else unit_of(unit, f"unit in {text}"),
-            dt=None if dt is None else _seconds(text, dt),
+            dt=None if dt is None else seconds_of(f"dt in {text}", dt),
             channel=options.get("channel"),
             column=options.get("column"),
             name=options.get("name"),
@@ -61,7 +61,7 @@ class RecordReference:
         if set(options) - {"name"}:
             raise InvalidInput("record", text, "a synthetic motion takes no option but name")
         name, colon, seed = place.removeprefix(_SYNTHETIC).partition(":")
-        if colon and re.fullmatch(r"\d{1,9}", seed) is None:
+        if colon and re.fullmatch(r"[0-9]{1,9}", seed) is None:
             raise InvalidInput(f"seed in {text}", seed, "it must be a whole number of at most nine digits")
         _check_synthetic(text, name)
         return replace(found, synthetic=name, seed=int(seed) if colon else None)
@@ -110,7 +110,11 @@ def read_records(references: Sequence[RecordReference]) -> tuple[Accelerogram, .
 def _options(text: str, tail: str) -> dict[str, str]:
     options: dict[str, str] = {}
     for option in tail.split(",") if tail else ():
-        key, _, value = option.partition("=")
+        key, equals, value = option.partition("=")
+        if not equals and options:
+            last = next(reversed(options))
+            allowed = f"a decimal comma in {last}? write {last}={options[last]}.{option}; commas separate options"
+            raise InvalidInput("record", text, allowed)
         if key not in _KEYS:
             raise InvalidInput("record", text, f"{key} is not one of {', '.join(_KEYS)}, which may follow @")
         if key in options or not value.strip():
@@ -119,13 +123,14 @@ def _options(text: str, tail: str) -> dict[str, str]:
     return options
 
 
-def _seconds(text: str, value: str) -> float:
+def seconds_of(item: str, value: str) -> float:
+    """A time step as it was typed [s]. Raises InvalidInput."""
     try:
-        seconds = float(value)
-    except ValueError:
-        seconds = 0.0
-    if not (isfinite(seconds) and seconds > 0.0):
-        raise InvalidInput(f"dt in {text}", value, "it must be positive seconds")
+        seconds = read_number(value, "s")
+    except ValueError as error:
+        raise InvalidInput(item, value, str(error) or "it must be positive seconds") from None
+    if seconds <= 0.0:
+        raise InvalidInput(item, value, "it must be positive seconds")
     return seconds
 
 

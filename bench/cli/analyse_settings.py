@@ -14,6 +14,7 @@ from sim.parameters import Parameters
 if TYPE_CHECKING:
     from bench.analysis.signals import SignalMap
     from bench.cli.catalogue import Entry
+    from bench.config.declared import Declared
     from bench.config.model import BenchConfiguration
     from bench.record.reader import Record
     from bench.replaying.analysis import Follower
@@ -49,6 +50,7 @@ def choice_of(record: "Record", changes: Sequence[str], config: Path | None, spe
     Raises InvalidInput for what there is not, or what may not be changed after a measurement.
     """
     from bench.cli.recorded import entry_of, parameters_of
+    from bench.config.declared import at
     from bench.config.model import BenchConfiguration
     from bench.config.validation import dotted, validated
     from bench.replaying.session import stored_configuration
@@ -65,12 +67,14 @@ def choice_of(record: "Record", changes: Sequence[str], config: Path | None, spe
         given["identified"] = read_specimen(specimen).model_dump(mode="json")
     data |= given
     own: dict[str, Any] = {}
+    settings_type = HarmonicSettings if entry.name == "harmonic" else entry.parameters
     for change in changes:
         key, equals, text = change.partition("=")
         if not (key and equals):
             raise InvalidInput("--set", change, f"it must be KEY=VALUE; {LIST}")
-        value = given[key] = _value(text)
         section, *path = key.split(".")
+        model = BenchConfiguration if path else settings_type
+        value = given[key] = _value(at(model, tuple(key.split("."))), text)
         if section in SECTIONS and path:
             _put(data, [section, *path], value)
         elif path:
@@ -78,7 +82,7 @@ def choice_of(record: "Record", changes: Sequence[str], config: Path | None, spe
             raise InvalidInput(f"--set {key}", value, f"of the configuration only {tables} can be changed; {LIST}")
         else:
             own[key] = value
-    _require_known(own, HarmonicSettings if entry.name == "harmonic" else entry.parameters)
+    _require_known(own, settings_type)
 
     def named(path: tuple[str | int, ...]) -> str:
         return f"--set {dotted(path)}"
@@ -138,8 +142,14 @@ def _from_file(config: Path, data: Mapping[str, Any]) -> dict[str, Any]:
     return {name: other[name] for name in (*SECTIONS, "identified") if other[name] != data[name]}
 
 
-def _value(text: str) -> Any:
-    """A number, a list, true, null or the like as JSON has it, else the text itself."""
+def _value(entry: "Declared | None", text: str) -> Any:
+    """Numbers as they are typed everywhere; a list, true, null or the like as JSON has it, else the text itself."""
+    if entry is not None and entry.kind in (int, float):
+        from bench.config.validation import read_typed
+
+        typed = read_typed(entry, text)
+        if not any(isinstance(each, str) for each in (typed if entry.many else [typed])):
+            return typed
     try:
         return json.loads(text)
     except json.JSONDecodeError:

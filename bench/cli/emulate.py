@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 _LEAD = 0.4
 """Lead of the configuration that is handed out [s]: client and laboratory share one computer, which may be busy."""
 
+LARGEST_CLOCK_ERROR = 0.01
+"""Of an emulated clock: as for those of the virtual bench's lasers."""
+
 
 def emulate_app() -> App:
     """`rockbench emulate`."""
@@ -38,7 +41,7 @@ def emulate(
     lasers: Annotated[Literal["serial", "analogue"], Parameter(help="How the lasers are connected.")] = "serial",
     device: Annotated[Literal["usb", "crio"], Parameter(help="Which DAQ device there is.")] = "usb",
     sample_rate: Annotated[
-        float | None,
+        str | None,
         Parameter(
             metavar="HZ",
             help="Samples per second of drive, inputs and virtual bench (at most 20000).",
@@ -47,7 +50,7 @@ def emulate(
     ] = None,
     seed: Seed = None,
     clock_error: Annotated[
-        tuple[float, float, float] | None,
+        tuple[str, str, str] | None,
         Parameter(
             metavar="NUMBER",
             negative=(),
@@ -70,6 +73,7 @@ def emulate(
     if given.backend != "simulated":
         raise InvalidInput("backend", given.backend, "an emulated laboratory is made of a simulated bench")
     configuration = _at_rate(given, sample_rate)
+    errors = None if clock_error is None else _ratios(clock_error)
     if write is not None and write.exists():
         raise InvalidInput("--write", str(write), "it exists and is never overwritten; name another")
     from drivers.emulation.laboratory import ClockErrors, Laboratory
@@ -83,7 +87,7 @@ def emulate(
             spring_factor=simulation.spring_factor,
             connection=lasers,
             device=device,
-            clock_errors=None if clock_error is None else ClockErrors(*clock_error),
+            clock_errors=None if errors is None else ClockErrors(*errors),
         )
         try:
             laboratory.start()
@@ -95,15 +99,33 @@ def emulate(
     return 0
 
 
-def _at_rate(configuration: "BenchConfiguration", rate: float | None) -> "BenchConfiguration":
+def _ratios(typed: tuple[str, str, str]) -> list[float]:
+    """Relative errors of clocks as they were typed. Raises InvalidInput."""
+    from bench.config.numbers import read_number
+
+    found: list[float] = []
+    for text in typed:
+        allowed = f"it must be a number from -{LARGEST_CLOCK_ERROR:g} to {LARGEST_CLOCK_ERROR:g}, such as 12e-6"
+        try:
+            found.append(read_number(text))
+        except ValueError as error:
+            raise InvalidInput("--clock-error", text, str(error) or allowed) from None
+        if abs(found[-1]) > LARGEST_CLOCK_ERROR:
+            raise InvalidInput("--clock-error", text, allowed)
+    return found
+
+
+def _at_rate(configuration: "BenchConfiguration", rate: str | None) -> "BenchConfiguration":
     """The configuration with the sample rate of its virtual bench replaced. Raises InvalidInput."""
     if rate is None:
         return configuration
+    from bench.cli.flags import given
     from bench.config.model import Simulation
     from bench.config.validation import dotted, validated
+    from sim.virtual_bench import VirtualBenchParameters
 
     simulation = configuration.simulation.model_dump(mode="json")
-    simulation["bench"]["sample_rate"] = rate
+    simulation["bench"] |= given(VirtualBenchParameters, {"sample_rate": rate})
     changed = validated(
         Simulation, simulation, lambda path: "--sample-rate" if path[-1] == "sample_rate" else dotted(path)
     )

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 from cyclopts import Group, Parameter
 
 from bench.config.declared import Declared, declared
+from bench.config.validation import read_typed
 from sim.parameters import Parameters
 
 _METAVAR: dict[Any, str] = {int: "INT", float: "NUMBER", str: "TEXT"}
@@ -30,16 +31,15 @@ def arguments_of(model: type[Parameters], group: Group, positional: str | None =
 
 
 def given(model: type[Parameters], arguments: Mapping[str, Any]) -> dict[str, Any]:
-    """The fields of `model` that were given as flags, as plain data for its validation.
+    """The fields of `model` that were given as flags, or in the lines of a form, as plain data for its validation.
 
     Text that is not what the field holds is left as it is, for the validation to refuse.
     """
-    values: dict[str, Any] = {}
-    for entry in declared(model):
-        value = arguments.get(entry.name)
-        if value is not None:
-            values[entry.name] = [_read(item, entry.kind) for item in value] if entry.many else _read(value, entry.kind)
-    return values
+    return {
+        entry.name: read_typed(entry, arguments[entry.name])
+        for entry in declared(model)
+        if arguments.get(entry.name) is not None
+    }
 
 
 def in_words(value: object) -> str:
@@ -84,12 +84,3 @@ def _argument(entry: Declared, group: Group) -> Argument:
     )
     kind = bool if entry.kind is bool else tuple[str, ...] if entry.many else str
     return Argument(entry.name, Argument.KEYWORD_ONLY, default=None, annotation=Annotated[kind | None, parameter])
-
-
-def _read(value: Any, kind: Any) -> Any:
-    if kind not in (int, float):
-        return value
-    try:
-        return kind(value)
-    except ValueError:
-        return value

@@ -1,6 +1,7 @@
 """What a prediction is asked for, from flags and a file of the specimen: refused in one line, or complete and valid."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -16,8 +17,8 @@ if TYPE_CHECKING:
 
 P = TypeVar("P", bound=Parameters)
 
-MOST_VALUES, MOST_POINTS = 10_000, 1_000_000
-"""Of a range, and of all ranges together: more is a slip of the finger."""
+MOST_POINTS = 1_000_000
+"""Of all ranges together: more is a slip of the finger."""
 
 SPECIMEN_FILE = ".json"
 """Ending of a specimen file: what has been identified, as opposed to what is assumed."""
@@ -32,35 +33,16 @@ _OF_SPECIMEN: dict[tuple[str | int, ...], str] = {
 
 def request_from(model: type[P], arguments: Mapping[str, Any]) -> P:
     """The request that the flags make. Raises InvalidInput."""
-    flags = dict(arguments)
-    points = 1
-    for name in _AXES:
-        if flags.get(name) is not None:
-            flags[name] = expanded(flag(name), flags[name])
-            points *= len(flags[name])
+    wanted = given(model, arguments)
+    axes = [name for name in _AXES if name in wanted]
+    points = prod(len(wanted[name]) for name in axes)
     if points > MOST_POINTS:
-        axes = " times ".join(flag(name) for name in _AXES if flags.get(name) is not None)
-        raise InvalidInput(axes, points, f"at most {MOST_POINTS} points")
-    wanted = given(model, flags)
+        raise InvalidInput(" times ".join(flag(name) for name in axes), points, f"at most {MOST_POINTS} points")
 
     def named(path: tuple[str | int, ...]) -> str:
         return flag(str(path[0])) if path else dotted(path)
 
     return validated(model, wanted, named)
-
-
-def expanded(item: str, tokens: Sequence[str]) -> list[str | float]:
-    """Numbers as they were typed, commas between them or not, and in place of each `start:stop:count` its numbers.
-
-    Raises InvalidInput.
-    """
-    values: list[str | float] = []
-    for token in (part for word in tokens for part in word.split(",")):
-        if ":" in token:
-            values += _range(item, token)
-        else:
-            values.append(token)
-    return values
 
 
 def known_from(
@@ -114,18 +96,3 @@ def specimen_from(
     specimen = validated(Specimen, table, named)
     identified = known_from(file, restitution_factor).identified if known is None else known.identified
     return identified.applied(specimen)
-
-
-def _range(item: str, token: str) -> tuple[float, ...]:
-    from bench.prediction.requests import spaced
-
-    try:
-        start, stop, count = token.split(":")
-        n = int(count)
-        if not 2 <= n <= MOST_VALUES or float(start) == float(stop):
-            raise ValueError(token)
-        return spaced(start, stop, n)
-    except (ValueError, OverflowError, ZeroDivisionError):
-        raise InvalidInput(
-            item, token, f"a range is start:stop:count, two different numbers and a count of 2 to {MOST_VALUES}"
-        ) from None

@@ -38,7 +38,7 @@ def info(
         ),
     ],
     dt: Annotated[
-        float | None, Parameter(metavar="SECONDS", help="Time step of files that do not state it.", show_default=False)
+        str | None, Parameter(metavar="SECONDS", help="Time step of files that do not state it.", show_default=False)
     ] = None,
     unit: Annotated[
         str | None, Parameter(metavar="UNIT", help="Unit of files that do not state it.", show_default=False)
@@ -64,7 +64,7 @@ def info(
     every record was read, 1 when a figure could not be written, 2 when something was refused. Files that exist are
     never overwritten.
     """
-    from bench.accelerograms.reference import GRAMMAR, RecordReference, read_records
+    from bench.accelerograms.reference import GRAMMAR, RecordReference, read_records, seconds_of
     from bench.cli.records_output import content_of, figure_of, text_of
 
     if not files:
@@ -72,7 +72,12 @@ def info(
     references = [RecordReference.parse(text) for text in files]
     if plot is not None:
         _check_plot(plot, len(references))
-    defaults: dict[str, Any] = {"dt": dt, "unit": unit, "channel": channel, "column": column}
+    defaults: dict[str, Any] = {
+        "dt": None if dt is None else seconds_of("--dt", dt),
+        "unit": unit,
+        "channel": channel,
+        "column": column,
+    }
     records = read_records([reference.or_else(**defaults) for reference in references])
     try:
         if plot is not None:

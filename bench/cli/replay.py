@@ -77,14 +77,16 @@ def _clock(speed: str) -> "Clock":
 
     if speed == MAX:
         return VirtualClock()
+    from bench.config.numbers import read_number
     from bench.replaying.pace import PacedClock
 
+    allowed = f"a number from 0.01 to 1000, or {MAX}"
     try:
-        factor = float(speed)
-    except ValueError:
-        factor = 0.0
+        factor = read_number(speed)
+    except ValueError as error:
+        raise InvalidInput("--speed", speed, str(error) or allowed) from None
     if not 0.01 <= factor <= 1000.0:
-        raise InvalidInput("--speed", speed, f"a number from 0.01 to 1000, or {MAX}")
+        raise InvalidInput("--speed", speed, allowed)
     return PacedClock(factor)
 
 

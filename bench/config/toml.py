@@ -1,5 +1,6 @@
 """Configuration files: TOML in SI units, checked completely before anything starts."""
 
+import re
 import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -24,9 +25,11 @@ _HEADING = """\
 
 def read_table(path: Path, item: str) -> dict[str, Any]:
     """The keys of a TOML file, unchecked. `item` names the file in an error: InvalidInput, one line."""
+    text = ""
     try:
         # Windows editors put a byte-order mark in front, which TOML does not allow
-        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        text = path.read_text(encoding="utf-8-sig")
+        return tomllib.loads(text)
     except FileNotFoundError:
         raise InvalidInput(item, str(path), "there is no such file") from None
     except OSError as error:
@@ -36,7 +39,17 @@ def read_table(path: Path, item: str) -> dict[str, Any]:
     except RecursionError:
         raise InvalidInput(item, str(path), "it is nested too deeply") from None
     except tomllib.TOMLDecodeError as error:
-        raise InvalidInput(item, str(path), f"it is not TOML: {error}") from None
+        raise InvalidInput(item, str(path), f"it is not TOML: {error}{_comma_hint(text, str(error))}") from None
+
+
+def _comma_hint(text: str, error: str) -> str:
+    """What to write where the line that is no TOML has a decimal comma."""
+    line = re.search(r"at line (\d+)", error)
+    lines = text.splitlines()
+    if line is None or not 0 < int(line[1]) <= len(lines):
+        return ""
+    found = re.match(r"\s*([\w.]+)\s*=\s*([+-]?\d+),(\d+)", lines[int(line[1]) - 1], re.ASCII)
+    return "" if found is None else f"; a decimal comma? write {found[1]} = {found[2]}.{found[3]}"
 
 
 def read_configuration(path: Path) -> BenchConfiguration:

@@ -1,13 +1,14 @@
 """Validates values from outside; what is refused is said in one plain line per value."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from difflib import get_close_matches
 from json import dumps
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from pydantic import ValidationError
 
-from bench.config.declared import at, declared, keys
+from bench.config.declared import Declared, at, declared, keys
+from bench.config.numbers import carries_unit, items_of, read_number, read_values, require_units_alike
 from sim.errors import InvalidInput
 from sim.parameters import Parameters
 
@@ -15,6 +16,8 @@ Path = tuple[str | int, ...]
 """Where a value is: keys, and indices into lists."""
 
 P = TypeVar("P", bound=Parameters)
+
+_NUMBERS = (int, float)
 
 
 def dotted(path: Path) -> str:
@@ -49,9 +52,80 @@ def problems(
     return []
 
 
+def read_typed(entry: Declared, typed: Any) -> Any:
+    """What a person typed for a field, a text or the tokens of a list, as plain data: numbers where it holds numbers.
+
+    What is refused is left as the text that it is, for the validation to say why.
+    """
+    if entry.kind not in _NUMBERS or isinstance(typed, bool):
+        return typed
+    if not entry.many:
+        return _number_or_text(entry, typed) if isinstance(typed, str) else typed
+    items = items_of([typed] if isinstance(typed, str) else [str(token) for token in typed])
+    try:
+        require_units_alike(items)
+    except ValueError:
+        return " ".join(items)
+    return [value for item in items for value in _values_or_text(entry, item)]
+
+
 def _parsed(model: type[P], data: Mapping[str, Any]) -> P:
     # By way of JSON, strictly: a list may stand for a tuple, a word for a choice, but "12" or true is no number.
-    return model.model_validate_json(dumps(data, default=str), strict=True)
+    return model.model_validate_json(dumps(_in_si(model, data), default=str), strict=True)
+
+
+def _in_si(model: type[Parameters], data: Mapping[str, Any]) -> dict[str, Any]:
+    """The data of a file with its texts that carry a unit, and its lists and ranges as texts, as numbers."""
+    found = dict(data)
+    for entry in declared(model):
+        value = found.get(entry.name)
+        if entry.element is not None:
+            if isinstance(value, dict):
+                found[entry.name] = _in_si(entry.element, cast(dict[str, Any], value))
+            elif isinstance(value, list):
+                found[entry.name] = [
+                    _in_si(entry.element, cast(dict[str, Any], each)) if isinstance(each, dict) else each
+                    for each in cast(list[Any], value)
+                ]
+        elif entry.kind in _NUMBERS:
+            if isinstance(value, str) and (entry.many or carries_unit(value)):
+                found[entry.name] = read_typed(entry, value)
+            elif isinstance(value, list):
+                found[entry.name] = [
+                    number
+                    for each in cast(list[Any], value)
+                    for number in (_values_or_text(entry, each) if isinstance(each, str) else [each])
+                ]
+    return found
+
+
+def _number_or_text(entry: Declared, text: str) -> Any:
+    try:
+        return read_number(text, entry.unit, whole=entry.kind is int)
+    except ValueError:
+        return text
+
+
+def _values_or_text(entry: Declared, text: str) -> Sequence[Any]:
+    try:
+        return read_values(text, entry.unit, whole=entry.kind is int)
+    except ValueError:
+        return [text]
+
+
+def _remedy(entry: Declared, text: str, listed: bool) -> str:
+    """What to write in place of a text that was given for a number; empty when nothing more can be told."""
+    try:
+        if listed:
+            items = items_of([text])
+            require_units_alike(items)
+            for item in items:
+                read_values(item, entry.unit, whole=entry.kind is int)
+        else:
+            read_number(text, entry.unit, whole=entry.kind is int)
+    except ValueError as error:
+        return str(error)
+    return ""
 
 
 def _refusals(model: type[Parameters], error: ValidationError, named: Callable[[Path], str]) -> list[InvalidInput]:
@@ -75,6 +149,10 @@ def _refusal(model: type[Parameters], detail: Any, named: Callable[[Path], str])
     if detail["type"] == "missing":
         return InvalidInput(named(path), None, "it is required")
     entry = at(model, path)
+    if entry is not None and entry.kind in _NUMBERS and isinstance(value, str):
+        listed = entry.many or isinstance(path[-1], int)
+        if remedy := _remedy(entry, value, listed):
+            return InvalidInput(named(path), value, remedy)
     allowed = f"it must be {entry.allowed_in_unit}" if entry is not None else str(detail["msg"])
     return InvalidInput(named(path), value, allowed)
 

@@ -93,10 +93,8 @@ class Form(QWidget):
 
 
 def _parts(entry: Declared, text: str) -> list[str]:
-    """Several values: texts may hold spaces, and are set apart by semicolons; numbers by spaces or commas."""
-    if entry.kind is str:
-        return [part.strip() for part in text.split(";") if part.strip()]
-    return text.replace(",", " ").replace(";", " ").split()
+    """Several values: texts may hold spaces, and are set apart by semicolons; numbers by spaces, as everywhere."""
+    return [part.strip() for part in text.split(";") if part.strip()] if entry.kind is str else [text]
 
 
 def _field(entry: Declared, value: Any) -> Field:

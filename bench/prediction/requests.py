@@ -1,10 +1,10 @@
 """What a prediction is asked for: declared once, used by command line, file and documentation. SI units."""
 
-from fractions import Fraction
 from typing import Annotated, Literal
 
 from pydantic import Field, field_validator
 
+from bench.config.numbers import spaced
 from sim.parameters import Parameters, each_once, quantity
 
 Frequency = Annotated[float, Field(gt=0, le=1000)]
@@ -13,15 +13,6 @@ Stiffness = Annotated[float, Field(ge=0, le=1000)]
 Corner = Annotated[float, Field(gt=0, le=50)]
 
 SolverName = Literal["taylor", "paper", "rk4-located", "dop853"]
-
-
-def spaced(start: str, stop: str, count: int) -> tuple[float, ...]:
-    """`count` (2 or more) equally spaced numbers; decimal ends are taken exactly, so 0.1 to 1.2 has 0.3 in it.
-
-    Raises ValueError for text that is no finite number.
-    """
-    first, last = Fraction(start), Fraction(stop)
-    return tuple(float(first + (last - first) * k / (count - 1)) for k in range(count))
 
 
 class ModesRequest(Parameters):

@@ -3,10 +3,9 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from bench.accelerograms.accelerogram import Accelerogram
 from bench.config.model import BenchConfiguration
+from bench.config.numbers import read_band
 from bench.control.preparation import PreparedMotion, prepare
 from bench.control.stroke.fit import Method, periods_of
 from bench.control.stroke.reach import Reach
@@ -40,12 +39,10 @@ def band_of(text: str | None, configuration: BenchConfiguration) -> Band:
     if text == "none":
         return None
     try:
-        low, high = (float(part) for part in text.split(":"))
-    except ValueError:
-        low, high = 0.0, 0.0
-    if not 0.0 < low < high < np.inf:
-        raise InvalidInput("--table-band", text, "it must be LOW:HIGH, two frequencies above 0 Hz that ascend, or none")
-    return low, high
+        return read_band(text)
+    except ValueError as error:
+        allowed = str(error) or "it must be LOW:HIGH, two frequencies above 0 Hz that ascend, or none"
+        raise InvalidInput("--table-band", text, allowed) from None
 
 
 def seismic_curves(

@@ -4,9 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from bench.config.numbers import spaced
 from bench.prediction.gain_map import grids, map_table, resting_margin
 from bench.prediction.history import History
-from bench.prediction.requests import MapRequest, spaced
+from bench.prediction.requests import MapRequest
 from bench.record.tables import arrays
 from bench.report.history_figure import Motion, history_figure
 from bench.report.map_figure import Layer, MapPoint, map_figure

@@ -49,7 +49,7 @@ def test_an_untouched_form_is_the_defaults(entry: Entry, qtbot: QtBot) -> None:
 def test_what_is_typed_is_what_is_asked(qtbot: QtBot) -> None:
     form = Form(HarmonicParameters)
     qtbot.addWidget(form)
-    _type(form.fields["omega"], "12.5, 16 18")
+    _type(form.fields["omega"], "12.5 16:18:2")
     _type(form.fields["ramp_time"], "4")
     _type(form.fields["starts"], "")
     assert form.parameters() == HarmonicParameters(omega=(12.5, 16.0, 18.0), ramp_time=4.0)
@@ -57,7 +57,14 @@ def test_what_is_typed_is_what_is_asked(qtbot: QtBot) -> None:
 
 @pytest.mark.parametrize(
     ("name", "text", "said"),
-    [("omega", "16 99", "at most 40"), ("harmonics", "2.5", "whole number"), ("ramp_time", "soon", "a number")],
+    [
+        ("omega", "16 99", "at most 40"),
+        ("omega", "12,5 16", "write 12.5; separate values by spaces"),
+        ("omega", "12.5, 16", "separate values by spaces"),
+        ("harmonics", "2.5", "whole number"),
+        ("ramp_time", "soon", "a number"),
+        ("ramp_time", "4 mm", "not of the dimension of s"),
+    ],
 )
 def test_a_refused_value_stays_as_typed_and_says_why(name: str, text: str, said: str, qtbot: QtBot) -> None:
     form = Form(HarmonicParameters)
