@@ -3,6 +3,15 @@
 from bench.config.model import BenchConfiguration
 from drivers.clock import VirtualClock, WallClock
 from drivers.rig import Rig
+from sim.extras import require
+
+
+def require_drivers(configuration: BenchConfiguration) -> None:
+    """Check that the libraries of the configured backend are installed. Raises MissingExtra."""
+    if configuration.backend == "hardware":
+        require("ni", "the hardware backend")
+        if configuration.hardware.lasers.connection == "serial":
+            require("serial", "a laser on a serial port")
 
 
 def open_rig(configuration: BenchConfiguration, *, realtime: bool) -> Rig:

@@ -22,7 +22,7 @@ from bench.record.recorder import PATIENCE, Recorder
 from bench.record.tables import Table
 from bench.report.summary import Summary, write_summary
 from bench.results import FILE, SUMMARY
-from bench.rigs import open_rig
+from bench.rigs import open_rig, require_drivers
 from bench.twin.beside import twin_beside
 from drivers.clock import VirtualClock
 from drivers.rig import Rig
@@ -167,6 +167,7 @@ def run_session(
     every ending is a result, with its status.
     """
     started = time.monotonic()
+    require_drivers(configuration)
     protocol.check(configuration)
     preflight = compile_run(protocol, configuration, out)
     preflight.require()

@@ -7,6 +7,7 @@ from importlib import import_module
 from typing import Any, TypeVar
 
 from sim.errors import InvalidInput, RockbenchError
+from sim.extras import require
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -16,7 +17,7 @@ PATIENCE = 10.0
 
 
 class SchedulerUnavailable(RockbenchError):
-    """The work cannot go to a scheduler: the client is not installed, or nothing answers there."""
+    """The work cannot go to a scheduler: nothing answers there."""
 
 
 def processors() -> int:
@@ -34,7 +35,8 @@ def sweep(
     need this package, and function and items must be picklable. A task there carries `batch` items: make it last long
     against the milliseconds that its journey takes.
 
-    Raises InvalidInput for batch < 1, SchedulerUnavailable when the extra "distributed" is missing or nothing answers.
+    Raises InvalidInput for batch < 1, MissingExtra without the extra "distributed", SchedulerUnavailable when nothing
+    answers.
     """
     if batch < 1:
         raise InvalidInput("batch", batch, "a task carries at least one item")
@@ -46,13 +48,9 @@ def sweep(
 
 
 def _distributed(function: Callable[[Item], Result], items: list[Item], scheduler: str, batch: int) -> list[Result]:
+    require("distributed", f"scheduler = {scheduler!r}")
     # `Any`: an optional dependency, which publishes no types
-    try:
-        distributed: Any = import_module("distributed")
-    except ImportError:
-        raise SchedulerUnavailable(
-            f"scheduler = {scheduler!r} cannot be used without dask.distributed: install rocking-bench[distributed]"
-        ) from None
+    distributed: Any = import_module("distributed")
     try:
         client: Any = distributed.Client(scheduler, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError) as error:

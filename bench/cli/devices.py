@@ -9,6 +9,7 @@ from cyclopts import App, Parameter
 
 from bench.cli.inputs import configuration_from
 from drivers.errors import RigError
+from sim.extras import MissingExtra, require
 
 if TYPE_CHECKING:
     from drivers.daqmx.devices import FoundDevice
@@ -50,21 +51,30 @@ def devices(
     A port is asked at every baud rate; name the ports when other instruments must not be disturbed. Nothing found is
     a result: the exit code is 0 then, and 2 when what was given is refused.
     """
+    if server is not None:
+        require("ni", "--server")
+    if port:
+        require("serial", "--port")
     hardware = None if config is None else configuration_from(config, None).hardware
     server = server if server is not None or hardware is None else hardware.daq.server
-    from drivers.daqmx.devices import find_devices
-
-    missing: str | None = None
-    try:
-        found = find_devices(server)
-    except RigError as error:
-        found, missing = [], str(error)
-    lasers = _lasers(port or _configured(hardware))
+    found, missing = _daq(server)
+    lasers, no_ports = _lasers(port or _configured(hardware))
     if as_json:
-        print(_json_text(server, found, missing, lasers))
+        print(_json_text(server, found, missing, lasers, no_ports))
     else:
-        print("\n".join([*_daq_lines(server, found, missing), "", *_laser_lines(lasers)]))
+        print("\n".join([*_daq_lines(server, found, missing), "", *_laser_lines(lasers, no_ports)]))
     return 0
+
+
+def _daq(server: str | None) -> "tuple[list[FoundDevice], str | None]":
+    """The NI devices, or none and the reason."""
+    try:
+        require("ni", "the search for NI devices")
+        from drivers.daqmx.devices import find_devices
+
+        return find_devices(server), None
+    except (MissingExtra, RigError) as error:
+        return [], str(error)
 
 
 def _configured(hardware: "Hardware | None") -> tuple[str, ...]:
@@ -73,10 +83,15 @@ def _configured(hardware: "Hardware | None") -> tuple[str, ...]:
     return tuple(laser.port for laser in (hardware.laser_1, hardware.laser_2) if laser.port is not None)
 
 
-def _lasers(ports: tuple[str, ...]) -> "list[FoundLaser]":
+def _lasers(ports: tuple[str, ...]) -> "tuple[list[FoundLaser], str | None]":
+    """What is on the serial ports, or nothing and the reason."""
+    try:
+        require("serial", "the search for lasers")
+    except MissingExtra as error:
+        return [], str(error)
     from drivers.optoncdt.find import find_lasers
 
-    return find_lasers(ports or None)
+    return find_lasers(ports or None), None
 
 
 def _daq_lines(server: str | None, found: "list[FoundDevice]", missing: str | None) -> list[str]:
@@ -106,7 +121,9 @@ def _volts(ranges: tuple[tuple[float, float], ...]) -> str:
     return f"; ranges {', '.join(f'{low:g} .. {high:g} V' for low, high in ranges)}" if ranges else ""
 
 
-def _laser_lines(lasers: "list[FoundLaser]") -> list[str]:
+def _laser_lines(lasers: "list[FoundLaser]", missing: str | None) -> list[str]:
+    if missing is not None:
+        return ["Serial ports:", f"  none: {missing}"]
     if not lasers:
         return ["Serial ports:", "  none: plug in the adapters of the lasers, and see that their driver is installed"]
     return ["Serial ports:", *(f"  {laser.port}: {_said(laser)}" for laser in lasers)]
@@ -119,11 +136,18 @@ def _said(laser: "FoundLaser") -> str:
     return identity if laser.problem is None else f"{identity}; {laser.problem}"
 
 
-def _json_text(server: str | None, found: "list[FoundDevice]", missing: str | None, lasers: "list[FoundLaser]") -> str:
+def _json_text(
+    server: str | None,
+    found: "list[FoundDevice]",
+    missing: str | None,
+    lasers: "list[FoundLaser]",
+    no_ports: str | None,
+) -> str:
     content: dict[str, Any] = {
         "server": server,
         "devices": [asdict(device) for device in found],
         "reason": missing,
         "ports": [asdict(laser) for laser in lasers],
+        "ports_reason": no_ports,
     }
     return json.dumps(content, allow_nan=False)

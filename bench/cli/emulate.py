@@ -13,6 +13,7 @@ from cyclopts import App, Parameter
 
 from bench.cli.inputs import Seed, configuration_from
 from sim.errors import InvalidInput
+from sim.extras import require
 
 if TYPE_CHECKING:
     from bench.config.model import BenchConfiguration
@@ -69,6 +70,7 @@ def emulate(
     A configuration with which a bench reaches it is printed, or written with --write; then the laboratory serves until
     Ctrl-C. Pseudo-terminals, which serial lasers need, exist on Linux and macOS only.
     """
+    require("ni", "rockbench emulate")
     given = configuration_from(config, seed)
     if given.backend != "simulated":
         raise InvalidInput("backend", given.backend, "an emulated laboratory is made of a simulated bench")

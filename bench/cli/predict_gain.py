@@ -13,6 +13,7 @@ from bench.prediction.requests import GainRequest, HistoryRequest, MapRequest, S
 from bench.prediction.steady import predict_points, predict_spectra, steady_table
 from bench.record.tables import Table, arrays
 from sim.errors import RockbenchError
+from sim.extras import require
 from sim.gain import GainPrediction
 from sim.knowledge import SpecimenKnowledge
 from sim.specimen import Specimen
@@ -70,6 +71,8 @@ def gain_map(request: MapRequest, specimen: Specimen, known: SpecimenKnowledge) 
     """Gain maps."""
     from bench.prediction.gain_map import grids, map_table, resting_margin
 
+    if request.scheduler is not None:
+        require("distributed", "--scheduler")
     if request.solver == "taylor":
         table = map_table(specimen, request, known if request.band or request.members else None)
         _tell_lost(len(request.omega) * len(request.beta) - int((table["layer"].values == "rocking").sum()))

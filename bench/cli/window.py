@@ -8,6 +8,7 @@ from cyclopts import App, Parameter
 from bench.cli.catalogue import CATALOGUE
 from bench.cli.check import CHECK
 from bench.cli.inputs import Seed, SpecimenFile, configuration_from
+from sim.extras import require
 
 
 def gui_app() -> App:
@@ -38,6 +39,7 @@ def gui(
     Runs go on in a process of their own: a window that is closed or dies lets them ramp out. Its STOP asks the
     program; the emergency stop is the red button at the bench.
     """
+    require("gui", "rockbench gui")
     configuration = configuration_from(config, seed, specimen)
 
     from bench.gui.app import open_window

@@ -10,11 +10,15 @@ from bench.export.content import content_of
 from bench.record.integrity import Integrity
 from bench.record.reader import Record
 from sim.errors import InvalidInput
+from sim.extras import require
 
 Format = Literal["mat", "csv", "uff", "parquet"]
 
 DAMAGED = "DAMAGED.txt"
 """File that travels with an export of what failed its checksum."""
+
+LIBRARIES = {"uff": "pyuff", "parquet": "pyarrow"}
+"""Formats whose library comes with the extra `export`."""
 
 _WRITERS = {"mat": matlab.write, "csv": text.write, "uff": uff.write, "parquet": parquet.write}
 
@@ -24,8 +28,11 @@ def export(record: Record, path: Path, to: Format, out: Path, *, raw: bool = Fal
     whether the record is as it was written. What is not stands in the file DAMAGED.txt beside the others.
 
     Physical values are float64; with `raw` the counts are written with the way to values beside them. Raises
-    InvalidInput when `out` exists or cannot be made, or when the format cannot hold what there is.
+    InvalidInput when `out` exists or cannot be made, or when the format cannot hold what there is, MissingExtra without
+    the format's library.
     """
+    if to in LIBRARIES:
+        require("export", f"--to {to}", LIBRARIES[to])
     if out.exists():
         raise InvalidInput("--out", str(out), "it exists, and nothing is ever overwritten; name another folder")
     integrity = record.integrity(None)

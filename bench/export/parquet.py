@@ -2,16 +2,18 @@
 
 import json
 from collections.abc import Mapping, Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from bench.export.content import ROWS_AT_ONCE, Content, Signal, TableColumn
-from bench.export.libraries import needed
 
 
 def write(content: Content, folder: Path) -> None:
     """Write run-<number>.parquet in pieces, and <table>.parquet. Absent values of tables are null."""
-    arrow, parquet = needed("pyarrow", "parquet"), needed("pyarrow.parquet", "parquet")
+    # `Any`: an optional dependency, which publishes no types
+    arrow: Any = import_module("pyarrow")
+    parquet: Any = import_module("pyarrow.parquet")
     about = {name: str(value) for name, value in content.info.items()}
     fields = [arrow.field("time", arrow.float64(), metadata=_about("s", "seconds since the rig was armed"))]
     fields += [_field(arrow, signal) for signal in content.signals]

@@ -8,6 +8,7 @@ import shutil
 import tempfile
 import warnings
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,6 @@ from numpy.typing import NDArray
 
 from bench.export import text
 from bench.export.content import Content, Signal
-from bench.export.libraries import needed
 from bench.record.series import RecordedRun
 from sim.errors import InvalidInput
 
@@ -32,7 +32,7 @@ _LABEL, _LINE = 20, 80
 
 def write(content: Content, folder: Path) -> None:
     """Write run-<number>.uff, and the tables as text. Raises InvalidInput for a signal in too many parts."""
-    pyuff = needed("pyuff", "uff")
+    pyuff: Any = import_module("pyuff")  # an optional dependency, which publishes no types
     for run in content.runs:
         with (folder / f"run-{run.number}.uff").open("wb") as file:
             _append(pyuff, file, _units(pyuff), folder)

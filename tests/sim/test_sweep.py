@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from sim.errors import InvalidInput
+from sim.extras import MissingExtra
 from sim.maps import gain_map
 from sim.outcomes import outcome_map
 from sim.specimen import Specimen
@@ -48,7 +49,7 @@ def test_errors_come_through() -> None:
 
 def test_without_the_client_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(SchedulerUnavailable, match=r"tcp://x:1.*rocking-bench\[distributed\]"):
+    with pytest.raises(MissingExtra, match=r"tcp://x:1.*rocking-bench\[distributed\]"):
         sweep(inverse, [1], "tcp://x:1")
 
 

@@ -1,0 +1,46 @@
+"""The parts of the installation that a headless run does not need."""
+
+from importlib.util import find_spec
+
+from sim.errors import InvalidInput, RockbenchError
+
+EXTRAS = {
+    "gui": ("PySide6", "pyqtgraph"),
+    "ni": ("nidaqmx", "grpc"),
+    "serial": ("serial",),
+    "export": ("pyarrow", "pyuff"),
+    "distributed": ("distributed",),
+}
+"""The packages that each extra of `pyproject.toml` brings and that this software imports."""
+
+
+class MissingExtra(InvalidInput):
+    """Something was asked for whose extra is not installed; nothing was started.
+
+    `item` is what needs it, `value` the name of the extra, `allowed` the commands that install it.
+    """
+
+    def __init__(self, purpose: str, extra: str, package: str) -> None:
+        remedy = f'pip install "rocking-bench[{extra}]" (in a checkout: uv sync --inexact --extra {extra})'
+        RockbenchError.__init__(self, f"{purpose} needs {package}: {remedy}")
+        self.item = purpose
+        self.value = extra
+        self.allowed = remedy
+
+
+def require(extra: str, purpose: str, *packages: str) -> None:
+    """Check that an extra is installed, before anything starts; imports nothing.
+
+    `purpose` begins the sentence of the error: what needs it. Of the extra's packages all are looked for, or only
+    those named. Raises MissingExtra.
+    """
+    for package in packages or EXTRAS[extra]:
+        if not _installed(package):
+            raise MissingExtra(purpose, extra, package)
+
+
+def _installed(package: str) -> bool:
+    try:
+        return find_spec(package) is not None
+    except ImportError:
+        return False
