@@ -9,10 +9,9 @@ the test for non-finite numbers. Nobody calls them as C functions: without that 
 # pyright: reportPrivateImportUsage=false, reportAttributeAccessIssue=false
 # numba publishes no types; `cast` below gives the decorated function its own type back.
 
-import hashlib
 import os
+import threading
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, TypeVar, cast
 
 # the loops here are short recurrences: vectorising them and the last level of optimisation cost a fifth of the
@@ -20,23 +19,23 @@ from typing import Any, TypeVar, cast
 for name, value in (("NUMBA_OPT", "2"), ("NUMBA_LOOP_VECTORIZE", "0"), ("NUMBA_SLP_VECTORIZE", "0")):
     os.environ.setdefault(name, value)
 
+import llvmlite  # noqa: E402
 import numba  # noqa: E402
+import numpy as np  # noqa: E402
+
+from sim.kernel.cache import KernelCache  # noqa: E402
 
 F = TypeVar("F", bound=Callable[..., Any])
 
+OPTIONS = ("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "BOUNDSCHECK", "DEBUGINFO_DEFAULT", "DISABLE_INTEL_SVML")
+"""numba's settings that change the compiled code and are not in the key of its own index, as the processor is."""
 
-def _cache_directory() -> str:
-    """A cache directory that changes with any source of the kernel.
-
-    numba looks only at the file of the function itself: a caller in another file would go on with the old callee.
-    """
-    here = Path(__file__).parent
-    sources = b"".join(path.read_bytes() for path in sorted(here.glob("*.py")))
-    return str(here / "__pycache__" / hashlib.sha256(sources).hexdigest()[:12])
-
-
-if not numba.config.CACHE_DIR:
-    numba.config.CACHE_DIR = _cache_directory()
+_SETTINGS = [(option, str(getattr(numba.config, option, None))) for option in OPTIONS]
+_cache = KernelCache(
+    cast(str, numba.config.CACHE_DIR),
+    [numba.__version__, llvmlite.__version__, np.__version__, *_SETTINGS, __debug__],
+)
+_one_at_a_time = threading.RLock()
 
 
 def inlined(function: F) -> F:
@@ -44,10 +43,32 @@ def inlined(function: F) -> F:
 
     Every level of calls between compiled functions costs seconds of compilation, because each is optimised anew.
     """
-    return cast(F, numba.njit(cache=True, nogil=True, error_model="numpy", inline="always")(function))
+    return cast(F, numba.njit(nogil=True, error_model="numpy", inline="always")(function))
 
 
 def compiled(signature: str) -> Callable[[F], F]:
     """Compile a function for one numba `signature`, for example ``"float64(float64[::1])"``."""
-    decorator = cast(Any, numba.njit)(signature, cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True)
-    return cast(Callable[[F], F], decorator)
+
+    def decorate(function: F) -> F:
+        with _one_at_a_time:
+            folder = _cache.folder()
+            if folder is not None:
+                # numba reads this once for each function; it is set for ours only, and other code keeps its caches
+                before, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(folder)
+                try:
+                    return _njit(signature, function, cache=True)
+                except numba.core.errors.NumbaError:
+                    raise
+                except Exception as error:
+                    # a file that a power cut left empty, a full disk: reading and writing pickles raises what it likes
+                    _cache.give_up(f"{folder} cannot be used ({type(error).__name__}: {error}), remove it")
+                finally:
+                    numba.config.CACHE_DIR = before
+            return _njit(signature, function, cache=False)
+
+    return decorate
+
+
+def _njit(signature: str, function: F, *, cache: bool) -> F:
+    decorator = cast(Any, numba.njit)(signature, cache=cache, nogil=True, error_model="numpy", no_cfunc_wrapper=True)
+    return cast(F, decorator(function))

@@ -1,0 +1,231 @@
+"""The folder of the kernel's compiled code: named by a hash of what it was compiled from, writable by this user only.
+
+numba compares only the file of the function itself, so that a caller in another file would keep its old callee; and
+where that file's folder cannot be written, it uses a folder in the user's home. Here every place has the hash.
+The files in it are pickles, which run code when they are loaded: a folder that others can write is not used.
+"""
+
+import hashlib
+import os
+import shutil
+import stat
+import sys
+import tempfile
+from collections.abc import Sequence
+from contextlib import suppress
+from importlib import resources
+from pathlib import Path
+
+if sys.platform != "win32":
+    import fcntl
+    import grp
+    import pwd
+
+KEPT = 6
+"""Folders of other states of the kernel that stay, besides those in use: going back to one costs no compilation."""
+
+PREFIX = "rockbench-"
+IN_USE = "in-use"
+"""File in a folder that every process which uses it keeps open; its time is that of the last use."""
+
+TOLD = "ROCKBENCH_KERNEL_IN_MEMORY"
+"""Environment variable by which child processes do not repeat the notice."""
+
+
+class KernelCache:
+    """Finds the folder for the compiled kernel once, and gives it up for good when it turns out to be unusable.
+
+    given : folder that the user named for numba's caches, or empty: then it is the installation, or the user's folder
+    for caches.  versions : whatever else decides about the compiled code.  package : the kernel's.
+    """
+
+    def __init__(self, given: str, versions: Sequence[object], package: str = "sim.kernel") -> None:
+        self._sources = Path(str(resources.files(package)))
+        self._stamp = _stamp(self._sources)
+        self._folder: Path | None = None
+        self._handle: int | None = None
+        sources = _read(package)
+        if not sources or not self._stamp:
+            # numba's own locators need files, and without sources nothing says when the code has changed
+            self.give_up(f"{self._sources} is no folder of source files")
+            return
+        name = PREFIX + _digest([*sources, *versions, self._sources])
+        reasons: list[str] = []
+        for base in [Path(given).absolute()] if given else _places(self._sources):
+            try:
+                self._folder, self._handle = _claim(base, name)
+                return
+            except OSError as error:
+                reasons.append(f"{error.filename or base} {error.strerror or error}")
+                if isinstance(error, NotPrivate) and (base / name).exists():
+                    _say(f"the compiled kernel in {base / name} is not loaded: {reasons[-1]}; remove it")
+        self.give_up("; ".join(reasons) or "there is no home folder")
+
+    def folder(self) -> Path | None:
+        """The folder to load from and save to; None when the kernel is to be compiled in memory."""
+        if self._folder is not None and _stamp(self._sources) != self._stamp:
+            self.give_up(f"the sources in {self._sources} changed while they were loaded")
+        return self._folder
+
+    def give_up(self, why: str) -> None:
+        """From now on compile in memory, and say so: once, on standard error, for this process and its children."""
+        self._folder = None
+        self.release()
+        _say(
+            f"the kernel is compiled in memory, which takes about ten seconds at every start: {why};"
+            " set NUMBA_CACHE_DIR to a folder that only you can write"
+        )
+
+    def release(self) -> None:
+        """Let the folder be removed when it is old."""
+        if self._handle is not None:
+            os.close(self._handle)
+            self._handle = None
+
+
+class NotPrivate(OSError):
+    """Others can write there."""
+
+
+def _say(what: str) -> None:
+    if TOLD not in os.environ and sys.stderr is not None:  # pyright: ignore[reportUnnecessaryComparison]
+        os.environ[TOLD] = "1"
+        print(f"rockbench: {what}", file=sys.stderr, flush=True)
+
+
+def _stamp(folder: Path) -> list[tuple[str, int, int]]:
+    # cheap enough to be asked before each function: an update in the middle of loading mixes two states
+    with suppress(OSError), os.scandir(folder) as entries:
+        sources = [entry for entry in entries if entry.name.endswith(".py")]
+        return sorted((entry.name, entry.stat().st_mtime_ns, entry.stat().st_size) for entry in sources)
+    return []
+
+
+def _read(package: str) -> list[tuple[str, bytes]]:
+    files = [entry for entry in resources.files(package).iterdir() if entry.name.endswith(".py")]
+    return sorted((entry.name, entry.read_bytes()) for entry in files)
+
+
+def _digest(parts: Sequence[object]) -> str:
+    return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
+
+
+def _places(sources: Path) -> list[Path]:
+    places = [sources / "__pycache__"]
+    with suppress(RuntimeError):  # a user without a home
+        home = Path.home()
+        if sys.platform == "win32":
+            user = Path(os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local")
+        elif sys.platform == "darwin":
+            user = home / "Library" / "Caches"
+        else:
+            user = Path(os.environ.get("XDG_CACHE_HOME") or home / ".cache")
+        if user.is_absolute():
+            places.append(user / "rockbench")
+    return places
+
+
+def _claim(base: Path, name: str) -> tuple[Path, int]:
+    """Make or take the folder `name` in `base`; returns it with the open file that keeps it from being removed.
+
+    Raises OSError that says what stands in the way.
+    """
+    existing = base
+    while not existing.exists() and existing != existing.parent:
+        existing = existing.parent
+    _require_private(existing.resolve(), parents=True)
+    base.mkdir(parents=True, exist_ok=True)
+    folder = base / name
+    for _ in range(10):
+        new = False
+        with suppress(FileExistsError):
+            folder.mkdir(mode=0o700)
+            new = True
+        try:
+            _require_private(folder, parents=False)
+            with tempfile.TemporaryFile(dir=folder):
+                pass
+            handle = os.open(folder / IN_USE, os.O_RDWR | os.O_CREAT, 0o600)
+        except FileNotFoundError:
+            continue  # another process removes it just now
+        if _hold(handle, folder / IN_USE):
+            if new:
+                _remove_old(base, folder)
+            return folder, handle
+        os.close(handle)
+    raise OSError(None, "is removed again and again", str(folder))
+
+
+def _hold(handle: int, path: Path) -> bool:
+    """Mark the open file as in use now; False when it is no longer the one at `path`."""
+    with suppress(OSError):  # a file system without locks: then nothing is removed on it either
+        if sys.platform != "win32":
+            fcntl.flock(handle, fcntl.LOCK_SH)
+    with suppress(OSError):
+        os.utime(path)
+        return os.path.samestat(os.fstat(handle), path.stat())
+    return False
+
+
+def _remove_old(base: Path, own: Path) -> None:
+    """Remove all but the last used KEPT of the folders in `base`, never one in use."""
+    with suppress(OSError):
+        others = [(_last_use(path), path) for path in base.glob(f"{PREFIX}*") if path != own]
+        for _, path in sorted(others, reverse=True)[KEPT:]:
+            _remove_unused(path)
+
+
+def _last_use(folder: Path) -> float:
+    with suppress(OSError):
+        return (folder / IN_USE).stat().st_mtime
+    return 0.0
+
+
+def _remove_unused(folder: Path) -> None:
+    with suppress(OSError):
+        handle = os.open(folder / IN_USE, os.O_RDWR | os.O_CREAT, 0o600)
+        try:
+            if sys.platform != "win32":
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                shutil.rmtree(folder)
+        finally:
+            os.close(handle)
+        if sys.platform == "win32":
+            # an open file can be neither removed nor its folder renamed
+            (folder / IN_USE).unlink()
+            shutil.rmtree(folder)
+
+
+def _require_private(path: Path, *, parents: bool) -> None:
+    """Raises OSError when another user than root could put files there. Windows' user folders are private already."""
+    if sys.platform == "win32":
+        return
+    info = path.lstat()
+    us = os.geteuid()
+    if not stat.S_ISDIR(info.st_mode):
+        raise OSError(None, "is not a folder", str(path))
+    if info.st_uid not in ((us, 0) if parents else (us,)):
+        raise OSError(None, "belongs to another user", str(path))
+    for each in (path, *path.parents) if parents else (path,):
+        if _others_write(each.stat(), parents):
+            raise NotPrivate(None, "can be written by others", str(each))
+
+
+def _others_write(info: os.stat_result, is_parent: bool) -> bool:
+    if sys.platform == "win32":
+        return False
+    if is_parent and info.st_mode & stat.S_ISVTX:
+        return False  # others cannot replace what is in it, and what is in it is looked at on its own
+    if info.st_mode & stat.S_IWOTH:
+        return True
+    return bool(info.st_mode & stat.S_IWGRP) and not (is_parent and _own_group(info.st_gid))
+
+
+def _own_group(gid: int) -> bool:
+    """Whether a group is the private one of this user, as where new folders are writable by the group."""
+    if sys.platform == "win32":
+        return True
+    with suppress(KeyError):
+        user, group = pwd.getpwuid(os.geteuid()), grp.getgrgid(gid)
+        return user.pw_gid == gid and group.gr_name == user.pw_name and set(group.gr_mem) <= {user.pw_name}
+    return False
