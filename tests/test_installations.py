@@ -29,7 +29,7 @@ PROJECT = Path(__file__).parents[1]
 COMMAND = ("-m", "bench", "predict", "steady", "--omega", "16", "--beta", "0.4", "--json")
 NOBODY = 65534
 IN_MEMORY = "compiled in memory"
-HEAVIER = ("p[MASS] * p[GRAVITY] / p[INERTIA], ", "0.9 * p[MASS] * p[GRAVITY] / p[INERTIA], ")
+LIGHTER = ("p[MASS] * p[GRAVITY] / p[INERTIA], ", "0.97 * p[MASS] * p[GRAVITY] / p[INERTIA], ")
 """The edit: gravity's moment on the rocking block, in sim/kernel/taylor.py, which other files call."""
 
 not_windows = pytest.mark.skipif(sys.platform == "win32", reason="permissions of POSIX")
@@ -54,7 +54,7 @@ def edit(kernel: Path, change: tuple[str, str]) -> None:
 
 
 def back() -> tuple[str, str]:
-    return HEAVIER[1], HEAVIER[0]
+    return LIGHTER[1], LIGHTER[0]
 
 
 def ask(python: Path, home: Path | None, user: int | None = None, **more: str) -> tuple[float, str]:
@@ -128,7 +128,7 @@ def wheels(place: Path) -> tuple[Path, Path]:
     for name in ("old", "new"):
         uv("build", "--wheel", "--out-dir", place / name, copy)
         built.extend((place / name).glob("*.whl"))
-        edit(copy / "sim" / "kernel", HEAVIER if name == "old" else back())
+        edit(copy / "sim" / "kernel", LIGHTER if name == "old" else back())
     old, new = built
     return old, new
 
@@ -143,11 +143,11 @@ def right(place: Path, installed: tuple[Path, Path]) -> tuple[float, float]:
     """alpha_2 before and after the edit, each compiled into an empty cache."""
     python, kernel = installed
     found: list[float] = []
-    for number, change in enumerate((HEAVIER, back())):
+    for number, change in enumerate((LIGHTER, back())):
         found.append(ask(python, None, NUMBA_CACHE_DIR=str(place / f"empty {number}"))[0])
         edit(kernel, change)
     old, new = found
-    assert abs(new - old) > 0.01
+    assert abs(new - old) > 1e-3
     return old, new
 
 
@@ -164,7 +164,7 @@ def test_editable(place: Path, interpreter: str, wheels: tuple[Path, Path], righ
     assert kernel == sources(place) / "sim" / "kernel"
     mine = home(place, "home of editable")
     assert ask(python, mine) == (right[0], "")
-    edit(kernel, HEAVIER)
+    edit(kernel, LIGHTER)
     assert ask(python, mine) == (right[1], "")
     edit(kernel, back())
     assert ask(python, mine) == (right[0], "")
@@ -189,7 +189,7 @@ def test_read_only(place: Path, installed: tuple[Path, Path], right: tuple[float
     user = NOBODY if os.geteuid() == 0 else None
     shutil.rmtree(kernel / "__pycache__")
     mine = home(place, "home of read-only", user)
-    for change, expected in ((HEAVIER, right[0]), (back(), right[1]), (None, right[0])):
+    for change, expected in ((LIGHTER, right[0]), (back(), right[1]), (None, right[0])):
         kernel.chmod(0o555)
         assert ask(python, mine, user) == (expected, "")
         kernel.chmod(0o755)
@@ -204,7 +204,7 @@ def test_other_user(place: Path, installed: tuple[Path, Path], right: tuple[floa
     """Root has a cache in the installation, another user one in a home; each keeps to its own."""
     python, kernel = installed
     theirs, roots = home(place, "home of other user", NOBODY), home(place, "home of root")
-    for change, expected in ((HEAVIER, right[0]), (back(), right[1]), (None, right[0])):
+    for change, expected in ((LIGHTER, right[0]), (back(), right[1]), (None, right[0])):
         assert ask(python, roots) == (expected, "")
         assert ask(python, theirs, NOBODY) == (expected, "")
         if change is not None:
@@ -228,7 +228,7 @@ def test_other_user(place: Path, installed: tuple[Path, Path], right: tuple[floa
 def test_no_home(place: Path, installed: tuple[Path, Path], right: tuple[float, float]) -> None:
     python, kernel = installed
     nobody = os.geteuid() == 0
-    for change, expected in ((HEAVIER, right[0]), (back(), right[1]), (None, right[0])):
+    for change, expected in ((LIGHTER, right[0]), (back(), right[1]), (None, right[0])):
         kernel.chmod(0o555)
         # root's entry among the users names a home even without HOME; nobody's names one that does not exist
         number, said = ask(python, None if nobody else place / "nowhere", NOBODY if nobody else None)
