@@ -9,6 +9,7 @@ EXTRAS = {
     "ni": ("nidaqmx", "grpc"),
     "serial": ("serial",),
     "export": ("pyarrow", "pyuff"),
+    "pdf": ("typst",),
     "distributed": ("distributed",),
 }
 """The packages that each extra of `pyproject.toml` brings and that this software imports."""

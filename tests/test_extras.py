@@ -52,6 +52,7 @@ def _refused(done: subprocess.CompletedProcess[str], extra: str) -> None:
         ("ni", ["emulate"]),
         ("ni", ["devices", "--server", "localhost:1"]),
         ("serial", ["devices", "--port", "COM9"]),
+        ("pdf", ["paper", "--only", "modes", "--pdf", "no-such-folder/paper.pdf"]),
         (
             "distributed",
             ["predict", "map", "--omega", "15:17:2", "--beta", "0.3:0.4:2", "--scheduler", "tcp://localhost:1"],
@@ -143,6 +144,7 @@ def test_an_environment_with_the_core_alone_runs_a_point(tmp_path: Path) -> None
         ("ni", ["emulate"]),
         ("ni", ["check", "--yes", "--config", "bench.toml"]),
         ("serial", ["devices", "--port", "COM9"]),
+        ("pdf", ["report", campaign, "--pdf", "a.pdf"]),
         ("export", ["export", campaign, "--to", "uff"]),
         ("export", ["export", campaign, "--to", "parquet"]),
         (

@@ -5,7 +5,6 @@ from typing import Annotated, Literal
 
 from cyclopts import App, Parameter
 
-from bench.cli.interrupt import answer
 from bench.cli.prose import prose
 from bench.cli.refusal import tell, warn
 
@@ -58,7 +57,7 @@ def export(
         tell(f"{out} could not be written ({error.strerror or error}): see to the disk")
         return 1
     except KeyboardInterrupt:
-        answer("the export was interrupted; nothing was left behind")
+        tell("the export was interrupted; nothing was left behind")
         return 130
     if integrity.failing:
         warn(f"{file}: {integrity}")

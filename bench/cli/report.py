@@ -9,6 +9,7 @@ from cyclopts import App, Parameter
 from bench.cli.prose import prose
 from bench.cli.refusal import tell, warn
 from sim.errors import InvalidInput, RockbenchError
+from sim.extras import require
 
 if TYPE_CHECKING:
     from bench.report.page.document import Document
@@ -62,7 +63,9 @@ def report(
 
 
 def check_outputs(html: Path | None, pdf: Path | None, *, overwrite: bool) -> None:
-    """Refuse places where nothing can be written. Raises InvalidInput naming the option."""
+    """Refuse places where nothing can be written, and a PDF without its typesetter. Raises InvalidInput."""
+    if pdf is not None:
+        require("pdf", "--pdf")
     for item, path in (("--html", html), ("--pdf", pdf)):
         if path is None:
             continue

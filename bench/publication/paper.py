@@ -13,9 +13,8 @@ from bench.prediction.statements import POINTS, POINTS_BETA, SECTIONS, harmonic_
 from bench.prediction.steady import predict_spectra, steady_table
 from bench.provenance import revision, software
 from bench.publication.facts import facts_table
-from bench.publication.made import made_line
 from bench.publication.predicted import histories_picture, map_section
-from bench.publication.provenance import NAME, libraries, program
+from bench.publication.provenance import NAME, libraries, program, provenance_line
 from bench.publication.records import drift_picture, gains_picture, motions_table, record_pictures
 from bench.publication.specimen import modes_section, specimen_section
 from bench.publication.verdicts import Named, statement_table, verdicts_table
@@ -149,7 +148,7 @@ def paper_report(request: PaperRequest) -> tuple[Document, list[Named]]:
         "motion by one command, without a bench. Frame, block and springs are those of Tables 1 to 3 unless said "
         f"otherwise; the sine has an amplitude of {AMPLITUDE_FACTOR:g} g/λ (Eq. 11)."
     ]
-    return Document("The paper, from simulation alone", summary, sections, made_line()), paper.named
+    return Document("The paper, from simulation alone", summary, sections, provenance_line()), paper.named
 
 
 def _of_what(records: Sequence[Accelerogram]) -> list[Part]:

@@ -1,6 +1,7 @@
-"""Where the numbers of a report came from: file, people, software, parameters, bench, clocks."""
+"""Provenance of a report's numbers: file, people, software, parameters, bench, clocks."""
 
 from collections.abc import Mapping
+from datetime import UTC, datetime
 from hashlib import file_digest
 
 from bench.provenance import revision, software
@@ -10,6 +11,9 @@ from bench.publication.typography import moment, typeset
 from bench.report.page.document import Column, Part, Section, Table
 
 NAME = "rocking-bench"
+
+SHORT = 10
+"""Digits of the git hash below the title; the provenance has all."""
 
 UNKNOWN = "unknown"
 
@@ -28,6 +32,13 @@ def provenance_section(campaign: Campaign) -> Section:
         parts.append(facts_table("The bench", devices))
     parts += _clocks(campaign)
     return Section("provenance", "Provenance", parts)
+
+
+def provenance_line() -> str:
+    """Line below the title: date and program of the report, definition of its gains."""
+    maker = program(software()[NAME], revision(), SHORT)
+    units = "α₂ is the peak drift of the coupled frame over that of the bare one, α₁ the same of u₁ (Eq. 10)."
+    return f"Report made on {moment(datetime.now(UTC).isoformat())} by {maker}. {units}"
 
 
 def program(version: str, git: str, digits: int = 40) -> str:

@@ -10,10 +10,9 @@ from bench.publication.free_rocking import rocking_section
 from bench.publication.free_vibration import vibration_section
 from bench.publication.harmonic import histories_section, map_points, results_section, spectra_section
 from bench.publication.identified import identified_section
-from bench.publication.made import made_line
 from bench.publication.points import points_section
 from bench.publication.predicted import map_section
-from bench.publication.provenance import provenance_section
+from bench.publication.provenance import provenance_line, provenance_section
 from bench.publication.seismic import seismic_section
 from bench.publication.specimen import modes_section, specimen_section
 from bench.publication.typography import listed, moment
@@ -30,7 +29,7 @@ def campaign_report(campaign: Campaign) -> Document:
         title=f"Test report: {campaign.path.stem}" if campaign.path.stem != "campaign" else _title(campaign),
         summary=_summary(campaign),
         sections=[section for section in _sections(campaign) if section is not None],
-        made=made_line(),
+        provenance=provenance_line(),
     )
 
 

@@ -1,8 +1,8 @@
-"""What a report consists of. Built once; HTML and PDF say the same."""
+"""The content of a report: built once, rendered as HTML and as PDF by a template each."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, assert_never
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -73,26 +73,53 @@ class Section:
 
 @dataclass(frozen=True, eq=False)
 class Document:
-    """A whole report. `summary` stands under the title; `made` says when and with what."""
+    """A whole report. `summary` follows the title; `provenance` is the line below it: date, program, definitions."""
 
     title: str
     summary: Sequence[Part]
     sections: Sequence[Section]
-    made: str
+    provenance: str
 
 
-class Numbers:
-    """Counts tables and figures, each by itself."""
+def template_content(document: Document, draw: Callable[[Picture, int], Any]) -> dict[str, Any]:
+    """Returns title, provenance, summary and sections (key, heading, parts) as a template takes them.
 
-    def __init__(self) -> None:
-        self._tables = self._figures = 0
+    A part is a dictionary whose `kind` is "text", "notice", "listing", "table" or "picture". Tables and figures are
+    counted, each by itself: their `name` is "Table 3" or "Fig. 2". `draw` gets a figure and its number and returns
+    what the template places as `drawing`.
+    """
+    counts = {"Table": 0, "Fig.": 0}
 
-    def next(self, part: Part) -> str:
-        """The name of a part, such as "Table 3"; empty for what has no caption."""
-        if isinstance(part, Table):
-            self._tables += 1
-            return f"Table {self._tables}"
-        if isinstance(part, Picture):
-            self._figures += 1
-            return f"Fig. {self._figures}"
-        return ""
+    def number(kind: str) -> int:
+        counts[kind] += 1
+        return counts[kind]
+
+    def content(part: Part) -> dict[str, Any]:
+        match part:
+            case str():
+                return {"kind": "text", "text": part}
+            case Notice():
+                return {"kind": "notice", "text": part.text}
+            case Listing():
+                return {"kind": "listing", "items": [*part.items]}
+            case Table():
+                columns = [{"heading": column.heading, "words": column.words} for column in part.columns]
+                rows = [[*row] for row in part.rows]
+                name = f"Table {number('Table')}"
+                return {"kind": "table", "name": name, "caption": part.caption, "columns": columns, "rows": rows}
+            case Picture():
+                count = number("Fig.")
+                texts = {"name": f"Fig. {count}", "caption": part.caption, "description": part.description}
+                return {"kind": "picture", **texts, "drawing": draw(part, count)}
+            case _:
+                assert_never(part)
+
+    return {
+        "title": document.title,
+        "provenance": document.provenance,
+        "summary": [content(part) for part in document.summary],
+        "sections": [
+            {"key": each.key, "heading": each.heading, "parts": [content(part) for part in each.parts]}
+            for each in document.sections
+        ],
+    }

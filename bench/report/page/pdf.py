@@ -1,99 +1,58 @@
 # pyright: reportUnknownMemberType=false
-"""A report as PDF: A4 pages of text, tables and vector figures, printed with matplotlib alone.
+"""A report as PDF: A4 pages of text, tables and vector figures, typeset by Typst from `report.typ`.
 
-`PdfPages` prints one figure to a page; the file below it takes several, each moved to its place by the transformation
-that PDF itself has. matplotlib's keyword arguments have no types, hence the first line.
+matplotlib draws each figure as a PDF file of its own, which Typst embeds as it is. Texts reach the template as JSON and
+are never read as markup. matplotlib's keyword arguments have no types, hence the first line.
 """
 
-from datetime import datetime
+import json
+from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
 
-from bench.report.page.compositor import SMALL, composed
-from bench.report.page.document import Document
-from bench.report.page.sheet import HEIGHT, MARGIN, WIDTH, Line, Placed, Rule, Sheet
-from bench.report.style import GREY, new_figure
+from bench.report.page.document import Document, Picture, template_content
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-FOOT = 0.45
-"""Height of the line at the foot of each page [in]."""
-
-INCH = 72
-"""Points, the unit of a PDF file."""
+WIDTH, HEIGHT = 6.77, 9.4
+"""Largest figure [in]: the text of an A4 page without a caption of a few lines."""
 
 
 def write_pdf(path: Path, document: Document) -> None:
     """Write the pages to `path`, over whatever is there. Draws every figure, which keeps its size."""
     import matplotlib
-    from matplotlib.backends.backend_pdf import PdfFile
+    import typst
 
-    about = {"Title": document.title, "Creator": "rockbench", "CreationDate": datetime.now().astimezone()}
-    sheets = composed(document)
-    # fonts whole enough for text to be found and copied
-    with matplotlib.rc_context({"pdf.fonttype": 42}):
-        file: Any = PdfFile(path, metadata=about)
-        try:
-            for number, sheet in enumerate(sheets, 1):
-                file.newPage(WIDTH, HEIGHT)
-                foot = Line(MARGIN, FOOT, document.title, SMALL, GREY)
-                page = Line(WIDTH - MARGIN, FOOT, f"{number} of {len(sheets)}", SMALL, GREY, right=True)
-                _draw(file, _lettering(sheet, foot, page), 0.0, 0.0)
-                for mark in sheet.marks:
-                    if isinstance(mark, Placed):
-                        _draw_placed(file, mark)
-            file.finalize()
-        finally:
-            file.close()
+    with TemporaryDirectory(prefix="rockbench-") as name:
+        folder = Path(name)
+
+        def draw(picture: Picture, number: int) -> str:
+            file = f"figure-{number}.pdf"
+            _draw(picture.figure, folder / file)
+            return file
+
+        (folder / "report.json").write_text(json.dumps(template_content(document, draw)), encoding="utf-8")
+        template = folder / "report.typ"
+        template.write_bytes(files("bench.report.page").joinpath(template.name).read_bytes())
+        fonts = Path(matplotlib.get_data_path()) / "fonts" / "ttf"
+        path.write_bytes(typst.compile(template, font_paths=[fonts], ignore_system_fonts=True))
 
 
-def _lettering(sheet: Sheet, *more: Line) -> "Figure":
-    """Text and rules of a page as a figure of its size."""
-    from matplotlib.lines import Line2D
+def _draw(figure: "Figure", path: Path) -> None:
+    """Save a figure no larger than a page; a wide one gets lower by the root of the factor that it gets narrower by.
 
-    page = new_figure(WIDTH, HEIGHT)
-    page.set_layout_engine("none")
-    for mark in (*sheet.marks, *more):
-        if isinstance(mark, Rule):
-            ends = [each / WIDTH for each in mark.x], [each / HEIGHT for each in mark.y]
-            page.add_artist(Line2D(*ends, color=mark.colour, linewidth=mark.width, transform=page.transFigure))
-        elif isinstance(mark, Line):
-            page.text(
-                mark.x / WIDTH,
-                mark.y / HEIGHT,
-                mark.text,
-                fontsize=mark.font.size,
-                fontweight="bold" if mark.font.bold else "normal",
-                color=mark.colour,
-                ha="right" if mark.right else "left",
-                parse_math=False,
-            )
-    return page
-
-
-def _draw_placed(file: Any, placed: Placed) -> None:
-    size = placed.figure.get_size_inches().tolist()
-    placed.figure.set_size_inches(placed.width, placed.height)
-    try:
-        _draw(file, placed.figure, placed.x, placed.y)
-    finally:
-        placed.figure.set_size_inches(*size)
-
-
-def _draw(file: Any, figure: "Figure", x: float, y: float) -> None:
-    """Draw onto the open page, the figure's lower left corner at (x, y)."""
-    from matplotlib.backends.backend_pdf import Op, RendererPdf
+    Letters keep their size, for the figure is drawn at that size instead of being scaled.
+    """
+    import matplotlib
 
     width, height = (float(side) for side in figure.get_size_inches())
-    dpi = figure.dpi
-    figure.dpi = INCH
-    file.output(Op.gsave)
-    file.output(1, 0, 0, 1, INCH * x, INCH * y, Op.concat_matrix)
+    narrower = min(1.0, WIDTH / width)
+    figure.set_size_inches(narrower * width, min(HEIGHT, height * narrower**0.5))
     try:
-        renderer = RendererPdf(file, dpi, height, width)
-        figure.draw(renderer)
-        renderer.finalize()
-        file.output(Op.grestore)
+        # whole fonts instead of outlines: text can be found and copied
+        with matplotlib.rc_context({"pdf.fonttype": 42}):
+            figure.savefig(path, format="pdf")
     finally:
-        figure.dpi = dpi
+        figure.set_size_inches(width, height)
