@@ -167,14 +167,16 @@ def run_session(
     every ending is a result, with its status.
     """
     started = time.monotonic()
-    require_drivers(configuration)
-    protocol.check(configuration)
-    preflight = compile_run(protocol, configuration, out)
-    preflight.require()
-    # after the hash of the plan: it is the same at every pace
-    configuration = configuration.at_pace(realtime=realtime)
-    prediction = protocol.predict(configuration)
-    sources = protocol.sources(configuration) if isinstance(protocol, Sourced) else dict[str, Table]()
+    with requests.without_rig():
+        require_drivers(configuration)
+        protocol.check(configuration)
+        preflight = compile_run(protocol, configuration, out)
+        preflight.require()
+        # after the hash of the plan: it is the same at every pace
+        configuration = configuration.at_pace(realtime=realtime)
+        prediction = protocol.predict(configuration)
+        sources = protocol.sources(configuration) if isinstance(protocol, Sourced) else dict[str, Table]()
+        metadata = _metadata(protocol, configuration) | {"plan_hash": preflight.plan_hash, **(about or {})}
     if requests.strongest is not None:
         raise KeyboardInterrupt
     out.mkdir(parents=True, exist_ok=True)
@@ -185,8 +187,7 @@ def run_session(
             channels=rig.channels,
             sample_rate=rig.sample_rate,
             point_type=protocol.point_type,
-            metadata=_metadata(protocol, configuration, rig.description)
-            | {"plan_hash": preflight.plan_hash, **(about or {})},
+            metadata=metadata | {"devices": json.dumps(rig.description)},
             tables={"prediction": prediction, **preflight.tables, **sources},
             # in virtual time nothing moves on while the disk is waited for
             hold_up=PATIENCE if isinstance(rig.clock, VirtualClock) else 0.0,
@@ -239,9 +240,12 @@ def run_session(
     write_summary(out / SUMMARY, summary)
     if isinstance(protocol, Keeping):
         protocol.keep(out / protocol.kept_name)
-    protocol.figure(points.all, prediction, out / protocol.figure_name)
-    if more:
-        more.draw_further(out)
+    if not requests.interrupted:
+        # who interrupts does not wait for pictures: `rockbench report` draws them from the file
+        with requests.without_rig():
+            protocol.figure(points.all, prediction, out / protocol.figure_name)
+            if more:
+                more.draw_further(out)
     return SessionResult(
         status=ending.status,
         reason=ending.reason,
@@ -251,14 +255,13 @@ def run_session(
     )
 
 
-def _metadata(protocol: Experiment, configuration: BenchConfiguration, devices: dict[str, str]) -> dict[str, str]:
+def _metadata(protocol: Experiment, configuration: BenchConfiguration) -> dict[str, str]:
     return {
         "protocol": protocol.name,
         "parameters": protocol.parameters.model_dump_json(),
         "configuration": configuration.model_dump_json(),
         "specimen": configuration.known_specimen.model_dump_json(),
         **({} if configuration.seed is None else {"seed": str(configuration.seed)}),
-        "devices": json.dumps(devices),
         **software(),
         "git": revision(),
     }

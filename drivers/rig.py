@@ -18,6 +18,7 @@ from drivers.errors import DriveUnderflow as DriveUnderflow
 from drivers.errors import RigError as RigError
 from sim.channel import Channel as Channel
 from sim.channel import Counts as Counts
+from sim.parameters import column
 
 
 @dataclass(frozen=True)
@@ -43,13 +44,18 @@ class Alignment:
     fixed delay that was configured [s], `values` how many the sensor gave and `lost` how many it should have given.
     """
 
-    sensor: str
-    offset: float
-    rate: float
-    residual: float
-    delay: float
-    values: int
-    lost: int
+    sensor: str = column("", "name of the channel")
+    offset: float = column("s", "time of the run at which second 0 of the sensor's clock stands, without delay")
+    rate: float = column("1", "seconds of the sample clock per second of the sensor's clock")
+    residual: float = column("s", "root mean square of what the fit leaves of the readings of the clocks")
+    delay: float = column("s", "fixed delay by which the values were placed later, as configured")
+    values: int = column("1", "values that the sensor gave")
+    lost: int = column("1", "values that it should have given and that did not arrive")
+
+    def __str__(self) -> str:
+        rate, residual = 1e6 * (self.rate - 1.0), 1e6 * self.residual
+        given = f"{self.values} values, {self.lost} lost"
+        return f"{self.sensor}: clock {rate:+.1f} ppm, readings within {residual:.0f} us, {given}"
 
 
 class Handwork(StrEnum):

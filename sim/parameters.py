@@ -1,9 +1,11 @@
-"""How a parameter is declared: once, with its unit, its limits and its meaning.
+"""Declarations of parameters and of recorded values: once, with unit, limits and meaning.
 
-From one declaration come the validation, the configuration file, the command-line flags,
-the documentation table and the metadata of the data file.
+From the declaration of a parameter come the validation, the configuration file, the command-line flags,
+the documentation table and the metadata of the data file; from that of a recorded value its column in the data file,
+with reader, export and replay.
 """
 
+from dataclasses import field
 from typing import Any, cast
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -19,6 +21,14 @@ class Parameters(BaseModel):
 def quantity(default: Any, unit: str, description: str, **limits: Any) -> Any:
     """Declare a field of `Parameters` with its SI `unit` ("1" for a pure number) and its `limits` (gt, ge, lt, le)."""
     return Field(default, description=description, json_schema_extra={"unit": unit}, **limits)
+
+
+def column(unit: str, description: str, **options: Any) -> Any:
+    """Declare a recorded field of a dataclass with its SI `unit` ("1" for a pure number, "" for a text).
+
+    `options` are those of `dataclasses.field`.
+    """
+    return field(metadata={"unit": unit, "description": description}, **options)
 
 
 def unit_of(field: FieldInfo) -> str:

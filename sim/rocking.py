@@ -3,9 +3,7 @@
 The integration is `sim.kernel.rocking`; here it gets names, checks and threads.
 """
 
-import os
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
 from importlib import import_module
@@ -18,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from sim.errors import InvalidInput
 from sim.excitation import ROW, Excitation
 from sim.specimen import Specimen
+from sim.sweep import in_threads
 
 TOLERANCE = 1e-10
 """Default relative tolerance of a step. The error over 120 s of steady rocking is of the same order."""
@@ -170,8 +169,7 @@ def simulate_many(
         )
         for i in range(runs)
     ]
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        return list(pool.map(_Run.motion, prepared))
+    return in_threads(_Run.motion, prepared)
 
 
 def series_order(tolerance: float, segment: float) -> int:

@@ -2,8 +2,10 @@
 
 import os
 from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import FIRST_EXCEPTION, Future, ThreadPoolExecutor
+from concurrent.futures import wait as wait_for
 from importlib import import_module
+from time import sleep
 from typing import Any, TypeVar
 
 from sim.errors import InvalidInput, RockbenchError
@@ -14,6 +16,12 @@ Result = TypeVar("Result")
 
 PATIENCE = 10.0
 """Seconds to wait for a scheduler to answer."""
+
+STEP = 0.2
+"""Longest single wait for a thread [s]: on Windows, before Python 3.14, no signal ends one."""
+
+Done = Callable[[int, int], None]
+"""Called with how many of all items are done."""
 
 
 class SchedulerUnavailable(RockbenchError):
@@ -26,14 +34,19 @@ def processors() -> int:
 
 
 def sweep(
-    function: Callable[[Item], Result], items: Iterable[Item], scheduler: str | None = None, *, batch: int = 1
+    function: Callable[[Item], Result],
+    items: Iterable[Item],
+    scheduler: str | None = None,
+    *,
+    batch: int = 1,
+    done: Done | None = None,
 ) -> list[Result]:
     """`function` of each item, in order; the first exception that it raises is raised here.
 
-    By default in as many threads as there are processors: right for work that goes on in `sim.kernel`, which lets
-    other threads run. With the address of a dask `scheduler`, such as "tcp://10.0.0.5:8786", its workers do it; they
-    need this package, and function and items must be picklable. A task there carries `batch` items: make it last long
-    against the milliseconds that its journey takes.
+    By default in as many threads as there are processors, see `in_threads`. With the address of a dask `scheduler`,
+    such as "tcp://10.0.0.5:8786", its workers do it; they need this package, and function and items must be picklable.
+    A task there carries `batch` items: make it last long against the milliseconds that its journey takes. `done` counts
+    tasks then.
 
     Raises InvalidInput for batch < 1, MissingExtra without the extra "distributed", SchedulerUnavailable when nothing
     answers.
@@ -42,12 +55,37 @@ def sweep(
         raise InvalidInput("batch", batch, "a task carries at least one item")
     todo = list(items)
     if scheduler is not None:
-        return _distributed(function, todo, scheduler, batch)
-    with ThreadPoolExecutor(processors()) as pool:
-        return list(pool.map(function, todo))
+        return _distributed(function, todo, scheduler, batch, done)
+    return in_threads(function, todo, done)
 
 
-def _distributed(function: Callable[[Item], Result], items: list[Item], scheduler: str, batch: int) -> list[Result]:
+def in_threads(
+    function: Callable[[Item], Result], items: Iterable[Item], done: Done | None = None, *, threads: int | None = None
+) -> list[Result]:
+    """`function` of each item, in order, in as many `threads` as there are processors by default: right for work that
+    goes on in `sim.kernel`, which lets other threads run. `done` is called in this thread.
+
+    The first exception that it raises is raised here, as is KeyboardInterrupt: then no further item is begun, and
+    nobody waits for those that have.
+    """
+    pool = ThreadPoolExecutor(threads or processors())
+    try:
+        futures = [pool.submit(function, item) for item in items]
+        waiting: set[Future[Result]] = set(futures)
+        while waiting:
+            finished, waiting = wait_for(waiting, STEP, FIRST_EXCEPTION)
+            for future in finished:
+                future.result()
+            if done is not None:
+                done(len(futures) - len(waiting), len(futures))
+        return [future.result() for future in futures]
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _distributed(
+    function: Callable[[Item], Result], items: list[Item], scheduler: str, batch: int, done: Done | None
+) -> list[Result]:
     require("distributed", f"scheduler = {scheduler!r}")
     # `Any`: an optional dependency, which publishes no types
     distributed: Any = import_module("distributed")
@@ -61,6 +99,10 @@ def _distributed(function: Callable[[Item], Result], items: list[Item], schedule
         # items are the same function's: equal ones may share a result, but never one of an earlier sweep
         groups = [items[i : i + batch] for i in range(0, len(items), batch)]
         futures: Any = client.map(_each, groups, function=function, pure=False)
+        while not all(future.done() for future in futures):
+            if done is not None:
+                done(sum(future.done() for future in futures), len(futures))
+            sleep(STEP)
         gathered: list[list[Result]] = client.gather(futures)
     return [result for group in gathered for result in group]
 

@@ -7,6 +7,8 @@ import pytest
 
 # a test needs no screen; a person who wants to see the windows sets the variable himself
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+# sums of matrix products have the same last digits on every number of processors; read when numpy is imported
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 REAL_TIME = (
     "tests/drivers/daqmx/",

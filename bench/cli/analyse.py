@@ -11,6 +11,7 @@ from cyclopts import App, Parameter
 
 from bench.cli.analyse_output import side_by_side
 from bench.cli.analyse_settings import Choice, choice_of, listed
+from bench.cli.interrupt import answer
 from bench.cli.prose import prose
 from bench.cli.refusal import tell
 from sim.errors import InvalidInput
@@ -98,7 +99,7 @@ def analyse(
             tell(error)
             return 1
         except KeyboardInterrupt:
-            tell("the analysis was interrupted; nothing was written")
+            answer("the analysis was interrupted; nothing was written")
             return 130
         kind = choice.entry.campaign(choice.asked).point_type
         analysis = Analysis(points, kind, choice.given, choice.settings, choice.changed)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import App, Parameter
 
 from bench.cli.inputs import Seed, configuration_from
+from bench.cli.interrupt import SIGNALS
 from sim.errors import InvalidInput
 from sim.extras import require
 
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
     from bench.config.model import BenchConfiguration
     from drivers.emulation.laboratory import Laboratory
 
+
+STEP = 0.2
+"""Longest wait that no signal can end [s]."""
 
 _LEAD = 0.4
 """Lead of the configuration that is handed out [s]: client and laboratory share one computer, which may be busy."""
@@ -81,22 +85,26 @@ def emulate(
     from drivers.emulation.laboratory import ClockErrors, Laboratory
 
     simulation = configuration.simulation
-    with _until_asked() as over:
-        laboratory = Laboratory(
-            simulation.bench,
-            simulation.specimen or configuration.specimen,
-            seed=simulation.seed,
-            spring_factor=simulation.spring_factor,
-            connection=lasers,
-            device=device,
-            clock_errors=None if errors is None else ClockErrors(*errors),
-        )
-        try:
-            laboratory.start()
+    laboratory = Laboratory(
+        simulation.bench,
+        simulation.specimen or configuration.specimen,
+        seed=simulation.seed,
+        spring_factor=simulation.spring_factor,
+        connection=lasers,
+        device=device,
+        clock_errors=None if errors is None else ClockErrors(*errors),
+    )
+    try:
+        laboratory.start()
+        with _until_asked() as over:
             _hand_out(configuration, laboratory, write)
-            over.wait()
-        finally:
+            # in steps: on Windows, before Python 3.14, no signal ends a wait
+            while not over.wait(STEP):
+                pass
+            # under the same handler: a second Ctrl-C must not break it
             laboratory.close()
+    finally:
+        laboratory.close()
     _say("the laboratory is closed")
     return 0
 
@@ -166,9 +174,7 @@ def _until_asked() -> Generator[threading.Event]:
     def handle(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - the signature is Python's
         over.set()
 
-    names = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
-    numbers = [signal.Signals[name] for name in names if name in signal.Signals.__members__]
-    before = {number: signal.signal(number, handle) for number in numbers}
+    before = {number: signal.signal(number, handle) for number in SIGNALS}
     try:
         yield over
     finally:

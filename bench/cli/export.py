@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 
 from cyclopts import App, Parameter
 
+from bench.cli.interrupt import answer
 from bench.cli.prose import prose
 from bench.cli.refusal import tell, warn
 
@@ -57,7 +58,7 @@ def export(
         tell(f"{out} could not be written ({error.strerror or error}): see to the disk")
         return 1
     except KeyboardInterrupt:
-        tell("the export was interrupted; nothing was left behind")
+        answer("the export was interrupted; nothing was left behind")
         return 130
     if integrity.failing:
         warn(f"{file}: {integrity}")

@@ -1,16 +1,42 @@
-"""Ctrl-C ends a run in order: once aborts it, a second time cuts the output."""
+"""Ctrl-C, SIGTERM and a closed terminal: what each means in every phase of a command, and that each is answered.
 
+While a rig is open, the first ends the run in order and the second cuts the output. Everywhere else there is nothing
+to bring to rest: the first raises KeyboardInterrupt, and where the main thread does not come to it, because it is in
+native code or waits, the process is ended from another thread.
+"""
+
+import os
 import signal
+import socket
+import sys
 import threading
 from collections.abc import Callable, Generator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType
+from typing import TYPE_CHECKING
 
-from bench.engine.requests import Requests
+from bench.cli.refusal import tell
+from bench.unfinished import remove_unfinished
+
+if TYPE_CHECKING:
+    from bench.engine.requests import Requests
+
+ANSWER = 0.1
+"""How long the command itself may take to answer, in words that fit what it did, before another thread does [s]."""
+ORDERLY = 0.4
+"""How long an orderly end may take before the process is ended at once [s]."""
+
+# a closed terminal ends a run as Ctrl-C does; which of these exist depends on the system
+SIGNALS = tuple(
+    signal.Signals[name] for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if name in signal.Signals.__members__
+)
 
 
 class Interrupts:
-    """Which signal asked for the end of a run, if one did."""
+    """The handler of the signals where nothing is open, and which of them came first."""
+
+    leavable = True
+    """Whether the process may be ended at once."""
 
     def __init__(self) -> None:
         self.first: int | None = None
@@ -20,35 +46,144 @@ class Interrupts:
         """128 + the number of the signal, as shells count (Ctrl-C: 130); None when no signal came."""
         return None if self.first is None else 128 + self.first
 
+    def __call__(self, number: int, frame: FrameType | None) -> None:  # noqa: ARG002 - the signature is Python's
+        """Raise KeyboardInterrupt at the first signal; further ones must not break the cleaning up after it."""
+        if self.first is None:
+            self.first = number
+            raise KeyboardInterrupt
 
-@contextmanager
-def interruptible(requests: Requests, asking: Callable[[], bool]) -> Generator[Interrupts, None, None]:
-    """Turn SIGINT, SIGTERM and a closed terminal into `requests`: abort at the first, halt at the next.
 
-    When `asking` says that the operator is being asked, the handler also raises KeyboardInterrupt, because
-    Python would resume the wait for the answer. Outside the main thread, where Python allows no handlers, nothing
-    is changed.
-    """
-    interrupts = Interrupts()
-    if threading.current_thread() is not threading.main_thread():
-        yield interrupts
-        return
+class RunInterrupts(Interrupts):
+    """The handler during a run: the signals become `requests`, abort at the first and halt at the next."""
 
-    def handle(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - the signature is Python's
-        if interrupts.first is None:
-            interrupts.first = number
+    def __init__(self, requests: "Requests", asking: Callable[[], bool]) -> None:
+        super().__init__()
+        self._requests, self._asking = requests, asking
+
+    @property
+    def leavable(self) -> bool:
+        """Whether no rig is open: the run is still being planned, or has ended."""
+        return self._requests.rig_closed
+
+    def __call__(self, number: int, frame: FrameType | None) -> None:  # noqa: ARG002 - the signature is Python's
+        requests, first = self._requests, self.first is None
+        if first:
+            self.first = number
+            requests.interrupted = True
             requests.abort()
         else:
             requests.halt()
-        if asking():
+        if self._asking():
             raise KeyboardInterrupt
+        if first and requests.breaking is not None:
+            raise requests.breaking()
 
-    # a closed terminal ends a run as Ctrl-C does; which of these exist depends on the system
-    names = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
-    numbers = [signal.Signals[name] for name in names if name in signal.Signals.__members__]
-    before = {number: signal.signal(number, handle) for number in numbers}
+
+@contextmanager
+def interruptible(requests: "Requests", asking: Callable[[], bool]) -> Generator[Interrupts, None, None]:
+    """Turn SIGINT, SIGTERM and a closed terminal into `requests`: abort at the first, halt at the next.
+
+    The handler also raises what `requests.breaking` says, which ends the planning of a run; and KeyboardInterrupt when
+    `asking` says that the operator is being asked, because Python would resume the wait for the answer. Outside the
+    main thread, where Python allows no handlers, nothing is changed.
+    """
+    interrupts = RunInterrupts(requests, asking)
+    if threading.current_thread() is not threading.main_thread():
+        yield interrupts
+        return
+    before = {number: signal.signal(number, interrupts) for number in SIGNALS}
     try:
         yield interrupts
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+class Watch:
+    """A thread that answers for a main thread that does not.
+
+    Python runs a signal's handler in the main thread, between two of its instructions: not while native code works or
+    waits, and on Windows, before Python 3.14, not during a wait for a lock either. The number of the signal, however,
+    is written to a socket at once, on which this thread waits. The process is ended here only while the installed
+    handler says that it may be left: never while a rig is open, and never under a handler of somebody else.
+    """
+
+    def __init__(self) -> None:
+        self._numbers, self._written = socket.socketpair()
+        self._written.setblocking(False)
+        self._unanswered = threading.Lock()
+        self._told: list[str] = []
+
+    def start(self) -> None:
+        """Watch from now on, to the end of the process. In the main thread."""
+        signal.set_wakeup_fd(self._written.fileno(), warn_on_full_buffer=False)
+        threading.Thread(target=self._watch, name="interrupts", daemon=True).start()
+
+    def claim(self) -> bool:
+        """Whether the answer is still to be given; then the caller gives it."""
+        return self._unanswered.acquire(blocking=False)
+
+    def _watch(self) -> None:
+        while True:
+            for number in self._numbers.recv(16):
+                handler = signal.getsignal(number)
+                if isinstance(handler, RunInterrupts) and not handler.leavable:
+                    self._tell_of_the_run()
+                elif isinstance(handler, Interrupts):
+                    threading.Thread(target=self._end, args=(number,), name="interrupted", daemon=True).start()
+
+    def _tell_of_the_run(self) -> None:
+        texts = ("the run is ended: the output is ramped to zero; Ctrl-C again cuts it", "the output is cut at once")
+        if len(self._told) < len(texts):
+            self._told.append(texts[len(self._told)])
+            with suppress(OSError, ValueError):
+                print(f"rockbench: interrupted: {self._told[-1]}", file=sys.stderr, flush=True)
+
+    def _end(self, number: int) -> None:
+        threading.Event().wait(ANSWER)
+        if self.claim():
+            with suppress(OSError, ValueError):
+                tell("interrupted")
+        threading.Event().wait(ORDERLY - ANSWER)
+        handler = signal.getsignal(number)
+        if isinstance(handler, Interrupts) and handler.leavable:
+            leave(128 + number)
+
+
+_watch: Watch | None = None
+"""That of this process, whose signals are one thing for all of it; none where `main` is called by another program."""
+
+
+def heed_signals(interrupts: Interrupts) -> None:
+    """Make this process answer its signals from now on, with `interrupts` as their handler. In the main thread."""
+    global _watch
+
+    def unraisable(error: "sys.UnraisableHookArgs") -> None:
+        # what an interrupt breaks in destructors and callbacks is no news: the process ends all the same
+        if interrupts.first is None and not isinstance(error.exc_value, KeyboardInterrupt):
+            sys.__unraisablehook__(error)
+
+    sys.unraisablehook = unraisable
+    _watch = Watch()
+    _watch.start()
+    for number in SIGNALS:
+        # who starts a program with nohup wants it to go on
+        if number.name != "SIGHUP" or signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, interrupts)
+
+
+def answer(text: str) -> None:
+    """Say, in one line on standard error, that the command was interrupted, unless that has been said."""
+    if _watch is None or _watch.claim():
+        tell(text)
+
+
+def leave(code: int) -> None:
+    """End the process now, without running anything that still waits in it; what was in the making is removed."""
+    remove_unfinished()
+    with suppress(OSError, ValueError):
+        if sys.__stderr__ is not None and sys.__stderr__.isatty():
+            # a progress bar hides the cursor
+            sys.__stderr__.write("\x1b[?25h")
+            sys.__stderr__.flush()
+    os._exit(code)

@@ -1,10 +1,8 @@
 """The command `rockbench`."""
 
-import os
 import sys
 from collections.abc import Sequence
 from importlib.metadata import version
-from io import TextIOWrapper
 
 from cyclopts import App, CycloptsError, UnusedCliTokensError
 
@@ -16,6 +14,7 @@ from bench.cli.devices import devices_app
 from bench.cli.emulate import emulate_app
 from bench.cli.export import export_app
 from bench.cli.file import file_app
+from bench.cli.interrupt import answer
 from bench.cli.paper import paper_app
 from bench.cli.predict import predict_app
 from bench.cli.queue import queue_app
@@ -26,22 +25,6 @@ from bench.cli.report import report_app
 from bench.cli.run import Start, run_app
 from bench.cli.window import gui_app
 from sim.errors import RockbenchError
-
-
-def run() -> None:
-    """Entry point of the console script."""
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, TextIOWrapper):
-            # a console that cannot show a character shows another, and the run goes on
-            stream.reconfigure(errors="replace")
-    try:
-        code = main()
-        sys.stdout.flush()
-    except BrokenPipeError:
-        # the reader, such as `head`, has seen enough; what is still held back has nowhere to go at exit either
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        code = 1
-    sys.exit(code)
 
 
 def main(argv: Sequence[str] | None = None, start: Start | None = None) -> int:
@@ -84,7 +67,7 @@ def main(argv: Sequence[str] | None = None, start: Start | None = None) -> int:
     except (CycloptsError, RockbenchError) as error:
         tell(error)
         return 2
-    except KeyboardInterrupt:
-        tell("interrupted before the run began")
+    except KeyboardInterrupt as interrupt:
+        answer(str(interrupt) or "interrupted")
         return 130
     return code if isinstance(code, int) else 0

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import App, Parameter
 
 from bench.cli.inputs import Seed, SpecimenFile
+from bench.cli.interrupt import answer
 from bench.cli.plan_table import plans_text, tests_text
 from bench.cli.refusal import tell
 from bench.cli.run import Start, carry_out
@@ -152,11 +153,11 @@ def _run_one(
                 return None
     except InvalidInput as refused:
         told = f"refused: {refused}"
-    except KeyboardInterrupt:
-        told, interrupted = "ended before anything moved", 130
+    except KeyboardInterrupt as interrupt:
+        told, interrupted = str(interrupt) or "interrupted", 130
     finally:
         tests.finish(index, good=good, told=told)
-    tell(f"test {index + 1} {told}")
+    (tell if interrupted is None else answer)(f"test {index + 1} {told}")
     return interrupted or 1
 
 

@@ -41,9 +41,10 @@ def draw(scene: Scene, width: int, height: int) -> RenderableType:
     hint = Text("Ctrl-C ramps the output to zero and ends the run; a second Ctrl-C cuts it at once.", style="dim")
     hint.no_wrap, hint.overflow = True, "ellipsis"
     wide = width >= _WIDE
-    twin = [Text(f"twin  {scene.twin}", no_wrap=True, overflow="ellipsis")] if scene.twin else []
-    room = height - _AROUND_TABLE - len(twin)
-    return Group(_banner(scene), _points(scene, room, wide), _progress(scene, wide), *twin, _log(scene), hint)
+    texts = [*scene.live.values(), *([f"twin  {scene.twin}"] if scene.twin else [])]
+    lines = [Text(text, no_wrap=True, overflow="ellipsis") for text in texts]
+    room = height - _AROUND_TABLE - len(lines)
+    return Group(_banner(scene), _points(scene, room, wide), _progress(scene, wide), *lines, _log(scene), hint)
 
 
 def log_line(notice: Notice) -> Text:

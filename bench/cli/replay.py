@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Parameter
 
+from bench.cli.interrupt import answer
 from bench.cli.prose import prose
 from bench.cli.refusal import tell
 from bench.cli.words import one_line
@@ -62,7 +63,7 @@ def replay(
             with entry.progress(sys.stderr, False) as progress, redirect_stdout(sys.stderr):
                 replayed = play(record, experiment, configuration, clock=clock, subscribers=[progress])
         except KeyboardInterrupt:
-            tell("the replay was interrupted")
+            answer("the replay was interrupted")
             return 130
         points = list(replayed.points)
         print(json.dumps(_content(replayed)) if as_json else _text(replayed, experiment.table(points)))

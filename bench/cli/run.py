@@ -17,6 +17,7 @@ from bench.cli.catalogue import CATALOGUE, Entry
 from bench.cli.flags import arguments_of
 from bench.cli.options import Options, arguments_of_options
 from bench.cli.refusal import tell
+from bench.results import SUMMARY
 from sim.errors import InvalidInput, RockbenchError
 
 if TYPE_CHECKING:
@@ -150,6 +151,13 @@ def carry_out(
             )
         except InvalidInput:
             raise
+        except KeyboardInterrupt:
+            # before anything moved there is no summary: `check_folder` has seen to that
+            if (out / SUMMARY).exists():
+                raise KeyboardInterrupt(
+                    f"interrupted after the run: {out} holds its results, without pictures"
+                ) from None
+            raise KeyboardInterrupt("interrupted: ended before anything moved") from None
         except (RockbenchError, OSError) as error:
             ended = error
     return ended, interrupts.exit_code

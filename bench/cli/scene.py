@@ -3,27 +3,22 @@
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import isfinite, nan
 from typing import Any
 
 from bench.cli.twin_line import twin_line
-from bench.cli.words import ABSENT, difference, gain, number, one_line, setting
+from bench.cli.words import ABSENT, difference, gain, measured, number, one_line, setting
 from bench.events import (
     Estimate,
     Event,
-    FitFinished,
-    LimitExceeded,
-    OperatorAnswered,
-    OperatorAsked,
-    PassFinished,
+    LiveValue,
     PointFinished,
     Progress,
     RunningGain,
     State,
     StateChanged,
     StepStarted,
-    TableIdentified,
     TwinEstimate,
-    Warned,
 )
 
 NOTICES = 5
@@ -117,40 +112,37 @@ class Row:
         )
 
 
+def live_line(live: LiveValue) -> str:
+    """A number that a protocol follows, with what was predicted for it."""
+    text = f"{one_line(live.label)}  {measured(live.value, live.uncertainty, live.unit)}"
+    if not isfinite(live.predicted):
+        return text
+    predicted = measured(live.predicted, nan, live.unit)
+    return f"{text}, predicted {predicted}, difference {difference(live.value, live.predicted)}"
+
+
 def notice_of(event: Event) -> Notice | None:
     """The event as a line of the log, or None when it is not worth one."""
     match event:
-        case StepStarted():
-            return Notice(event.time, "step", one_line(event.text))
-        case PointFinished() if "alpha_2" in type(event.point).model_fields:
+        case PointFinished():
+            if "alpha_2" not in type(event.point).model_fields:
+                return None
             point = event.point.model_dump()
             reason = one_line(str(point.get("reason") or ""))
             text = Row.finished(point).sentence + (f" ({reason})" if reason else "")
-            return Notice(event.time, "point", text, grave=point.get("status") == "overturned")
-        case PassFinished():
-            return Notice(event.time, "pass", one_line(f"{event.motion}: {event.text}"))
-        case FitFinished():
-            return Notice(event.time, "fit", one_line(f"{event.name}: {event.text}"))
-        case TableIdentified():
-            return Notice(event.time, "table", one_line(event.text))
-        case Warned():
-            return Notice(event.time, "warning", one_line(event.text), grave=True)
-        case LimitExceeded():
-            reached, allowed = (f"{value:.4g} {event.unit}" for value in (event.value, event.limit))
-            return Notice(event.time, "LIMIT", f"{event.quantity} reached {reached}, allowed {allowed}", grave=True)
-        case OperatorAsked():
-            return Notice(event.time, "asked", one_line(event.request))
-        case OperatorAnswered():
-            return Notice(event.time, "done", one_line(f"{event.request} (by {event.by})"))
+            return Notice(event.time, event.notice, text, grave=point.get("status") == "overturned")
         case StateChanged(after=State.ABORTING | State.HALTED):
             return Notice(event.time, str(event.after), one_line(event.reason), grave=True)
         case _:
-            return None
+            return Notice(event.time, event.notice, one_line(event.line), grave=event.grave) if event.notice else None
 
 
 @dataclass
 class Scene:
-    """The present picture: `rows` of finished points, the last `notices` that are no points, and the rest as it is."""
+    """The present picture: `rows` of finished points, the last `notices` that are no points, and the rest as it is.
+
+    `live` are the numbers that the protocol follows, in one line each, by their label.
+    """
 
     time: float = 0.0
     state: State = State.IDLE
@@ -162,6 +154,7 @@ class Scene:
     rows: list[Row] = field(default_factory=list[Row])
     running: Row | None = None
     twin: str = ""
+    live: dict[str, str] = field(default_factory=dict[str, str])
     notices: deque[Notice] = field(default_factory=lambda: deque[Notice](maxlen=NOTICES))
 
     def update(self, event: Event) -> Notice | None:
@@ -170,9 +163,13 @@ class Scene:
         match event:
             case StateChanged():
                 self.state, self.reason = event.after, one_line(event.reason)
-                self.twin = "" if event.after in (State.IDLE, State.HALTED, State.CLOSED) else self.twin
+                if event.after in (State.IDLE, State.HALTED, State.CLOSED):
+                    self.twin = ""
+                    self.live.clear()
             case TwinEstimate():
                 self.twin = twin_line(event)
+            case LiveValue():
+                self.live[one_line(event.label)] = live_line(event)
             case StepStarted():
                 self.step, self.running = one_line(event.text), None
             case Progress():

@@ -40,6 +40,14 @@ def difference(value: float | None, reference: float | None) -> str:
     return f"{100.0 * (value / reference - 1.0):+.1f} %"
 
 
+def measured(value: float, uncertainty: float, unit: str) -> str:
+    """A value with its uncertainty and unit: `(12.31 ± 0.04) mm`; a pure number has no unit."""
+    text = gain(value, uncertainty)
+    if unit in ("", "1") or text == ABSENT:
+        return text
+    return f"({text}) {unit}" if "±" in text else f"{text} {unit}"
+
+
 def one_line(text: str) -> str:
     """The text without line breaks and control characters, which would disturb a terminal or a log."""
     return "".join(character for character in " ".join(text.split()) if character.isprintable())

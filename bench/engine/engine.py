@@ -50,7 +50,7 @@ class Engine:
         operator: Operator,
         block: int,
     ) -> None:
-        self._rig, self._stream, self._operator = rig, stream, operator
+        self._rig, self._stream, self._operator, self._requests = rig, stream, operator, requests
         self._output = Output(rig, guard, stream, requests, block)
         self._turns = Turns(self._output, guard, signals, stream, requests)
         self._rest = Rest(self._turns, rig, guard, signals, stream)
@@ -90,12 +90,18 @@ class Engine:
         return output.cut(ending) if output.driven else ending
 
     def _carry_out(self, plan: Plan) -> None:
+        outcome: Outcome | None = None
         try:
-            step = next(plan)
             while True:
-                step = plan.send(self._do(step))
+                # what the plan computes between its steps may take long, and looks at no request
+                with self._requests.breakable(self._asked_to_end):
+                    step = next(plan) if outcome is None else plan.send(outcome)
+                outcome = self._do(step)
         except StopIteration:
             return
+
+    def _asked_to_end(self) -> Ended:
+        return Ended(Ending("aborted", self._requests.reason))
 
     def _do(self, step: Step) -> Outcome:
         match step:

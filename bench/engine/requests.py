@@ -1,7 +1,7 @@
 """What a person may ask of a running bench, from any thread or signal handler."""
 
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Generator
+from contextlib import contextmanager, suppress
 
 from drivers.errors import RigError
 
@@ -15,6 +15,30 @@ class Requests:
     def __init__(self) -> None:
         self._stop = self._abort = self._halt = ""
         self._cut: Callable[[], None] | None = None
+        self.interrupted = False
+        """Whether a signal made one of them: then nothing is waited for once the rig is at rest."""
+        self.breaking: Callable[[], BaseException] | None = None
+        """What a signal handler raises in the main thread besides making its request; None: the loop looks itself."""
+        self.rig_closed = False
+        """Whether the session says that no rig is open; the process may be ended at once then."""
+
+    @contextmanager
+    def breakable(self, error: Callable[[], BaseException]) -> Generator[None]:
+        """Within, a signal handler raises `error()`: for long computations, which look at no request."""
+        before, self.breaking = self.breaking, error
+        try:
+            yield
+        finally:
+            self.breaking = before
+
+    @contextmanager
+    def without_rig(self) -> Generator[None]:
+        """Within, no rig is open: an end that a signal asks for is KeyboardInterrupt."""
+        self.rig_closed = True
+        with self.breakable(KeyboardInterrupt):
+            yield
+        # after an error it stays so: the session ends without opening one
+        self.rig_closed = False
 
     def cut_by(self, cut: Callable[[], None]) -> None:
         """From now on `halt` also calls `cut`, in the thread that asks."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.record import findings
-from bench.record.declared import EVENTS, OWN_TABLES
+from bench.record.declared import EVENT_TABLES
 from bench.record.reader import Record
 from bench.record.series import RecordedRun
 from drivers.rig import Channel
@@ -111,33 +111,21 @@ def _raw_signal(record: Record, channel: Channel) -> Signal:
 
 
 def _tables(record: Record) -> Iterator[tuple[str, list[TableColumn]]]:
-    """The results, what was said on the way to them, and what was stored before the run."""
+    """The results, what was recorded on the way to them, and what was stored before the run."""
     points, about = record.points, record.results
     if points:
         yield "points", [_column(name, about[name].unit, about[name].description, points) for name in points[0]]
-    declared = dict(OWN_TABLES.values()) | findings.TABLES
-    own: dict[str, list[dict[str, Any]]] = {
-        "estimates": _rows(record.estimates),
-        "running_gains": _rows(record.running_gains),
-        "passes": record.passes,
-        "table_response": _rows(record.table_response),
-        "twin": _rows(record.twin),
-        "identified": record.findings["identified"],
-        "identified_correlations": record.findings["identified_correlations"],
-        "events": [{"time": each.time, "kind": each.kind, "text": each.text} for each in record.events],
-    }
-    for name, rows in own.items():
-        fields = EVENTS if name == "events" else declared[name]
-        if rows:
-            yield name, [_column(field.name, field.unit, field.description, rows) for field in fields]
+    for path in (*(table.path for table in EVENT_TABLES.values()), *findings.TABLES, "events"):
+        columns = record.growing(path)
+        if any(columns.values()):
+            named = [_plain(field.name, field.unit, field.description, values) for field, values in columns.items()]
+            yield path.rpartition("/")[2], named
     for number, fit in enumerate(record.fits, start=1):
-        yield (
-            f"fit_{number}",
-            [
-                _plain(key, each.unit, f"{fit.name}: {each.description}", each.values.tolist())
-                for key, each in fit.columns.items()
-            ],
-        )
+        columns = [
+            _plain(key, each.unit, f"{fit.name}: {each.description}", each.values.tolist())
+            for key, each in fit.columns.items()
+        ]
+        yield f"fit_{number}", columns
     for name, table in record.tables.items():
         columns = [_plain(key, each.unit, each.description, each.values.tolist()) for key, each in table.items()]
         if columns and columns[0].values:
@@ -158,7 +146,3 @@ def _plain(name: str, unit: str, description: str, values: Sequence[Any]) -> Tab
     elif known and all(isinstance(value, int) for value in known):
         kind = "whole"
     return TableColumn(name, "" if kind in ("switch", "text") else unit, description, kind, values)
-
-
-def _rows(columns: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
-    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]

@@ -1,6 +1,5 @@
 """A whole export: a new folder, complete or not there at all."""
 
-import shutil
 from pathlib import Path
 from typing import Literal
 from uuid import uuid4
@@ -9,6 +8,7 @@ from bench.export import matlab, parquet, text, uff
 from bench.export.content import content_of
 from bench.record.integrity import Integrity
 from bench.record.reader import Record
+from bench.unfinished import unfinished
 from sim.errors import InvalidInput
 from sim.extras import require
 
@@ -41,17 +41,14 @@ def export(record: Record, path: Path, to: Format, out: Path, *, raw: bool = Fal
         matlab.check(content)
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
-        unfinished = out.with_name(f".{out.name}-{uuid4().hex[:8]}")
-        unfinished.mkdir()
+        temporary = out.with_name(f".{out.name}-{uuid4().hex[:8]}")
+        temporary.mkdir()
     except OSError as error:
         raise InvalidInput("--out", str(out), f"the folder cannot be made: {error.strerror}") from None
-    try:
-        _WRITERS[to](content, unfinished)
+    with unfinished(temporary):
+        _WRITERS[to](content, temporary)
         if integrity.failing:
             lines = (f"{path.name} is damaged or was changed since it was written:", *integrity.failing.values())
-            (unfinished / DAMAGED).write_text("\n".join(lines) + "\n", encoding="utf-8")
-        unfinished.rename(out)
-    except BaseException:
-        shutil.rmtree(unfinished, ignore_errors=True)
-        raise
+            (temporary / DAMAGED).write_text("\n".join(lines) + "\n", encoding="utf-8")
+        temporary.rename(out)
     return sorted(out.iterdir()), integrity

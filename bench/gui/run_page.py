@@ -15,8 +15,8 @@ from PySide6.QtWidgets import (
 )
 
 from bench.cli.scene import Notice
-from bench.cli.words import ABSENT, clock, difference, gain, number
-from bench.events import Estimate, Event, PointFinished, RunningGain, StepStarted, TwinEstimate
+from bench.cli.words import ABSENT, clock, difference, gain, measured, number
+from bench.events import Estimate, Event, LiveValue, PointFinished, RunningGain, StepStarted, TwinEstimate
 from bench.gui import texts
 from bench.gui.buttons import give_key
 from bench.gui.controller import PERIOD, Controller
@@ -143,6 +143,11 @@ class RunPage(QWidget):
                 )
                 self.gains.show_running(event)
                 self._couple(event.beta)
+            case LiveValue():
+                self.alpha.setText(f"{event.label}  {measured(event.value, event.uncertainty, event.unit)}")
+                off = difference(event.value, event.predicted)
+                predicted = f"{texts.PREDICTED} {number(event.predicted)}, difference {off}"
+                self.predicted.setText(predicted if isfinite(event.predicted) else "")
             case PointFinished():
                 self.gains.add(event.point.model_dump())
             case StepStarted():

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bench.config.model import BenchConfiguration
-from bench.record.declared import TWIN
+from bench.events import TwinEstimate
+from bench.record.declared import EVENT_TABLES
 from sim.errors import InvalidInput
 
 SPARE = 3.0
@@ -50,7 +51,7 @@ def bytes_per_second(configuration: BenchConfiguration) -> float:
     else:
         channels, width = len(configuration.hardware.transducers) + 2, 4
     beside = configuration.at_pace(realtime=False).twin.enabled
-    said = 8 * len(TWIN) / configuration.acquisition.block_duration if beside else 0.0
+    said = 8 * len(EVENT_TABLES[TwinEstimate].fields) / configuration.acquisition.block_duration if beside else 0.0
     return configuration.sample_rate * (channels * width + DRIVE_BYTES) + said
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.analysis.signals import ACCELERATION, DRIFT, SIGNALS, U1, SignalMap
+from bench.events import Estimate
 from bench.publication.campaign import Campaign
 from bench.record.reader import Record
 from bench.report.measured_figure import MeasuredMotion, Predicted
@@ -96,7 +97,7 @@ def _ends_of_dwells(record: Record) -> dict[tuple[float, float | None], list[flo
     The running estimates tell which test was going on; the dwell whose cycles count follows the last of them.
     """
     changes = [event.time for event in record.events if event.kind in BOUNDARIES]
-    estimates = record.estimates
+    estimates = record.columns_of(Estimate)
     ends: dict[tuple[float, float | None], list[float]] = {}
     for time, omega, beta in zip(estimates["time"], estimates["omega"], estimates["beta"], strict=True):
         after = bisect_right(changes, time)

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.analysis.signals import SignalMap
+from bench.events import RunningGain
 from bench.record.reader import Record
 
 Floats = NDArray[np.float64]
@@ -28,7 +29,7 @@ class Played:
 
 def played_records(record: Record) -> list[Played]:
     """Every play of the file that was watched, in order; `beta` is None for the bare frame."""
-    gains, blocks = record.running_gains, record.blocks
+    gains, blocks = record.columns_of(RunningGain), record.blocks
     found: list[Played] = []
     if not gains:
         return found

@@ -1,10 +1,12 @@
-"""How one field of a row is stored: its type in the file, its unit, and what stands for an absent value."""
+"""Storage of one field of a row: its type in the file, its unit, and what stands for an absent value."""
 
+import dataclasses
 import inspect
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from types import NoneType, UnionType
-from typing import Annotated, Any, Union, get_args, get_origin
+from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,13 +33,17 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True)
 class Field:
-    """One field. When it is absent, a number is NaN, a switch -1, and a text empty."""
+    """One field. When it is absent, a number is NaN, a switch -1, and a text empty.
+
+    Of an `array`, each element is a row.
+    """
 
     name: str
     kind: Kind
     unit: str
     description: str
     optional: bool = False
+    array: bool = False
 
     @property
     def dtype(self) -> np.dtype[Any]:
@@ -99,13 +105,45 @@ def field_of(name: str, stored: hdf5.Dataset) -> Field:
         return Field(name, Kind(attrs["kind"]), unit, told, bool(attrs["optional"]))
 
 
-def fields_of(row_type: type[Parameters]) -> tuple[Field, ...]:
-    """The fields of a declared group of parameters. Raises InvalidInput for what is no number, switch or text."""
+def fields_of(row_type: type[Any]) -> tuple[Field, ...]:
+    """The fields of a group of parameters, or the columns of a dataclass (`sim.parameters.column`) but for its parts.
+
+    Raises InvalidInput for what is no number, switch or text.
+    """
+    if issubclass(row_type, Parameters):
+        declared = [
+            (name, info.annotation, unit_of(info), info.description or "")
+            for name, info in row_type.model_fields.items()
+        ]
+    else:
+        parts = parts_of(row_type)
+        declared = [
+            (name, hint, about["unit"], about["description"])
+            for name, hint, about in _columns(row_type)
+            if parts is None or name != parts[0]
+        ]
     fields: list[Field] = []
-    for name, info in row_type.model_fields.items():
-        kind, optional = _classify(f"{row_type.__name__}.{name}", info.annotation)
-        fields.append(Field(name, kind, unit_of(info), info.description or "", optional))
+    for name, hint, unit, description in declared:
+        array = get_origin(hint) is np.ndarray
+        kind, optional = (Kind.REAL, False) if array else _classify(f"{row_type.__name__}.{name}", hint)
+        fields.append(Field(name, kind, unit, description, optional, array))
     return tuple(fields)
+
+
+def parts_of(row_type: type[Any]) -> tuple[str, type[Any]] | None:
+    """The column of a dataclass that holds a tuple of dataclasses, and their type; None where there is none."""
+    for name, hint, _ in _columns(row_type):
+        if get_origin(hint) is tuple and dataclasses.is_dataclass(inner := get_args(hint)[0]):
+            assert isinstance(inner, type)
+            return name, inner
+    return None
+
+
+def _columns(row_type: type[Any]) -> list[tuple[str, Any, Mapping[str, str]]]:
+    """Name, type and declaration of each field that was declared as a column."""
+    hints = get_type_hints(row_type)
+    declared = dataclasses.fields(row_type)
+    return [(each.name, hints[each.name], each.metadata) for each in declared if "unit" in each.metadata]
 
 
 def _read(stored: hdf5.Dataset) -> NDArray[Any]:

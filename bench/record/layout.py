@@ -11,18 +11,9 @@ from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
 
-from bench.record import findings, fits, hdf5, tables
+from bench.record import hdf5, tables
 from bench.record.checksums import Checksums
-from bench.record.declared import (
-    ALIGNMENTS,
-    BLOCKS,
-    COUNTED,
-    EVENTS,
-    FIXED_ENTRIES,
-    FIXED_GROUPS,
-    FIXED_INSTRUMENTS,
-    OWN_TABLES,
-)
+from bench.record.declared import COUNTED, FIXED_ENTRIES, FIXED_GROUPS, FIXED_INSTRUMENTS, TABLES
 from bench.record.fields import fields_of
 from bench.record.growing import Growing
 from bench.record.opening import FORMAT, FORMAT_VERSION
@@ -116,14 +107,10 @@ def build(file: hdf5.File, skeleton: Skeleton) -> Parts:
     )
     time = create_plot(entry, skeleton.channels, chunk_of(skeleton.sample_rate))
     samples = Samples(instrument, skeleton.channels, skeleton.sample_rate, time)
-    rows = {
-        "blocks": Rows(instrument, "blocks", BLOCKS),
-        "events": Rows(entry, "events", EVENTS),
-        **{name: Rows(entry, name, fields) for name, fields in OWN_TABLES.values()},
-        **{name: Rows(entry, name, fields) for name, fields in (fits.TABLES | findings.TABLES).items()},
-        "points": Rows(entry, "points", fields_of(skeleton.point_type)),
-        "alignments": Rows(instrument, "alignments", ALIGNMENTS),
-    }
+    rows = dict[str, Rows]()
+    for path, fields in {**TABLES, "points": fields_of(skeleton.point_type)}.items():
+        folder, _, name = path.rpartition("/")
+        rows[name] = Rows(instrument if folder else entry, name, fields)
     replaced = create_ends(entry)
     grown = [*samples.grown, *(each for table in rows.values() for each in table.grown)]
     checksums = Checksums(entry, [*(each.path for each in grown), *(each.name for each in replaced)])

@@ -4,21 +4,13 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from bench.record import findings, fits, hdf5
-from bench.record.declared import ALIGNMENTS, BLOCKS, EVENTS, OWN_TABLES
+from bench.record import hdf5
+from bench.record.declared import TABLES
 from bench.record.errors import RecordError
 from bench.record.rows import Rows
 from bench.record.samples import create_drive, read_channel, read_channels
 
 _ROWS_AT_ONCE = 2**18
-_TABLES = {
-    "instrument/blocks": BLOCKS,
-    "instrument/alignments": ALIGNMENTS,
-    "events": EVENTS,
-    **dict(OWN_TABLES.values()),
-    **fits.TABLES,
-    **findings.TABLES,
-}
 
 
 def drop_channels(entry: hdf5.Group, lost: dict[str, str]) -> None:
@@ -50,7 +42,7 @@ def renew_drive(entry: hdf5.Group) -> None:
 def renew_tables(entry: hdf5.Group, lost: Iterable[str]) -> None:
     """Make every table empty of which a path is `lost`; the journal may fill it again."""
     gone = tuple(lost)
-    for path, fields in _TABLES.items():
+    for path, fields in TABLES.items():
         if any(each == f"/entry/{path}" or each.startswith(f"/entry/{path}/") for each in gone):
             folder, _, name = path.rpartition("/")
             parent = hdf5.group(entry, folder) if folder else entry

@@ -6,17 +6,17 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from bench.events import FitFinished
+from bench.events import Event, FitFinished, SensorsAligned
 from bench.record import checksums, findings, fits, hdf5, tables
-from bench.record.declared import FIXED_GROUPS, OWN_TABLES
+from bench.record.declared import EVENT_TABLES, FIXED_GROUPS, TABLES
 from bench.record.errors import UNREADABLE, RecordError, reading, reason
-from bench.record.fields import decode
+from bench.record.fields import Field, decode, field_of
 from bench.record.integrity import SMALL, Integrity, integrity
 from bench.record.opening import open_file
 from bench.record.plot import GROUP as PLOT
 from bench.record.plot import TIME
 from bench.record.stored import StoredSamples
-from bench.record.tables import Column
+from bench.record.tables import Column, as_rows
 from drivers.rig import Alignment
 from sim.identified import Identified
 
@@ -143,8 +143,7 @@ class Record(StoredSamples):
     @property
     def events(self) -> list[RecordedEvent]:
         """The journal."""
-        columns = self._decoded("events")
-        return [RecordedEvent(*row) for row in zip(columns["time"], columns["kind"], columns["text"], strict=True)]
+        return [RecordedEvent(**row) for row in self._rows("events")]
 
     @property
     def points(self) -> list[dict[str, Any]]:
@@ -157,30 +156,26 @@ class Record(StoredSamples):
         group, whole = hdf5.group(self._entry, "points"), len(self.points)
         return {name: Column(c.values[:whole], c.unit, c.description) for name, c in tables.read(group).items()}
 
-    @property
-    def estimates(self) -> dict[str, list[Any]]:
-        """The running estimates, one list per column; an absent value is None, an unknown one NaN."""
-        return self._decoded("estimates")
+    def columns_of(self, event: type[Event]) -> dict[str, list[Any]]:
+        """What was recorded of a kind of events that has a table, one list per column, in the order of declaration.
 
-    @property
-    def running_gains(self) -> dict[str, list[Any]]:
-        """The running gains under records, one list per column; `beta` is None for the bare frame."""
-        return self._decoded("running_gains") if hdf5.has(self._entry, "running_gains") else {}
+        An absent value is None, an unknown one NaN. No columns in an older file that has no such table.
+        """
+        return {field.name: values for field, values in self.growing(EVENT_TABLES[event].path).items()}
 
-    @property
-    def twin(self) -> dict[str, list[Any]]:
-        """What the model said that ran beside, one list per column; no columns in a file that knows of none."""
-        return self._decoded("twin") if hdf5.has(self._entry, "twin") else {}
+    def rows_of(self, event: type[Event]) -> list[dict[str, Any]]:
+        """The same as one dict per row."""
+        return as_rows(self.columns_of(event))
 
-    @property
-    def passes(self) -> list[dict[str, Any]]:
-        """What the passes of replications achieved, one dict each; none in a file that knows of none."""
-        return self._rows("passes") if hdf5.has(self._entry, "passes") else []
-
-    @property
-    def table_response(self) -> dict[str, list[Any]]:
-        """The identified response of the table, one list per column, one row per line; empty where there is none."""
-        return self._decoded("table_response") if hdf5.has(self._entry, "table_response") else {}
+    def growing(self, path: str) -> dict[Field, list[Any]]:
+        """The complete rows of the table at `path` below /entry, by column as the file declares it."""
+        if not hdf5.has(self._entry, path):
+            return {}
+        group = hdf5.group(self._entry, path)
+        stored = {name: hdf5.dataset(group, name) for name in hdf5.names(group)}
+        columns = {field_of(name, each): decode(each) for name, each in stored.items()}
+        whole = min([self._complete(path.rpartition("/")[2]), *(len(values) for values in columns.values())])
+        return {field: values[:whole] for field, values in columns.items()}
 
     @property
     def fits(self) -> list[FitFinished]:
@@ -190,22 +185,15 @@ class Record(StoredSamples):
     @property
     def identified(self) -> Identified | None:
         """What was known of the specimen when the run had last found something; None where it identified nothing."""
-        return findings.last(*self.findings.values())
-
-    @property
-    def findings(self) -> dict[str, list[dict[str, Any]]]:
-        """The rows of what was identified, each time that it was said, and of its correlations."""
-        return {name: self._rows(name) if hdf5.has(self._entry, name) else [] for name in findings.TABLES}
+        return findings.last(*(self._rows(name) for name in findings.TABLES))
 
     @property
     def alignments(self) -> dict[int, tuple[Alignment, ...]]:
         """How sensors with clocks of their own were placed on the sample clock, by run; empty where there are none."""
-        if not hdf5.has(self._instrument, "alignments"):
-            return {}
-        columns = self._decoded("alignments", self._instrument)
-        runs = columns.pop("run")
-        found = [Alignment(**dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True)]
-        return {run: tuple(one for of, one in zip(runs, found, strict=True) if of == run) for run in sorted({*runs})}
+        found: dict[int, list[Alignment]] = {}
+        for row in self.rows_of(SensorsAligned):
+            found.setdefault(row.pop("run"), []).append(Alignment(**row))
+        return {run: tuple(found[run]) for run in sorted(found)}
 
     @cached_property
     def tables(self) -> dict[str, dict[str, Column]]:
@@ -220,27 +208,11 @@ class Record(StoredSamples):
     def _growing(self) -> list[str]:
         """Paths of the datasets that change while the file is written."""
         paths = [f"instrument/{channel.name}/counts" for channel in self.channels]
-        folders = [
-            "instrument/blocks",
-            "events",
-            "points",
-            "instrument/alignments",
-            *(name for name, _ in OWN_TABLES.values()),
-            *fits.TABLES,
-            *findings.TABLES,
-        ]
+        folders = [*TABLES, "points"]
         folders = [folder for folder in folders if hdf5.has(self._entry, folder)]
         paths += [f"{folder}/{name}" for folder in folders for name in hdf5.names(hdf5.group(self._entry, folder))]
         paths += [f"{PLOT}/{TIME}"] if self.format_version > 1 else []
         return [*paths, "instrument/drive/voltage", "status", "summary", "end_time"]
 
-    def _decoded(self, name: str, parent: hdf5.Group | None = None) -> dict[str, list[Any]]:
-        """The columns of a table that grew, in the order in which they were declared."""
-        group = hdf5.group(parent or self._entry, name)
-        columns = {column: decode(hdf5.dataset(group, column)) for column in hdf5.names(group)}
-        whole = min([self._complete(name), *(len(values) for values in columns.values())])
-        return {column: values[:whole] for column, values in columns.items()}
-
-    def _rows(self, name: str) -> list[dict[str, Any]]:
-        columns = self._decoded(name)
-        return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+    def _rows(self, path: str) -> list[dict[str, Any]]:
+        return as_rows({field.name: values for field, values in self.growing(path).items()})

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.events import Acquired, Estimate, Event, PointFinished, Progress, RunningGain, StateChanged, TwinEstimate
+from bench.events import Acquired, Event, PointFinished, Progress, StateChanged
 from bench.record.errors import RecordError, reason
 from bench.record.layout import Skeleton, Status
 from bench.record.tables import Table
@@ -211,7 +211,7 @@ class Recorder:
                 self._writer.add_block(item.time, item.run, item.first, item.counts, item.drive)
             case Event():
                 self._writer.add_event(item)
-                self._pressing |= not isinstance(item, Estimate | RunningGain | TwinEstimate)
+                self._pressing |= item.journalled
                 self._partial |= isinstance(item, StateChanged)
             case _Sync():
                 self._commit(partial=True)

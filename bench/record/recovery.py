@@ -5,7 +5,6 @@ The original is only read. The copy holds what was whole, in today's layout, wit
 
 import os
 from collections.abc import Mapping
-from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +27,7 @@ from bench.record.plot import create_plot
 from bench.record.reader import Record, open_record
 from bench.record.samples import chunk_of, read_channels
 from bench.record.timeline import Timeline
+from bench.unfinished import unfinished
 from sim.errors import InvalidInput
 
 _MADE_ANEW = frozenset(
@@ -42,25 +42,22 @@ def recover(path: Path, target: Path) -> Recovery:
     Raises InvalidInput when `target` exists or `path` is no record, RecordError when it is too damaged.
     """
     with open_record(path, judging=True) as record:
-        unfinished = target.with_name(f"{target.name}.part")
-        for taken in (target, unfinished):
+        temporary = target.with_name(f"{target.name}.part")
+        for taken in (target, temporary):
             if taken.exists():
                 raise InvalidInput("recovered file", str(taken), "the file exists and is never overwritten")
         try:
-            result = _rebuild(record, path, unfinished, target)
-            os.rename(unfinished, target)
+            with unfinished(temporary):
+                result = _rebuild(record, path, temporary, target)
+                os.rename(temporary, target)
         except UNREADABLE as error:
             raise RecordError(f"{path} could not be recovered into {target} ({reason(error)})") from error
-        finally:
-            with suppress(OSError):
-                # where nothing can be written nothing was left behind
-                unfinished.unlink(missing_ok=True)
     return result
 
 
-def _rebuild(record: Record, path: Path, unfinished: Path, target: Path) -> Recovery:
+def _rebuild(record: Record, path: Path, temporary: Path, target: Path) -> Recovery:
     judged = record.integrity(None)
-    file = hdf5.create(unfinished)
+    file = hdf5.create(temporary)
     try:
         copying = Copying(_counted(record, judged), path.stat().st_size, _MADE_ANEW)
         copying.copy(hdf5.group(record.file, "/"), hdf5.group(file, "/"))
@@ -91,7 +88,7 @@ def _rebuild(record: Record, path: Path, unfinished: Path, target: Path) -> Reco
         Checksums(entry, ())
     finally:
         file.close()
-    platter = Platter(unfinished)
+    platter = Platter(temporary)
     platter.sync()
     platter.close()
     return result

@@ -11,6 +11,7 @@ from pydantic import ValidationError
 
 from bench.config.model import BenchConfiguration
 from bench.config.twin import Twin
+from bench.events import TwinEstimate
 from bench.record.reader import Record
 from drivers.rig import Channel, Counts
 from sim.errors import InvalidInput
@@ -142,4 +143,6 @@ def _configuration(record: Record) -> BenchConfiguration:
         allowed = "its configuration is of another version of this software; replay it with that one"
         raise InvalidInput("record", record.title, allowed) from error
     # a file from before there was a twin has no place for what it says
-    return configuration if record.twin else configuration.model_copy(update={"twin": Twin(enabled=False)})
+    if record.columns_of(TwinEstimate):
+        return configuration
+    return configuration.model_copy(update={"twin": Twin(enabled=False)})

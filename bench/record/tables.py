@@ -1,6 +1,6 @@
 """A table that is known before the run, such as the prediction: named columns, each with its unit."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -70,6 +70,11 @@ def read(group: "hdf5.Group") -> dict[str, Column]:
             values = np.where(values < 0, np.nan, values) if (values < 0).any() else values.astype(np.bool_)
         table[key] = Column(values, str(stored.attrs.get("units", "")), str(hdf5.attribute(stored, "description")))
     return table
+
+
+def as_rows(columns: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
+    """Columns of one length as one dict per row."""
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
 def arrays(table: Table) -> dict[str, NDArray[Any]]:

@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.events import Event, FitFinished, PointFinished, SensorsAligned, SpecimenIdentified
+from bench.events import Event, FitFinished, PointFinished, SpecimenIdentified
 from bench.record import findings, fits, hdf5
-from bench.record.declared import COUNTED, OWN_TABLES
+from bench.record.declared import COUNTED, EVENT_TABLES
 from bench.record.diary import Diary, beside
 from bench.record.disk import Platter
 from bench.record.errors import RecordError, reason
-from bench.record.journal import NOT_JOURNALLED, text_of
 from bench.record.layout import (
     STATUS_WIDTH,
     SUMMARY_WIDTH,
@@ -97,21 +96,16 @@ class RecordWriter:
     def add_event(self, event: Event) -> None:
         """Append an event that is no block."""
         rows = self._parts.rows
-        if (own := OWN_TABLES.get(type(event))) is not None:
-            values = [getattr(event, field.name) for field in own[1]]
-            for row in zip(*values, strict=True) if isinstance(values[0], np.ndarray) else [values]:
-                rows[own[0]].add(*row)
+        if (table := EVENT_TABLES.get(type(event))) is not None:
+            for row in table.rows(event):
+                rows[table.name].add(*row)
         if isinstance(event, FitFinished):
             fits.add(rows, event)
         if isinstance(event, SpecimenIdentified):
             findings.add(rows, event.time, event.identified)
-        if isinstance(event, NOT_JOURNALLED):
+        if not event.journalled:
             return
-        if isinstance(event, SensorsAligned):
-            for one in event.alignments:
-                placed = (one.offset, one.rate, one.residual, one.delay, one.values, one.lost)
-                rows["alignments"].add(event.run, one.sensor, *placed)
-        kind, text, more = type(event).__name__, text_of(event), dict[str, Any]()
+        kind, text, more = type(event).__name__, event.line, dict[str, Any]()
         if isinstance(event, PointFinished):
             text = f"row {len(rows['points'])} of points"
             rows["points"].add(*(getattr(event.point, name) for name in self._point_fields))

@@ -20,6 +20,7 @@ from bench.record.opening import ANALYSIS, ANALYSIS_VERSION
 from bench.record.reader import Record
 from bench.record.reanalysis import file_hash
 from bench.record.rows import Rows
+from bench.unfinished import unfinished, whole
 from sim.errors import InvalidInput
 from sim.parameters import Parameters
 
@@ -55,11 +56,15 @@ def write_analysis(original: Path, record: Record, analysis: Analysis, out: Path
         except OSError as error:
             raise InvalidInput("--out", str(path), f"the file cannot be created ({reason(error)})") from error
         try:
-            _fill(file, original, digest, record, analysis)
-            file.close()
+            with unfinished(path):
+                try:
+                    _fill(file, original, digest, record, analysis)
+                    file.close()
+                except BaseException:
+                    hdf5.let_go(file)
+                    raise
+                whole(path)
         except (OSError, RuntimeError) as error:
-            hdf5.let_go(file)
-            path.unlink(missing_ok=True)
             raise RecordError(f"{path} could not be written ({reason(error)}): see to the disk") from error
         return path
     raise AssertionError("there is always a free name")

@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.events import Acquired, Event, PointFinished
-from bench.record.declared import OWN_TABLES
+from bench.events import Acquired, Event, PointFinished, SensorsAligned, TwinEstimate
+from bench.record.declared import EVENT_TABLES
 from bench.record.fields import TEXT_WIDTH
 from bench.record.hdf5 import clip_text
-from bench.record.journal import text_of
 from bench.record.reader import Record
 from bench.replaying.course import RecordedCourse
 
@@ -52,18 +51,18 @@ class Comparison:
         self._drive = _DriveComparison(record)
         self._journal: list[tuple[str, str]] = []
         self._points: list[Mapping[str, Any]] = []
-        self._own: dict[str, list[Mapping[str, Any]]] = {name: [] for name, _ in OWN_TABLES.values()}
+        self._own: dict[type[Event], list[Mapping[str, Any]]] = {kind: [] for kind in EVENT_TABLES}
 
     def __call__(self, event: Event) -> None:
         if isinstance(event, Acquired):
             self._drive.push(event)
             return
-        if type(event) in OWN_TABLES:
-            name, fields = OWN_TABLES[type(event)]
-            self._own[name] += _rows_of({each.name: getattr(event, each.name) for each in fields})
+        if (table := EVENT_TABLES.get(type(event))) is not None:
+            names = [each.name for each in table.fields]
+            self._own[type(event)] += (dict(zip(names, row, strict=True)) for row in table.rows(event))
         if not self._course.journalled(event):
             return
-        text = text_of(event)
+        text = event.line
         if isinstance(event, PointFinished):
             text = f"row {len(self._points)} of points"
             self._points.append(event.point.model_dump(mode="json"))
@@ -83,18 +82,16 @@ class Comparison:
         self._compare_journal(found, broken_off)
         record = self._record
         _compare_rows(found, POINTS, record.points, self._points)
-        own: dict[str, Sequence[Mapping[str, Any]]] = {
-            "estimates": _as_rows(record.estimates),
-            "running_gains": _as_rows(record.running_gains),
-            "passes": record.passes,
-            "table_response": _as_rows(record.table_response),
-        }
-        if self._course.twin_in_time:
-            said = _as_rows(record.twin)
-            # a killed program's last samples may be lost, although what the twin said of them is not
-            own["twin"] = said if broken_off is None else said[: len(self._own["twin"])]
-        for name, stored in own.items():
-            _compare_rows(found, name.replace("_", " "), stored, self._own[name])
+        for kind, rows in self._own.items():
+            if kind is TwinEstimate and not self._course.twin_in_time:
+                continue
+            stored = record.rows_of(kind)
+            if broken_off is not None and kind in (TwinEstimate, SensorsAligned):
+                # a killed program's last samples may be lost, although what the twin published of them is not; and
+                # the end of its run was not published at all
+                common = min(len(stored), len(rows))
+                stored, rows = stored[:common], rows[:common]
+            _compare_rows(found, EVENT_TABLES[kind].name.replace("_", " "), stored, rows)
         return found
 
     def _compare_journal(self, found: Found, broken_off: str | None) -> None:
@@ -169,7 +166,7 @@ def _compare_rows(
         found.differences.append(Difference(f"{len(stored)} rows of {what} are recorded, {len(came)} come", what))
     largest = 0.0
     for number, (was, now) in enumerate(zip(stored, came, strict=False), 1):
-        for name in now.keys() - {"time"}:
+        for name in (now.keys() & was.keys()) - {"time"}:
             apart = _apart(was.get(name), now[name])
             if apart > ROUNDING:
                 text = f"row {number} of {what}: {name} was {was.get(name)!r} and is {now[name]!r}"
@@ -189,16 +186,6 @@ def _apart(was: Any, now: Any) -> float:
     if was is None or now is None or isinstance(was, str):
         return 0.0 if was is now else np.inf
     return 0.0 if was == now else abs(was - now) / max(abs(was), abs(now))
-
-
-def _rows_of(values: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """What an event adds to its table: one row, or one for each element of its arrays."""
-    arrays: dict[str, list[Any]] = {key: each.tolist() for key, each in values.items() if isinstance(each, np.ndarray)}
-    return _as_rows(arrays) if arrays else [dict(values)]
-
-
-def _as_rows(columns: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
-    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
 def _clipped(text: str) -> str:

@@ -17,9 +17,9 @@ from bench.events import (
     OperatorAsked,
     SpecimenMounted,
     StateChanged,
+    TwinEstimate,
     Warned,
 )
-from bench.record.journal import NOT_JOURNALLED
 from bench.record.reader import Record, RecordedEvent
 from bench.twin.beside import BEHIND
 from drivers.rig import Alignment
@@ -57,7 +57,8 @@ class RecordedCourse:
         self._alignments = record.alignments
         self.in_place: tuple[str, ...] = ()
         events = [each for each in record.events if not _twin_behind(each)]
-        self.twin_in_time = len(events) == len(record.events) and len({*record.twin.get("members", ())}) <= 1
+        members = record.columns_of(TwinEstimate).get("members", ())
+        self.twin_in_time = len(events) == len(record.events) and len({*members}) <= 1
         """Whether the model beside the test kept up; else it said what a replay, which waits for it, does not say."""
         self.journal = self._without_timing(events)
         kinds = {each.kind for each in self.journal}
@@ -94,7 +95,7 @@ class RecordedCourse:
 
     def journalled(self, event: Event) -> bool:
         """Whether what was recorded has an entry for such an event: older files know of fewer kinds."""
-        return not isinstance(event, (*NOT_JOURNALLED, *self._unknown))
+        return event.journalled and not isinstance(event, self._unknown)
 
     def alignments(self, run: int) -> tuple[Alignment, ...]:
         """How sensors with clocks of their own were placed in `run`."""

@@ -4,6 +4,7 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
+from bench.unfinished import unfinished
 from sim.errors import InvalidInput, RockbenchError
 
 
@@ -18,11 +19,9 @@ def write_new(path: Path, write: Callable[[Path], None], *, overwrite: bool = Fa
     if not path.parent.is_dir():
         raise InvalidInput("file", str(path), "its folder does not exist; create it first")
     # the temporary name keeps the suffix, from which a writer may choose the format
-    unfinished = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
     try:
-        write(unfinished)
-        os.replace(unfinished, path)
+        with unfinished(path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")) as temporary:
+            write(temporary)
+            os.replace(temporary, path)
     except OSError as error:
         raise RockbenchError(f"{path} could not be written ({error.strerror or error}): see to the disk") from error
-    finally:
-        unfinished.unlink(missing_ok=True)

@@ -1,7 +1,6 @@
 """Which sensors there are on the serial ports of this machine."""
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 from drivers.errors import RigError
@@ -9,6 +8,7 @@ from drivers.optoncdt.dialogue import Dialogue
 from drivers.optoncdt.info import SensorInfo
 from drivers.optoncdt.port import FACTORY_BAUD, listed_ports, open_port
 from drivers.optoncdt.search import asked
+from sim.sweep import in_threads
 
 
 @dataclass(frozen=True)
@@ -30,8 +30,7 @@ def find_lasers(ports: Sequence[str] | None = None) -> list[FoundLaser]:
     names = list(dict.fromkeys(listed_ports() if ports is None else ports))
     if not names:
         return []
-    with ThreadPoolExecutor(max_workers=len(names)) as pool:
-        return list(pool.map(_probed, names))
+    return in_threads(_probed, names, threads=len(names))
 
 
 def _probed(port: str) -> FoundLaser:

@@ -1,8 +1,6 @@
 """What a seismic campaign will ask of the bench: every record with every specimen, over what is not known of it."""
 
-import os
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from importlib import import_module
 
 import numpy as np
@@ -21,6 +19,7 @@ from protocols.earthquake.table import identification, stored_table, table_warni
 from protocols.identify.level import planned
 from protocols.identify.sheet import expected_duration
 from sim.specimen import Specimen
+from sim.sweep import in_threads
 
 Array = NDArray[np.float64]
 
@@ -110,5 +109,4 @@ def _travels(
     def one(k: int) -> Travel:
         return travel(drawn[k], shaking, float(factors[k]), grounded)
 
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        return list(pool.map(one, range(len(drawn))))
+    return in_threads(one, range(len(drawn)))

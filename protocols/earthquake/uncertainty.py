@@ -9,9 +9,7 @@ by one say which counts most, and no more: where the response is chaotic each of
 together do.
 """
 
-import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from importlib import import_module
 from math import nan
@@ -30,6 +28,7 @@ from sim.excitation import SampledRecord
 from sim.knowledge import SpecimenKnowledge
 from sim.rocking import Status, simulate
 from sim.specimen import Specimen
+from sim.sweep import in_threads
 
 Array = NDArray[np.float64]
 
@@ -134,8 +133,7 @@ def predict_draws(
         random = np.random.default_rng(seeds[k])
         return gains(drawn[k], motion(bare, k, random), motion(coupled, k, random))
 
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        found = np.array(list(pool.map(one, range(n)))).reshape(n, 3)
+    found = np.array(in_threads(one, range(n))).reshape(n, 3)
     nominal = gains(specimen, bare.record, coupled.record)
     return Predicted(nominal[:2], found[:, 0], found[:, 1], found[np.isnan(found[:, 1]), 2])
 

@@ -1,8 +1,6 @@
 """What a harmonic campaign will ask of the bench: predicted for every stage, over what is not known of the specimen."""
 
-import os
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from importlib import import_module
 
 import numpy as np
@@ -22,6 +20,7 @@ from protocols.harmonic.parameters import HarmonicParameters
 from protocols.harmonic.reach import bare_travel, rocking_travel
 from protocols.harmonic.stages import Trial, payload_of, trials
 from sim.specimen import Specimen
+from sim.sweep import in_threads
 
 Array = NDArray[np.float64]
 
@@ -85,8 +84,7 @@ def _travels(found: Sequence[Trial], factors: Array, configuration: BenchConfigu
         return travel(specimen, program(legs), trial.begin, configuration.laser_reference, CATCH_ANGLE)
 
     n = len(factors)
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        every = list(pool.map(one, [(trial, i) for trial in found for i in range(n)]))
+    every = in_threads(one, [(trial, i) for trial in found for i in range(n)])
     return [every[k * n : (k + 1) * n] for k in range(len(found))]
 
 

@@ -313,7 +313,7 @@ def test_help_imports_nothing_that_only_a_run_needs():
 
 @pytest.mark.skipif(os.name != "posix", reason="closes a pipe as POSIX shells do")
 def test_a_reader_that_has_seen_enough_is_no_error() -> None:
-    program = "from bench.cli.main import run; import sys; sys.argv[1:] = ['--help']; run()"
+    program = "from bench.cli.process import run; import sys; sys.argv[1:] = ['--help']; run()"
     with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as ran:
         assert ran.stdout is not None
         assert ran.stderr is not None

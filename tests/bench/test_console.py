@@ -125,7 +125,7 @@ def test_an_abort_is_told_in_words():
     abort = StateChanged(State.RUNNING, State.ABORTING, "table velocity 0.7123 m/s exceeds 0.6 m/s", time=10.0)
     lines = rendered(scene_after([*CAMPAIGN, over, abort]))
     assert re.match(r" ABORTING +table velocity 0.7123 m/s exceeds", lines[0])
-    assert line_with(lines, "LIMIT", "table velocity reached 0.7123 m/s, allowed 0.6 m/s")
+    assert line_with(lines, "LIMIT", "table velocity reached 0.71234 m/s; limit 0.6 m/s")
 
 
 def test_plain_lines_are_one_per_event_and_free_of_control_characters():

@@ -188,7 +188,7 @@ def test_journal_keeps_all_but_samples_progress_and_estimates(path: Path) -> Non
             (3.0, "LimitExceeded", "displacement reached 0.0612 m; limit 0.06 m"),
             (4.0, "OperatorAnswered", "stand the block up (answered by unattended run)"),
         ]
-        estimates = kept.estimates
+        estimates = kept.columns_of(Estimate)
         assert estimates["beta"] == [0.25, None]
         assert estimates["cycles"] == [8, 9]
         assert estimates["alpha_2"][0] == 0.5

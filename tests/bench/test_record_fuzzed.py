@@ -12,6 +12,7 @@ import pytest
 import bench.record
 from bench.cli.main import main
 from bench.events import PointFinished, State, StateChanged
+from bench.record.declared import TABLES
 from bench.record.reader import Record
 from sim.errors import RockbenchError
 from tests.bench.test_record import RATE, begin, block
@@ -51,8 +52,8 @@ def spoilt(content: bytes, rng: np.random.Generator) -> bytes:
 def read_all(record: Record) -> None:
     """What a report or an export asks for."""
     _ = record.status, record.summary, record.title, record.start_time, record.end_time, record.software
-    _ = record.metadata, record.events, record.points, record.results, record.estimates, record.running_gains
-    _ = record.passes, record.table_response, record.alignments, record.tables, record.recoveries, record.blocks
+    _ = record.metadata, record.events, record.points, record.results, [record.growing(path) for path in TABLES]
+    _ = record.alignments, record.fits, record.identified, record.tables, record.recoveries, record.blocks
     for run in record.runs:
         for series in (*run.channels.values(), run.drive, run.time):
             series[:]

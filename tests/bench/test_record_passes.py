@@ -23,8 +23,8 @@ def test_they_come_back_exactly(tmp_path: Path) -> None:
     second = replace(PASS, number=2, accepted=False)
     record(begin(path), block(0, 10), PASS, second, GAIN, replace(GAIN, beta=None, predicted=0.9))
     with open_record(path) as kept:
-        assert kept.passes == [stored(PASS), stored(second)]
-        gains = kept.running_gains
+        assert kept.rows_of(PassFinished) == [stored(PASS), stored(second)]
+        gains = kept.columns_of(RunningGain)
         assert {name: column[0] for name, column in gains.items() if name != "predicted"} == {
             name: value for name, value in stored(GAIN).items() if name != "predicted"
         }
@@ -41,13 +41,13 @@ def test_they_can_be_read_while_the_file_is_written(tmp_path: Path) -> None:
     path = tmp_path / "campaign.h5"
     recorder = begin(path)
     with open_record(path) as kept:
-        assert (kept.passes, kept.running_gains["record"]) == ([], [])
+        assert (kept.rows_of(PassFinished), kept.columns_of(RunningGain)["record"]) == ([], [])
         recorder(PASS)
         recorder(GAIN)
         recorder.sync()
         kept.refresh()
-        assert kept.passes == [stored(PASS)]
-        assert kept.running_gains["seconds"] == [4.2]
+        assert kept.rows_of(PassFinished) == [stored(PASS)]
+        assert kept.columns_of(RunningGain)["seconds"] == [4.2]
     recorder.close("completed")
 
 
@@ -60,5 +60,5 @@ def test_a_file_of_before_has_none(tmp_path: Path) -> None:
             del file[name]
         file["entry"].create_dataset("complete", data=counted)
     with open_record(path) as kept:
-        assert (kept.rows, kept.passes, kept.running_gains) == (10, [], {})
+        assert (kept.rows, kept.rows_of(PassFinished), kept.columns_of(RunningGain)) == (10, [], {})
         kept.refresh()

@@ -256,9 +256,9 @@ def test_a_recording_is_replayed_with_the_same_twin(tmp_path_factory: pytest.Tem
         ending = recorded(path, Shaken().plan(bench), rig, bench, Twin)
     assert ending.status == "stopped"
     with open_record(path) as record:
-        rows = len(record.twin["drift"])
+        rows = len(record.columns_of(TwinEstimate)["drift"])
         played = replay(record, Shaken(), bench, clock=VirtualClock(), subscribers=[])
-        assert record.twin["excess"][-1] > 0.2
+        assert record.columns_of(TwinEstimate)["excess"][-1] > 0.2
         mounted = next(event.text for event in record.events if event.kind == SpecimenMounted.__name__)
     assert rows > 30
     assert mounted == "remove block: bare frame"

@@ -10,7 +10,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
-from bench.events import Estimate, PointFinished, State, StateChanged, Warned
+from bench.events import Estimate, LiveValue, PointFinished, State, StateChanged, Warned
 from bench.gui.ring import Ring
 from bench.gui.run_page import GAINS_HEIGHT
 from bench.gui.traces import AHEAD, LEAST
@@ -236,3 +236,13 @@ def test_no_dialog_can_be_opened_while_armed(window: Window, link: SpokenLink) -
     link.said = [Beat(State.RUNNING, "", 1.0, 0, 0)]
     window._controller._look()
     assert not window.results.open_file.isEnabled()
+
+
+def test_a_live_value_is_shown_with_its_unit_and_prediction(window: Window, link: SpokenLink) -> None:
+    link.said = [Told(LiveValue("period", 0.6412, "s", 0.0031, 0.6389, time=3.0))]
+    window._controller._look()
+    assert window.run.alpha.text() == "period  (0.6412 ± 0.0031) s"
+    assert window.run.predicted.text() == "predicted 0.6389, difference +0.4 %"
+    link.said = [Told(LiveValue("cycles", 12.0, "1", time=4.0))]
+    window._controller._look()
+    assert (window.run.alpha.text(), window.run.predicted.text()) == ("cycles  12.00", "")

@@ -128,7 +128,7 @@ def test_file_model_and_summary_say_the_same(identified: Identified) -> None:
     out, _, result, events = identified
     model = TableModel.read(out / "table_model.json")
     with open_record(out / FILE) as record:
-        stored = record.table_response
+        stored = record.columns_of(TableIdentified)
         for name in ("frequency", "real", "imaginary", "uncertainty", "distortion", "coherence", "noise"):
             assert tuple(stored[name]) == getattr(model, name)
         assert record.points == json.loads((out / "summary.json").read_text(encoding="utf-8"))["points"]

@@ -16,7 +16,7 @@ from bench.record.reader import open_record
 @pytest.mark.skipif(sys.platform == "win32", reason="sends SIGINT to one process")
 def test_ctrl_c(tmp_path: Path) -> None:
     folder = tmp_path / "run"
-    command = [sys.executable, "-c", "from bench.cli.main import run; run()", "run", "harmonic"]
+    command = [sys.executable, "-c", "from bench.cli.process import run; run()", "run", "harmonic"]
     command += ["--omega", "16", "--beta", "0.4", "0.64", "--out", str(folder)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
@@ -36,6 +36,30 @@ def test_ctrl_c(tmp_path: Path) -> None:
     with open_record(folder / "campaign.h5") as record:
         reasons = [event.text for event in record.events if event.kind == "StateChanged"]
     assert any("abort was asked for" in reason for reason in reasons)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="sends SIGINT to one process")
+@pytest.mark.parametrize("times", [1, 3])
+def test_ctrl_c_while_the_run_is_planned(tmp_path: Path, times: int) -> None:
+    """The default campaign plans its starts for many seconds, most of them in native code."""
+    command = [sys.executable, "-m", "bench", "run", "harmonic", "--out", str(tmp_path / "run")]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        time.sleep(4.0)
+        asked = time.monotonic()
+        for _ in range(times):
+            process.send_signal(signal.SIGINT)
+            time.sleep(0.05)
+        output, errors = process.communicate(timeout=60)
+        took = time.monotonic() - asked
+    finally:
+        process.kill()
+    assert (process.returncode, output) == (130, "")
+    assert errors.splitlines()[-1].startswith("rockbench: error: interrupted")
+    assert "Traceback" not in errors
+    assert list(tmp_path.iterdir()) == []
+    # half a second, and what a machine under full load may be late
+    assert took < 2.0
 
 
 def _wait_until_running(path: Path, process: "subprocess.Popen[str]") -> None:

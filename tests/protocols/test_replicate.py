@@ -128,9 +128,9 @@ def test_half_a_percent_within_five_passes_and_never_worse(
     floor = found.passes[-1].floor
     assert np.sqrt(max(error_of(target, truth[0]) ** 2 - floor**2, 0.0)) < 0.005
     with open_record(tmp_path / "passes.h5") as record:
-        assert [row["error"] for row in record.passes] == [report.error for report in found.passes]
-        assert [row["number"] for row in record.passes] == list(range(1, len(found.passes) + 1))
-        assert {row["motion"] for row in record.passes} == {"a record"}
+        assert [row["error"] for row in record.rows_of(PassFinished)] == [report.error for report in found.passes]
+        assert [row["number"] for row in record.rows_of(PassFinished)] == list(range(1, len(found.passes) + 1))
+        assert {row["motion"] for row in record.rows_of(PassFinished)} == {"a record"}
         assert sum(event.kind == "PassFinished" for event in record.events) == len(found.passes)
 
 

@@ -1,0 +1,115 @@
+"""Data files of the first edition, one of each protocol: opened, verified, replayed, analysed, reported, exported.
+
+Without `-m soak` all are opened, verified and replayed but the longest, and three are put through the rest as well.
+"""
+
+import json
+import re
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import h5py
+import pytest
+
+from tests.first_edition.command import DATA, Rockbench
+
+NAMES = sorted(path.name.removesuffix(".h5.xz") for path in DATA.glob("*.h5.xz"))
+LONGEST = {"harmonic_springs"}
+QUICK = {"check", "free_rocking", "identify"}
+PROTOCOLS = {
+    "check",
+    "coupling-stiffness",
+    "earthquake",
+    "free-rocking",
+    "free-vibration",
+    "harmonic",
+    "identify",
+    "laser-calibration",
+}
+
+
+@pytest.fixture
+def file(request: pytest.FixtureRequest, unpacked: Callable[[str], Path]) -> Path:
+    return unpacked(request.param)
+
+
+def of(always: Iterable[str]) -> pytest.MarkDecorator:
+    """Every file; those that are not named only with `-m soak`."""
+    cases = [pytest.param(name, marks=() if name in always else pytest.mark.soak) for name in NAMES]
+    return pytest.mark.parametrize("file", cases, indirect=True)
+
+
+def recorded(file: Path) -> dict[str, object]:
+    """What the run printed when the file was written."""
+    return json.loads((DATA / f"{file.stem}.json").read_text(encoding="utf-8"))
+
+
+def test_every_protocol_has_a_file() -> None:
+    assert {recorded(Path(f"{name}.h5"))["protocol"] for name in NAMES} == PROTOCOLS
+
+
+@of(NAMES)
+def test_it_is_opened_and_verified(file: Path, rockbench: Rockbench) -> None:
+    info = rockbench("file", "info", file)
+    assert info.code == 0, info.err
+    assert re.search(rf"^protocol +{recorded(file)['protocol']}$", info.out, re.MULTILINE)
+    verified = rockbench("file", "verify", file)
+    assert verified.code == 0, verified.err
+    with h5py.File(file) as content:
+        count = len(content["entry/checksums/dataset"])
+    assert f"{count} of {count} datasets" in verified.out
+
+
+@of({*NAMES} - LONGEST)
+def test_it_is_replayed_bit_for_bit(file: Path, rockbench: Rockbench, same_arithmetic: bool) -> None:
+    done = rockbench("replay", file, "--json")
+    found = json.loads(done.out)
+    with h5py.File(file) as content:
+        samples = len(content["entry/instrument/drive/voltage"])
+        points = len(next(iter(content["entry/points"].values())))
+        events = len(content["entry/events/time"])
+    assert (found["status"], found["breaks_off"]) == ("completed", None)
+    assert found["samples"] == {"played": samples, "recorded": samples}
+    compared = found["compared"]
+    assert (compared["drive samples"], compared["journal entries"], compared["points"]) == (samples, events, points)
+    if same_arithmetic:
+        assert found["differences"] == []
+        assert found["identical"]
+        assert found["agrees"]
+        assert done.code == 0, done.err
+
+
+@of(QUICK)
+def test_it_is_analysed_again(file: Path, rockbench: Rockbench, same_arithmetic: bool, tmp_path: Path) -> None:
+    again = tmp_path / "again.h5"
+    done = rockbench("analyse", file, "--json", "--out", again)
+    assert done.code == 0, done.err
+    found = json.loads(done.out)
+    assert found["recorded"] == recorded(file)["points"]
+    assert len(found["points"]) == len(found["recorded"])
+    if same_arithmetic:
+        assert found["points"] == found["recorded"]
+    assert rockbench("file", "verify", again).code == 0
+
+
+@of(QUICK)
+def test_it_is_reported(file: Path, rockbench: Rockbench, tmp_path: Path) -> None:
+    page = tmp_path / "report.html"
+    done = rockbench("report", file, "--html", page)
+    assert done.code == 0, done.err
+    text = page.read_text(encoding="utf-8")
+    assert text.rstrip().endswith("</html>")
+    assert text.count("<table") >= 2
+    assert "<svg" in text or "<img" in text
+
+
+@of(QUICK)
+@pytest.mark.parametrize("format", ["mat", "csv", "uff", "parquet"])
+def test_it_is_exported(file: Path, format: str, rockbench: Rockbench, tmp_path: Path) -> None:
+    folder = tmp_path / "exported"
+    done = rockbench("export", file, "--to", format, "--out", folder)
+    assert done.code == 0, done.err
+    assert not (folder / "DAMAGED.txt").exists()
+    with h5py.File(file) as content:
+        runs = len(set(content["entry/instrument/blocks/run"][:]))
+    assert len(list(folder.glob(f"run-[0-9]*.{format}"))) == runs

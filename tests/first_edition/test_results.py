@@ -1,0 +1,117 @@
+"""Short runs with fixed seeds: the same digits, samples and kinds of files as the first edition gave."""
+
+import json
+import shlex
+import shutil
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+import h5py
+import pytest
+
+from tests.first_edition.command import DATA, Rockbench
+
+COMMANDS = {words[-1]: words[1:] for words in map(shlex.split, (DATA / "commands.txt").read_text("utf-8").splitlines())}
+QUICK = {
+    "coupling_stiffness",
+    "earthquake",
+    "free_rocking",
+    "free_vibration",
+    "harmonic_point",
+    "harmonic_springs",
+}
+
+EXCEPTED = {"elapsed_s", "software", "plan_hash", "file", "figure", "further_figures"}
+"""What holds a time, a version, a hash over both and over every key of the configuration, or a path."""
+
+RENAMED: dict[str, str] = {}
+"""What keys and texts of the first edition are called today, by each part of them that was renamed, with the reason."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run of today, and its folder."""
+
+    name: str
+    printed: dict[str, object]
+    folder: Path
+
+    @property
+    def recorded(self) -> dict[str, object]:
+        """What the first edition printed, in today's words."""
+        text = (DATA / f"{self.name}.json").read_text(encoding="utf-8")
+        for old, new in RENAMED.items():
+            text = text.replace(old, new)
+        return json.loads(text)
+
+
+def _table_of_today(folder: Path) -> None:
+    """The identified table, as old as a run accepts it."""
+    model = json.loads((DATA / "table_model.json").read_text(encoding="utf-8"))
+    model["date"] = datetime.now(UTC).replace(microsecond=0).isoformat()
+    (folder / "table_model.json").write_text(json.dumps(model), encoding="utf-8")
+
+
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(name, marks=() if name in QUICK else pytest.mark.soak) for name in COMMANDS],
+)
+def run(
+    request: pytest.FixtureRequest, rockbench: Rockbench, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Run]:
+    """The same command again, in a folder of its own."""
+    name, folder = request.param, tmp_path_factory.mktemp("run")
+    for path in DATA.glob("*.toml"):
+        shutil.copy(path, folder)
+    _table_of_today(folder)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        done = rockbench(*COMMANDS[name])
+    assert done.code == 0, done.err
+    yield Run(name, json.loads(done.out), folder / name)
+    shutil.rmtree(folder)
+
+
+def differences(old: object, new: object, where: str = "") -> Iterator[str]:
+    """What of `old` is not in `new`, digit for digit; `new` may have more keys."""
+    if isinstance(old, dict) and isinstance(new, dict):
+        for key in old.keys() - EXCEPTED:
+            if key in new:
+                yield from differences(old[key], new[key], f"{where}.{key}")
+            else:
+                yield f"{where}.{key} is missing"
+    elif isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
+        for index, (one, other) in enumerate(zip(old, new, strict=True)):
+            yield from differences(one, other, f"{where}[{index}]")
+    elif type(old) is not type(new) or old != new:
+        yield f"{where} was {old!r} and is {new!r}"
+
+
+def only_here(same_arithmetic: bool) -> None:
+    if not same_arithmetic:
+        pytest.skip("this processor rounds otherwise than the one that computed the first edition's digits")
+
+
+def test_every_digit_of_its_results_is_the_same(run: Run, same_arithmetic: bool) -> None:
+    only_here(same_arithmetic)
+    assert not sorted(differences(run.recorded, run.printed))
+
+
+def test_every_sample_and_the_drive_are_the_same(
+    run: Run, unpacked: Callable[[str], Path], same_arithmetic: bool
+) -> None:
+    only_here(same_arithmetic)
+    with h5py.File(unpacked(run.name)) as old, h5py.File(run.folder / "campaign.h5") as new:
+        before, after = old["entry/instrument"], new["entry/instrument"]
+        channels = [name for name, group in before.items() if isinstance(group, h5py.Group) and "counts" in group]
+        assert len(channels) == 4
+        for name in (*(f"{channel}/counts" for channel in channels), "drive/voltage"):
+            assert (before[name][:] == after[name][:]).all(), name
+
+
+def test_its_summary_and_its_output_agree(run: Run) -> None:
+    summary = json.loads((run.folder / "summary.json").read_text(encoding="utf-8"))
+    assert summary.keys() >= run.recorded.keys() - EXCEPTED
+    assert all(summary[key] == value for key, value in run.printed.items())
