@@ -6,7 +6,7 @@ from typing import Annotated
 
 from cyclopts import App, Parameter
 
-from bench.cli.output import check_folder, default_folder
+from bench.cli.output import check_folder, default_folder, make_folder, remove_unused
 
 
 def benchmark_app() -> App:
@@ -40,6 +40,12 @@ def benchmark(
 
     folder = out or default_folder("benchmark", datetime.now())
     check_folder(folder, RESULTS)
-    run_benchmark(QUICK if quick else FULL, folder)
+    if out is None:
+        folder = make_folder(folder)
+    try:
+        run_benchmark(QUICK if quick else FULL, folder)
+    finally:
+        if out is None:
+            remove_unused(folder)
     print(f"Results are in {folder}")
     return 0

@@ -1,8 +1,10 @@
-"""Checks, before anything starts, that the results of a run can be written and overwrite nothing."""
+"""Folders for results: one of its own for each run, and checks before anything starts that nothing is overwritten."""
 
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
+from contextlib import suppress
 from datetime import datetime
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,6 +25,44 @@ def result_names(experiment: "Experiment") -> tuple[str, ...]:
 def default_folder(protocol: str, now: datetime) -> Path:
     """`runs/<protocol>-<date>T<time>`; hyphens in the time, because a colon is not allowed on every system."""
     return Path("runs", f"{protocol}-{now:%Y-%m-%dT%H-%M-%S}")
+
+
+def make_folder(first: Path, taken: Container[Path] = ()) -> Path:
+    """Make a folder that no other run has: `first`, or where that exists or is `taken` the same with -2, -3 and so on.
+
+    Of processes that ask at the same time each gets another one. Raises InvalidInput when none can be made.
+    """
+    for number in count(1):
+        folder = first if number == 1 else first.with_name(f"{first.name}-{number}")
+        if folder in taken:
+            continue
+        try:
+            # another process may remove an empty parent in between
+            for _ in range(100):
+                with suppress(FileNotFoundError):
+                    _make_parent(folder)
+                    folder.mkdir()
+                    return folder
+        except FileExistsError:
+            continue
+        except OSError as error:
+            raise InvalidInput("--out", str(folder), f"it cannot be made: {error.strerror}") from None
+        break
+    raise InvalidInput("--out", str(first), f"{first.parent} is removed again and again; give another folder")
+
+
+def _make_parent(folder: Path) -> None:
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+    except FileExistsError:
+        raise InvalidInput("--out", str(folder), f"{folder.parent} is a file; give a folder") from None
+
+
+def remove_unused(folder: Path) -> None:
+    """Remove a folder that `make_folder` made if nothing was put in it, and so its parent."""
+    with suppress(OSError):
+        folder.rmdir()
+        folder.parent.rmdir()
 
 
 def check_folder(folder: Path, results: Iterable[str]) -> None:

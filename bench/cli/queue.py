@@ -122,10 +122,12 @@ def _run_one(
     tests: "Queue", index: int, configuration: "BenchConfiguration", yes: bool, start: Start | None
 ) -> int | None:
     """Run a test; None when the next may follow, else the exit code of the whole."""
+    from bench.cli.output import remove_unused
     from bench.cli.queueing import ENTRIES, own_folder, ready
 
     test = tests.tests[index]
     interrupted: int | None = None
+    out: Path | None = None
     good, told = False, "the program failed"
     try:
         each = ready(test, index + 1, ENTRIES, configuration)
@@ -157,6 +159,8 @@ def _run_one(
         told, interrupted = str(interrupt) or "interrupted", 130
     finally:
         tests.finish(index, good=good, told=told)
+        if out is not None and test.out is None:
+            remove_unused(out)
     (tell if interrupted is None else answer)(f"test {index + 1} {told}")
     return interrupted or 1
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from bench.cli.catalogue import CATALOGUE, Entry
 from bench.cli.check import CHECK
-from bench.cli.output import check_folder, default_folder, result_names
+from bench.cli.output import check_folder, default_folder, make_folder, result_names
 from bench.config.validation import dotted, validated
 from bench.queue.queued import Queued, Stage
 from sim.errors import InvalidInput
@@ -85,17 +85,14 @@ def room_refusal(found: Iterable["Room | None"]) -> InvalidInput | None:
 
 
 def own_folder(test: Queued, moment: datetime, tests: Iterable[Queued] = ()) -> Path:
-    """Where the results of a test go that begins now: where it says, or to a folder that is not there yet and that
-    none of the other `tests` has.
+    """Where the results of a test go that begins now: where it says, or to a new folder, made here, that none of the
+    other `tests` has. Raises InvalidInput when none can be made.
     """
     if test.out is not None:
         return Path(test.out)
-    first = folder = default_folder(test.protocol, moment)
-    number, taken = 2, {Path(each.out) for each in tests if each.out is not None}
-    while folder.exists() or folder in taken:
-        folder = first.with_name(f"{first.name}-{number}")
-        number += 1
-    return folder
+    return make_folder(
+        default_folder(test.protocol, moment), {Path(each.out) for each in tests if each.out is not None}
+    )
 
 
 def add_to_queue(

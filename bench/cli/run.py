@@ -83,7 +83,7 @@ def command_of(entry: Entry, start: Start | None) -> Callable[..., int]:
 def _perform(entry: Entry, arguments: dict[str, Any], options: Options, start: Start | None) -> int:
     from bench.cli.inputs import configuration_from, parameters_from
     from bench.cli.operator import choose
-    from bench.cli.output import check_folder, default_folder, result_names
+    from bench.cli.output import check_folder, default_folder, make_folder, remove_unused, result_names
 
     experiment = entry.campaign(parameters_from(entry.parameters, arguments, options.protocol_file))
     configuration = configuration_from(options.config, options.seed, options.specimen)
@@ -100,9 +100,15 @@ def _perform(entry: Entry, arguments: dict[str, Any], options: Options, start: S
     operator = choose(
         serves_itself=configuration.serves_itself, yes=options.yes, ask=options.ask, terminal=sys.stdin.isatty()
     )
-    ended, interrupted = carry_out(
-        entry, experiment, configuration, out, operator, realtime=options.realtime, about=options.about, start=start
-    )
+    if options.out is None:
+        out = make_folder(out)
+    try:
+        ended, interrupted = carry_out(
+            entry, experiment, configuration, out, operator, realtime=options.realtime, about=options.about, start=start
+        )
+    finally:
+        if options.out is None:
+            remove_unused(out)
     if isinstance(ended, Exception):
         tell(ended)
         return interrupted or 1

@@ -1,6 +1,7 @@
 """The loop check: started like any run, its lines with their verdicts as soon as each is known."""
 
 from datetime import datetime
+from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QColor
@@ -18,7 +19,7 @@ from PySide6.QtWidgets import (
 )
 
 from bench.cli.check import CHECK
-from bench.cli.output import default_folder
+from bench.cli.output import default_folder, make_folder, remove_unused
 from bench.cli.words import ABSENT
 from bench.config.model import BenchConfiguration
 from bench.events import Event, PointFinished
@@ -29,6 +30,7 @@ from bench.gui.header import set_level
 from bench.gui.palette import Theme
 from bench.link.messages import Ended, Refused, Run
 from protocols.check.line import CheckLine, Verdict
+from sim.errors import RockbenchError
 
 MARKS = {
     Verdict.PASSED: ("✓", "good"),
@@ -49,6 +51,7 @@ class CheckPanel(QWidget):
         self._controller, self._theme = controller, theme
         self._configuration = BenchConfiguration()
         self._ours = False
+        self._folder: Path | None = None
         self.lines: list[CheckLine] = []
         self.check, self.person = QPushButton(texts.CHECK_LOOP), QCheckBox(texts.ASK)
         give_key(self.check, "Ctrl+L")
@@ -93,7 +96,12 @@ class CheckPanel(QWidget):
         """Run the check."""
         if self._why_not:
             return
-        out = default_folder(CHECK.name, datetime.now())
+        try:
+            out = make_folder(default_folder(CHECK.name, datetime.now()))
+        except RockbenchError as error:
+            self._say(str(error), "alarm")
+            return
+        self._folder = out
         person = self.person.isChecked()
         self.predicted.emit({})
         self._controller.start(Run(CHECK.campaign, CHECK.parameters(), self._configuration, out, person=person))
@@ -141,6 +149,9 @@ class CheckPanel(QWidget):
         if not self._ours:
             return
         self._ours = False
+        if self._folder is not None:
+            remove_unused(self._folder)
+            self._folder = None
         passed, failed = (sum(line.verdict is kind for line in self.lines) for kind in (Verdict.PASSED, Verdict.FAILED))
         well = isinstance(ended, Ended) and ended.status == "completed"
         how = texts.CHECK_IN.format(out=ended.out) if isinstance(ended, Ended) and well else texts.CHECK_CUT

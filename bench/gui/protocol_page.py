@@ -1,6 +1,7 @@
 """What to run: the form of a protocol, what the plan comes to, and Start; or a place in the queue."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
@@ -8,7 +9,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QPushButton, QScrollArea, QSplitter, QVBoxLayout, QWidget
 
 from bench.cli.catalogue import Entry
-from bench.cli.output import check_folder, default_folder, result_names
+from bench.cli.output import check_folder, default_folder, make_folder, remove_unused, result_names
 from bench.cli.queueing import queued
 from bench.config.model import BenchConfiguration
 from bench.gui import texts
@@ -43,6 +44,7 @@ class ProtocolPage(QWidget):
         self._checked: Surveyed | None = None
         self._checking = self._began = False
         self._edited_test: Queued | None = None
+        self._made: Path | None = None
         self.choice = QComboBox()
         self.choice.addItems([entry.name for entry in entries])
         self.choice.setAccessibleName(texts.NAMES["protocol"])
@@ -120,6 +122,9 @@ class ProtocolPage(QWidget):
             return
         try:
             asked = self._asked()
+            if self.options.out is None:
+                self._made = make_folder(asked.out)
+                asked = replace(asked, out=self._made)
         except RockbenchError as error:
             self.plan.refuse(str(error))
             return
@@ -211,6 +216,9 @@ class ProtocolPage(QWidget):
         self.refresh()
 
     def _ended(self) -> None:
+        if self._made is not None:
+            remove_unused(self._made)
+            self._made = None
         if self._began:
             # the folder is taken now: another run needs another
             self._began = False

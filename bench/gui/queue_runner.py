@@ -8,6 +8,7 @@ from datetime import datetime
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from bench.cli.catalogue import Entry
+from bench.cli.output import remove_unused
 from bench.cli.queueing import own_folder
 from bench.config.model import BenchConfiguration
 from bench.gui import texts
@@ -158,8 +159,14 @@ class QueueRunner(QObject):
 
     def _begin(self, index: int, each: Checked) -> None:
         test, plan = each.test, each.plan
-        out = own_folder(test, datetime.now(), self.queue.tests)
+        try:
+            out = own_folder(test, datetime.now(), self.queue.tests)
+        except RockbenchError as error:
+            self._refused(test, str(error))
+            return
         if not self.do(lambda: self.queue.begin(index, str(out))):
+            if test.out is None:
+                remove_unused(out)
             return
         self.predicted.emit(each.found.prediction)
         run = Run(
@@ -185,6 +192,8 @@ class QueueRunner(QObject):
         if index is None or begun is None:
             return
         self._begun = None
+        if begun[1].test.out is None:
+            remove_unused(begun[0].out)
         if isinstance(ended, Refused):
             status, good, told = ("failed" if ended.failed else "refused"), False, ended.text
         else:
