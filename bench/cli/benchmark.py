@@ -19,7 +19,7 @@ def benchmark_app() -> App:
 def benchmark(
     *,
     quick: Annotated[
-        bool, Parameter(negative=(), show_default=False, help="Measure less, in under a minute; maps are coarser.")
+        bool, Parameter(negative=(), show_default=False, help="Measure less, in about a minute; maps are coarser.")
     ] = False,
     out: Annotated[
         Path | None,

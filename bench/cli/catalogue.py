@@ -171,7 +171,7 @@ CATALOGUE = (
             "The storeys are clamped to the table, which moves slowly over the range that the tests see. Scale, smooth "
             "linearity error and delay of each laser follow, and how far the two agree. The result, "
             "laser_calibration.json, is what `laser_calibration` in the configuration of other runs names. Without "
-            "options: six passes of 50 mm, about two minutes."
+            "options: eight passes of 50 mm, about four minutes."
         ),
         parameters=LaserCalibrationParameters,
         campaign=_laser_calibration,

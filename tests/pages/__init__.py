@@ -1,0 +1,1 @@
+"""The pages of the documentation, executed: commands, files, quoted results and pictures."""

@@ -1,0 +1,76 @@
+"""Pictures of the pages, made again by the commands that the pages name."""
+
+import shutil
+import sys
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from matplotlib.testing.compare import compare_images
+
+from tests.pages.blocks import ROOT
+from tests.pages.execute import process
+
+TOLERANCE = 3.0
+"""Largest root mean square difference of the pixels, of 255: anti-aliasing and fonts, not another curve."""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture in `page` and what makes it: `make` leaves the file in a folder and returns its path."""
+
+    page: str
+    path: str
+    make: Callable[[Path], Path]
+    repeats: bool = True
+    """Whether it is the same each time; a window in the middle of a run is not, and is only made again."""
+
+    def difference(self, *, write: bool) -> str | None:
+        """How the picture of the page differs from the one that is made now; None when it does not."""
+        with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+            made = self.make(Path(folder))
+            if write:
+                shutil.copy(made, ROOT / self.path)
+            if write or not self.repeats:
+                return None
+            shown = Path(folder) / "shown.png"
+            shutil.copy(ROOT / self.path, shown)
+            text = compare_images(str(made), str(shown), tol=TOLERANCE)
+        return None if text is None else f"{self.path} differs from the one made now: {' '.join(text.split()[:12])}"
+
+
+def _figure(name: str, *arguments: str) -> Callable[[Path], Path]:
+    """A figure that a run leaves in its folder."""
+
+    def make(folder: Path) -> Path:
+        command = [sys.executable, "-m", "bench", "run", *arguments, "--yes", "--out", "run"]
+        done = process(command, folder)
+        if done.returncode != 0:
+            raise RuntimeError(done.stderr.strip().splitlines()[-1])
+        return folder / "run" / name
+
+    return make
+
+
+def _window(name: str) -> Callable[[Path], Path]:
+    """A picture of the operator's window while the virtual bench runs."""
+
+    def make(folder: Path) -> Path:
+        done = process([sys.executable, "-m", "tests.gui.screenshots", str(folder)], ROOT)
+        if done.returncode != 0:
+            raise RuntimeError(done.stderr.strip().splitlines()[-1])
+        return folder / name
+
+    return make
+
+
+PICTURES = (
+    Picture("README.md", "docs/images/gain_spectra.png", _figure("gain_spectra.png", "harmonic")),
+    Picture("docs/identify.md", "docs/images/table_response.png", _figure("table_response.png", "identify")),
+    Picture("docs/free-rocking.md", "docs/images/free_rocking.png", _figure("free_rocking.png", "free-rocking")),
+    *(
+        Picture("docs/window.md", f"docs/images/{name}", _window(name), repeats=False)
+        for name in ("window-run.png", "window-queue.png", "window-compare.png")
+    ),
+)
