@@ -1,6 +1,7 @@
 """Executes the blocks of a page in a folder that has the files which the page speaks of."""
 
 import json
+import lzma
 import os
 import shutil
 import signal
@@ -15,7 +16,7 @@ from pathlib import Path
 
 from tests.pages.blocks import ROOT, Block, Command, blocks
 
-CAMPAIGN = ROOT / "tests" / "data" / "first_edition" / "harmonic.h5"
+CAMPAIGN = ROOT / "tests" / "data" / "first_edition" / "harmonic_point.h5.xz"
 """A recorded campaign, for pages that read one."""
 
 RECORDS = {
@@ -56,7 +57,7 @@ def collection() -> Path | None:
 
 def furnish(folder: Path, specimen: str) -> None:
     """Put the files into `folder` that the pages name; `specimen` is the text of a specimen file."""
-    shutil.copy(CAMPAIGN, folder / "campaign.h5")
+    (folder / "campaign.h5").write_bytes(lzma.decompress(CAMPAIGN.read_bytes()))
     (folder / "bench.toml").write_text("[simulation]\nseed = 5\n", encoding="utf-8")
     (folder / "better.toml").write_text("[analysis]\nlaser_linearity = 0.0005\n", encoding="utf-8")
     (folder / "specimen.json").write_text(specimen, encoding="utf-8")
