@@ -9,6 +9,8 @@ class RigError(RockbenchError):
     `code` is the number that the instrument's own driver gave, where it gave one.
     """
 
+    error_code = "rig"
+
     def __init__(self, text: str, code: int | None = None) -> None:
         super().__init__(text if code is None else f"{text} (code {code})")
         self.code = code
@@ -17,18 +19,28 @@ class RigError(RockbenchError):
 class DriveUnderflow(RigError):
     """The output ran out of samples: more were asked to be played than were written."""
 
+    error_code = "drive_underflow"
+
 
 class InputOverflow(RigError):
     """Inputs were read too late: samples that nobody fetched were overwritten."""
+
+    error_code = "input_overflow"
 
 
 class DeviceTimeout(RigError):
     """A device did not answer in time."""
 
+    error_code = "device_timeout"
+
 
 class ConnectionLost(RigError):
     """A device that was there is gone."""
 
+    error_code = "connection_lost"
+
 
 class DeviceNotFound(RigError):
     """A device, its driver or its port is not there, or somebody else holds it."""
+
+    error_code = "device_not_found"

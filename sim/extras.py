@@ -21,6 +21,8 @@ class MissingExtra(InvalidInput):
     `item` is what needs it, `value` the name of the extra, `allowed` the commands that install it.
     """
 
+    error_code = "missing_extra"
+
     def __init__(self, purpose: str, extra: str, package: str) -> None:
         remedy = f'pip install "rocking-bench[{extra}]" (in a checkout: uv sync --inexact --extra {extra})'
         RockbenchError.__init__(self, f"{purpose} needs {package}: {remedy}")

@@ -31,6 +31,8 @@ SEED_SECTION = (3.11068, -0.0010828, 0.00037455, 0.049398, -0.11073, 0.67994)
 class NoOrbit(RockbenchError):
     """No periodic rocking motion was found."""
 
+    error_code = "no_orbit"
+
 
 @dataclass(frozen=True, eq=False)
 class Orbit:

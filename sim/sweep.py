@@ -27,6 +27,8 @@ Done = Callable[[int, int], None]
 class SchedulerUnavailable(RockbenchError):
     """The work cannot go to a scheduler: nothing answers there."""
 
+    error_code = "scheduler_unavailable"
+
 
 def processors() -> int:
     """Processors that this machine has for a sweep."""

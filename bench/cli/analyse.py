@@ -13,7 +13,7 @@ from bench.cli.analyse_output import side_by_side
 from bench.cli.analyse_settings import Choice, choice_of, listed
 from bench.cli.interrupt import answer
 from bench.cli.prose import prose
-from bench.cli.refusal import tell
+from bench.cli.refusal import fail
 from sim.errors import InvalidInput
 from sim.parameters import Parameters
 
@@ -96,7 +96,7 @@ def analyse(
             with choice.entry.progress(sys.stderr, False) as progress, redirect_stdout(sys.stderr):
                 experiment, replayed, points = _carried_out(record, choice, [progress])
         except NotComparable as error:
-            tell(error)
+            fail(error)
             return 1
         except KeyboardInterrupt:
             answer("the analysis was interrupted; nothing was written")

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bench.cli.predict_text import aligned
-from bench.cli.refusal import tell
+from bench.cli.refusal import error_object, tell
 from bench.cli.words import ABSENT, clock
 
 if TYPE_CHECKING:
@@ -41,6 +41,7 @@ def _content(found: "Preflight") -> dict[str, Any]:
     return {
         "would_run": refused is None,
         "refused": None if refused is None else str(refused),
+        **({} if refused is None else {"error": error_object(refused)}),
         "warnings": list(found.warnings),
         "margins": [
             {

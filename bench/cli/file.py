@@ -7,7 +7,7 @@ from typing import Annotated
 from cyclopts import App, Parameter
 
 from bench.cli.file_text import text_of
-from bench.cli.refusal import tell
+from bench.cli.refusal import error_object, tell
 
 _File = Annotated[Path, Parameter(metavar="FILE", help="Data file of a campaign.")]
 _Json = Annotated[
@@ -49,7 +49,8 @@ def verify(file: _File, /, *, as_json: _Json = False) -> int:
     sound = not verdict.problems
     if as_json:
         content = {"file": str(file), "sound": sound, "datasets": verdict.datasets, "compared": verdict.compared}
-        print(json.dumps(content | {"problems": verdict.problems}))
+        damaged = {} if sound else {"error": error_object(f"{file}: {verdict.problems[0]}", "damaged_file")}
+        print(json.dumps(content | {"problems": verdict.problems} | damaged))
     elif sound:
         print(f"{file} is sound: {verdict.compared} of {verdict.datasets} datasets held against their checksums")
     for problem in verdict.problems:

@@ -15,7 +15,7 @@ from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import TYPE_CHECKING
 
-from bench.cli.refusal import tell
+from bench.cli.refusal import fail, tell
 from bench.unfinished import remove_unfinished
 
 if TYPE_CHECKING:
@@ -143,7 +143,7 @@ class Watch:
         threading.Event().wait(ANSWER)
         if self.claim():
             with suppress(OSError, ValueError):
-                tell("interrupted")
+                fail("interrupted", "interrupted")
         threading.Event().wait(ORDERLY - ANSWER)
         handler = signal.getsignal(number)
         if isinstance(handler, Interrupts) and handler.leavable:
@@ -172,10 +172,15 @@ def heed_signals(interrupts: Interrupts) -> None:
             signal.signal(number, interrupts)
 
 
-def answer(text: str) -> None:
-    """Say, in one line on standard error, that the command was interrupted, unless that has been said."""
+def answer(text: str, *, in_result: bool = False) -> None:
+    """Say, in one line on standard error, that the command was interrupted, unless that has been said; with --json in
+    an object too, but for what is `in_result` of the command itself.
+    """
     if _watch is None or _watch.claim():
-        tell(text)
+        if in_result:
+            tell(text)
+        else:
+            fail(text, "interrupted")
 
 
 def leave(code: int) -> None:

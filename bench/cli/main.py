@@ -19,7 +19,7 @@ from bench.cli.paper import paper_app
 from bench.cli.predict import predict_app
 from bench.cli.queue import queue_app
 from bench.cli.records import records_app
-from bench.cli.refusal import tell
+from bench.cli.refusal import fail, reply_in_json
 from bench.cli.replay import replay_app
 from bench.cli.report import report_app
 from bench.cli.run import Start, run_app
@@ -31,7 +31,7 @@ def main(argv: Sequence[str] | None = None, start: Start | None = None) -> int:
     """Carry out a command line and return its exit code; `start` stands in for `bench.session.run_session`.
 
     0: done. 1: a run failed or was aborted. 2: refused before anything started. 130: ended by Ctrl-C.
-    What went wrong is one line on standard error.
+    What went wrong is one line on standard error, and with --json an object on standard output (docs/errors.md).
     """
     app = App(
         name="rockbench",
@@ -59,13 +59,19 @@ def main(argv: Sequence[str] | None = None, start: Start | None = None) -> int:
     app.command(export_app())
     app.command(config_app())
     app.command(benchmark_app())
+    given = sys.argv[1:] if argv is None else list(argv)
+    # also for what cannot be parsed
+    reply_in_json(sys.stdout if "--json" in given else None)
     try:
-        code = app(sys.argv[1:] if argv is None else list(argv))
+        code = app(given)
     except UnusedCliTokensError as error:
-        tell(f"unexpected argument: {' '.join(error.unused_tokens or [])} (see --help)")
+        fail(f"unexpected argument: {' '.join(error.unused_tokens or [])} (see --help)", "usage")
         return 2
-    except (CycloptsError, RockbenchError) as error:
-        tell(error)
+    except CycloptsError as error:
+        fail(error, "usage")
+        return 2
+    except RockbenchError as error:
+        fail(error)
         return 2
     except KeyboardInterrupt as interrupt:
         answer(str(interrupt) or "interrupted")

@@ -4,7 +4,9 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from bench.cli.refusal import error_object
 from bench.cli.words import ABSENT, clock
+from sim.errors import InvalidInput
 
 if TYPE_CHECKING:
     from bench.preflight.compiled import Preflight
@@ -19,11 +21,14 @@ def tests_text(tests: "Sequence[Queued]") -> str:
     return "\n".join([*_aligned([("test", "state", "protocol", "results in", "how it ended"), *rows]), f"{said}."])
 
 
-def plans_text(tests: "Sequence[Queued]", found: "Mapping[int, Preflight]", *, as_json: bool) -> str:
-    """What the plan of every test that waits comes to."""
+def plans_text(
+    tests: "Sequence[Queued]", found: "Mapping[int, Preflight]", refused: InvalidInput | None, *, as_json: bool
+) -> str:
+    """The plan of every test that waits, and in JSON why the queue is refused."""
     plans = [_plan(index + 1, tests[index], plan) for index, plan in found.items()]
     if as_json:
-        return json.dumps({"tests": plans}, allow_nan=False)
+        error = {} if refused is None else {"error": error_object(refused)}
+        return json.dumps({"tests": plans, **error}, allow_nan=False)
     titles = ("test", "protocol", "duration", "tightest", "margin [%]", "disk [MB]", "")
     return "\n".join(_aligned([titles, *(_row(plan) for plan in plans)]))
 

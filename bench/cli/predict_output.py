@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bench.cli.predict_options import ResultOptions
-from bench.cli.refusal import tell
+from bench.cli.refusal import fail
 from sim.errors import InvalidInput, RockbenchError
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ def carried_out(make: Callable[[], Result], options: ResultOptions) -> int:
     except InvalidInput:
         raise
     except (RockbenchError, OSError) as error:
-        tell(error)
+        fail(error)
         return 1
     return 0
 

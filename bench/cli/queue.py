@@ -12,7 +12,7 @@ from cyclopts import App, Parameter
 from bench.cli.inputs import Seed, SpecimenFile
 from bench.cli.interrupt import answer
 from bench.cli.plan_table import plans_text, tests_text
-from bench.cli.refusal import tell
+from bench.cli.refusal import error_object, tell
 from bench.cli.run import Start, carry_out
 from sim.errors import InvalidInput
 
@@ -86,16 +86,17 @@ def queue_app(start: Start | None = None) -> App:
                 }
             refused = _refusal(found) or room_refusal([each.room for each in found.values()])
             if dry_run:
-                print(plans_text(tests.tests, found, as_json=as_json))
+                print(plans_text(tests.tests, found, refused, as_json=as_json))
+                if refused is not None:
+                    tell(refused)
+                return 0 if refused is None else 2
             if refused is not None:
                 raise refused
-            if dry_run:
-                return 0
             for test in tests.tests:
                 # nobody to answer is found before the first one begins
                 _operator(test, configuration, yes)
             code = _run_all(tests, configuration, yes, start)
-        print(json.dumps(_content(tests.tests), allow_nan=False) if as_json else tests_text(tests.tests))
+        print(json.dumps(_content(tests.tests, code), allow_nan=False) if as_json else tests_text(tests.tests))
         return code
 
     app.default(queue)
@@ -161,7 +162,10 @@ def _run_one(
         tests.finish(index, good=good, told=told)
         if out is not None and test.out is None:
             remove_unused(out)
-    (tell if interrupted is None else answer)(f"test {index + 1} {told}")
+    if interrupted is None:
+        tell(f"test {index + 1} {told}")
+    else:
+        answer(f"test {index + 1} {told}", in_result=True)
     return interrupted or 1
 
 
@@ -173,5 +177,9 @@ def _operator(test: "Queued", configuration: "BenchConfiguration", yes: bool) ->
     return choose(serves_itself=configuration.serves_itself, yes=yes, ask=asks, terminal=terminal)
 
 
-def _content(tests: "tuple[Queued, ...]") -> dict[str, object]:
-    return {"tests": [test.model_dump(mode="json") for test in tests]}
+def _content(tests: "tuple[Queued, ...]", code: int) -> dict[str, object]:
+    content: dict[str, object] = {"tests": [test.model_dump(mode="json") for test in tests]}
+    if code == 0:
+        return content
+    ended = error_object("the queue was not carried out: see the tests", "run_failed" if code == 1 else "interrupted")
+    return content | {"error": ended}

@@ -8,7 +8,7 @@ from cyclopts import App, Parameter
 
 from bench.cli.predict_options import ResultOptions
 from bench.cli.records_fit import register_fit
-from bench.cli.refusal import tell
+from bench.cli.refusal import fail
 from sim.errors import InvalidInput, RockbenchError
 
 MOST_DRAWN = 8
@@ -87,7 +87,7 @@ def info(
     except InvalidInput:
         raise
     except (RockbenchError, OSError) as error:
-        tell(error)
+        fail(error)
         return 1
     if as_json:
         from bench.provenance import software

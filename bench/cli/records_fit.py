@@ -11,7 +11,7 @@ from cyclopts import App, Group, Parameter
 from bench.cli import flags
 from bench.cli.predict_options import ResultOptions
 from bench.cli.predict_records import CONFIG
-from bench.cli.refusal import tell
+from bench.cli.refusal import fail
 from bench.prediction.requests import StrokeFitRequest
 from sim.errors import InvalidInput, RockbenchError
 
@@ -103,7 +103,7 @@ def _perform(file: str, arguments: dict[str, Any]) -> int:
     except InvalidInput:
         raise
     except (RockbenchError, OSError) as error:
-        tell(error)
+        fail(error)
         return 1
     if as_json:
         import json

@@ -10,7 +10,7 @@ from cyclopts import App, Parameter
 
 from bench.cli.interrupt import answer
 from bench.cli.prose import prose
-from bench.cli.refusal import tell
+from bench.cli.refusal import error_object, tell
 from bench.cli.words import one_line
 from sim.errors import InvalidInput
 
@@ -66,9 +66,9 @@ def replay(
             answer("the replay was interrupted")
             return 130
         points = list(replayed.points)
-        print(json.dumps(_content(replayed)) if as_json else _text(replayed, experiment.table(points)))
+        print(json.dumps(_content(file, replayed)) if as_json else _text(replayed, experiment.table(points)))
     if not replayed.agrees:
-        tell(f"{file} did not replay as it was recorded: {_first(replayed)}")
+        tell(_different(file, replayed))
         return 1
     return 0
 
@@ -115,12 +115,15 @@ def _software(replayed: "Replayed") -> str:
     return "The software is that of the recording: the git hash and every version are the same"
 
 
-def _first(replayed: "Replayed") -> str:
-    return one_line(next(each.text for each in replayed.found.differences if not each.rounding))
+def _different(file: Path, replayed: "Replayed") -> str:
+    first = one_line(next(each.text for each in replayed.found.differences if not each.rounding))
+    return f"{file} did not replay as it was recorded: {first}"
 
 
-def _content(replayed: "Replayed") -> dict[str, Any]:
+def _content(file: Path, replayed: "Replayed") -> dict[str, Any]:
+    different = None if replayed.agrees else error_object(_different(file, replayed), "replay_differs")
     return {
+        **({} if different is None else {"error": different}),
         "status": replayed.status,
         "reason": replayed.reason,
         "identical": replayed.identical,

@@ -16,7 +16,7 @@ from cyclopts import App, Group
 from bench.cli.catalogue import CATALOGUE, Entry
 from bench.cli.flags import arguments_of
 from bench.cli.options import Options, arguments_of_options
-from bench.cli.refusal import tell
+from bench.cli.refusal import error_object, fail, tell
 from bench.results import SUMMARY
 from sim.errors import InvalidInput, RockbenchError
 
@@ -110,7 +110,7 @@ def _perform(entry: Entry, arguments: dict[str, Any], options: Options, start: S
         if options.out is None:
             remove_unused(out)
     if isinstance(ended, Exception):
-        tell(ended)
+        fail(ended)
         return interrupted or 1
     return _report(entry, ended, out, options.json, interrupted)
 
@@ -171,12 +171,23 @@ def carry_out(
 
 def _report(entry: Entry, result: "SessionResult", out: Path, as_json: bool, interrupted: int | None) -> int:
     """Print the result, and turn the way it ended into an exit code."""
+    error = _error(entry, result)
     if as_json:
-        print(json.dumps({"status": result.status, "reason": result.reason, **result.summary}, allow_nan=False))
+        content = {"status": result.status, "reason": result.reason, **result.summary}
+        print(json.dumps(content | ({} if error is None else {"error": error}), allow_nan=False))
     else:
         print(f"{result.table.rstrip()}\nResults are in {out}")
     if result.status in GOOD:
         # an end that was asked for when there was nothing left to end changes nothing
-        return 0 if entry.passed(result.summary) else 1
+        return 0 if error is None else 1
     tell(f"the run was {result.status}: {result.reason}")
     return interrupted or (130 if result.interrupted else 1)
+
+
+def _error(entry: Entry, result: "SessionResult") -> dict[str, Any] | None:
+    """The error that the JSON object of a run has beside its results; None for a run that came to a good end."""
+    if result.status not in GOOD:
+        return error_object(result.reason, "run_failed" if result.status == "failed" else "run_aborted")
+    if not entry.passed(result.summary):
+        return error_object("something that was checked failed: see the points", "check_failed")
+    return None

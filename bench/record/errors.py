@@ -10,6 +10,8 @@ from sim.errors import RockbenchError
 class RecordError(RockbenchError):
     """The file could not be written or read further; what was complete before stays readable."""
 
+    error_code = "data_file"
+
 
 UNREADABLE = (OSError, RuntimeError, KeyError, ValueError, TypeError, IndexError, OverflowError, RecordError)
 """What reading a damaged file raises: errors of HDF5, of its Python library, and of the decoding of what it holds."""

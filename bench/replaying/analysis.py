@@ -19,6 +19,8 @@ from sim.parameters import Parameters
 class NotComparable(RockbenchError):
     """The recorded samples do not answer what was asked of them."""
 
+    error_code = "not_comparable"
+
 
 class Follower(Protocol):
     """Looks on while the recorded plan is carried out again, and comes to results of its own.

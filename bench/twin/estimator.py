@@ -40,6 +40,8 @@ class Setting:
 class Blind(RockbenchError):
     """Without every sample of the table's acceleration there is no model."""
 
+    error_code = "no_estimate"
+
 
 class Estimator:
     """It begins at rest, with the first block that it is given, and takes every one from there on."""

@@ -16,6 +16,8 @@ SLOW = 3.0
 class CommandRefused(RigError):
     """The sensor answered a command with an error; `answer` is its code and text."""
 
+    error_code = "command_refused"
+
     def __init__(self, who: str, command: str, answer: str) -> None:
         if answer.startswith("E202"):
             remedy = "switch it to the user level professional in its web interface"

@@ -18,6 +18,8 @@ AUDIBLE = 5.0
 class Unmeasurable(RockbenchError):
     """The signals do not show what the protocol needs to go on."""
 
+    error_code = "not_measurable"
+
 
 def need_cycles(cycles: Sequence[Cycle], asked: int) -> None:
     """Raise Unmeasurable when too many cycles lack samples."""

@@ -212,7 +212,9 @@ def test_json_is_all_there_is_on_standard_output(
     assert harmonic(session, "--json", "--yes") == code
     shown = capsys.readouterr()
     assert shown.out.count("\n") == 1
-    assert json.loads(shown.out) == {"status": status, "reason": "why it ended", "points": [1]}
+    content = json.loads(shown.out)
+    assert ("error" in content) == (code != 0)
+    assert {**content, "error": 0} == {"status": status, "reason": "why it ended", "points": [1], "error": 0}
     assert "a library that talks" in shown.err
     assert ("rockbench: error: " in shown.err) == (code != 0)
 

@@ -24,6 +24,8 @@ MOST_LOST = 0.02
 class Unusable(RockbenchError):
     """The recording does not show what the fit needs."""
 
+    error_code = "not_measurable"
+
 
 @dataclass(frozen=True, eq=False)
 class Stretch:

@@ -30,6 +30,8 @@ _SHARE = 0.25
 class NotRocking(RockbenchError):
     """A recording does not show what a block does that was tilted and let go."""
 
+    error_code = "not_measurable"
+
 
 @dataclass(frozen=True, eq=False)
 class Seen:
