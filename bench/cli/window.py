@@ -1,5 +1,9 @@
 """`rockbench gui`: the operator's window."""
 
+import os
+import re
+import subprocess
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -8,7 +12,42 @@ from cyclopts import App, Parameter
 from bench.cli.catalogue import CATALOGUE
 from bench.cli.check import CHECK
 from bench.cli.inputs import Seed, SpecimenFile, configuration_from
+from sim.errors import InvalidInput, RockbenchError
 from sim.extras import require
+
+HEADLESS = "`rockbench run`, which needs no window"
+
+PROBE = "from PySide6.QtGui import QGuiApplication; QGuiApplication([])"
+"""What Qt cannot do ends the process with SIGABRT: it is tried in another one."""
+
+PATIENCE = 20.0
+"""Seconds to wait for the display to answer; one that is forwarded takes its time."""
+
+PACKAGES = {
+    "libEGL.so": "libegl1",
+    "libGL.so": "libgl1",
+    "libxcb-cursor.so": "libxcb-cursor0",
+    "libxkbcommon.so": "libxkbcommon0",
+    "libxkbcommon-x11.so": "libxkbcommon-x11-0",
+    "libwayland-client.so": "libwayland-client0",
+    "libwayland-cursor.so": "libwayland-cursor0",
+    "libwayland-egl.so": "libwayland-egl1",
+    "libdbus-1.so": "libdbus-1-3",
+    "libfontconfig.so": "libfontconfig1",
+    "libxcb-icccm.so": "libxcb-icccm4",
+    "libxcb-image.so": "libxcb-image0",
+    "libxcb-keysyms.so": "libxcb-keysyms1",
+    "libxcb-render-util.so": "libxcb-render-util0",
+}
+"""Packages of Debian and Ubuntu that have the libraries which Qt's wheels leave to the system."""
+
+
+class NoDisplay(InvalidInput):
+    """A window cannot be shown here; nothing was started. `item` is the variable or library, `allowed` the remedy."""
+
+    def __init__(self, item: str, why: str, remedy: str) -> None:
+        RockbenchError.__init__(self, f"rockbench gui cannot open a window: {why}; {remedy}, or use {HEADLESS}")
+        self.item, self.value, self.allowed = item, why, remedy
 
 
 def gui_app() -> App:
@@ -41,7 +80,42 @@ def gui(
     """
     require("gui", "rockbench gui")
     configuration = configuration_from(config, seed, specimen)
+    require_display()
 
     from bench.gui.app import open_window
 
     return open_window(configuration, (*CATALOGUE, CHECK), config, queue)
+
+
+def require_display() -> None:
+    """Check that Qt can open a window here. Raises NoDisplay naming the variable or the library that is missing."""
+    if sys.platform in ("win32", "darwin"):
+        return
+    chosen = next((name for name in ("QT_QPA_PLATFORM", "WAYLAND_DISPLAY", "DISPLAY") if os.environ.get(name)), None)
+    if chosen is None:
+        why = "neither DISPLAY nor WAYLAND_DISPLAY is set"
+        raise NoDisplay("DISPLAY", why, "start it on a desktop or over `ssh -X`")
+    try:
+        probe = subprocess.run(
+            [sys.executable, "-c", PROBE],
+            env=os.environ | {"QT_DEBUG_PLUGINS": "1"},
+            capture_output=True,
+            text=True,
+            errors="replace",
+            timeout=PATIENCE,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        why = f"{chosen} = {os.environ[chosen]!r} does not answer within {PATIENCE:g} s"
+        raise NoDisplay(chosen, why, "start it on a desktop or over `ssh -X`") from None
+    if probe.returncode == 0:
+        return
+    lacking = re.search(r"(lib[\w.+-]+?\.so)([.\d]*): cannot open shared object", probe.stderr)
+    if lacking is not None:
+        library, version = lacking.groups()
+        package = PACKAGES.get(library)
+        remedy = "install the package that has it" if package is None else f"install it (Debian: apt install {package})"
+        raise NoDisplay(library, f"the library {library}{version} is missing", remedy)
+    why = f"Qt cannot use {chosen} = {os.environ[chosen]!r}"
+    remedy = "name one of Qt's platforms or unset it" if chosen == "QT_QPA_PLATFORM" else "start it on a desktop"
+    raise NoDisplay(chosen, why, remedy)
