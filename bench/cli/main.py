@@ -9,9 +9,11 @@ from cyclopts import App, CycloptsError, UnusedCliTokensError
 from bench.cli.analyse import analyse_app
 from bench.cli.benchmark import benchmark_app
 from bench.cli.check import check_app
+from bench.cli.completion import completion_app
 from bench.cli.configure import config_app
 from bench.cli.devices import devices_app
 from bench.cli.emulate import emulate_app
+from bench.cli.examples import add_examples
 from bench.cli.export import export_app
 from bench.cli.file import file_app
 from bench.cli.interrupt import answer
@@ -27,12 +29,8 @@ from bench.cli.window import gui_app
 from sim.errors import RockbenchError
 
 
-def main(argv: Sequence[str] | None = None, start: Start | None = None) -> int:
-    """Carry out a command line and return its exit code; `start` stands in for `bench.session.run_session`.
-
-    0: done. 1: a run failed or was aborted. 2: refused before anything started. 130: ended by Ctrl-C.
-    What went wrong is one line on standard error, and with --json an object on standard output (docs/errors.md).
-    """
+def rockbench_app(start: Start | None = None) -> App:
+    """The tree of all commands; `start` stands in for `bench.session.run_session`."""
     app = App(
         name="rockbench",
         help="Runs a shake-table bench for a frame coupled to a rocking block, and compares its gain with prediction.",
@@ -59,6 +57,18 @@ def main(argv: Sequence[str] | None = None, start: Start | None = None) -> int:
     app.command(export_app())
     app.command(config_app())
     app.command(benchmark_app())
+    app.command(completion_app(app))
+    add_examples(app)
+    return app
+
+
+def main(argv: Sequence[str] | None = None, start: Start | None = None) -> int:
+    """Carry out a command line and return its exit code; `start` stands in for `bench.session.run_session`.
+
+    0: done. 1: a run failed or was aborted. 2: refused before anything started. 130: ended by Ctrl-C.
+    What went wrong is one line on standard error, and with --json an object on standard output (docs/errors.md).
+    """
+    app = rockbench_app(start)
     given = sys.argv[1:] if argv is None else list(argv)
     # also for what cannot be parsed
     reply_in_json(sys.stdout if "--json" in given else None)
