@@ -11,6 +11,7 @@ from pathlib import Path
 import h5py
 import pytest
 
+from tests.first_edition import inventory
 from tests.first_edition.command import DATA, Rockbench
 
 COMMANDS = {words[-1]: words[1:] for words in map(shlex.split, (DATA / "commands.txt").read_text("utf-8").splitlines())}
@@ -115,3 +116,20 @@ def test_its_summary_and_its_output_agree(run: Run) -> None:
     summary = json.loads((run.folder / "summary.json").read_text(encoding="utf-8"))
     assert summary.keys() >= run.recorded.keys() - EXCEPTED
     assert all(summary[key] == value for key, value in run.printed.items())
+
+
+def test_it_leaves_every_file(run: Run) -> None:
+    before = json.loads((DATA / "inventory.json").read_text(encoding="utf-8"))["files"][run.name]
+    assert {RENAMED.get(name, name) for name in before} <= {path.name for path in run.folder.iterdir()}
+
+
+def test_its_file_has_every_table_and_column(run: Run) -> None:
+    content = json.loads((DATA / "inventory.json").read_text(encoding="utf-8"))["tables"]
+    before, after = content["every file"] | content[run.name], inventory.tables(run.folder / "campaign.h5")
+    assert not {name: said for name, said in before.items() if after.get(RENAMED.get(name, name)) != said}
+
+
+def test_its_journal_has_the_same_events_in_the_same_order(run: Run, unpacked: Callable[[str], Path]) -> None:
+    with h5py.File(unpacked(run.name)) as old, h5py.File(run.folder / "campaign.h5") as new:
+        before, after = ([kind.decode() for kind in file["entry/events/kind"][:]] for file in (old, new))
+    assert [RENAMED.get(kind, kind) for kind in before] == after

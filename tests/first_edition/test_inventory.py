@@ -1,0 +1,106 @@
+"""Nothing that the first edition offered is gone: commands, options, keys, settings, tables, exports, sections."""
+
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.first_edition import inventory
+from tests.first_edition.command import DATA
+
+BEFORE: dict[str, Any] = json.loads((DATA / "inventory.json").read_text(encoding="utf-8"))
+
+RENAMED: dict[str, str] = {}
+"""What was renamed since, as "part: name" (such as "commands: run harmonic" or "options: run harmonic --omega") to its
+name of today, each with the reason beside it.
+"""
+
+CHANGED: dict[str, Any] = {}
+"""What another value is meant for today, as "part: name: what" (such as "options: run harmonic --starts: default") to
+that value, each with the reason beside it.
+"""
+
+QUICK = "check"
+
+
+def today(part: str, name: str) -> str:
+    """What is called `name` in the inventory."""
+    return RENAMED.get(f"{part}: {name}", name)
+
+
+def missing(part: str, before: dict[str, Any], after: dict[str, Any], said: tuple[str, ...]) -> Iterator[str]:
+    """What of `before` is not in `after`, and where something of `said` is another one; names may be added."""
+    for name, old in before.items():
+        new = after.get(today(part, name))
+        if new is None:
+            yield f"{part}: {name} is missing"
+            continue
+        for what in said:
+            expected = CHANGED.get(f"{part}: {name}: {what}", old.get(what))
+            if new.get(what) != expected:
+                yield f"{part}: {name}: {what} was {expected!r} and is {new.get(what)!r}"
+
+
+def each_option(commands: dict[str, Any]) -> dict[str, Any]:
+    """All options, by command and first name."""
+    return {
+        f"{command} {name}".strip(): option
+        for command, found in commands.items()
+        for name, option in found["options"].items()
+    }
+
+
+@pytest.fixture(scope="module")
+def commands() -> dict[str, Any]:
+    with pytest.MonkeyPatch.context() as patch:
+        # so that nothing in a panel of the help is broken into lines
+        patch.setenv("COLUMNS", "1000")
+        return inventory.commands()
+
+
+def test_every_command_is_there(commands: dict[str, Any]) -> None:
+    assert len(BEFORE["commands"]) == 38
+    assert not list(missing("commands", BEFORE["commands"], commands, ()))
+
+
+def test_every_option_is_there_with_its_value_unit_default_and_bounds(commands: dict[str, Any]) -> None:
+    before, after = each_option(BEFORE["commands"]), each_option(commands)
+    assert len(before) > 350
+    said = ("names", "value", "unit", "default", "allowed", "choices", "required")
+    assert not list(missing("options", before, after, said))
+
+
+def test_every_key_of_the_configuration_is_there_with_its_unit_default_and_bounds() -> None:
+    before, after = BEFORE["configuration"], inventory.configuration()
+    assert len(before) == 248
+    assert not list(missing("configuration", before, after, ("absent", "default", "unit", "allowed")))
+
+
+@pytest.mark.parametrize("name", sorted(BEFORE["exports"]))
+def test_every_setting_of_an_analysis_is_there(name: str, unpacked: Callable[[str], Path]) -> None:
+    before = BEFORE["settings"]["every file"] | BEFORE["settings"][name]
+    after = inventory.settings(unpacked(name))
+    gone = {key: unit for key, unit in before.items() if after.get(today("settings", key)) != unit}
+    assert not gone
+
+
+def cases(names: list[str]) -> list[Any]:
+    return [pytest.param(name, marks=() if name == QUICK else pytest.mark.soak) for name in names]
+
+
+@pytest.mark.parametrize("name", cases(sorted(BEFORE["exports"])))
+@pytest.mark.parametrize("to", inventory.FORMATS)
+def test_every_file_of_an_export_is_there(name: str, to: str, unpacked: Callable[[str], Path], tmp_path: Path) -> None:
+    after = inventory.exported(unpacked(name), to, tmp_path)
+    assert {today("exports", file) for file in BEFORE["exports"][name][to]} <= {*after}
+
+
+@pytest.mark.parametrize("name", cases(sorted(BEFORE["reports"])))
+def test_every_section_table_and_figure_of_a_report_is_there(
+    name: str, unpacked: Callable[[str], Path], tmp_path: Path
+) -> None:
+    after = inventory.report(unpacked(name), tmp_path)
+    for part, before in BEFORE["reports"][name].items():
+        assert [text for text in before if today(part, text) not in after[part]] == []
