@@ -30,7 +30,9 @@ class Shaker(Parameters):
     gain: float = quantity(
         3.0, "1", "coil volts (voltage amplifier) or coil amperes (current amplifier) per volt of drive", gt=0
     )
-    amplifier_lag: float = quantity(0.0, "s", "time constant of a first-order lag of the amplifier; 0 for none", ge=0)
+    amplifier_lag: float = quantity(
+        0.0, "s", "time constant of a first-order lag of the amplifier; 0 for none", ge=0, usual=(1e-5, 0.02)
+    )
     voltage_limit: float = quantity(30.0, "V", "largest coil voltage the amplifier can give", gt=0)
     current_limit: float = quantity(18.0, "A", "largest coil current the amplifier can give", gt=0)
     drive_range: float = quantity(10.0, "V", "largest magnitude of the drive at the amplifier's input", gt=0)

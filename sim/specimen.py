@@ -11,23 +11,27 @@ from numpy.typing import NDArray
 from pydantic import model_validator
 
 from sim.errors import InvalidInput
-from sim.parameters import Parameters, quantity
+from sim.parameters import COUPLING, Parameters, quantity
 
 SLOWEST, FASTEST = 1e-3, 1e5
 """Natural frequencies [rad/s] of any frame that stands on a table; beyond them a number was mistyped."""
 
 
+DAMPING = (0.001, 0.15)
+"""Usual damping ratios of a laboratory frame of metal, with dampers or without: 0.1 % to 15 %."""
+
+
 class Frame(Parameters):
     """The two-storey shear frame (Tables 1 and 3)."""
 
-    h1: float = quantity(0.200, "m", "height of the first storey, where the spring acts", gt=0)
-    h2: float = quantity(0.496, "m", "height of the second storey", gt=0)
-    m1: float = quantity(1.062, "kg", "mass of the first storey", gt=0)
-    m2: float = quantity(1.062, "kg", "mass of the second storey", gt=0)
+    h1: float = quantity(0.200, "m", "height of the first storey, where the spring acts", gt=0, usual=(0.02, 3.0))
+    h2: float = quantity(0.496, "m", "height of the second storey", gt=0, usual=(0.02, 3.0))
+    m1: float = quantity(1.062, "kg", "mass of the first storey", gt=0, usual=(0.05, 20.0))
+    m2: float = quantity(1.062, "kg", "mass of the second storey", gt=0, usual=(0.05, 20.0))
     k1: float = quantity(213.44, "N/m", "stiffness of the first storey", gt=0)
     k2: float = quantity(56.45, "N/m", "stiffness of the second storey", gt=0)
-    xi1: float = quantity(0.010, "1", "damping ratio of the first mode of the bare frame", ge=0, lt=1)
-    xi2: float = quantity(0.035, "1", "damping ratio of the second mode of the bare frame", ge=0, lt=1)
+    xi1: float = quantity(0.010, "1", "damping ratio of the first mode of the bare frame", ge=0, lt=1, usual=DAMPING)
+    xi2: float = quantity(0.035, "1", "damping ratio of the second mode of the bare frame", ge=0, lt=1, usual=DAMPING)
 
     @model_validator(mode="after")
     def _a_frame_that_can_stand(self) -> "Frame":
@@ -71,10 +75,10 @@ class Frame(Parameters):
 class Block(Parameters):
     """The rigid rocking block (Table 2). It neither slides nor flies free."""
 
-    b: float = quantity(0.025, "m", "half width of the block", gt=0)
-    h_b: float = quantity(0.200, "m", "half height of the block", gt=0)
-    s: float = quantity(0.10, "m", "depth of the block, across the plane of motion", gt=0)
-    rho: float = quantity(2450.0, "kg/m3", "density of the block", gt=0)
+    b: float = quantity(0.025, "m", "half width of the block", gt=0, usual=(0.005, 0.5))
+    h_b: float = quantity(0.200, "m", "half height of the block", gt=0, usual=(0.02, 2.0))
+    s: float = quantity(0.10, "m", "depth of the block, across the plane of motion", gt=0, usual=(0.01, 1.0))
+    rho: float = quantity(2450.0, "kg/m3", "density of the block", gt=0, usual=(400.0, 12_000.0))
     restitution_factor: float = quantity(
         1.0, "1", "measured over theoretical restitution r_exp/r_th (the paper measured 0.992)", ge=0, le=2
     )
@@ -84,7 +88,8 @@ class Block(Parameters):
         # below 0, as for a slab 1.42 times as wide as it is high, the impact would turn it back on the corner it left
         if not 0.0 <= self.restitution <= 1.0:
             allowed = (
-                f"it gives r = {self.restitution:.4g}: an impact neither adds speed nor turns it back, r is 0 to 1"
+                f"with b = {self.b:g} m and h_b = {self.h_b:g} m it gives r = {self.restitution:.4g}: an impact "
+                "neither adds speed nor turns it back, r is 0 to 1"
             )
             raise InvalidInput("restitution_factor", self.restitution_factor, allowed)
         return self
@@ -122,8 +127,10 @@ class Block(Parameters):
 class Spring(Parameters):
     """A coupling spring whose stiffness has been measured."""
 
-    label: float = quantity(..., "1", "what is written on it: beta, its nominal stiffness over k1", gt=0)
-    k_c: float = quantity(..., "N/m", "its stiffness", gt=0)
+    label: float = quantity(
+        ..., "1", "what is written on it: beta, its nominal stiffness over k1", gt=0, usual=COUPLING
+    )
+    k_c: float = quantity(..., "N/m", "its stiffness", gt=0, usual=(5.0, 1100.0))
 
 
 class Specimen(Parameters):
@@ -135,14 +142,23 @@ class Specimen(Parameters):
 
     frame: Frame = Frame()
     block: Block = Block()
-    beta: float | None = quantity(None, "1", "stiffness ratio k_C/k1 of the spring; absent for the bare frame", ge=0)
-    spring_label: float | None = quantity(None, "1", "what is written on the mounted spring; absent: beta", ge=0)
+    beta: float | None = quantity(
+        None, "1", "stiffness ratio k_C/k1 of the spring; absent for the bare frame", ge=0, usual=COUPLING
+    )
+    spring_label: float | None = quantity(
+        None, "1", "what is written on the mounted spring; absent: beta", ge=0, usual=COUPLING
+    )
     spring_k1: float | None = quantity(
-        None, "N/m", "k1 that the labels of the springs refer to: nominal k_C = label times it; absent: k1", gt=0
+        None,
+        "N/m",
+        "k1 that the labels of the springs refer to: nominal k_C = label times it; absent: k1",
+        gt=0,
+        usual=(40.0, 1100.0),
+        example=213.44,
     )
     springs: tuple[Spring, ...] = quantity((), "", "springs whose stiffness has been measured")
-    d: float = quantity(0.10, "m", "free length of the spring (not given in the paper)", gt=0)
-    g: float = quantity(9.81, "m/s2", "acceleration of gravity", gt=0)
+    d: float = quantity(0.10, "m", "free length of the spring (not given in the paper)", gt=0, usual=(0.005, 1.0))
+    g: float = quantity(9.81, "m/s2", "acceleration of gravity", gt=0, usual=(9.76, 9.84))
 
     @model_validator(mode="after")
     def _springs_can_be_told_apart(self) -> "Specimen":

@@ -16,6 +16,9 @@ from sim.errors import InvalidInput
 
 GRAMMAR = "FILE[@KEY=VALUE,...] with the keys unit, dt, channel, column and name, or synthetic:NAME[:SEED]"
 
+SHORTEST_STEP, LONGEST_STEP = 1e-4, 0.5
+"""Time steps [s] that are typed for a record: strong motion is sampled at 50 to 1000 Hz, old film at 10 Hz and more."""
+
 _SYNTHETIC = "synthetic:"
 _KEYS = ("unit", "dt", "channel", "column", "name")
 _OPTIONS = re.compile(r"\w+=[^=]*(,\w+=[^=]*)*")
@@ -131,6 +134,11 @@ def seconds_of(item: str, value: str) -> float:
         raise InvalidInput(item, value, str(error) or "it must be positive seconds") from None
     if seconds <= 0.0:
         raise InvalidInput(item, value, "it must be positive seconds")
+    if not SHORTEST_STEP <= seconds <= LONGEST_STEP:
+        allowed = (
+            f"records of earthquakes have steps of {SHORTEST_STEP:g} to {LONGEST_STEP:g} s: write its unit, as 5ms"
+        )
+        raise InvalidInput(item, value, allowed)
     return seconds
 
 

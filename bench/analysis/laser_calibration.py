@@ -22,16 +22,22 @@ class LaserCurve(Parameters):
     """What one laser says too much, by its reading [m] from the middle of its range."""
 
     sensor: str = quantity(..., "", "the laser, as the data file of its calibration names it")
-    lowest: float = quantity(..., "m", "least reading that was covered")
-    highest: float = quantity(..., "m", "greatest reading that was covered")
-    rest: float = quantity(..., "m", "reading with the storey at rest")
+    lowest: float = quantity(..., "m", "least reading that was covered", usual=(1e-3, 1.0))
+    highest: float = quantity(..., "m", "greatest reading that was covered", usual=(1e-3, 1.0))
+    rest: float = quantity(..., "m", "reading with the storey at rest", usual=(1e-6, 0.1))
     error: tuple[float, ...] = quantity(
-        ..., "m", "Chebyshev coefficients, over the covered readings, of what the laser says too much", min_length=2
+        ...,
+        "m",
+        "Chebyshev coefficients, over the covered readings, of what the laser says too much",
+        min_length=2,
+        usual=(0.0, 2e-3),
     )
-    uncertainty: float = quantity(..., "m", "standard uncertainty of that error at one reading", ge=0)
+    uncertainty: float = quantity(
+        ..., "m", "standard uncertainty of that error at one reading", ge=0, usual=(1e-6, 1e-3)
+    )
     scale: float = quantity(..., "1", "span of its readings over that of the motion, the mean of both lasers' being 1")
-    delay: float = quantity(..., "s", "by how much later than the table's displacement it was")
-    delay_uncertainty: float = quantity(..., "s", "standard uncertainty of the delay", ge=0)
+    delay: float = quantity(..., "s", "by how much later than the table's displacement it was", usual=(1e-5, 0.05))
+    delay_uncertainty: float = quantity(..., "s", "standard uncertainty of the delay", ge=0, usual=(1e-7, 1e-3))
 
     @model_validator(mode="after")
     def _covers_something(self) -> "LaserCurve":
@@ -49,13 +55,16 @@ class LaserCalibration(Parameters):
     """Both lasers calibrated against one motion. Standard uncertainties throughout."""
 
     date: AwareDatetime = quantity(..., "", "when it was measured")
-    valid_days: float = quantity(..., "d", "how long it is good for", gt=0)
+    valid_days: float = quantity(..., "d", "how long it is good for", gt=0, usual=(7.0, 1100.0))
     laser_1: LaserCurve
     laser_2: LaserCurve
     differential_scale: float = quantity(..., "1", "scale of laser 2 over that of laser 1, before the correction")
     differential_uncertainty: float = quantity(..., "1", "what the correction leaves open of it", ge=0)
     common_linearity: float = quantity(
-        ..., "m", "largest smooth error that both corrected lasers may share: that of the sensor they were held against"
+        ...,
+        "m",
+        "largest smooth error that both corrected lasers may share: that of the sensor they were held against",
+        usual=(1e-6, 1e-3),
     )
     table_displacement: float = quantity(..., "1", "true over shown displacement of the table", gt=0)
     table_acceleration: float = quantity(..., "1", "true over shown acceleration of the table", gt=0)

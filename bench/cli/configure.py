@@ -5,7 +5,8 @@ from typing import Annotated
 
 from cyclopts import App, Parameter
 
-from bench.cli.refusal import tell
+from bench.cli.refusal import tell, warn
+from sim.errors import InvalidInput
 
 
 def config_app() -> App:
@@ -19,29 +20,45 @@ def config_app() -> App:
 def init(
     file: Annotated[Path, Parameter(help="File to write.", metavar="FILE", negative=())] = Path("rockbench.toml"),
     /,
+    *,
+    minimal: Annotated[
+        bool, Parameter(negative=(), show_default=False, help="Only what to look at before the first run.")
+    ] = False,
+    hardware: Annotated[
+        bool,
+        Parameter(negative=(), show_default=False, help="A complete example of a bench with NI and optoNCDT devices."),
+    ] = False,
 ) -> int:
     """Write a configuration file with every key, its default, unit and limits.
 
     A file that exists is never overwritten.
     """
-    from bench.config.toml import write_commented
+    from bench.config.template import write_template
 
-    write_commented(file)
-    print(f"{file} written: every key with its default")
+    if minimal and hardware:
+        raise InvalidInput("--minimal", "--hardware", "give one of them")
+    write_template(file, "minimal" if minimal else "hardware" if hardware else "all")
+    what = (
+        "what to look at first" if minimal else "an example with devices" if hardware else "every key with its default"
+    )
+    print(f"{file} written: {what}")
     return 0
 
 
 def check(file: Annotated[Path, Parameter(help="File to check.", metavar="FILE", negative=())], /) -> int:
     """Check a configuration file and say all that is wrong with it, one line for each key.
 
-    The exit code is 0 when the file is good and 2 when it is not.
+    Values that are valid but unusual are warned of. The exit code is 0 when the file is good and 2 when it is not.
     """
-    from bench.config.toml import problems_of
+    from bench.config.review import review
+    from bench.config.toml import problems_of, read_configuration
 
     problems = problems_of(file)
     for problem in problems:
         tell(problem)
     if problems:
         return 2
+    for notice in review(read_configuration(file)).notices:
+        warn(notice)
     print(f"{file} is good")
     return 0

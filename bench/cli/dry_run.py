@@ -61,7 +61,7 @@ def _content(found: "Preflight") -> dict[str, Any]:
         "starts": [
             {"name": stage.name, "chance": stage.chance} for stage in found.forecast.stages if stage.chance is not None
         ],
-        "notes": list(found.forecast.notes),
+        "notes": list(found.notes),
         "duration_s": found.forecast.duration,
         "disk": None if room is None else {"needed_bytes": room.needed, "free_bytes": room.free},
         "plan_hash": found.plan_hash,
@@ -79,7 +79,7 @@ def _text(found: "Preflight") -> str:
         names, stated = zip(*chances, strict=True)
         table = aligned([["start", "", *names], ["chance", "", *(f"{chance:.0%}" for chance in stated)]])
         lines += ["", table, ""]
-    for note in found.forecast.notes:
+    for note in found.notes:
         lines += textwrap.wrap(note, WIDTH, subsequent_indent="    ")
     if found.forecast.duration is not None:
         lines.append(f"Expected duration: {clock(found.forecast.duration)}")

@@ -13,6 +13,7 @@ from cyclopts import App, Parameter
 
 from bench.cli.inputs import Seed, configuration_from
 from bench.cli.interrupt import SIGNALS
+from bench.cli.refusal import warn
 from sim.errors import InvalidInput
 from sim.extras import require
 
@@ -79,6 +80,12 @@ def emulate(
     if given.backend != "simulated":
         raise InvalidInput("backend", given.backend, "an emulated laboratory is made of a simulated bench")
     configuration = _at_rate(given, sample_rate)
+    from bench.config.review import review
+
+    reviewed = review(configuration)
+    reviewed.require()
+    for notice in reviewed.notices:
+        warn(notice)
     errors = None if clock_error is None else _ratios(clock_error)
     if write is not None and write.exists():
         raise InvalidInput("--write", str(write), "it exists and is never overwritten; name another")

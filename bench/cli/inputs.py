@@ -51,9 +51,11 @@ def configuration_from(file: Path | None, seed: str | None, specimen: Path | Non
 
     configuration = read_configuration(file) if file is not None else BenchConfiguration()
     if specimen is not None:
+        from bench.config.review import review
         from bench.config.specimen_file import read_specimen
 
         configuration = with_identified(configuration, read_specimen(specimen))
+        review(configuration).require()
     if seed is None:
         return configuration
     if configuration.backend != "simulated":

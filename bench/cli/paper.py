@@ -69,9 +69,10 @@ def paper(
     unless --overwrite is given.
     """
     from bench.cli.paper_inputs import named_records
-    from bench.cli.predict_inputs import specimen_from
+    from bench.cli.predict_inputs import specimen_from, warn_of_unusual
     from bench.cli.predict_records import records_from
     from bench.config.model import BenchConfiguration
+    from bench.prediction.requests import SpectrumRequest
     from bench.prediction.seismic import band_of
     from bench.publication.paper import PARTS, PaperRequest, paper_report
 
@@ -85,6 +86,7 @@ def paper(
         band=table_band,
         parts=only or PARTS,
     )
+    warn_of_unusual(SpectrumRequest(), request.specimen)
     document, named = paper_report(request)
     for number, statement in named:
         print(f"statement {number}: {statement.title}: {statement.verdict}")

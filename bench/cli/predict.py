@@ -70,7 +70,7 @@ def _command(prediction: Prediction) -> Callable[..., int]:
 
 
 def _perform(prediction: Prediction, arguments: dict[str, Any]) -> int:
-    from bench.cli.predict_inputs import known_from, request_from, specimen_from
+    from bench.cli.predict_inputs import known_from, request_from, specimen_from, warn_of_unusual
     from bench.cli.predict_output import carried_out, check_files
 
     options = ResultOptions(**taken(arguments, ResultOptions))
@@ -86,6 +86,7 @@ def _perform(prediction: Prediction, arguments: dict[str, Any]) -> int:
         if points > prediction.drawable:
             allowed = f"at most {prediction.drawable} points fit in this figure; ask for fewer"
             raise InvalidInput("--plot", f"{points} points", allowed)
+    warn_of_unusual(request, specimen)
     return carried_out(lambda: prediction.make(request, specimen, known), options)
 
 

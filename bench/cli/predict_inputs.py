@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from bench.cli.flags import flag, given
+from bench.cli.refusal import warn
 from bench.config.validation import dotted, validated
 from sim.errors import InvalidInput
 from sim.parameters import Parameters
@@ -43,6 +44,14 @@ def request_from(model: type[P], arguments: Mapping[str, Any]) -> P:
         return flag(str(path[0])) if path else dotted(path)
 
     return validated(model, wanted, named)
+
+
+def warn_of_unusual(request: Parameters, specimen: "Specimen") -> None:
+    """One line on standard error for each value that is valid but unusual."""
+    from bench.config.review import notices_of, specimen_notices
+
+    for notice in (*notices_of(request, specimen), *specimen_notices(specimen)):
+        warn(notice)
 
 
 def known_from(

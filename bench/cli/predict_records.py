@@ -83,7 +83,7 @@ def records_command(prediction: RecordsPrediction) -> Callable[..., int]:
 
 def _perform(prediction: RecordsPrediction, files: Sequence[str], arguments: dict[str, Any]) -> int:
     from bench.cli.inputs import configuration_from
-    from bench.cli.predict_inputs import known_from, request_from, specimen_from
+    from bench.cli.predict_inputs import known_from, request_from, specimen_from, warn_of_unusual
     from bench.cli.predict_output import carried_out, check_files
 
     options = ResultOptions(**taken(arguments, ResultOptions))
@@ -98,6 +98,7 @@ def _perform(prediction: RecordsPrediction, files: Sequence[str], arguments: dic
     if options.plot is not None and len(records) > prediction.drawable:
         allowed = f"at most {prediction.drawable} fit in this figure; give fewer"
         raise InvalidInput("--plot", f"{len(records)} records", allowed)
+    warn_of_unusual(request, specimen)
     return carried_out(lambda: prediction.make(request, specimen, known, records, configuration), options)
 
 

@@ -89,7 +89,7 @@ _JSON = _option(
 def _perform(file: str, arguments: dict[str, Any]) -> int:
     from bench.accelerograms.reference import RecordReference
     from bench.cli.inputs import configuration_from
-    from bench.cli.predict_inputs import request_from
+    from bench.cli.predict_inputs import request_from, warn_of_unusual
     from bench.cli.predict_output import check_files
     from bench.prediction.stroke_fits import stroke_fits
 
@@ -97,6 +97,7 @@ def _perform(file: str, arguments: dict[str, Any]) -> int:
     configuration = configuration_from(arguments.pop("config", None), None)
     request = request_from(StrokeFitRequest, arguments)
     check_files(ResultOptions(out=out, plot=plot))
+    warn_of_unusual(request, configuration.known_specimen)
     fits = stroke_fits(RecordReference.parse(file).read(), request, configuration)
     try:
         _write(fits, out, plot)

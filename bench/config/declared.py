@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 from annotated_types import Ge, Gt, Le, Lt, MaxLen, MinLen
 from pydantic.fields import FieldInfo
 
-from sim.parameters import Parameters, unit_of
+from sim.parameters import Parameters, example_of, unit_of, usual_of
 
 _BOUNDS: dict[type, tuple[str, str]] = {
     Gt: ("gt", "above"),
@@ -43,6 +43,10 @@ class Declared:
     description: str
     constraints: tuple[object, ...]
     lengths: tuple[object, ...]
+    usual: tuple[float, float] | None
+    """Lowest and highest magnitude that call for no notice, see `sim.parameters.usual_of`."""
+    example: Any
+    """What a person may give where the default is absence, see `sim.parameters.example_of`."""
 
     @property
     def group(self) -> type[Parameters] | None:
@@ -156,4 +160,6 @@ def _declared(name: str, field: FieldInfo) -> Declared:
         description=field.description or "",
         constraints=tuple(item for item in metadata if type(item) in _BOUNDS),
         lengths=tuple(item for item in metadata if isinstance(item, MinLen | MaxLen)),
+        usual=usual_of(field) if kind in (int, float) else None,
+        example=example_of(field),
     )

@@ -60,13 +60,19 @@ class BenchConfiguration(Parameters):
     specimen: Specimen = Specimen()
     uncertainty: SpecimenUncertainty = SpecimenUncertainty()
     specimen_file: str | None = quantity(
-        None, "", "JSON file of what has been identified of the specimen, read beside this file; absent: nothing has"
+        None,
+        "",
+        "JSON file of what has been identified of the specimen, read beside this file; absent: nothing has",
+        example="specimen.json",
     )
     identified: Identified | None = quantity(
         None, "", "what has been identified of the specimen, in place of a specimen_file; goes before what is assumed"
     )
     laser_calibration: str | None = quantity(
-        None, "", "JSON file of a calibration of the lasers, read beside this file; absent: their data sheets hold"
+        None,
+        "",
+        "JSON file of a calibration of the lasers, read beside this file; absent: their data sheets hold",
+        example="laser_calibration.json",
     )
     calibrated: LaserCalibration | None = quantity(
         None, "", "a calibration of the lasers, in place of a laser_calibration file"
@@ -75,6 +81,7 @@ class BenchConfiguration(Parameters):
         None,
         "",
         "JSON file of an identified table, from which the drive is predicted; absent: from the simulated shaker",
+        example="table_model.json",
     )
     limits: Limits = Limits()
     ramps: Ramps = Ramps()

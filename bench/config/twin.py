@@ -10,6 +10,7 @@ class Twin(Parameters):
         None,
         "",
         "whether the model runs beside every test; absent: where time is real, in virtual time it doubles the cost",
+        example=True,
     )
     members: int = quantity(
         39,
@@ -26,6 +27,8 @@ class Twin(Parameters):
         "by how much later than the table's sensors the lasers show a motion; absent: what their settings come to",
         ge=-0.02,
         le=0.02,
+        usual=(1e-4, 0.015),
+        example=0.001,
     )
     residual_warn: float | None = quantity(
         0.15,
@@ -35,6 +38,6 @@ class Twin(Parameters):
         gt=0,
     )
     residual_stop: float | None = quantity(
-        None, "1", "the same that ends the run along the smooth ramp; absent: never", gt=0
+        None, "1", "the same that ends the run along the smooth ramp; absent: never", gt=0, example=0.5
     )
     persistence: float = quantity(2.0, "s", "how long a residual must stay above a limit before it counts", ge=0, le=60)

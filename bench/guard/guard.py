@@ -11,13 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.guard.health import SensorWatch
-from bench.guard.limits import Limits, Ramps
+from bench.guard.limits import Limits, Ramps, ramp_refusal
 from bench.guard.quantities import Mover
 from bench.guard.timing import TimeWatch
 from bench.guard.violation import Violation
 from bench.guard.watch import MotionWatch
 from drivers.rig import Block, Rig, RigError
-from sim.errors import InvalidInput
 
 
 @dataclass(frozen=True)
@@ -60,10 +59,8 @@ class Guard:
         self._ramp_from = 1.0
         self._slew = limits.drive_slew / rig.sample_rate
         self._expected = 0
-        steepest = 0.5 * np.pi * limits.drive_voltage / min(ramps.stop, ramps.abort)
-        if steepest > limits.drive_slew:
-            needs = f"a ramp from {limits.drive_voltage:g} V needs {steepest:.0f} V/s, limits.drive_slew allows less"
-            raise InvalidInput("ramps.abort", min(ramps.stop, ramps.abort), needs)
+        if (refused := ramp_refusal(limits, ramps)) is not None:
+            raise refused
 
     @property
     def ramping(self) -> bool:

@@ -1,11 +1,19 @@
 """What the table, the shaker and the specimen may do at most, and what is expected of the sensors."""
 
+from math import pi
+from typing import Literal
+
 from pydantic import model_validator
 
+from sim.errors import InvalidInput
 from sim.parameters import Parameters, quantity
 
 _SHARE = "share of the limit from which the operator is warned"
 _PERSISTENCE = "how long the limit must be exceeded before it counts"
+
+
+DEBOUNCE = (1e-3, 0.05)
+"""Usual debounce of a limit [s]: above single spikes, below the time from a limit to the end of the stroke."""
 
 
 class Warnings(Parameters):
@@ -24,14 +32,30 @@ class Warnings(Parameters):
 class Debounce(Parameters):
     """How long a measured limit must be exceeded before it counts: single spikes are noise."""
 
-    displacement: float = quantity(0.003, "s", f"displacement of the table: {_PERSISTENCE}", ge=0)
-    velocity: float = quantity(0.003, "s", f"velocity of the table: {_PERSISTENCE}", ge=0)
-    acceleration: float = quantity(0.003, "s", f"acceleration of the table: {_PERSISTENCE}", ge=0)
-    force: float = quantity(0.003, "s", f"force on the table: {_PERSISTENCE}", ge=0)
-    current: float = quantity(0.01, "s", f"current of the coil: {_PERSISTENCE}", ge=0)
-    heating: float = quantity(0.0, "s", f"heating of the coil: {_PERSISTENCE}", ge=0)
-    laser_range: float = quantity(0.01, "s", f"place in the laser's range: {_PERSISTENCE}", ge=0)
-    drift: float = quantity(0.01, "s", f"drift of the specimen: {_PERSISTENCE}", ge=0)
+    displacement: float = quantity(0.003, "s", f"displacement of the table: {_PERSISTENCE}", ge=0, le=1, usual=DEBOUNCE)
+    velocity: float = quantity(0.003, "s", f"velocity of the table: {_PERSISTENCE}", ge=0, le=1, usual=DEBOUNCE)
+    acceleration: float = quantity(0.003, "s", f"acceleration of the table: {_PERSISTENCE}", ge=0, le=1, usual=DEBOUNCE)
+    force: float = quantity(0.003, "s", f"force on the table: {_PERSISTENCE}", ge=0, le=1, usual=DEBOUNCE)
+    current: float = quantity(0.01, "s", f"current of the coil: {_PERSISTENCE}", ge=0, le=1, usual=DEBOUNCE)
+    heating: float = quantity(0.0, "s", f"heating of the coil: {_PERSISTENCE}", ge=0, le=60, usual=(1e-3, 5.0))
+    laser_range: float = quantity(0.01, "s", f"place in the laser's range: {_PERSISTENCE}", ge=0, le=1, usual=DEBOUNCE)
+    drift: float = quantity(0.01, "s", f"drift of the specimen: {_PERSISTENCE}", ge=0, le=1, usual=DEBOUNCE)
+
+
+Confirmable = Literal[
+    "drive_voltage",
+    "drive_slew",
+    "displacement",
+    "velocity",
+    "acceleration",
+    "force",
+    "current",
+    "heating",
+    "laser_range",
+    "drift",
+    "late",
+]
+"""Limits that can be too wide to trip on a given bench."""
 
 
 class Limits(Parameters):
@@ -48,11 +72,18 @@ class Limits(Parameters):
     heating_time: float = quantity(60.0, "s", "time constant of the coil's temperature", gt=0)
     laser_range: float = quantity(0.99, "1", "share of half its range that a storey may leave the laser's middle", gt=0)
     drift: float = quantity(0.080, "m", "largest drift of the specimen from rest", gt=0)
-    sensor_loss: float = quantity(0.5, "s", "how long a sensor may give no valid sample before the run aborts", gt=0)
-    stuck: float = quantity(1.0, "s", "how long a sensor may show the same count while the table is driven", gt=0)
-    late: float = quantity(0.5, "s", "how much later than due a block of samples may come", gt=0)
+    sensor_loss: float = quantity(
+        0.5, "s", "how long a sensor may give no valid sample before the run aborts", gt=0, le=60
+    )
+    stuck: float = quantity(
+        1.0, "s", "how long a sensor may show the same count while the table is driven", gt=0, le=60
+    )
+    late: float = quantity(0.5, "s", "how much later than due a block of samples may come", gt=0, le=60)
     clock: float = quantity(
-        1.0e-3, "1", "largest relative difference between the sample clock and the computer's clock", gt=0
+        1.0e-3, "1", "largest relative difference between the sample clock and the computer's clock", gt=0, le=0.1
+    )
+    confirmed: tuple[Confirmable, ...] = quantity(
+        (), "", "limits that are meant to lie beyond what this bench can show, by their keys: every run says so"
     )
     warning: Warnings = Warnings()
     debounce: Debounce = Debounce()
@@ -69,3 +100,13 @@ class Ramps(Parameters):
         if self.abort > self.stop:
             raise ValueError("abort must not be longer than stop")
         return self
+
+
+def ramp_refusal(limits: Limits, ramps: Ramps) -> InvalidInput | None:
+    """Why the output could not be brought to zero in time from its limit, or None: half a cosine has its own slew."""
+    shortest = min(ramps.stop, ramps.abort)
+    steepest = 0.5 * pi * limits.drive_voltage / shortest
+    if steepest <= limits.drive_slew:
+        return None
+    needs = f"a ramp from {limits.drive_voltage:g} V needs {steepest:.0f} V/s, limits.drive_slew allows less"
+    return InvalidInput("ramps.abort", shortest, needs)

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field, field_validator
 
 from bench.config.numbers import spaced
-from sim.parameters import Parameters, each_once, quantity
+from sim.parameters import COUPLING, Parameters, each_once, quantity
 
 Frequency = Annotated[float, Field(gt=0, le=1000)]
 Stiffness = Annotated[float, Field(ge=0, le=1000)]
@@ -23,6 +23,7 @@ class ModesRequest(Parameters):
         "1",
         "stiffness ratios k_C/k1 of the coupling spring: values, or start:stop:count",
         min_length=1,
+        usual=COUPLING,
     )
 
     _each_once = field_validator("beta")(each_once)
@@ -42,6 +43,7 @@ class SineRequest(Parameters):
         "1",
         "stiffness ratios k_C/k1 of the coupling spring: values, or start:stop:count",
         min_length=1,
+        usual=COUPLING,
     )
     amplitude_factor: float = quantity(
         1.01, "1", "amplitude of the base acceleration over the uplift acceleration g/lambda", gt=0, le=1000
@@ -102,6 +104,7 @@ class MapRequest(GainRequest):
         "1",
         "stiffness ratios k_C/k1 of the coupling spring: values, or start:stop:count",
         min_length=2,
+        usual=COUPLING,
     )
     outcomes: bool = quantity(
         False, "", "also start every point at rest with the sine switched on, and say what it comes to (3 ms a point)"
@@ -124,7 +127,11 @@ class HistoryRequest(SineRequest):
         min_length=1,
     )
     beta: tuple[Stiffness, ...] = quantity(
-        (0.40,), "1", "stiffness ratios k_C/k1 of the coupling spring: values, or start:stop:count", min_length=1
+        (0.40,),
+        "1",
+        "stiffness ratios k_C/k1 of the coupling spring: values, or start:stop:count",
+        min_length=1,
+        usual=COUPLING,
     )
     duration: float = quantity(12.0, "s", "length of a history that starts from rest", gt=0, le=3600)
     steady: bool = quantity(False, "", "show the steady motions instead of a start from rest")
@@ -160,6 +167,7 @@ class SeismicRequest(RecordsRequest):
         "1",
         "stiffness ratios k_C/k1 of the coupling spring: values, or start:stop:count",
         min_length=1,
+        usual=COUPLING,
     )
     stroke_fit: Literal["none", "least-change", "high-pass"] = quantity(
         "none", "", "how the scaled motions are made to fit the configured bench's stroke"
@@ -189,6 +197,7 @@ class BandStudyRequest(RecordsRequest):
         "1",
         "stiffness ratios k_C/k1 of the coupling spring: values, or start:stop:count",
         min_length=1,
+        usual=COUPLING,
     )
 
     _each_once = field_validator("corner", "beta")(each_once)

@@ -1,12 +1,13 @@
 """A run before it runs: its forecast, the margin to every limit, room on the disk, and the hash of it all."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Protocol
 
 from bench.config.model import BenchConfiguration
+from bench.config.review import Review, notices_of, review, scales_of
 from bench.preflight.bounds import bounds
 from bench.preflight.disk import Room, room
 from bench.preflight.fingerprint import plan_hash
@@ -36,7 +37,8 @@ class Asked(Protocol):
 @dataclass(frozen=True)
 class Preflight:
     """What was found. `margins` are tightest first; `room` is None where the run's duration is not known; `sensors` is
-    what is to be said of their calibration.
+    what is to be said of their calibration; `reviewed` are the cross-checks of configuration and parameters, and
+    `scales` the frequencies in both units.
     """
 
     forecast: Forecast
@@ -44,16 +46,26 @@ class Preflight:
     room: Room | None
     plan_hash: str
     sensors: tuple[str, ...] = ()
+    reviewed: Review = field(default_factory=lambda: Review((), ()))
+    scales: tuple[str, ...] = ()
 
     @property
     def refusal(self) -> InvalidInput | None:
-        """Why the run is refused: the limit that binds, else the disk; None when it may run."""
-        return refusal(self.margins) or (self.room.refusal() if self.room else None)
+        """Why the run is refused: a contradiction of the configuration, the limit that binds, else the disk; None when
+        it may run.
+        """
+        contradiction = next(iter(self.reviewed.refusals), None)
+        return contradiction or refusal(self.margins) or (self.room.refusal() if self.room else None)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was made of the input."""
+        return (*self.scales, *self.forecast.notes)
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """What the operator should know although the run may begin."""
-        return (*self.sensors, *self.forecast.warnings, *warnings(self.margins))
+        return (*self.sensors, *self.reviewed.notices, *self.forecast.warnings, *warnings(self.margins))
 
     @property
     def tables(self) -> Mapping[str, Table]:
@@ -77,6 +89,7 @@ def compile_run(experiment: Asked, configuration: BenchConfiguration, folder: Pa
     Raises InvalidInput only for what cannot be planned at all: a refusal is part of the answer.
     """
     forecast = experiment.preflight(configuration) if isinstance(experiment, Forecasting) else Forecast()
+    found, specimen = review(configuration), configuration.known_specimen
     return Preflight(
         forecast=forecast,
         margins=margins(forecast.demands, bounds(configuration)),
@@ -85,6 +98,8 @@ def compile_run(experiment: Asked, configuration: BenchConfiguration, folder: Pa
             experiment.name, experiment.parameters, configuration, software()["rocking-bench"], forecast
         ),
         sensors=_aged(configuration),
+        reviewed=Review(found.refusals, (*found.notices, *notices_of(experiment.parameters, specimen))),
+        scales=scales_of(experiment.parameters, specimen),
     )
 
 

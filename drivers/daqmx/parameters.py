@@ -15,7 +15,7 @@ class AnalogInput(Parameters):
 
     terminal: str = quantity("Dev1/ai0", "", "physical channel of the input")
     wiring: Wiring = quantity("default", "", "terminal configuration of the input")
-    range: float = quantity(10.0, "V", "largest magnitude at the input", gt=0, le=60)
+    range: float = quantity(10.0, "V", "largest magnitude at the input", gt=0, le=60, usual=(1.0, 60.0))
 
 
 class SafetyInput(Parameters):
@@ -54,6 +54,8 @@ class AmplifierReady(SafetyInput):
         " absent: it is good before",
         gt=0,
         le=10,
+        usual=(0.02, 5.0),
+        example=1.0,
     )
 
 
@@ -68,24 +70,37 @@ class Daq(Parameters):
     """The DAQ device: where its driver runs, the drive output, the enable line, the safety inputs."""
 
     server: str | None = quantity(
-        None, "", "host:port of the gRPC device server on the controller; absent: the NI-DAQmx driver of this PC"
+        None,
+        "",
+        "host:port of the gRPC device server on the controller; absent: the NI-DAQmx driver of this PC",
+        example="crio.local:31763",
     )
     output: str = quantity("Dev1/ao0", "", "physical channel of the drive output")
-    output_range: float = quantity(10.0, "V", "largest magnitude of the drive output", gt=0, le=10)
+    output_range: float = quantity(10.0, "V", "largest magnitude of the drive output", gt=0, le=10, usual=(1.0, 10.0))
     enable_line: str | None = quantity(
         "Dev1/port0/line0", "", "digital line of the amplifier's enable relay; absent when there is none"
     )
     start_trigger: str | None = quantity(
-        None, "", "terminal of the inputs' start trigger; absent: as the input task says itself"
+        None,
+        "",
+        "terminal of the inputs' start trigger; absent: as the input task says itself",
+        example="/Dev1/ai/StartTrigger",
     )
     clock: str | None = quantity(
         None,
         "",
         "terminal of the output's sample clock; absent: that of the inputs, as the input task says itself;"
         " OnboardClock: one of its own, which only starts with the inputs",
+        example="OnboardClock",
     )
     watchdog: float | None = quantity(
-        None, "s", "time-out of the device's watchdog on the enable line; absent when it has none", ge=0.1, le=30
+        None,
+        "s",
+        "time-out of the device's watchdog on the enable line; absent when it has none",
+        ge=0.1,
+        le=30,
+        usual=(0.2, 5.0),
+        example=1.0,
     )
     emergency_stop: EmergencyStop | None = quantity(None, "", "emergency stop; absent when it is not wired")
     over_travel: OverTravel | None = quantity(None, "", "over-travel switches; absent when they are not wired")

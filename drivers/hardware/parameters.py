@@ -9,35 +9,50 @@ from sim.errors import InvalidInput
 from sim.parameters import Parameters, quantity
 
 
-class TableDisplacement(AnalogInput):
+class CalibratedInput(AnalogInput):
+    """An input with a linear calibration."""
+
+    sensitivity: float
+    zero: float
+
+    @model_validator(mode="after")
+    def _a_calibration_that_tells_something(self) -> "CalibratedInput":
+        if self.sensitivity == 0.0:
+            raise InvalidInput("sensitivity", self.sensitivity, "it divides the voltage: volts per unit, never 0")
+        if abs(self.zero) >= self.range:
+            raise InvalidInput("zero", self.zero, f"it must lie within the input's range of {self.range:g} V")
+        return self
+
+
+class TableDisplacement(CalibratedInput):
     """Input of the displacement transducer between table and ground."""
 
     sensitivity: float = quantity(100.0, "V/m", "volts per metre as calibrated; its sign is the polarity")
-    zero: float = quantity(0.0, "V", "voltage at mid stroke")
+    zero: float = quantity(0.0, "V", "voltage at mid stroke", usual=(1e-3, 2.0))
 
 
-class TableAcceleration(AnalogInput):
+class TableAcceleration(CalibratedInput):
     """Input of the table's accelerometer."""
 
     terminal: str = quantity("Dev1/ai1", "", "physical channel of the input")
     sensitivity: float = quantity(1.0, "V s2/m", "volts per m/s2 as calibrated; its sign is the polarity")
-    zero: float = quantity(0.0, "V", "voltage at rest")
+    zero: float = quantity(0.0, "V", "voltage at rest", usual=(1e-3, 2.0))
 
 
-class TableForce(AnalogInput):
+class TableForce(CalibratedInput):
     """Input of a load cell between armature and table."""
 
     terminal: str = quantity("Dev1/ai4", "", "physical channel of the input")
     sensitivity: float = quantity(0.01, "V/N", "volts per newton as calibrated; its sign is the polarity")
-    zero: float = quantity(0.0, "V", "voltage without force")
+    zero: float = quantity(0.0, "V", "voltage without force", usual=(1e-3, 2.0))
 
 
-class CoilCurrent(AnalogInput):
+class CoilCurrent(CalibratedInput):
     """Input of the amplifier's current monitor."""
 
     terminal: str = quantity("Dev1/ai5", "", "physical channel of the input")
     sensitivity: float = quantity(0.2, "V/A", "volts per ampere as calibrated; its sign is the polarity")
-    zero: float = quantity(0.0, "V", "voltage without current")
+    zero: float = quantity(0.0, "V", "voltage without current", usual=(1e-3, 2.0))
 
 
 Transducer = TableDisplacement | TableAcceleration | TableForce | CoilCurrent
@@ -54,7 +69,12 @@ class Lasers(Parameters):
     )
     rate: float = quantity(4000.0, "1/s", "measurements per second of each laser", gt=0, le=8000)
     delay: float = quantity(
-        0.0, "s", "by how much later the laser values are placed; `rockbench check` measures it", ge=-0.1, le=0.1
+        0.0,
+        "s",
+        "by how much later the laser values are placed; `rockbench check` measures it",
+        ge=-0.1,
+        le=0.1,
+        usual=(1e-4, 0.05),
     )
     listening: float = quantity(
         10.0, "s", "how long the lasers are listened to before the first run: their clocks are known then", ge=1, le=120
@@ -65,8 +85,12 @@ class Lasers(Parameters):
 class LaserInput(AnalogInput):
     """A laser on a storey; terminal, wiring and range are for its analogue output."""
 
-    port: str | None = quantity(None, "", "serial port, such as COM5 or /dev/ttyUSB0; needed when it is read serially")
-    baud: int | None = quantity(None, "1/s", "baud rate; absent: it is searched for", ge=9600, le=1_000_000)
+    port: str | None = quantity(
+        None, "", "serial port, such as COM5 or /dev/ttyUSB0; needed when it is read serially", example="COM5"
+    )
+    baud: int | None = quantity(
+        None, "1/s", "baud rate; absent: it is searched for", ge=9600, le=1_000_000, example=921600
+    )
     measuring_range: float = quantity(0.200, "m", "measuring range; checked with the sensor when read serially", gt=0)
     polarity: Literal[1, -1] = quantity(1, "", "1 when the distance grows with the displacement of the storey")
 
@@ -81,6 +105,9 @@ class Laser2(LaserInput):
     """The laser on the second storey; terminal, wiring and range are for its analogue output."""
 
     terminal: str = quantity("Dev1/ai3", "", "physical channel of the input")
+    port: str | None = quantity(
+        None, "", "serial port, such as COM6 or /dev/ttyUSB1; needed when it is read serially", example="COM6"
+    )
 
 
 class Hardware(Parameters):
@@ -91,9 +118,16 @@ class Hardware(Parameters):
     band_low: float = quantity(1.0, "Hz", "lower end of the table's usable band", gt=0)
     band_high: float = quantity(100.0, "Hz", "upper end of the table's usable band", gt=0)
     moving_mass: float | None = quantity(
-        None, "kg", "armature, table and fixtures, to estimate force and current; absent: they are not estimated", gt=0
+        None,
+        "kg",
+        "armature, table and fixtures, to estimate force and current; absent: they are not estimated",
+        gt=0,
+        usual=(2.0, 500.0),
+        example=50.0,
     )
-    force_constant: float | None = quantity(None, "N/A", "of the coil, to estimate its current", gt=0)
+    force_constant: float | None = quantity(
+        None, "N/A", "of the coil, to estimate its current", gt=0, usual=(5.0, 200.0), example=50.0
+    )
     hands: str | None = quantity(
         None, "", "host:port that is told of the operator's work; only an emulated bench has one"
     )

@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import Field, field_validator
 
-from sim.parameters import Parameters, each_once, quantity
+from sim.parameters import COUPLING, Parameters, each_once, quantity
 
 Stiffness = Annotated[float, Field(gt=0, le=100)]
 
@@ -19,7 +19,7 @@ class EarthquakeParameters(Parameters):
         "absent: the seven synthetic ones",
     )
     beta: tuple[Stiffness, ...] = quantity(
-        (0.25, 0.64, 0.97), "1", "stiffness ratios k_C/k1 of the coupling springs", min_length=1
+        (0.25, 0.64, 0.97), "1", "stiffness ratios k_C/k1 of the coupling springs", min_length=1, usual=COUPLING
     )
 
     _each_once = field_validator("beta")(each_once)

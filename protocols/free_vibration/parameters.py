@@ -19,7 +19,12 @@ class DecayParameters(Parameters):
         le=1,
     )
     pulse: float | None = quantity(
-        None, "s", "length of the pulse; absent: one over the geometric mean of the frame's frequencies", gt=0, le=10
+        None,
+        "s",
+        "length of the pulse; absent: one over the geometric mean of the frame's frequencies",
+        gt=0,
+        le=10,
+        usual=(0.02, 3.0),
     )
     window: float | None = quantity(
         None,

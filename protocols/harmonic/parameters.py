@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import Field, field_validator
 
-from sim.parameters import Parameters, each_once, quantity
+from sim.parameters import COUPLING, Parameters, each_once, quantity
 
 Frequency = Annotated[float, Field(gt=0, le=40)]
 Stiffness = Annotated[float, Field(gt=0, le=100)]
@@ -17,7 +17,7 @@ class HarmonicParameters(Parameters):
         (12.5, 15.0, 17.5, 20.0), "rad/s", "circular frequencies of the base motion", min_length=1
     )
     beta: tuple[Stiffness, ...] = quantity(
-        (0.25, 0.64, 0.97), "1", "stiffness ratios k_C/k1 of the coupling springs", min_length=1
+        (0.25, 0.64, 0.97), "1", "stiffness ratios k_C/k1 of the coupling springs", min_length=1, usual=COUPLING
     )
 
     _each_once = field_validator("omega", "beta")(each_once)

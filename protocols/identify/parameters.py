@@ -3,20 +3,33 @@
 from pydantic import model_validator
 
 from sim.errors import InvalidInput
-from sim.parameters import Parameters, quantity
+from sim.parameters import COUPLING, Parameters, quantity
 
 
 class IdentifyParameters(Parameters):
     """Random-phase multisines at low level, with the specimen mounted; several realisations of several periods each."""
 
     beta: float | None = quantity(
-        None, "1", "stiffness ratio of the spring that couples the block; absent: bare frame, no block", gt=0, le=100
+        None,
+        "1",
+        "stiffness ratio of the spring that couples the block; absent: bare frame, no block",
+        gt=0,
+        le=100,
+        usual=COUPLING,
     )
     band_low: float | None = quantity(
-        None, "Hz", "lower end of the band; absent: half that of the table's band, as a replication needs it", gt=0
+        None,
+        "Hz",
+        "lower end of the band; absent: half that of the table's band, as a replication needs it",
+        gt=0,
+        usual=(0.1, 3.0),
     )
     band_high: float | None = quantity(
-        None, "Hz", "upper end of the band; absent: twice that of the table's band, as a replication needs it", gt=0
+        None,
+        "Hz",
+        "upper end of the band; absent: twice that of the table's band, as a replication needs it",
+        gt=0,
+        usual=(5.0, 100.0),
     )
     corner: float = quantity(
         1.0, "Hz", "the motion is flat in displacement below this frequency, in acceleration above", gt=0, le=50

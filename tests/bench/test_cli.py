@@ -142,7 +142,7 @@ def test_help_and_version_are_an_end_in_themselves(capsys: pytest.CaptureFixture
         ("--omega 0", "--omega = 0.0 is refused: it must be a number above 0 and at most 40 rad/s"),
         ("--omega 12 x", "--omega = 'x' is refused"),
         ("--omega", "--omega = [] is refused: it must be one or more numbers"),
-        ("--omega inf", "--omega = inf is refused"),
+        ("--omega inf", "--omega = 'inf' is refused: it must be a number above 0"),
         ("--beta -1", "--beta = -1.0 is refused"),
         ("--starts 1.5", "--starts = '1.5' is refused: it must be a whole number"),
         ("--starts 1 --starts 2", "--starts"),

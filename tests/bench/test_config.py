@@ -1,13 +1,18 @@
 import re
+import tomllib
 from collections.abc import Callable
+from functools import reduce
 from pathlib import Path
 
 import pytest
 
+from bench.cli.main import main
 from bench.config.declared import at, keys
 from bench.config.dump import as_toml
 from bench.config.model import BenchConfiguration
-from bench.config.toml import problems_of, read_configuration, write_commented
+from bench.config.review import review
+from bench.config.template import Kind, write_template
+from bench.config.toml import problems_of, read_configuration
 from bench.config.validation import problems, validated
 from drivers.hardware.parameters import Daq, Hardware, Laser1, Laser2, Lasers, TableForce
 from protocols.harmonic.parameters import HarmonicParameters
@@ -37,38 +42,75 @@ def refusal(path: Path) -> str:
 
 def test_a_written_file_reads_back_as_the_defaults(tmp_path: Path):
     path = tmp_path / "rockbench.toml"
-    write_commented(path)
+    write_template(path)
     assert read_configuration(path) == BenchConfiguration()
 
 
 def test_a_written_file_holds_every_key_with_unit_and_limits_above_it(tmp_path: Path):
     path = tmp_path / "rockbench.toml"
-    write_commented(path)
+    write_template(path)
     lines = path.read_text(encoding="utf-8").splitlines()
-    names = [match[1] for line in lines if (match := re.match(r"#?(\w+) = ", line))]
-    assert sorted(names) == sorted(key.rpartition(".")[2] for key in keys(BenchConfiguration))
+    names = [match[1] for line in lines if (match := re.match(r"#? ?([\w.]+)(?: = |, which a run|, not to be)", line))]
+    assert sorted(name.rpartition(".")[2] for name in names) == sorted(
+        key.rpartition(".")[2] for key in keys(BenchConfiguration)
+    )
     above = lines[lines.index("k1 = 213.44") - 1]
     assert above == "# stiffness of the first storey [N/m]; a number above 0"
 
 
-def test_the_optional_table_can_be_uncommented(tmp_path: Path):
+def test_every_line_that_is_uncommented_by_itself_gives_its_key(tmp_path: Path):
     path = tmp_path / "rockbench.toml"
-    write_commented(path)
-    text = re.sub(r"(?m)^#(?=[\w\[])(?!.*<)", "", path.read_text(encoding="utf-8"))
-    path.write_text(text, encoding="utf-8")
-    assert read_configuration(path).simulation.specimen == Specimen()
+    write_template(path)
+    lines = path.read_text(encoding="utf-8").splitlines()
+    table, uncommented = "", 0
+    for place, line in enumerate(lines):
+        if line.startswith("["):
+            table = line.strip("[]")
+        if not line.startswith("#") or line.startswith("# "):
+            continue
+        key, _, value = line.removeprefix("#").partition(" = ")
+        data = tomllib.loads("\n".join([*lines[:place], line.removeprefix("#"), *lines[place + 1 :]]))
+        dotted = f"{table}.{key}" if table else key
+        configuration = validated(BenchConfiguration, data)
+        found = reduce(getattr, dotted.split("."), configuration)
+        assert (list(found) if isinstance(found, tuple) else found) == tomllib.loads(f"x = {value}")["x"], dotted
+        assert review(configuration) == review(BenchConfiguration()), dotted
+        uncommented += 1
+    assert uncommented > 50
+
+
+@pytest.mark.parametrize("kind", ["minimal", "hardware"])
+def test_shorter_files_to_begin_with_are_good_and_never_overwrite(
+    kind: Kind, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    path = tmp_path / "rockbench.toml"
+    assert main(["config", "init", str(path), f"--{kind}"]) == 0
+    written = path.read_text(encoding="utf-8")
+    assert main(["config", "check", str(path)]) == 0
+    assert capsys.readouterr().err == ""
+    configuration = read_configuration(path)
+    assert configuration.backend == ("hardware" if kind == "hardware" else "simulated")
+    if kind == "minimal":
+        assert configuration == BenchConfiguration()
+        assert len(written.splitlines()) < 70
+    else:
+        assert (configuration.hardware.laser_1.port, configuration.hardware.laser_2.port) == ("COM5", "COM6")
+        assert configuration.hardware.daq.watchdog == 1.0
+        assert "over-travel 2" not in configuration.hardware.daq.missing_inputs
+    assert main(["config", "init", str(path), f"--{kind}"]) == 2
+    assert path.read_text(encoding="utf-8") == written
 
 
 def test_a_file_is_never_overwritten(file: Callable[[str], Path]):
     path = file("# mine\n")
     with pytest.raises(InvalidInput, match="exists already"):
-        write_commented(path)
+        write_template(path)
     assert path.read_text(encoding="utf-8") == "# mine\n"
 
 
 def test_writing_below_a_file_is_refused_in_words(file: Callable[[str], Path]):
     with pytest.raises(InvalidInput, match="cannot be written"):
-        write_commented(file("") / "rockbench.toml")
+        write_template(file("") / "rockbench.toml")
 
 
 def test_values_in_a_file_replace_the_defaults(file: Callable[[str], Path]):

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy import signal
 
 from bench.config.model import BenchConfiguration, Simulation
+from bench.config.review import review
 from bench.control.table_model import TableModel
 from bench.engine.operator import Unattended
 from bench.engine.requests import Requests
@@ -112,10 +113,11 @@ def test_the_response_is_that_of_the_shakers_equations_within_its_uncertainty(id
 
 
 def test_the_level_is_reached_from_below_and_never_passed_by_much(identified: Identified) -> None:
-    out, _, _, events = identified
+    out, configuration, _, events = identified
     probes = [event.text for event in events if isinstance(event, StepStarted) and event.text.startswith("probe 1")]
     assert probes == ["probe 1: 0.02 V"]
-    assert not any(isinstance(event, Warned) for event in events)
+    # the damping of this specimen is unusual, and nothing else is warned of
+    assert [event.text for event in events if isinstance(event, Warned)] == list(review(configuration).notices)
     with open_record(out / FILE) as record:
         names, moved = record.blocks["run"], np.abs(record.values("table_acceleration"))
         starts = record.blocks["row"]
@@ -196,7 +198,7 @@ def test_a_table_that_does_not_answer_is_told_before_it_is_driven_harder(tmp_pat
     dead = bench(Shaker(gain=1e-4, voltage_limit=30.0))
     found = planned(SHORT, bench())
     assert found.level == SHORT.level
-    result, events = run(SHORT, dead.model_copy(update={"limits": Limits(drive_slew=1e9)}), tmp_path / "run")
+    result, events = run(SHORT, dead.model_copy(update={"limits": Limits(drive_slew=3e4)}), tmp_path / "run")
     assert result.status == "failed"
     assert "the table does not answer a drive of 0.2 V" in result.reason
     assert sum(isinstance(event, StepStarted) and "V" in event.text for event in events) == 2

@@ -37,7 +37,7 @@ def test_a_file_with_options(text: str, path: str | None, options: dict[str, obj
         ("a@dt=soon", "positive seconds"),
         ("a@dt=-1", "positive seconds"),
         ("a@unit=stone", "must be one of"),
-        ("@dt=1", "it must be FILE"),
+        ("@dt=0.01", "it must be FILE"),
         ("synthetic:nowhere", NAMES[0]),
         ("synthetic:", NAMES[0]),
         (f"synthetic:{NAMES[0]}:x", "whole number"),

@@ -1,0 +1,248 @@
+"""Cross-checks of a whole configuration: what its parts, each valid by itself, say of each other.
+
+`rockbench config check`, `--dry-run`, a run and the window all ask this one function, so that they answer alike.
+A limit that nothing on the bench could show never trips: it is refused unless `limits.confirmed` names it, and every
+run says so then.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import sqrt, tau
+
+from bench.config.model import BenchConfiguration
+from bench.config.usual import in_hertz, off_resonance, unusual
+from bench.guard.limits import ramp_refusal
+from sim.errors import InvalidInput
+from sim.parameters import Parameters
+from sim.specimen import Specimen
+
+_ESTIMATE = 2.0
+"""An estimated force or current may be limited up to so many times what the accelerometer's range comes to: such a
+limit is a last resort, one beyond it a slip."""
+_LEAST_ERROR = 1e-7
+"""A triangulation laser that is true to less [m] over its range does not exist: the optoNCDT 1420 resolves 8 um."""
+_SPRING_OFF = 2.0
+"""A measured spring further than this factor from its label is unusual."""
+
+
+@dataclass(frozen=True)
+class Review:
+    """What was found: `refusals`, each naming key, value and remedy, and `notices` of what is merely unusual."""
+
+    refusals: tuple[InvalidInput, ...]
+    notices: tuple[str, ...]
+
+    def require(self) -> None:
+        """Raise the first refusal."""
+        if self.refusals:
+            raise self.refusals[0]
+
+
+@dataclass(frozen=True)
+class _Reach:
+    """The largest value of a limited quantity that the bench can show, and what sets it."""
+
+    limit: str
+    most: float
+    unit: str
+    owner: str
+
+
+def review(configuration: BenchConfiguration) -> Review:
+    """All that can be said of a configuration without a protocol."""
+    confirmed, refusals, notices = configuration.limits.confirmed, list[InvalidInput](), list[str]()
+    for reach in _reaches(configuration):
+        value = float(getattr(configuration.limits, reach.limit))
+        if value <= reach.most:
+            continue
+        why = f"it could never trip: {reach.owner} ends at {reach.most:.4g} {reach.unit}".rstrip()
+        if reach.limit in confirmed:
+            notices.append(f"limits.{reach.limit} = {value:g}: {why}; limits.confirmed names it")
+        else:
+            remedy = f'{why}; lower it, or name it in limits.confirmed = ["{reach.limit}"]'
+            refusals.append(InvalidInput(f"limits.{reach.limit}", value, remedy))
+    refusals += _contradictions(configuration)
+    notices += _unusual(configuration)
+    return Review(tuple(refusals), tuple(notices))
+
+
+def notices_of(parameters: Parameters, specimen: Specimen) -> tuple[str, ...]:
+    """Notices of what a protocol or a prediction is asked for, with this specimen on the table."""
+    found = (*unusual(parameters), *off_resonance(parameters, specimen.frame.natural_frequencies))
+    # one notice for each value: the one that names the modes says more
+    return tuple({notice.partition(" lies ")[0]: notice for notice in found}.values())
+
+
+def scales_of(parameters: Parameters, specimen: Specimen) -> tuple[str, ...]:
+    """Circular frequencies that are asked for in Hz too, beside the natural frequencies of the bare frame."""
+    lines = tuple(in_hertz(parameters))
+    if not lines:
+        return ()
+    modes = " and ".join(f"{mode:.4g} rad/s = {mode / tau:.4g} Hz" for mode in specimen.frame.natural_frequencies)
+    return (*lines, f"modes of the bare frame: {modes}")
+
+
+def specimen_notices(specimen: Specimen, prefix: str = "specimen.") -> Iterator[str]:
+    """Notices of what is assumed of a specimen."""
+    yield from unusual(specimen, prefix)
+    frame = specimen.frame
+    for number, dashpot in enumerate(frame.dashpots, 1):
+        if dashpot < 0.0:
+            ratios = f"{prefix}frame.xi1 = {frame.xi1:g}, xi2 = {frame.xi2:g}"
+            yield f"{ratios} make dashpot c{number} = {dashpot:.3g} N s/m: a negative one feeds energy in"
+    nominal = specimen.spring_k1 or frame.k1
+    for place, spring in enumerate(specimen.springs):
+        ratio = spring.k_c / (spring.label * nominal)
+        if not 1.0 / _SPRING_OFF <= ratio <= _SPRING_OFF:
+            item, promised = f"{prefix}springs[{place}].k_c = {spring.k_c:g} N/m", spring.label * nominal
+            yield f"{item} is {ratio:.3g} times what its label {spring.label:g} promises, {promised:.4g} N/m"
+
+
+def _reaches(configuration: BenchConfiguration) -> Iterator[_Reach]:
+    limits, rate = configuration.limits, configuration.sample_rate
+    bench = "simulation.bench" if configuration.backend == "simulated" else "hardware"
+    position, acceleration, output = _ranges(configuration)
+    yield _Reach("drive_voltage", *output)
+    step = f"a step between the limits of the drive (limits.drive_voltage = {limits.drive_voltage:g} V"
+    owner = f"{step}, {bench}.sample_rate = {rate:g} 1/s)"
+    yield _Reach("drive_slew", 2.0 * limits.drive_voltage * rate, "V/s", owner)
+    shaker = f"{bench}.shaker" if configuration.backend == "simulated" else bench
+    stroke = configuration.half_stroke, "m", f"the stroke ({shaker}.half_stroke)"
+    travel = min(stroke, position)
+    yield _Reach("displacement", *travel)
+    # Landau's inequality: |v|^2 <= 2 |x| |a| for a motion within them (E. Landau, Proc. London Math. Soc. 13, 1913)
+    owner = f"a motion within {travel[2]} and {acceleration[2]}"
+    yield _Reach("velocity", sqrt(2.0 * travel[0] * acceleration[0]), "m/s", owner)
+    yield _Reach("acceleration", *acceleration)
+    yield from _loads(configuration, acceleration[0])
+    yield _Reach("laser_range", 1.0, "", "the laser's range")
+    ranges = f"the range of the lasers ({bench}.laser_1.measuring_range and laser_2)"
+    yield _Reach("drift", 0.5 * sum(configuration.laser_ranges), "m", ranges)
+    if configuration.backend == "hardware":
+        yield _Reach("late", configuration.hardware.daq.buffer, "s", "the input buffer (hardware.daq.buffer)")
+
+
+def _loads(configuration: BenchConfiguration, acceleration: float) -> Iterator[_Reach]:
+    """Force and current: what the shaker can give, what a channel measures, or else the estimate from the motion."""
+    found: dict[str, _Reach] = {}
+    mover, hardware = configuration.mover, configuration.hardware
+    if configuration.backend == "simulated":
+        shaker, key = configuration.simulation.bench.shaker, "simulation.bench.shaker"
+        owner = f"what the shaker can give ({key}.bl times {key}.current_limit = {shaker.current_limit:g} A)"
+        found["force"] = _Reach("force", shaker.bl * shaker.current_limit, "N", owner)
+        owner = f"what the amplifier can give ({key}.current_limit)"
+        found["current"] = _Reach("current", shaker.current_limit, "A", owner)
+    else:
+        if mover is not None:
+            force = _ESTIMATE * mover.mass * acceleration
+            masses = f"hardware.moving_mass = {hardware.moving_mass:g} kg" if hardware.moving_mass else ""
+            owner = f"twice the estimate from the range of the accelerometer ({masses}, hardware.force_constant = "
+            owner += f"{mover.force_constant:g} N/A)"
+            found["force"] = _Reach("force", force, "N", owner)
+            found["current"] = _Reach("current", force / mover.force_constant, "A", owner)
+        for name, unit, sensor in (("force", "N", hardware.table_force), ("current", "A", hardware.coil_current)):
+            if sensor is not None:
+                key = "hardware.table_force" if name == "force" else "hardware.coil_current"
+                found[name] = _Reach(name, *_range_of(key, unit, sensor.range, sensor.sensitivity, sensor.zero))
+    yield from found.values()
+    if (current := found.get("current")) is not None:
+        yield _Reach("heating", current.most, "A", current.owner)
+
+
+_Range = tuple[float, str, str]
+"""Value, unit, and what sets it."""
+
+
+def _ranges(configuration: BenchConfiguration) -> tuple[_Range, _Range, _Range]:
+    """What displacement sensor and accelerometer show at most, and the range of the drive."""
+    if configuration.backend == "simulated":
+        bench, key = configuration.simulation.bench, "simulation.bench"
+        volts = bench.converter.range
+        return (
+            _range_of(f"{key}.displacement_sensor", "m", volts, bench.displacement_sensor.sensitivity),
+            _range_of(f"{key}.accelerometer", "m/s2", volts, bench.accelerometer.sensitivity),
+            (bench.shaker.drive_range, "V", f"the range of the drive ({key}.shaker.drive_range)"),
+        )
+    hardware = configuration.hardware
+    x, a = hardware.table_displacement, hardware.table_acceleration
+    return (
+        _range_of("hardware.table_displacement", "m", x.range, x.sensitivity, x.zero),
+        _range_of("hardware.table_acceleration", "m/s2", a.range, a.sensitivity, a.zero),
+        (hardware.daq.output_range, "V", "the range of the drive (hardware.daq.output_range)"),
+    )
+
+
+def _range_of(key: str, unit: str, volts: float, sensitivity: float, zero: float = 0.0) -> _Range:
+    owner = f"the range of {key} ({volts:g} V, sensitivity = {sensitivity:g} V/({unit}))"
+    return (volts + abs(zero)) / abs(sensitivity), unit, owner
+
+
+def _contradictions(configuration: BenchConfiguration) -> Iterator[InvalidInput]:
+    simulated = configuration.backend == "simulated"
+    if (refused := ramp_refusal(configuration.limits, configuration.ramps)) is not None:
+        yield refused
+    table = "simulation.bench.shaker" if simulated else "hardware"
+    low, high = configuration.table_band
+    if low >= high:
+        yield InvalidInput(f"{table}.band_low", low, f"it must be below band_high = {high:g} Hz")
+    if high > 0.5 * configuration.sample_rate:
+        half = f"half the sample rate, {0.5 * configuration.sample_rate:g} Hz"
+        yield InvalidInput(f"{table}.band_high", high, f"it must not be above {half}")
+    if simulated:
+        shaker, specimen = configuration.simulation.bench.shaker, configuration.known_specimen
+        mover = configuration.mover
+        needed = mover.mass * specimen.uplift_acceleration if mover is not None else 0.0
+        if needed > (most := shaker.bl * shaker.current_limit):
+            frame, block = specimen.frame, specimen.block
+            allowed = (
+                f"the uplift acceleration takes {needed:.4g} N, the shaker gives {most:.4g} N: are the masses in kg, "
+                f"the density in kg/m3 (m1 = {frame.m1:g}, m2 = {frame.m2:g}, specimen.block.rho = {block.rho:g}, "
+                f"simulation.bench.shaker.moving_mass = {shaker.moving_mass:g})?"
+            )
+            yield InvalidInput("specimen.frame.m1", specimen.frame.m1, allowed)
+
+
+def _unusual(configuration: BenchConfiguration) -> Iterator[str]:
+    """Notices of every part that the backend uses."""
+    unused = "hardware" if configuration.backend == "simulated" else "simulation"
+    for name in type(configuration).model_fields:
+        part = getattr(configuration, name)
+        if name == "specimen":
+            yield from specimen_notices(part)
+        elif isinstance(part, Parameters) and name != unused:
+            yield from unusual(part, f"{name}.")
+    true = configuration.simulation.specimen if configuration.backend == "simulated" else None
+    if true is not None:
+        own = set(unusual(true, "simulation.specimen."))
+        yield from (each for each in specimen_notices(true, "simulation.specimen.") if each not in own)
+    yield from _findings(configuration)
+    yield from _curves(configuration)
+
+
+def _findings(configuration: BenchConfiguration) -> Iterator[str]:
+    """Findings far from what is assumed, or with an uncertainty that none has."""
+    for place, finding in enumerate(configuration.identified.findings if configuration.identified else ()):
+        item = f"identified.findings[{place}] ({finding.name})"
+        relative = finding.standard_uncertainty / finding.value if finding.value else 0.0
+        if relative and not 2e-5 <= relative <= 0.5:
+            yield f"{item}: standard_uncertainty = {finding.standard_uncertainty:g} is {relative:.2g} of its value"
+        assumed = _assumed(configuration.specimen, finding.name)
+        if assumed and finding.value and not 0.2 <= finding.value / assumed <= 5.0:
+            ratio = finding.value / assumed
+            yield f"{item}: value = {finding.value:g} is {ratio:.3g} times what is assumed, {assumed:g}"
+
+
+def _curves(configuration: BenchConfiguration) -> Iterator[str]:
+    """Calibrations whose whole error is too small for a laser."""
+    if configuration.calibrated is not None:
+        for number, curve in enumerate(configuration.calibrated.lasers, 1):
+            largest = max(abs(each) for each in curve.error)
+            if largest < _LEAST_ERROR:
+                item = f"calibrated.laser_{number}.error"
+                yield f"{item}: its largest coefficient, {largest:g} m, lies below {_LEAST_ERROR:g} m"
+
+
+def _assumed(specimen: Specimen, name: str) -> float | None:
+    if name.startswith("k_c:"):
+        return float(name.removeprefix("k_c:")) * (specimen.spring_k1 or specimen.frame.k1)
+    return getattr(specimen.frame, name, None) or getattr(specimen.block, name, None)
