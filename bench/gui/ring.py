@@ -1,7 +1,5 @@
 """The last minute of traces in fixed memory, and what of it a plot of so many pixels needs."""
 
-from math import ceil
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -55,7 +53,8 @@ class Ring:
             return np.zeros(0), np.zeros((0, self._low.shape[1]), dtype=np.float32)
         first, length = self._end - self._size, seconds / buckets
         parts: NDArray[np.float64] = np.ceil(self._time[first : self._end] / length)
-        whole = int(np.searchsorted(parts, ceil((self.newest - seconds) / length)))
+        # counted back from the newest part: the time at which the window begins rounds to either side of a boundary
+        whole = int(np.searchsorted(parts, parts[-1] - buckets))
         starts = np.flatnonzero(np.concatenate(([True], parts[whole + 1 :] > parts[whole:-1])))
         kept = slice(first + whole, self._end)
         values = np.empty((2 * starts.size, self._low.shape[1]), dtype=np.float32)

@@ -77,6 +77,14 @@ def test_a_line_that_scrolls_does_not_flicker(sizes: list[int], seed: int) -> No
         seen = now
 
 
+def test_a_window_that_begins_on_a_boundary_has_no_part_more() -> None:
+    # 5.5 s - 0.7 s and its quotient with the length of a part round to different sides
+    ring = Ring(1)
+    ring.add(_block(3.9000000000000004, np.zeros((32, 1)), step=0.05))
+    time, drawn = ring.window(0.7, 7)
+    assert len(time) == len(drawn) == 2 * (7 + 1)
+
+
 def test_a_gap_breaks_the_line() -> None:
     ring = Ring(1)
     ring.add(_block(0.0, np.zeros((5, 1))))
