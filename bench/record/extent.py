@@ -4,18 +4,16 @@ from collections.abc import Mapping
 
 from bench.record import hdf5
 from bench.record.declared import part_of
-from bench.record.errors import UNREADABLE, RecordError
-
-_EVERY, _STRIDE = 2048, 64
-"""Of a long dataset each of the first chunks is looked up, and one in so many of the others: of the pieces in which
-HDF5 keeps their places, the smallest lie at the beginning."""
+from bench.record.errors import RecordError
 
 
 def intact_rows(stored: hdf5.Dataset, size: int) -> int:
     """Rows before the first chunk that is not wholly in the first `size` bytes of the file, or whose place is lost."""
     length, chunk = stored.shape[0], (stored.chunks or (1,))[0]
+    places = hdf5.places_of_chunks(stored)
     for start in range(0, length, chunk):
-        if not _is_within(stored, start, size):
+        place = places.get(start)
+        if place is None or place[0] + place[1] > size:
             return start
     return length
 
@@ -38,11 +36,7 @@ def check_whole(entry: hdf5.Group, counted: Mapping[str, int], size: int) -> Non
         for name in stored.attrs:
             _ = stored.attrs[name]
         if hdf5.grows(stored):
-            rows = min(counted[part_of(stored.name)], stored.shape[0])
-            chunk = (stored.chunks or (1,))[0]
-            chunks = -(-rows // chunk)
-            some = {*range(min(chunks, _EVERY)), *range(_EVERY, chunks, _STRIDE), *range(max(chunks - 1, 0), chunks)}
-            whole = all(_is_within(stored, number * chunk, size) for number in some)
+            whole = intact_rows(stored, size) >= min(counted[part_of(stored.name)], stored.shape[0])
         else:
             whole = is_within(stored, size)
         if not whole:
@@ -57,11 +51,3 @@ def whole_rows(entry: hdf5.Group, counted: Mapping[str, int], size: int) -> dict
             part = part_of(stored.name)
             whole[part] = min(whole[part], intact_rows(stored, size))
     return whole
-
-
-def _is_within(stored: hdf5.Dataset, row: int, size: int) -> bool:
-    try:
-        place = hdf5.place_of_chunk(stored, row)
-    except UNREADABLE:
-        return False
-    return place is not None and place[0] + place[1] <= size

@@ -25,7 +25,7 @@ from bench.record.hdf5_reading import is_dataset as is_dataset
 from bench.record.hdf5_reading import members as members
 from bench.record.hdf5_reading import names as names
 from bench.record.hdf5_reading import place as place
-from bench.record.hdf5_reading import place_of_chunk as place_of_chunk
+from bench.record.hdf5_reading import places_of_chunks as places_of_chunks
 from bench.record.hdf5_reading import read as read
 from bench.record.hdf5_reading import read_text as read_text
 from bench.record.hdf5_reading import read_texts as read_texts

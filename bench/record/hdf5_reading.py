@@ -2,6 +2,7 @@
 """Finds and reads what is in a file through h5py; what is damaged becomes a RecordError that names it."""
 
 from collections.abc import Iterator
+from contextlib import suppress
 from typing import Any, TypeGuard, cast
 
 import h5py
@@ -90,10 +91,18 @@ def place(stored: Dataset) -> tuple[int, int] | None:
     return None if begin is None else (begin, cast(int, raw.get_storage_size()))
 
 
-def place_of_chunk(stored: Dataset, row: int) -> tuple[int, int] | None:
-    """First byte in the file and number of bytes of the chunk with `row`; None if it was never written."""
-    found = cast(Any, cast(h5py.Dataset, stored).id.get_chunk_info_by_coord((row,)))
-    return None if found.byte_offset is None else (found.byte_offset, found.size)
+def places_of_chunks(stored: Dataset) -> dict[int, tuple[int, int]]:
+    """First byte in the file and number of bytes of every written chunk, by its first row, as far as their index can
+    be read. All at once: HDF5 goes through the chunks from the first one for each that is looked up on its own.
+    """
+    found: dict[int, tuple[int, int]] = {}
+
+    def note(chunk: Any) -> None:
+        found[chunk.chunk_offset[0]] = (chunk.byte_offset, chunk.size)
+
+    with suppress(*UNREADABLE):
+        cast(Any, cast(h5py.Dataset, stored).id).chunk_iter(note)
+    return found
 
 
 def read(stored: Dataset, key: object = ()) -> Any:
