@@ -54,7 +54,7 @@ class Ring:
         first, length = self._end - self._size, seconds / buckets
         parts: NDArray[np.float64] = np.ceil(self._time[first : self._end] / length)
         # counted back from the newest part: the time at which the window begins rounds to either side of a boundary
-        whole = int(np.searchsorted(parts, parts[-1] - buckets))
+        whole = int(np.searchsorted(parts, float(parts[-1]) - buckets))
         starts = np.flatnonzero(np.concatenate(([True], parts[whole + 1 :] > parts[whole:-1])))
         kept = slice(first + whole, self._end)
         values = np.empty((2 * starts.size, self._low.shape[1]), dtype=np.float32)

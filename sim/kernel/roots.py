@@ -15,6 +15,10 @@ SMALLEST_PART, FLOOR_GROWTH = 1e-9, 1.1
 That floor grows whenever it is reached: the work stays bounded for polynomials whose bounds say nothing.
 """
 
+ROUNDING, NOTHING = 2e-15, 1e-300
+"""Rounding of a polynomial's value in parts of the sum of its terms' magnitudes, and what is smaller than any motion:
+among denormal numbers relative bounds fail."""
+
 
 @compiled("Tuple((float64, float64, float64))(float64[::1], int64, float64)")
 def evaluate(p: NDArray[np.float64], n: int, t: float) -> tuple[float, float, float]:
@@ -75,20 +79,30 @@ def first_root(p: NDArray[np.float64], n: int, h: float) -> float:
 @compiled("float64(float64[::1], int64, float64, float64, float64)")
 def greatest_magnitude(p: NDArray[np.float64], n: int, start: float, h: float, best: float) -> float:
     """The greater of `best` and the greatest |sum p_k t^k|, k = 0..n, for t in [start, h]."""
-    sharpest = jerkiest = 0.0
-    for k in range(n, 1, -1):
-        sharpest = sharpest * h + k * (k - 1) * abs(p[k])
-        if k > 2:
-            jerkiest = jerkiest * h + k * (k - 1) * (k - 2) * abs(p[k])
+    # the ends first: a step that is long for its motion rises like a high power of t, and all before its end is small
+    best = max(best, abs(evaluate(p, n, start)[0]), abs(evaluate(p, n, h)[0]))
+    most = sharpest = jerkiest = bounded = 0.0
     left, width, floor = start, h - start, SMALLEST_PART * h
     while left < h:
         right = min(left + width, h)
+        if right != bounded:
+            # bounds on [0, right], of the value and the second and third derivatives: those on all of [0, h] would
+            # divide the beginning of such a step into thousands of parts
+            bounded = right
+            most = sharpest = jerkiest = 0.0
+            for k in range(n, -1, -1):
+                most = most * right + abs(p[k])
+                if k > 1:
+                    sharpest = sharpest * right + k * (k - 1) * abs(p[k])
+                if k > 2:
+                    jerkiest = jerkiest * right + k * (k - 1) * (k - 2) * abs(p[k])
         half = 0.5 * (right - left)
         t = left + half
         value, slope, half_bend = evaluate(p, n, t)
         best = max(best, abs(value))
-        # more than `best` by rounding alone is not searched for
-        if abs(value) + half * (abs(slope) + 0.5 * sharpest * half) > best * (1.0 + 1e-14):
+        # more than `best` by rounding alone, here or in the sum, is not searched for, nor what is nothing
+        above = best * (1.0 + 1e-14) + ROUNDING * most + NOTHING
+        if abs(value) + half * (abs(slope) + 0.5 * sharpest * half) > above:
             if abs(slope) <= sharpest * half and 2.0 * abs(half_bend) <= jerkiest * half:
                 if width > floor:
                     width *= 0.5

@@ -1,5 +1,7 @@
 """Roots and peaks of polynomials against a dense scan and against roots that were planted."""
 
+from typing import Any, cast
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -7,15 +9,19 @@ from hypothesis import strategies as st
 from numpy.polynomial import polynomial as series
 from numpy.typing import NDArray
 
+from sim.excitation import SineProgram, Sweep
+from sim.kernel import roots
 from sim.kernel.roots import evaluate, first_root, greatest_magnitude
+from sim.kernel.taylor import WORK_ROWS, forcing_coefficients, resting_coefficients
+from sim.specimen import Specimen
 
 COEFFICIENTS = st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=12)
 GRID = np.linspace(0.0, 1.0, 4001)
 
 
-def planted(*roots: float) -> NDArray[np.float64]:
+def planted(*values: float) -> NDArray[np.float64]:
     """A polynomial with these roots, positive at 0."""
-    p = np.asarray(series.polyfromroots(roots), dtype=np.float64)
+    p = np.asarray(series.polyfromroots(values), dtype=np.float64)
     return p if p[0] > 0.0 else -p
 
 
@@ -77,3 +83,46 @@ def test_the_work_stays_bounded_where_the_bounds_say_nothing() -> None:
     p = planted(*np.linspace(-0.97, 1.93, 16))
     assert 0.0 <= first_root(p, 16, 1.0) <= 1.0
     assert greatest_magnitude(p, 16, 0.0, 1.0, 0.0) >= abs(p[0])
+
+
+def first_step(scale: float, duration: float, omega: tuple[float, float]) -> tuple[np.ndarray, float]:
+    """The polynomial of u1, shape (17,), and the length [s] of the first step of a sweep that begins at rest with
+    `scale` times the acceleration of uplift: the tolerance, which is absolute there, allows a very long one.
+    """
+    n, specimen = 16, Specimen(beta=0.4)
+    amplitude = specimen.uplift_acceleration * scale
+    row = SineProgram([Sweep(duration, (amplitude, amplitude), omega)]).packed()[0]
+    a, c, work = np.zeros(n + 1), np.zeros((6, n + 1)), np.zeros((WORK_ROWS, n + 1))
+    forcing_coefficients(row, 0.0, a, work, n)
+    resting_coefficients(specimen.packed(), a, c, n)
+    sizes = {k: abs(c[2, k]) + abs(c[3, k]) for k in (n - 1, n)}
+    return c[0].copy(), min(duration, *((1e-14 / size) ** (1.0 / k) for k, size in sizes.items()))
+
+
+@pytest.mark.parametrize(
+    ("scale", "duration", "omega"),
+    [
+        (1e-12, 0.16, (108.0, 230.0)),
+        (1e-16, 0.7, (194.6, 35.9)),
+        (1e-20, 2.7, (48.0, 220.0)),
+        (1e-100, 27.0, (130.5, 130.8)),
+        (1e-305, 0.2, (46.6, 137.0)),
+        (2e-311, 8.1, (220.2, 163.7)),
+    ],
+)
+def test_peaks_of_tiny_motions_cost_no_more_than_those_of_others(
+    monkeypatch: pytest.MonkeyPatch, scale: float, duration: float, omega: tuple[float, float]
+) -> None:
+    p, h = first_step(scale, duration, omega)
+    count = 0
+
+    def counted(*arguments: Any) -> tuple[float, float, float]:
+        nonlocal count
+        count += 1
+        assert count < 1000
+        return evaluate(*arguments)
+
+    monkeypatch.setattr(roots, "evaluate", counted)
+    found = cast(Any, greatest_magnitude).py_func(p, 16, 0.0, h, 0.0)
+    sampled = np.abs(series.polyval(np.linspace(0.0, h, 20_001), p)).max()
+    assert found == pytest.approx(sampled, rel=1e-6, abs=1e-300)
