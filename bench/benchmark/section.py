@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import isfinite
 
+from bench.report.text_table import TextColumn, text_table
+
 Cell = float | int | str | bool | None
 
 
@@ -54,17 +56,14 @@ class Section:
 
     def text(self) -> str:
         """The table in aligned columns."""
-        cells = self._cells()
-        widths = [max(len(line[k]) for line in cells) for k in range(len(self.columns))]
-        lines = ["  ".join(self._aligned(line, widths)).rstrip() for line in cells]
-        lines.insert(1, "-" * (sum(widths) + 2 * (len(widths) - 1)))
-        return "\n".join([self.title, "", *lines, *self.notes])
+        columns = [TextColumn(column.heading, words=column.form == "s") for column in self.columns]
+        return "\n".join([self.title, "", text_table(columns, self._cells()), *self.notes])
 
     def markdown(self) -> str:
         """The section as Markdown."""
-        head, *body = self._cells()
+        head = [column.heading for column in self.columns]
         rule = ["---" if column.form == "s" else "--:" for column in self.columns]
-        lines = ["| " + " | ".join(line) + " |" for line in (head, rule, *body)]
+        lines = ["| " + " | ".join(line) + " |" for line in (head, rule, *self._cells())]
         return "\n".join([f"## {self.title}", "", *lines, *(f"\n{note}" for note in self.notes)])
 
     def as_dict(self) -> dict[str, object]:
@@ -76,16 +75,7 @@ class Section:
         return {"title": self.title, "rows": rows, "notes": list(self.notes)}
 
     def _cells(self) -> list[list[str]]:
-        return [
-            [column.heading for column in self.columns],
-            *([_shown(row.get(column.key), column.form) for column in self.columns] for row in self.rows),
-        ]
-
-    def _aligned(self, line: list[str], widths: list[int]) -> list[str]:
-        return [
-            text.ljust(width) if column.form == "s" else text.rjust(width)
-            for text, width, column in zip(line, widths, self.columns, strict=True)
-        ]
+        return [[_shown(row.get(column.key), column.form) for column in self.columns] for row in self.rows]
 
 
 TARGET_COLUMNS = (

@@ -3,8 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from bench.cli.predict_text import aligned
 from bench.cli.words import ABSENT
+from bench.report.text_table import TextColumn, text_table
 from sim.parameters import Parameters, unit_of
 
 HEADLINES = ("status", "alpha_2", "alpha_2_uncertainty", "alpha_2_predicted", "agrees")
@@ -28,8 +28,15 @@ def side_by_side(kind: type[Parameters], stored: Sequence[Mapping[str, Any]], ne
             rows.append([label, name, unit_of(fields[name]), _shown(was), _shown(now), _change(was, now)])
     if not rows:
         return "No result changed."
-    heads = [[", ".join(labels), "result", "", "recorded", "new", "change"], ["", "", "unit", "", "", "[%]"]]
-    return aligned([[row[k] for row in (*heads, *rows)] for k in range(6)])
+    columns = (
+        TextColumn(", ".join(labels), words=True),
+        TextColumn("result", words=True),
+        TextColumn("unit", words=True),
+        TextColumn("recorded"),
+        TextColumn("new"),
+        TextColumn("change", "%"),
+    )
+    return text_table(columns, rows)
 
 
 def _shown(value: Any) -> str:

@@ -8,6 +8,7 @@ from functools import reduce
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
+from bench.report.text_table import TextColumn, text_table
 from sim.errors import InvalidInput
 from sim.parameters import Parameters
 
@@ -107,7 +108,7 @@ def listed(choice: Choice) -> str:
     """Every setting that can be changed: value as it is now, unit, and what it is."""
     from bench.config.declared import at, keys
 
-    rows = [("KEY", "NOW", "UNIT", "MEANING")]
+    rows: list[tuple[str, str, str, str]] = []
     groups: list[tuple[str, Parameters]] = [("", choice.settings)]
     groups += [(f"{name}.", getattr(choice.changed, name)) for name in SECTIONS]
     for prefix, group in groups:
@@ -117,10 +118,13 @@ def listed(choice: Choice) -> str:
             if entry is not None and entry.group is None:
                 value = json.dumps(reduce(getattr, path, group), default=str)
                 rows.append((f"{prefix}{key}", value, entry.unit, entry.description))
-    widths = [max(len(row[k]) for row in rows) for k in range(3)]
-    return "\n".join(
-        f"{key:{widths[0]}}  {value:>{widths[1]}}  {unit:{widths[2]}}  {meaning}" for key, value, unit, meaning in rows
+    columns = (
+        TextColumn("key", words=True),
+        TextColumn("now"),
+        TextColumn("unit", words=True),
+        TextColumn("meaning", words=True),
     )
+    return text_table(columns, rows)
 
 
 def _require_known(own: Mapping[str, Any], kind: type[Parameters]) -> None:

@@ -7,9 +7,9 @@ from contextlib import redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bench.cli.predict_text import aligned
 from bench.cli.refusal import error_object, tell
 from bench.cli.words import ABSENT, clock
+from bench.report.text_table import TextColumn, text_table
 
 if TYPE_CHECKING:
     from bench.config.model import BenchConfiguration
@@ -19,6 +19,17 @@ if TYPE_CHECKING:
 
 
 WIDTH = 120
+
+_MARGINS = (
+    TextColumn("quantity", words=True),
+    TextColumn("unit", words=True),
+    TextColumn("demand"),
+    TextColumn("at 95 %"),
+    TextColumn("limit"),
+    TextColumn("margin", "%"),
+    TextColumn("at 95 %", "%"),
+    TextColumn("where", words=True),
+)
 
 
 def dry_run(experiment: "Experiment", configuration: "BenchConfiguration", out: Path, *, as_json: bool) -> int:
@@ -76,9 +87,8 @@ def _text(found: "Preflight") -> str:
     lines += [f"Warning: {warning}" for warning in found.warnings]
     chances = [(stage.name, stage.chance) for stage in found.forecast.stages if stage.chance is not None]
     if chances:
-        names, stated = zip(*chances, strict=True)
-        table = aligned([["start", "", *names], ["chance", "", *(f"{chance:.0%}" for chance in stated)]])
-        lines += ["", table, ""]
+        rows = ((name, f"{chance:.0%}") for name, chance in chances)
+        lines += ["", text_table((TextColumn("start", words=True), TextColumn("chance")), rows), ""]
     for note in found.notes:
         lines += textwrap.wrap(note, WIDTH, subsequent_indent="    ")
     if found.forecast.duration is not None:
@@ -97,15 +107,17 @@ def _margins(margins: "tuple[Margin, ...]") -> str:
     def share(value: float | None) -> str:
         return ABSENT if value is None else f"{100.0 * value:.1f}"
 
-    return aligned(
-        [
-            ["quantity", "", *(each.bound.name for each in margins)],
-            ["unit", "", *(each.bound.unit for each in margins)],
-            ["demand", "", *(number(each.demand.value) for each in margins)],
-            ["at 95 %", "", *(number(each.demand.likely) for each in margins)],
-            ["limit", "", *(number(each.bound.limit) for each in margins)],
-            ["margin", "[%]", *(share(each.margin) for each in margins)],
-            ["at 95 %", "[%]", *(share(each.likely) for each in margins)],
-            ["where", "", *(each.demand.where for each in margins)],
-        ]
+    rows = (
+        (
+            each.bound.name,
+            each.bound.unit,
+            number(each.demand.value),
+            number(each.demand.likely),
+            number(each.bound.limit),
+            share(each.margin),
+            share(each.likely),
+            each.demand.where,
+        )
+        for each in margins
     )
+    return text_table(_MARGINS, rows)

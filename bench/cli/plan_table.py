@@ -6,11 +6,29 @@ from typing import TYPE_CHECKING
 
 from bench.cli.refusal import error_object
 from bench.cli.words import ABSENT, clock
+from bench.report.text_table import TextColumn, text_table
 from sim.errors import InvalidInput
 
 if TYPE_CHECKING:
     from bench.preflight.compiled import Preflight
     from bench.queue.queued import Queued
+
+_TESTS = (
+    TextColumn("test"),
+    TextColumn("state", words=True),
+    TextColumn("protocol", words=True),
+    TextColumn("results in", words=True),
+    TextColumn("how it ended", words=True),
+)
+_PLANS = (
+    TextColumn("test"),
+    TextColumn("protocol", words=True),
+    TextColumn("duration"),
+    TextColumn("tightest", words=True),
+    TextColumn("margin", "%"),
+    TextColumn("disk", "MB"),
+    TextColumn("", words=True),
+)
 
 
 def tests_text(tests: "Sequence[Queued]") -> str:
@@ -18,7 +36,7 @@ def tests_text(tests: "Sequence[Queued]") -> str:
     rows = [(str(n + 1), str(test.stage), test.protocol, test.out or ABSENT, test.told) for n, test in enumerate(tests)]
     counted = {stage: sum(test.stage == stage for test in tests) for stage in dict.fromkeys(t.stage for t in tests)}
     said = ", ".join(f"{number} {stage}" for stage, number in counted.items()) or "no tests"
-    return "\n".join([*_aligned([("test", "state", "protocol", "results in", "how it ended"), *rows]), f"{said}."])
+    return f"{text_table(_TESTS, rows)}\n{said}."
 
 
 def plans_text(
@@ -29,8 +47,7 @@ def plans_text(
     if as_json:
         error = {} if refused is None else {"error": error_object(refused)}
         return json.dumps({"tests": plans, **error}, allow_nan=False)
-    titles = ("test", "protocol", "duration", "tightest", "margin [%]", "disk [MB]", "")
-    return "\n".join(_aligned([titles, *(_row(plan) for plan in plans)]))
+    return text_table(_PLANS, map(_row, plans))
 
 
 def _plan(number: int, test: "Queued", found: "Preflight") -> dict[str, object]:
@@ -59,8 +76,3 @@ def _row(plan: Mapping[str, object]) -> tuple[str, ...]:
         f"{needed / 1e6:.0f}" if isinstance(needed, int) else ABSENT,
         "" if plan["would_run"] else "REFUSED",
     )
-
-
-def _aligned(rows: Sequence[tuple[str, ...]]) -> list[str]:
-    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
-    return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]

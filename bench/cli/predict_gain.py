@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bench.cli.predict_output import Result
-from bench.cli.predict_text import extremes, text_table
+from bench.cli.predict_text import extremes, prediction_table
 from bench.prediction.files import provenance, rows_of
 from bench.prediction.requests import GainRequest, HistoryRequest, MapRequest, SpectrumRequest, SteadyRequest
 from bench.prediction.steady import predict_points, predict_spectra, steady_table
@@ -51,7 +51,9 @@ def steady(request: SteadyRequest, specimen: Specimen, known: SpecimenKnowledge)
         return figure_of(histories(specimen, HistoryRequest(**shared, steady=True, periods=2)))
 
     shown = {name: heading for name, heading in _SHOWN.items() if name in table}
-    return _result("steady motions under a sine", request, specimen, known, table, text_table(table, shown), figure)
+    return _result(
+        "steady motions under a sine", request, specimen, known, table, prediction_table(table, shown), figure
+    )
 
 
 def spectrum(request: SpectrumRequest, specimen: Specimen, known: SpecimenKnowledge) -> Result:

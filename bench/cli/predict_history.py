@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from bench.cli.predict_output import Result
-from bench.cli.predict_text import text_table
+from bench.cli.predict_text import prediction_table
 from bench.prediction.files import plain, provenance, rows_of
 from bench.prediction.history import History, histories, history_table, runs_table
 from bench.prediction.requests import HistoryRequest
@@ -35,7 +35,7 @@ def history(request: HistoryRequest, specimen: Specimen) -> Result:
         title="time histories under a sine",
         tables={"histories": history_table(made), "runs": runs},
         content={"histories": [{**row, **values} for row, values in zip(rows_of(runs), samples, strict=True)]},
-        text=text_table(runs, _SHOWN),
+        text=prediction_table(runs, _SHOWN),
         metadata=provenance(request, specimen),
         figure=lambda: figure_of(made),
     )

@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from bench.cli.predict_output import Result
-from bench.cli.predict_text import text_table
+from bench.cli.predict_text import prediction_table
 from bench.prediction.files import provenance, rows_of
 from bench.prediction.modes import modes_table
 from bench.prediction.requests import ModesRequest
@@ -39,7 +39,7 @@ def modes(request: ModesRequest, specimen: Specimen) -> Result:
         title="modes of the bare frame and of the linearised coupled system",
         tables={"modes": table},
         content={"modes": rows_of(table)},
-        text=text_table(table, _SHOWN),
+        text=prediction_table(table, _SHOWN),
         metadata=provenance(request, specimen),
         figure=figure,
     )

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from bench.accelerograms.accelerogram import Accelerogram
 from bench.cli.predict_output import Result
-from bench.cli.predict_text import text_table
+from bench.cli.predict_text import prediction_table
 from bench.config.model import BenchConfiguration
 from bench.prediction.files import provenance, rows_of
 from bench.prediction.requests import BandStudyRequest, RecordsRequest, SeismicRequest
@@ -80,7 +80,7 @@ def seismic(
         specimen,
         curves,
         words,
-        text_table(summary, _SHOWN),
+        prediction_table(summary, _SHOWN),
         lambda: seismic_figure(drawn, words),
         known if request.members else None,
     )
@@ -110,7 +110,7 @@ def study(
         specimen,
         curves,
         f"from {min(request.corner):g} to {max(request.corner):g} Hz on, up to {upper:g} Hz",
-        text_table(summary, _STUDY_SHOWN),
+        prediction_table(summary, _STUDY_SHOWN),
         lambda: band_figure(drawn, modes, upper),
     )
 

@@ -1,9 +1,10 @@
-"""Predictions as text for a terminal: aligned columns, five significant digits."""
+"""Predictions as text for a terminal, with five significant digits."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from bench.cli.words import ABSENT
+from bench.report.text_table import TextColumn, text_table
 
 if TYPE_CHECKING:
     from bench.record.tables import Table
@@ -12,14 +13,11 @@ MOST_SPECTRA = 12
 """Stiffnesses up to which each has lines of its own."""
 
 
-def text_table(table: "Table", columns: Mapping[str, str]) -> str:
-    """The chosen `columns` of a table under the headings given for them, with a line of units."""
-    return aligned(
-        [
-            [heading, _unit(table[name].unit), *map(_cell, table[name].values.tolist())]
-            for name, heading in columns.items()
-        ]
-    )
+def prediction_table(table: "Table", headings: Mapping[str, str]) -> str:
+    """Columns of a table, by their names, under the headings given for them."""
+    columns = [TextColumn(heading, _unit(table[name].unit)) for name, heading in headings.items()]
+    cells = (map(_cell, table[name].values.tolist()) for name in headings)
+    return text_table(columns, zip(*cells, strict=True))
 
 
 def extremes(table: "Table") -> str:
@@ -32,10 +30,10 @@ def extremes(table: "Table") -> str:
     stiffnesses = np.unique(beta)
     each = [(value, beta == value) for value in stiffnesses]
     groups = each if len(each) <= MOST_SPECTRA else [(None, np.full(beta.size, True))]
-    rows: list[list[str]] = [
-        ["beta", "layer", "points", "unstable", "least alpha_2", "at omega", "beta", "greatest", "at omega", "beta"],
-        ["", "", "", "", "", "[rad/s]", "", "", "[rad/s]", ""],
-    ]
+    where = (TextColumn("at omega", "rad/s"), TextColumn("beta"))
+    group = (TextColumn("beta"), TextColumn("layer"), TextColumn("points"), TextColumn("unstable"))
+    columns = (*group, TextColumn("least alpha_2"), *where, TextColumn("greatest"), *where)
+    rows: list[list[str]] = []
     for value, chosen in groups:
         for name in ("rocking", "resting"):
             here = np.flatnonzero(chosen & (layer == name))
@@ -45,18 +43,7 @@ def extremes(table: "Table") -> str:
             known: list[Any] = [ABSENT if value is None else float(value), name, here.size, int((~stable[here]).sum())]
             found = [float(x) for k in (least, most) for x in (alpha[k], omega[k], beta[k])]
             rows.append([_cell(each) for each in (*known, *found)])
-    return aligned(list(zip(*rows, strict=True)))
-
-
-def aligned(columns: Sequence[Sequence[str]]) -> str:
-    """Columns of equal length, each beginning with heading and unit, set flush right."""
-    set_out: list[list[str]] = []
-    for column in columns:
-        width = max(map(len, column))
-        set_out.append([cell.rjust(width) for cell in column])
-    lines = ["  ".join(row).rstrip() for row in zip(*set_out, strict=True)]
-    lines.insert(2, "-" * max(map(len, lines)))
-    return "\n".join(lines)
+    return text_table(columns, rows)
 
 
 def _cell(value: Any) -> str:
@@ -68,4 +55,4 @@ def _cell(value: Any) -> str:
 
 
 def _unit(unit: str) -> str:
-    return f"[{unit}]" if unit not in ("", "1") else ""
+    return unit if unit != "1" else ""

@@ -5,11 +5,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bench.cli.predict_text import aligned
 from bench.cli.words import number, one_line
 from bench.control.preparation import PreparedMotion
 from bench.prediction.stroke_fits import StrokeFits, change_at, change_over
 from bench.report.files import write_new
+from bench.report.text_table import TextColumn, text_table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -48,17 +48,19 @@ def content_of(fits: StrokeFits) -> dict[str, Any]:
 
 def text_of(fits: StrokeFits) -> str:
     """The fits as a person reads them."""
-    own = [f"at {period:.3g} s" for period in fits.own]
-    rows = [
-        ["", "peak", "velocity", "stroke", "end", *own, "rms", "most"],
-        ["", "[m/s2]", "[m/s]", "[mm]", "[mm]", *["[%]"] * len(own), "[%]", "[%]"],
-        ["before", *_numbers(fits.unfitted), *["-"] * (len(own) + 2)],
+    motion_columns = (("peak", "m/s2"), ("velocity", "m/s"), ("stroke", "mm"), ("end", "mm"))
+    changes = [*(f"at {period:.3g} s" for period in fits.own), "rms", "most"]
+    columns = [
+        TextColumn("", words=True),
+        *(TextColumn(title, unit) for title, unit in motion_columns),
+        *(TextColumn(title, "%") for title in changes),
     ]
+    rows = [["before", *_numbers(fits.unfitted), *["-"] * len(changes)]]
     for method, motion in fits.fitted.items():
         change = _change(fits, motion)
         shares = [*change["change_at_own_periods"], change["change_rms"], change["change_most"]]
         rows.append([str(method), *_numbers(motion), *(f"{100.0 * share:+.2f}" for share in shares)])
-    rows += [[str(method), *["refused"] * (6 + len(own))] for method in fits.refused]
+    rows += [[str(method), *["refused"] * (len(columns) - 1)] for method in fits.refused]
     record, reach = fits.record, fits.reach
     return "\n".join(
         [
@@ -66,7 +68,7 @@ def text_of(fits: StrokeFits) -> str:
             *fits.unfitted.steps,
             f"the table may move {1e3 * reach.displacement:.3g} mm and {reach.velocity:.3g} m/s",
             "",
-            aligned(list(zip(*rows, strict=True))),
+            text_table(columns, rows),
             "",
             "changes of the response spectrum: at the frame's periods, and over 0.1 to 2 s",
             *(f"{method}: {motion.fit.done}" for method, motion in fits.fitted.items() if motion.fit is not None),

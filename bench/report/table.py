@@ -3,21 +3,16 @@
 import textwrap
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from bench.report.rows import PointLike, plain
+from bench.report.text_table import TextColumn, text_table
 
 WIDTH = 118
 ABSENT = "-"
 
 
-@dataclass(frozen=True)
-class _Column:
-    title: str
-    unit: str
-    show: Callable[[dict[str, Any]], str]
-    left: bool = False
+_Row = dict[str, Any]
 
 
 def points_table(points: Sequence[PointLike]) -> str:
@@ -26,21 +21,11 @@ def points_table(points: Sequence[PointLike]) -> str:
     "-" stands where a value is absent; a disagreement with the prediction is marked "NO <" in the last column.
     """
     rows = plain(points)
-    cells = [[column.title for column in _COLUMNS], [f"[{column.unit}]" if column.unit else "" for column in _COLUMNS]]
-    cells += [[column.show(row) for column in _COLUMNS] for row in rows]
-    widths = [max(len(line[k]) for line in cells) for k in range(len(_COLUMNS))]
-    lines = [
-        "  ".join(
-            text.ljust(width) if column.left else text.rjust(width)
-            for text, width, column in zip(line, widths, _COLUMNS, strict=True)
-        ).rstrip()
-        for line in cells
-    ]
-    lines.insert(2, "-" * (sum(widths) + 2 * (len(widths) - 1)))
-    return "\n".join([*lines, *_remarks(rows)])
+    table = text_table([column for column, _ in _COLUMNS], ([cell(row) for _, cell in _COLUMNS] for row in rows))
+    return "\n".join([table, *_remarks(rows)])
 
 
-def _remarks(rows: list[dict[str, Any]]) -> list[str]:
+def _remarks(rows: list[_Row]) -> list[str]:
     disagreeing = sum(row.get("agrees") is False for row in rows)
     compared = sum(row.get("agrees") is not None for row in rows)
     lines = ["", f"{compared} of {len(rows)} points compared with the prediction, {disagreeing} disagree."]
@@ -52,7 +37,7 @@ def _remarks(rows: list[dict[str, Any]]) -> list[str]:
     return lines
 
 
-def _uncertainty(rows: list[dict[str, Any]]) -> list[str]:
+def _uncertainty(rows: list[_Row]) -> list[str]:
     """How uncertain the gains are, and what counts most in it; nothing where no budget is kept."""
     known = [row for row in rows if row.get("dominating") and row.get("alpha_2")]
     if not known:
@@ -65,43 +50,43 @@ def _uncertainty(rows: list[dict[str, Any]]) -> list[str]:
     )
 
 
-def _number(name: str, form: str) -> Callable[[dict[str, Any]], str]:
-    def show(row: dict[str, Any]) -> str:
+def _number(name: str, form: str) -> Callable[[_Row], str]:
+    def show(row: _Row) -> str:
         value = row.get(name)
         return ABSENT if value is None else format(value, form)
 
     return show
 
 
-def _word(name: str) -> Callable[[dict[str, Any]], str]:
+def _word(name: str) -> Callable[[_Row], str]:
     return lambda row: str(row.get(name) or ABSENT)
 
 
-def _difference(row: dict[str, Any]) -> str:
+def _difference(row: _Row) -> str:
     measured, predicted = row.get("alpha_2"), row.get("alpha_2_predicted")
     return f"{100.0 * (measured / predicted - 1.0):+.2f}" if measured is not None and predicted else ABSENT
 
 
-def _verdict(name: str, yes: str, no: str) -> Callable[[dict[str, Any]], str]:
-    def show(row: dict[str, Any]) -> str:
+def _verdict(name: str, yes: str, no: str) -> Callable[[_Row], str]:
+    def show(row: _Row) -> str:
         value = row.get(name)
         return ABSENT if value is None else yes if value else no
 
     return show
 
 
-_COLUMNS = (
-    _Column("beta", "1", _number("beta", ".3f")),
-    _Column("omega", "rad/s", _number("omega_rad_s", ".3f")),
-    _Column("status", "", _word("status"), left=True),
-    _Column("layer", "", _word("layer"), left=True),
-    _Column("alpha_2", "1", _number("alpha_2", ".4f")),
-    _Column("U (k=2)", "1", _number("alpha_2_uncertainty", ".4f")),
-    _Column("predicted", "1", _number("alpha_2_predicted", ".4f")),
-    _Column("diff.", "%", _difference),
-    _Column("orbit", "", _verdict("predicted_stable", "stable", "unstable"), left=True),
-    _Column("starts", "1", _number("starts_tried", "d")),
-    _Column("chance", "1", _number("start_chance", ".2f")),
-    _Column("settled", "s", _number("settle_time_s", ".1f")),
-    _Column("agrees", "", _verdict("agrees", "yes", "NO <"), left=True),
+_COLUMNS: tuple[tuple[TextColumn, Callable[[_Row], str]], ...] = (
+    (TextColumn("beta", "1"), _number("beta", ".3f")),
+    (TextColumn("omega", "rad/s"), _number("omega_rad_s", ".3f")),
+    (TextColumn("status", words=True), _word("status")),
+    (TextColumn("layer", words=True), _word("layer")),
+    (TextColumn("alpha_2", "1"), _number("alpha_2", ".4f")),
+    (TextColumn("U (k=2)", "1"), _number("alpha_2_uncertainty", ".4f")),
+    (TextColumn("predicted", "1"), _number("alpha_2_predicted", ".4f")),
+    (TextColumn("diff.", "%"), _difference),
+    (TextColumn("orbit", words=True), _verdict("predicted_stable", "stable", "unstable")),
+    (TextColumn("starts", "1"), _number("starts_tried", "d")),
+    (TextColumn("chance", "1"), _number("start_chance", ".2f")),
+    (TextColumn("settled", "s"), _number("settle_time_s", ".1f")),
+    (TextColumn("agrees", words=True), _verdict("agrees", "yes", "NO <")),
 )

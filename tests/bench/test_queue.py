@@ -271,7 +271,7 @@ def test_a_dry_run_tells_of_every_plan_and_runs_none(
     Path("bench.toml").write_text("[limits]\ndrift = 0.05\n", encoding="utf-8")
     assert main(["queue", "queue.json", "--dry-run", "--config", "bench.toml"]) == 2
     shown = capsys.readouterr()
-    assert [line.split()[0] for line in shown.out.splitlines()[1:]] == ["1", "2"]
+    assert [line.split()[0] for line in shown.out.splitlines()[3:]] == ["1", "2"]
     assert "test 2: limits.drift = 0.05 is refused" in shown.err
     assert _stages() == [Stage.WAITING, Stage.WAITING]
 
