@@ -98,11 +98,13 @@ class Acquired(Event):
     """A block of samples as read, and the drive [V], shape (n,), that was played while it was taken.
 
     `run` counts the times the rig has been armed; the block's `first` sample index is counted within that run.
+    `signals`, shape (n, n_signals), are in SI units from the zero of the run, as `bench.analysis.signals` numbers them.
     """
 
     run: int
     block: Block
     drive: Array
+    signals: Array = field(default_factory=lambda: np.empty((0, 0)))
 
 
 @event()

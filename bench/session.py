@@ -202,8 +202,7 @@ def run_session(
             signals = SignalMap(rig.channels, configuration.laser_reference, configuration.calibrated)
             engine = Engine(
                 rig,
-                Guard(rig, configuration.limits, configuration.ramps, configuration.mover),
-                signals,
+                Guard(rig, configuration.limits, configuration.ramps, configuration.mover, signals),
                 stream,
                 requests,
                 operator,
@@ -214,7 +213,7 @@ def run_session(
                 stream.publish(Warned(warning))
             # as long as the model takes, a bench in virtual time stands still
             patient = isinstance(rig.clock, VirtualClock)
-            with twin_beside(stream, rig, configuration, signals, requests, patient=patient):
+            with twin_beside(stream, rig, configuration, requests, patient=patient):
                 ending = engine.run(protocol.plan(configuration))
             status, reason = ending.status, ending.reason
         finally:

@@ -44,8 +44,7 @@ def recorded(
     signals = SignalMap(rig.channels, configuration.laser_reference)
     engine = Engine(
         rig,
-        Guard(rig, configuration.limits, configuration.ramps, configuration.mover),
-        signals,
+        Guard(rig, configuration.limits, configuration.ramps, configuration.mover, signals),
         stream,
         requests,
         operator or Unattended(),
@@ -53,7 +52,7 @@ def recorded(
     )
     for event in first:
         stream.publish(event)
-    with twin_beside(stream, rig, configuration, signals, requests, patient=True):
+    with twin_beside(stream, rig, configuration, requests, patient=True):
         ending = engine.run(plan)
     recorder.close(ending.status, ending.reason)
     return ending

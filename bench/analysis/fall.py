@@ -38,7 +38,7 @@ class FallWatch:
         return self._threshold
 
     def fallen(self, signals: NDArray[np.float64]) -> bool:
-        """Whether the next block of signals, shape (n, 6), shows a fallen block."""
+        """Whether the next block of signals, shape (n, n_signals), shows a fallen block."""
         if self._threshold == 0.0:
             return False
         u1 = signals[:, U1]

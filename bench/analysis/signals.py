@@ -1,5 +1,6 @@
-"""From the channels of a rig to the signals of the experiment."""
+"""The signals of the experiment, and their map from the channels of a rig."""
 
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -10,17 +11,30 @@ from drivers.rig import Channel
 from sim.errors import InvalidInput
 
 SIGNALS = ("acceleration", "displacement", "u1", "drift", "laser_1", "laser_2")
-"""Columns of a signal array: table acceleration [m/s2], table displacement [m], first storey relative to the table
-[m], drift u2 - u1 [m], and what the two lasers see [m]."""
+"""First columns of a signal array: table acceleration [m/s2], table displacement [m], first storey relative to the
+table [m], drift u2 - u1 [m], and what the two lasers see [m]."""
 
 ACCELERATION, DISPLACEMENT, U1, DRIFT, LASER_1, LASER_2 = range(6)
 
+MEASURED_BY = ("table_acceleration", "table_displacement", "laser_1", "laser_2")
+"""The channels that the signals are made of."""
+
+
+@dataclass(frozen=True)
+class Further:
+    """A signal that is a channel's own values, besides those of the experiment."""
+
+    name: str
+    unit: str
+    quantity: str
+
 
 class SignalMap:
-    """Turns channel values into signals, counted from the zero taken at rest.
+    """Turns channel values into signals, counted from the zero taken at rest; one for a run, with the guard.
 
-    Lasers beside the table see x_g + u; lasers on it see u. The drift is free of x_g either way. A `calibration` takes
-    the errors that it found of lasers and table sensors away.
+    Lasers beside the table see x_g + u; lasers on it see u. The drift is free of x_g either way. A `calibration`
+    corrects lasers and table sensors for the errors that it found. Channels that no signal of the experiment is made of
+    are `further` columns after those of SIGNALS. Raises InvalidInput where a channel is missing.
     """
 
     def __init__(
@@ -30,14 +44,18 @@ class SignalMap:
         calibration: LaserCalibration | None = None,
     ) -> None:
         names = [channel.name for channel in channels]
-        needed = ("table_acceleration", "table_displacement", "laser_1", "laser_2")
-        for name in needed:
+        for name in MEASURED_BY:
             if name not in names:
                 raise InvalidInput("channels", ", ".join(names), f"the harmonic analysis needs a channel {name}")
-        self._columns = [names.index(name) for name in needed]
+        self._columns = [names.index(name) for name in MEASURED_BY]
+        others = [column for column, name in enumerate(names) if name not in MEASURED_BY]
+        self._others = others
+        self.further = tuple(Further(names[at], channels[at].unit, channels[at].quantity) for at in others)
         self._ground = reference == "ground"
         self._calibration = calibration
-        self._zero = np.zeros(len(SIGNALS))
+        self._zero = np.zeros(len(SIGNALS) + len(others))
+        self.taken = np.zeros(self._zero.size, dtype=np.bool_)
+        """Which signals had a value when the zero was taken, shape (n_signals,)."""
 
     def tare(self, values: NDArray[np.float64]) -> None:
         """Take the mean of channel values at rest, shape (n, n_channels), as the zero of every signal.
@@ -47,14 +65,10 @@ class SignalMap:
         raw = self._raw(values)
         valid = np.count_nonzero(np.isfinite(raw), axis=0)
         self._zero = np.nansum(raw, axis=0) / np.maximum(valid, 1)
-
-    def scatter(self, values: NDArray[np.float64]) -> float:
-        """Larger standard deviation of u1 and drift [m] in channel values; infinite where samples are missing."""
-        deviation = np.std(self._raw(values)[:, [U1, DRIFT]], axis=0)
-        return float(np.nan_to_num(deviation, nan=np.inf).max())
+        self.taken = valid > 0
 
     def of(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Signals, shape (n, 6), of channel values, shape (n, n_channels); NaN where a sensor gave none."""
+        """Signals, shape (n, n_signals), of channel values, shape (n, n_channels); NaN where a sensor gave none."""
         return self._raw(values) - self._zero
 
     def _raw(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -65,11 +79,18 @@ class SignalMap:
                 found.table_displacement * displacement,
             )
             first, second = found.laser_1.corrected(first), found.laser_2.corrected(second)
-        signals = np.empty((values.shape[0], len(SIGNALS)), order="F")
+        signals = np.empty((values.shape[0], self._zero.size), order="F")
         signals[:, ACCELERATION] = acceleration
         signals[:, DISPLACEMENT] = displacement
         signals[:, U1] = first - displacement if self._ground else first
         signals[:, DRIFT] = second - first
         signals[:, LASER_1] = first
         signals[:, LASER_2] = second
+        signals[:, len(SIGNALS) :] = values[:, self._others]
         return signals
+
+
+def scatter(signals: NDArray[np.float64]) -> float:
+    """Larger standard deviation of u1 and drift [m], shape (n, n_signals); infinite where samples are missing."""
+    deviation = np.std(signals[:, [U1, DRIFT]], axis=0)
+    return float(np.nan_to_num(deviation, nan=np.inf).max())

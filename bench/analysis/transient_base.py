@@ -75,7 +75,7 @@ class BaseMotion:
 
 
 def base_motion(signals: Array, rest: Array, sample_rate: float) -> BaseMotion:
-    """The table's motion in `signals`, shape (n, 6), that begin and end at rest; `rest`, shape (m, 6), is the noise.
+    """The table's motion in `signals` that begin and end at rest; `rest` is the noise, shapes (n or m, n_signals).
 
     Raises InvalidInput when samples of a table sensor are missing.
     """

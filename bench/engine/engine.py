@@ -1,6 +1,5 @@
 """Runs a plan on a rig, through the guard, block by block."""
 
-from bench.analysis.signals import SignalMap
 from bench.engine.ending import Ended, Ending
 from bench.engine.operator import Operator
 from bench.engine.output import Output
@@ -36,15 +35,15 @@ from sim.specimen import Specimen
 class Engine:
     """Owns the loop: drive from its source, through the guard, signals back to the plan.
 
-    `block` is the number of samples of one turn. Whatever happens, `run` leaves the output at zero. A halt that is
-    asked for cuts the enable line in the thread that asks, also while the loop waits for a block.
+    `block` is the number of samples of one turn; `guard` has the map of the signals. Whatever happens, `run` leaves the
+    output at zero. A halt that is asked for cuts the enable line in the thread that asks, also while the loop waits for
+    a block.
     """
 
     def __init__(
         self,
         rig: Rig,
         guard: Guard,
-        signals: SignalMap,
         stream: Stream,
         requests: Requests,
         operator: Operator,
@@ -52,8 +51,8 @@ class Engine:
     ) -> None:
         self._rig, self._stream, self._operator, self._requests = rig, stream, operator, requests
         self._output = Output(rig, guard, stream, requests, block)
-        self._turns = Turns(self._output, guard, signals, stream, requests)
-        self._rest = Rest(self._turns, rig, guard, signals, stream)
+        self._turns = Turns(self._output, guard, stream, requests)
+        self._rest = Rest(self._turns, rig, guard, stream)
         self._sines = Sines(self._turns, rig.sample_rate)
         self._player = Player(self._turns, guard, stream)
         self._specimen: Specimen | None = None

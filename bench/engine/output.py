@@ -64,7 +64,7 @@ class Output:
         exchange = self._guard.exchange(self.source.next(self.block))
         self.read = exchange.block.first + len(exchange.block)
         self.drive = exchange.drive
-        self._stream.publish(Acquired(self._run, exchange.block, exchange.drive))
+        self._stream.publish(Acquired(self._run, exchange.block, exchange.drive, exchange.signals))
         if exchange.opened:
             raise Ended(self.cut(Ending("halted", f"{', '.join(exchange.opened)} opened")))
         return exchange

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.analysis.fall import FallWatch
-from bench.analysis.signals import SignalMap
+from bench.analysis.signals import scatter
 from bench.engine.steps import Arm, Heard, Listen
 from bench.engine.stream import Stream
 from bench.engine.turns import Turns
@@ -18,8 +18,8 @@ from sim.specimen import Specimen
 class Rest:
     """Waits for stillness, or hears what comes in."""
 
-    def __init__(self, turns: Turns, rig: Rig, guard: Guard, signals: SignalMap, stream: Stream) -> None:
-        self._turns, self._rig, self._guard, self._signals, self._stream = turns, rig, guard, signals, stream
+    def __init__(self, turns: Turns, rig: Rig, guard: Guard, stream: Stream) -> None:
+        self._turns, self._rig, self._guard, self._stream = turns, rig, guard, stream
         self.sees_storeys = True
         """Whether the laser of storey 2 looks at its storey: the difference of the lasers is no drift otherwise."""
 
@@ -27,10 +27,7 @@ class Rest:
         """Arm, wait until the storeys are still, and take the zero of every signal."""
         self._turns.begin("the operator's work is done")
         rest = self._stillness(step)
-        self._signals.tare(rest)
-        if self.sees_storeys:
-            # without a zero of the drift the guard does not watch it; all other limits apply
-            self._guard.tare(rest)
+        self._guard.tare(rest, drift=self.sees_storeys)
         self._turns.fall = FallWatch(specimen, self._rig.sample_rate) if specimen else None
         self._turns.output.machine.go(State.RUNNING, "at rest, zero taken")
 
@@ -56,8 +53,9 @@ class Rest:
         """Channel values over a rest during which the storeys were still, shape (n, n_channels)."""
         waited = 0.0
         while True:
-            values = np.concatenate([self._turns.values() for _ in range(self._blocks(step.rest))])
-            if self._signals.scatter(values) <= step.still:
+            blocks = [self._turns.exchange() for _ in range(self._blocks(step.rest))]
+            values = np.concatenate([each.values for each in blocks])
+            if scatter(np.concatenate([each.signals for each in blocks])) <= step.still:
                 return values
             waited += step.rest
             if waited >= step.patience:

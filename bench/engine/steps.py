@@ -83,7 +83,7 @@ class Trim:
 
 
 Watch = Callable[[NDArray[np.float64]], Event | None]
-"""Is shown the signals of each block while a drive is played, shape (n, 6); what it returns is published."""
+"""Is shown the signals of each block while a drive is played, shape (n, n_signals); what it returns is published."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +127,7 @@ class Done:
 class Fallen:
     """The block has fallen; the drive still runs until the plan ramps it out.
 
-    Of a `Play`: `signals`, shape (n, 6), are those until then, as `Played` has them.
+    Of a `Play`: `signals`, shape (n, n_signals), are those until then, as `Played` has them.
     """
 
     signals: NDArray[np.float64] | None = None
@@ -135,8 +135,8 @@ class Fallen:
 
 @dataclass(frozen=True, eq=False)
 class Played:
-    """What a played drive did: `signals`, shape (n, 6), as `bench.analysis.signals` numbers them, and the drive [V]
-    that really went out, shape (n,). Row i was taken while sample i of the volts was played; n is their number.
+    """What a played drive did: `signals`, shape (n, n_signals), as `bench.analysis.signals` numbers them, and the drive
+    [V] that really went out, shape (n,). Row i was taken while sample i of the volts was played; n is their number.
 
     Values that a sensor did not give are NaN.
     """

@@ -6,22 +6,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.analysis.fall import FallWatch
-from bench.analysis.signals import SignalMap
+from bench.analysis.signals import SIGNALS
 from bench.engine.ending import Ended, Ending
 from bench.engine.output import Output
 from bench.engine.requests import Requests
 from bench.engine.stream import Stream
 from bench.events import LimitExceeded, State, Warned
-from bench.guard.guard import Guard
+from bench.guard.guard import Exchange, Guard
 from bench.guard.violation import Violation
 
 
 class Turns:
     """Turns the loop until somebody or something ends it; an ending raises `Ended`, the output at zero by then."""
 
-    def __init__(self, output: Output, guard: Guard, signals: SignalMap, stream: Stream, requests: Requests) -> None:
+    def __init__(self, output: Output, guard: Guard, stream: Stream, requests: Requests) -> None:
         self.output = output
-        self._guard, self._signals, self._stream, self._requests = guard, signals, stream, requests
+        self._guard, self._stream, self._requests = guard, stream, requests
         self.fall: FallWatch | None = None
         """Watches the specimen that stands on the table, if one is known to."""
         self._over: Violation | None = None
@@ -35,8 +35,8 @@ class Turns:
         # a halt that came while the rig was being armed found no enable line to cut
         self.heed_requests()
 
-    def values(self) -> NDArray[np.float64]:
-        """One turn: the channels' values, shape (block, n_channels)."""
+    def exchange(self) -> Exchange:
+        """One turn."""
         exchange = self.output.exchange()
         for near in exchange.warnings:
             self._stream.publish(Warned(f"{near.quantity} {near.value:.4g} {near.unit} comes near {near.limit:.4g}"))
@@ -44,11 +44,12 @@ class Turns:
         if exchange.violation is not None and self._over is None:
             self._exceeded(exchange.violation)
         self.heed_requests()
-        return exchange.values
+        return exchange
 
     def signals(self) -> tuple[NDArray[np.float64], bool]:
-        """One turn: the signals, shape (block, 6), and whether the block has fallen."""
-        signals = self._signals.of(self.values())
+        """One turn: the experiment's signals, shape (block, len(SIGNALS)), and whether the block has fallen."""
+        # a channel besides may lose samples without costing a plan its cycles
+        signals = self.exchange().signals[:, : len(SIGNALS)]
         return signals, self.fall is not None and self.fall.fallen(signals)
 
     def heed_requests(self) -> None:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.analysis.signals import DRIFT, SignalMap
 from bench.guard.health import SensorWatch
 from bench.guard.limits import Limits, Ramps, ramp_refusal
 from bench.guard.quantities import Mover
@@ -23,14 +24,16 @@ from drivers.rig import Block, Rig, RigError
 class Exchange:
     """One turn of the acquisition loop.
 
-    `values` are the block's counts in units, shape (n, n_channels); `drive` [V], shape (n,), is what was played
-    while they were taken; `violation` is the limit that was exceeded first, if one was, `runaway` the first of those
-    that say that the table itself moves too much, and `warnings` are those that the motion has come near for the first
-    time since arming. `opened` names the safety inputs that are not good: the enable line is cut then.
+    `values` are the block's counts in units, shape (n, n_channels), and `signals` what they say of the experiment,
+    shape (n, n_signals), none without a map; `drive` [V], shape (n,), is what was played while they were taken;
+    `violation` is the limit that was exceeded first, if one was, `runaway` the first of those that say that the table
+    itself moves too much, and `warnings` are those that the motion has come near for the first time since arming.
+    `opened` names the safety inputs that are not good: the enable line is cut then.
     """
 
     block: Block
     values: NDArray[np.float64]
+    signals: NDArray[np.float64]
     drive: NDArray[np.float64]
     violation: Violation | None
     warnings: tuple[Violation, ...] = ()
@@ -41,14 +44,19 @@ class Exchange:
 class Guard:
     """Stands between the engine and the rig.
 
-    With a `mover`, a force and a current that no channel measures are estimated from the motion.
+    With a `mover`, a force and a current that no channel measures are estimated from the motion. With `signals`, every
+    block is turned into signals, once, and the drift among them is watched.
     """
 
-    def __init__(self, rig: Rig, limits: Limits, ramps: Ramps, mover: Mover | None = None) -> None:
+    def __init__(
+        self, rig: Rig, limits: Limits, ramps: Ramps, mover: Mover | None = None, signals: SignalMap | None = None
+    ) -> None:
         self._rig = rig
         self._limits = limits
         self._ramps = ramps
         self._mover = mover
+        self._signals = signals
+        self._first_block = True
         self._channels = rig.channels
         self._waiting = np.zeros(0)
         self._command = self._sent = 0.0
@@ -78,6 +86,7 @@ class Guard:
             raise RigError(f"arming is refused: {', '.join(opened)} open; close it, then begin again")
         self._ramp_samples, self._ramp_done, self._ramp_from = None, 0, 1.0
         self._command, self._sent, self._held, self._expected = 0.0, 0.0, None, 0
+        self._first_block = True
         self._make_watches()
         self._waiting = np.zeros(self._rig.lead)
         self._rig.arm()
@@ -106,7 +115,8 @@ class Guard:
         self._expected += len(block)
         played, self._waiting = queue[: volts.size], queue[volts.size :]
         values = self._values(block)
-        exceeded, near = self._motion.check(block.first, values)
+        signals = self._signals_of(values)
+        exceeded, near = self._motion.check(block.first, values, signals)
         exceeded += self._sensors.check(block.first, block.counts, values, played)
         exceeded += self._time.check(self._rig.clock.now(), self._expected)
         exceeded.sort(key=lambda violation: violation.sample)
@@ -117,7 +127,7 @@ class Guard:
         if opened:
             self._cut_because(f"{', '.join(opened)} opened")
         runaway = next((violation for violation in exceeded if violation.of_table), None)
-        return Exchange(block, values, played, refused or seen, tuple(near), opened, runaway)
+        return Exchange(block, values, signals, played, refused or seen, tuple(near), opened, runaway)
 
     def refusal(self, volts: NDArray[np.float64]) -> Violation | None:
         """Why commands [V] of shape (n,), sent now, would not be sent to their end; None when they would."""
@@ -133,9 +143,14 @@ class Guard:
             return Violation("drive slew", float(change[at]) * rate, self._limits.drive_slew, "V/s", at)
         return None
 
-    def tare(self, values: NDArray[np.float64]) -> None:
-        """Take a rest, values of shape (n, n_channels), as the zero of the specimen's drift."""
-        self._motion.tare(values)
+    def tare(self, values: NDArray[np.float64], *, drift: bool = True) -> None:
+        """Take a rest, values of shape (n, n_channels), as the zero of every signal.
+
+        From then on the drift is watched, unless it has no zero or is not `drift`: a laser may look elsewhere.
+        """
+        if self._signals is not None:
+            self._signals.tare(values)
+            self._motion.drift_watched = drift and bool(self._signals.taken[DRIFT])
 
     def stop(self) -> None:
         """Begin the smooth ramp to zero; a ramp that has begun goes on."""
@@ -208,6 +223,15 @@ class Guard:
             last += min(max(target - last, -self._slew), self._slew)
             slowed[i] = last
         return slowed
+
+    def _signals_of(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        if self._signals is None:
+            return np.empty((len(values), 0))
+        if self._first_block:
+            # the table is silent: near enough until a rest has been waited for
+            self._signals.tare(values)
+            self._first_block = False
+        return self._signals.of(values)
 
     def _values(self, block: Block) -> NDArray[np.float64]:
         values = np.empty(block.counts.shape, order="F")

@@ -56,13 +56,6 @@ class Quantities:
         self._forget = float(np.exp(-1.0 / (heating_time * sample_rate)))
         self._heat = np.zeros(1)
         self._middle = {name: _middle(channels[column]) for name, column in self._columns.items() if "laser" in name}
-        self._rest_drift: float | None = None
-
-    def tare(self, values: Array) -> None:
-        """Take the drift of a rest, values of shape (n, n_channels), as its zero; before, drift is not watched."""
-        drift = self._drift(values)
-        if drift is not None and np.isfinite(drift).any():
-            self._rest_drift = float(np.nanmean(drift))
 
     def of(self, values: Array) -> dict[str, Array]:
         """Magnitude of each quantity that the channels tell, shape (n,), by its key in `NAMES`."""
@@ -76,8 +69,6 @@ class Quantities:
         self._add_load(found, values, x, a)
         if (place := self._laser_place(values)) is not None:
             found["laser_range"] = place
-        if self._rest_drift is not None and (drift := self._drift(values)) is not None:
-            found["drift"] = np.abs(np.nan_to_num(drift - self._rest_drift))
         return found
 
     def _add_load(self, found: dict[str, Array], values: Array, x: Array | None, a: Array | None) -> None:
@@ -118,10 +109,6 @@ class Quantities:
             for name, (middle, half) in self._middle.items()
         ]
         return np.maximum.reduce(places) if places else None
-
-    def _drift(self, values: Array) -> Array | None:
-        first, second = self._column(values, "laser_1"), self._column(values, "laser_2")
-        return None if first is None or second is None else second - first
 
     def _column(self, values: Array, name: str) -> Array | None:
         column = self._columns.get(name)

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.analysis.signals import DRIFT
 from bench.guard.limits import Limits
 from bench.guard.persistence import Persistence
 from bench.guard.quantities import NAMES, Mover, Quantities
@@ -39,16 +40,22 @@ class MotionWatch:
         self._over = {key: Persistence(samples) for key, samples in debounce.items()}
         self._near = {key: Persistence(samples) for key, samples in debounce.items()}
         self._warned: set[str] = set()
+        self.drift_watched = False
+        """Whether the drift has a zero, and is one."""
 
-    def tare(self, values: NDArray[np.float64]) -> None:
-        """Take a rest, values of shape (n, n_channels), as the zero of the drift."""
-        self._quantities.tare(values)
+    def check(
+        self, first: int, values: NDArray[np.float64], signals: NDArray[np.float64]
+    ) -> tuple[list[Violation], list[Violation]]:
+        """Limits that a block exceeds, and those it comes near for the first time.
 
-    def check(self, first: int, values: NDArray[np.float64]) -> tuple[list[Violation], list[Violation]]:
-        """Limits that a block of values, shape (n, n_channels), exceeds, and those it comes near for the first time."""
+        Values have shape (n, n_channels), signals (n, n_signals).
+        """
         exceeded: list[Violation] = []
         near: list[Violation] = []
-        for key, size in self._quantities.of(values).items():
+        sizes = self._quantities.of(values)
+        if self.drift_watched:
+            sizes["drift"] = np.abs(np.nan_to_num(signals[:, DRIFT]))
+        for key, size in sizes.items():
             at = self._over[key].first(size > self._limits[key])
             if at is not None:
                 exceeded.append(self._violation(key, size, self._limits[key], first, at))

@@ -6,18 +6,70 @@ from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent, QWheelEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QSpinBox, QVBoxLayout, QWidget
 
+from bench.events import TWIN_TRACE, TwinEstimate
 from bench.gui import texts
 from bench.gui.drawing import Drawing, Pose
 from bench.gui.palette import Theme
+from bench.link.messages import Traces
 from bench.link.reduction import TRACES
 from sim.specimen import Specimen
 
 X_G, U_1, U_2 = (TRACES.index(name) for name in ("displacement", "u1", "u2"))
+_SECONDS, _THETA = (TWIN_TRACE.index(name) for name in ("seconds", "theta"))
+STEP = 0.01
+"""Between two angles of the twin [s]."""
+KEPT = 500
+"""Angles that are kept: five seconds."""
+BEHIND = 2.0
+"""How far the twin may be behind what was measured [s of the bench's time]: a run may be faster than the clock."""
 FACTOR, LARGEST = 5, 50
 """How many times as large as the frame the motion is drawn: at first, and at most."""
 BELOW = 12
 """Room under the table for the marks of contact [px]."""
 LARGER, SMALLER = (Qt.Key.Key_Plus, Qt.Key.Key_Equal, Qt.Key.Key_Up), (Qt.Key.Key_Minus, Qt.Key.Key_Down)
+
+
+class BlockAngle:
+    """The angle of the block over bench time, as the live twin publishes it: no sensor watches the block."""
+
+    def __init__(self) -> None:
+        self._run, self._origin = 0, 0.0
+        self._time, self._angle = np.zeros(0), np.zeros(0)
+
+    def place(self, traces: Traces) -> None:
+        """Take note of when the run of these traces began."""
+        if traces.run != self._run:
+            self._run, self._origin = traces.run, traces.origin
+            self._time, self._angle = np.zeros(0), np.zeros(0)
+
+    def add(self, estimate: TwinEstimate) -> None:
+        """Take the next stretch of the twin's trace; one of another run than that of the traces is left out."""
+        if estimate.run != self._run:
+            return
+        stood = estimate.trace[np.isfinite(estimate.trace[:, _THETA])]
+        self._time = np.append(self._time, self._origin + stood[:, _SECONDS])[-KEPT:]
+        self._angle = np.append(self._angle, stood[:, _THETA])[-KEPT:]
+
+    def nearest(self, time: float) -> float:
+        """The latest bench time [s] up to `time` at which the angle is known, so that frame and block are shown as they
+        were at one moment; `time` itself where nothing is known of the last `BEHIND` seconds.
+        """
+        newest = float(self._time[-1]) if self._time.size else float("-inf")
+        return newest if time - BEHIND <= newest < time else time
+
+    def at(self, time: float) -> tuple[float, float] | None:
+        """Angle [rad] at bench time [s], and how long ago the block last struck its base [s], infinite if it has not.
+
+        None while nothing is known of that moment.
+        """
+        times, angles = self._time, self._angle
+        if not times.size or not times[0] <= time <= times[-1] + STEP:
+            return None
+        until = int(np.searchsorted(times, time, side="right"))
+        sign = np.sign(angles[:until])
+        struck = np.flatnonzero((sign[:-1] != 0.0) & (sign[1:] != sign[:-1]))
+        ago = time - float(times[struck[-1] + 1]) if struck.size else float("inf")
+        return float(angles[until - 1]), ago
 
 
 class PhysicalPicture(QWidget):

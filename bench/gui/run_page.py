@@ -22,9 +22,8 @@ from bench.gui.buttons import give_key
 from bench.gui.controller import PERIOD, Controller
 from bench.gui.gain_plot import GainPlot
 from bench.gui.header import set_level
-from bench.gui.model_block import ModelBlock
 from bench.gui.palette import Theme
-from bench.gui.physical import PhysicalPicture
+from bench.gui.physical import BlockAngle, PhysicalPicture
 from bench.gui.steady_view import SteadyView
 from bench.gui.traces import TracePlot
 from bench.link.messages import Run, Traces
@@ -43,9 +42,8 @@ class RunPage(QWidget):
     def __init__(self, controller: Controller, theme: Theme) -> None:
         super().__init__()
         self._controller = controller
-        self._run: Run | None = None
         self.traces, self.gains, self.steady = TracePlot(theme), GainPlot(theme), SteadyView()
-        self.picture, self.block = PhysicalPicture(theme), ModelBlock()
+        self.picture, self.block = PhysicalPicture(theme), BlockAngle()
         self.alpha = QLabel(texts.NO_GAIN)
         self.alpha.setProperty("role", "value")
         self.alpha.setAccessibleName(texts.NAMES["alpha"])
@@ -103,21 +101,19 @@ class RunPage(QWidget):
         QVBoxLayout(self).addWidget(whole)
 
     def _begin(self, run: Run) -> None:
-        self._run = run
         self.traces.clear()
         self.log.clear()
         self.alpha.setText(texts.NO_GAIN)
         self.predicted.setText("")
         self.picture.use(run.configuration.known_specimen)
         self.steady.begin(run)
-        self.block.close()
-        self.block = ModelBlock()
+        self.block = BlockAngle()
 
     def _trace(self, traces: list[Traces]) -> None:
         self.traces.add(traces)
         self.steady.add(traces)
         for block in traces:
-            self.block.add(block)
+            self.block.place(block)
         # at once, not with the next tick: what is new waits for nothing
         self._draw()
 
@@ -153,15 +149,13 @@ class RunPage(QWidget):
             case StepStarted():
                 self.steady.over()
             case TwinEstimate():
+                self.block.add(event)
                 self._show_twin()
             case _:
                 pass
 
     def _couple(self, beta: float | None) -> None:
         self.picture.couple(beta is not None)
-        if self._run is not None:
-            specimen = self._run.configuration.known_specimen
-            self.block.couple(specimen.bare() if beta is None else specimen.coupled(beta))
 
     def _show(self, value: float, uncertainty: float | None, predicted: float, effort: str) -> None:
         known = isfinite(value)

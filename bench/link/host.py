@@ -138,13 +138,13 @@ class AtTheClient:
 class Teller:
     """The subscriber that puts the engine's events into the outbox."""
 
-    def __init__(self, host: Host, reduction: Callable[[Rig], Reduction]) -> None:
-        self._host, self._make = host, reduction
+    def __init__(self, host: Host) -> None:
+        self._host = host
         self._reduction: Reduction | None = None
 
     def opened(self, rig: Rig) -> None:
-        """The rig's channels decide what the traces are made of."""
-        self._reduction = self._make(rig)
+        """Traces are made from now on."""
+        self._reduction = Reduction(rig.sample_rate)
         names = tuple(channel.name for channel in rig.channels)
         self._host.outbox.put(Opened(names, rig.sample_rate, rig.description), always=True)
         self._host.inputs.watch(rig)

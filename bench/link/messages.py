@@ -129,7 +129,8 @@ class Traces:
     """Signals of one block: `low` and `high` have shape (n_bins, n_signals), extremes in bins of `step` seconds.
 
     The first bin begins at bench time `begin` [s]; the signals are `bench.link.reduction.TRACES`. `read` is the second
-    of the machine's clock (`drivers.clock.now`) at which the block had been read.
+    of the machine's clock (`drivers.clock.now`) at which the block had been read, `origin` the bench time of the run's
+    first sample [s].
     """
 
     run: int
@@ -138,6 +139,7 @@ class Traces:
     low: NDArray[np.float32]
     high: NDArray[np.float32]
     read: float
+    origin: float = 0.0
 
 
 @dataclass(frozen=True)

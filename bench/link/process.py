@@ -11,16 +11,13 @@ import traceback
 from multiprocessing.connection import Client, Connection
 from types import FrameType
 
-from bench.analysis.signals import SignalMap
 from bench.config.model import BenchConfiguration
 from bench.engine.operator import Unattended
 from bench.engine.requests import Requests
 from bench.link.host import AtTheClient, Host, Teller
 from bench.link.messages import Ended, FromSession, Refused, Run, Survey, Surveyed
-from bench.link.reduction import Reduction
 from bench.preflight.compiled import compile_run
 from bench.session import run_session
-from drivers.rig import Rig
 from sim.errors import InvalidInput, RockbenchError
 
 FAREWELL = 2.0
@@ -82,16 +79,12 @@ def _run(asked: Run, host: Host, requests: Requests) -> FromSession:
     configuration = asked.configuration
     _abort_on_terminate(requests)
 
-    def reduction(rig: Rig) -> Reduction:
-        signals = SignalMap(rig.channels, configuration.laser_reference, configuration.calibrated)
-        return Reduction(rig.channels, rig.sample_rate, signals)
-
     ended = run_session(
         asked.make(asked.parameters),
         configuration,
         out=asked.out,
         operator=AtTheClient(host, requests) if asked.person else Unattended(_policy(configuration)),
-        subscribers=[Teller(host, reduction)],
+        subscribers=[Teller(host)],
         requests=requests,
         realtime=asked.realtime,
         about=asked.about,

@@ -1,22 +1,19 @@
-"""Blocks of samples to what a screen can show: signals in SI units, extremes in bins of some milliseconds."""
+"""Blocks of signals reduced to what a screen can show: extremes in bins of some milliseconds."""
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.analysis.signals import ACCELERATION, DISPLACEMENT, DRIFT, U1, SignalMap
+from bench.analysis.signals import ACCELERATION, DISPLACEMENT, DRIFT, SIGNALS, U1
 from bench.events import Acquired
 from bench.link.messages import Traces
 from drivers.clock import now
-from drivers.rig import Channel
 
 TRACES = ("drive", "acceleration", "displacement", "u1", "u2", "drift")
 """Columns of traces: drive [V], table acceleration [m/s2] and displacement [m], storeys and their difference [m],
-the last three relative to the table."""
+the last three relative to the table. Channels besides follow, as in `bench.analysis.signals`."""
 
 BIN = 0.002
 """Shortest bin [s]: finer than a pixel of every window of a second and more."""
-REST = 0.5
-"""Share of a second at the start of a run from which the zero of the signals is taken: the table is silent then."""
 
 
 def extremes(values: NDArray[np.float64], width: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
@@ -31,40 +28,28 @@ def extremes(values: NDArray[np.float64], width: int) -> tuple[NDArray[np.float3
 
 
 class Reduction:
-    """Turns the blocks of a rig with these `channels` into traces; knows nothing of who reads them."""
+    """Turns the blocks of a rig into traces; knows nothing of who reads them."""
 
-    def __init__(self, channels: tuple[Channel, ...], sample_rate: float, signals: SignalMap) -> None:
-        self._channels, self._rate, self._signals = channels, sample_rate, signals
+    def __init__(self, sample_rate: float) -> None:
+        self._rate = sample_rate
         self._width = max(round(BIN * sample_rate), 1)
         self._run, self._origin = 0, 0.0
-        self._rest: list[NDArray[np.float64]] = []
 
     def __call__(self, event: Acquired) -> Traces:
         """The traces of a block."""
-        values = np.column_stack(
-            [channel.to_unit(event.block.counts[:, k]) for k, channel in enumerate(self._channels)]
-        )
+        signals = event.signals
         if event.run != self._run:
             # the samples follow one another evenly; the moments at which blocks are read do not
-            self._origin = event.time - (event.block.first + len(values)) / self._rate
-        self._tare(event.run, values)
-        signals = self._signals.of(values)
+            self._run, self._origin = event.run, event.time - (event.block.first + len(signals)) / self._rate
         chosen = np.column_stack(
             (
                 event.drive,
                 signals[:, [ACCELERATION, DISPLACEMENT, U1]],
                 signals[:, U1] + signals[:, DRIFT],
                 signals[:, DRIFT],
+                signals[:, len(SIGNALS) :],
             )
         )
         low, high = extremes(chosen, self._width)
         begin = self._origin + event.block.first / self._rate
-        return Traces(event.run, begin, self._width / self._rate, low, high, now())
-
-    def _tare(self, run: int, values: NDArray[np.float64]) -> None:
-        """Take the zero anew while a run is in its first moments."""
-        if run != self._run:
-            self._run, self._rest = run, []
-        if sum(map(len, self._rest)) < REST * self._rate:
-            self._rest.append(values)
-            self._signals.tare(np.concatenate(self._rest))
+        return Traces(event.run, begin, self._width / self._rate, low, high, now(), self._origin)

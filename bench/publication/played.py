@@ -54,7 +54,7 @@ def played_records(record: Record) -> list[Played]:
 
 
 def signals_of(record: Record, signals: SignalMap, played: Played) -> Floats:
-    """Signals of the play, shape (n, 6), counted from the zero at rest."""
+    """Signals of the play, shape (n, n_signals), counted from the zero at rest."""
 
     def values(start: int, stop: int) -> Floats:
         return np.column_stack([record.values(channel.name, slice(start, stop)) for channel in record.channels])

@@ -107,8 +107,7 @@ def replay(
         signals = signals or SignalMap(rig.channels, configuration.laser_reference, configuration.calibrated)
         engine = Engine(
             rig,
-            Guard(rig, configuration.limits, configuration.ramps, configuration.mover),
-            signals,
+            Guard(rig, configuration.limits, configuration.ramps, configuration.mover, signals),
             stream,
             requests,
             RecordedOperator(course),
@@ -116,7 +115,7 @@ def replay(
         )
         for warning in course.first_warnings:
             stream.publish(Warned(warning))
-        with twin_beside(stream, rig, configuration, signals, requests, patient=True):
+        with twin_beside(stream, rig, configuration, requests, patient=True):
             ending = engine.run(experiment.plan(configuration))
         over = rig.over
     broke_off = _broke_off(record, over)

@@ -3,7 +3,6 @@
 from collections.abc import Generator
 from contextlib import contextmanager
 
-from bench.analysis.signals import SignalMap
 from bench.config.model import BenchConfiguration
 from bench.engine.requests import Requests
 from bench.engine.stream import Stream
@@ -18,7 +17,6 @@ def twin_beside(
     stream: Stream,
     rig: Rig,
     configuration: BenchConfiguration,
-    signals: SignalMap,
     requests: Requests,
     *,
     patient: bool,
@@ -29,7 +27,7 @@ def twin_beside(
         return
     from bench.twin.twin import Twin
 
-    twin = Twin(rig, configuration, signals, stream.publish, requests, patient=patient)
+    twin = Twin(rig.sample_rate, configuration, stream.publish, requests, patient=patient)
     stream.join(twin)
     try:
         yield

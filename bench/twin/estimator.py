@@ -6,13 +6,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.analysis.signals import ACCELERATION, DISPLACEMENT, LASER_1, LASER_2, SignalMap
+from bench.analysis.signals import ACCELERATION, DISPLACEMENT, LASER_1, LASER_2
 from bench.events import TwinEstimate
 from bench.twin.ensemble import Candidates, Ensemble
 from bench.twin.gains import Gains, Measured
 from bench.twin.resampling import Resampler
 from bench.twin.residual import Residual
-from drivers.rig import Block, Channel
 from sim.errors import RockbenchError
 
 Array = NDArray[np.float64]
@@ -25,13 +24,11 @@ _TRACE = 0.01
 class Setting:
     """What the twin of a run needs to know of the bench.
 
-    `signals` have their zero. `on_ground`: the lasers see the table's displacement too. `lag` is theirs behind the
+    `on_ground`: the lasers see the table's displacement too. `lag` is theirs behind the
     table's accelerometer and displacement sensor [s], `linearity` their largest error [m], that of storey 1 first.
     """
 
-    channels: tuple[Channel, ...]
     sample_rate: float
-    signals: SignalMap
     on_ground: bool
     lag: tuple[float, float]
     linearity: tuple[float, float]
@@ -70,15 +67,15 @@ class Estimator:
         """Go on with half of the members; their band holds less."""
         self._ensemble.keep(1 + self.members // 2)
 
-    def take(self, time: float, block: Block, measured: Measured | None) -> TwinEstimate | None:
+    def take(self, time: float, end: int, signals: Array, measured: Measured | None) -> TwinEstimate | None:
         """The estimate at the end of a block that was read at `time`; None of one too short for a sample of the model.
+
+        `signals`, shape (n, n_signals), are those of the block before sample `end` of the run.
 
         Raises Blind where the table's acceleration is missing.
         """
         setting = self._setting
-        values = np.column_stack([each.to_unit(block.counts[:, k]) for k, each in enumerate(setting.channels)])
-        signals = setting.signals.of(values)[:, [ACCELERATION, DISPLACEMENT, LASER_1, LASER_2]]
-        samples, newer = self._resampler.push(signals)
+        samples, newer = self._resampler.push(signals[:, [ACCELERATION, DISPLACEMENT, LASER_1, LASER_2]])
         if not np.isfinite(samples[:, 0]).all():
             raise Blind("samples of the table's acceleration are missing")
         if not len(samples):
@@ -88,7 +85,7 @@ class Estimator:
         seen = np.stack((u1, u1 + laser_2 - laser_1, laser_2 - laser_1))
         motions = self._ensemble.feed(acceleration)
         u = np.stack((motions[0], motions[1], motions[1] - motions[0]))
-        seconds = (block.first + len(block) - 1 - newer) / setting.sample_rate - self._latency
+        seconds = (end - 1 - newer) / setting.sample_rate - self._latency
         return self._estimate(time, seconds, acceleration, seen, u, motions[2], measured)
 
     def _estimate(

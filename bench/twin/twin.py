@@ -7,13 +7,12 @@ that is a second behind is off until the rig is armed again.
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
-from copy import copy
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from importlib import import_module
 
 import numpy as np
+from numpy.typing import NDArray
 
-from bench.analysis.signals import SignalMap
 from bench.config.model import BenchConfiguration
 from bench.engine.requests import Requests
 from bench.events import (
@@ -34,8 +33,9 @@ from bench.twin.gains import Measured
 from bench.twin.lag import laser_lag
 from bench.twin.residual import Limit
 from bench.twin.standing import Standing
-from drivers.rig import Block, Rig
 from sim.specimen import Specimen
+
+Array = NDArray[np.float64]
 
 _LATE = 0.15
 """What may wait for the model before it gives up members [s]; two blocks may in any case."""
@@ -57,15 +57,13 @@ class Twin:
     """Runs from when the zero is taken to when the rig is at rest again, wherever the model describes what is there.
 
     `publish` is called in the thread of the engine. A `patient` twin waits for its model, so that what it says and when
-    is always the same: for benches whose clock does not run on. `signals` are those of the engine, which takes their
-    zero. `requests` are asked to stop when a residual says so.
+    is always the same: for benches whose clock does not run on. `requests` are asked to stop when a residual says so.
     """
 
     def __init__(
         self,
-        rig: Rig,
+        sample_rate: float,
         configuration: BenchConfiguration,
-        signals: SignalMap,
         publish: Callable[[Event], None],
         requests: Requests,
         *,
@@ -73,13 +71,13 @@ class Twin:
     ) -> None:
         import_module("sim.kernel.rocking")  # loading it would hold up a bench that is armed
 
-        self._configuration, self._signals = configuration, signals
+        self._configuration = configuration
         self._publish, self._requests, self._patient = publish, requests, patient
         first, second = (configuration.analysis.laser_linearity * reach for reach in configuration.laser_ranges)
         on_ground = configuration.laser_reference == "ground"
         lag = laser_lag(configuration)
-        self._setting = Setting(rig.channels, rig.sample_rate, signals, on_ground, lag, (first, second))
-        block = configuration.block_samples / rig.sample_rate
+        self._setting = Setting(sample_rate, on_ground, lag, (first, second))
+        block = configuration.block_samples / sample_rate
         self._late, self._most = max(round(_LATE / block), 2), max(round(_BEHIND / block), 5)
         self._standing = Standing()
         self._candidates: tuple[Specimen, Future[Candidates]] | None = None
@@ -129,9 +127,7 @@ class Twin:
 
     def _begin(self, number: int, those: Future[Candidates]) -> None:
         twin = self._configuration.twin
-        # the engine takes another zero when it arms again
-        setting = replace(self._setting, signals=copy(self._signals))
-        estimator = self._worker.submit(lambda: Estimator(number, setting, those.result()))
+        estimator = self._worker.submit(lambda: Estimator(number, self._setting, those.result()))
         warn, stop = (Limit(limit, twin.persistence) for limit in (twin.residual_warn, twin.residual_stop))
         self._run = _Run(estimator, warn, stop)
 
@@ -160,9 +156,9 @@ class Twin:
             self._give_up(event.time, f"{BEHIND}: {len(run.waiting)} blocks wait for its model")
             return
         shed = len(run.waiting) >= self._late
-        # a driver may use its buffer again
-        block = Block(event.block.first, np.array(event.block.counts))
-        run.waiting.append(self._worker.submit(_take, run.estimator, event.time, block, self._measured, shed))
+        end = event.block.first + len(event.block)
+        taking = self._worker.submit(_take, run.estimator, event.time, end, event.signals, self._measured, shed)
+        run.waiting.append(taking)
 
     def _give_up(self, now: float, why: str) -> None:
         self._leave()
@@ -179,10 +175,10 @@ class Twin:
 
 
 def _take(
-    estimator: Future[Estimator], time: float, block: Block, measured: Measured | None, shed: bool
+    estimator: Future[Estimator], time: float, end: int, signals: Array, measured: Measured | None, shed: bool
 ) -> TwinEstimate | None:
     """In the twin's thread, where the estimator has been made before."""
     twin = estimator.result()
     if shed:
         twin.shed()
-    return twin.take(time, block, measured)
+    return twin.take(time, end, signals, measured)

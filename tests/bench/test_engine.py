@@ -60,8 +60,9 @@ class Bench:
         subscribers = [self.events.append, *([listener] if listener else [])]
         self.engine = Engine(
             self.rig,
-            Guard(self.rig, limits or Limits(), Ramps(stop=1.0, abort=0.2)),
-            SignalMap(self.rig.channels, "table"),
+            Guard(
+                self.rig, limits or Limits(), Ramps(stop=1.0, abort=0.2), signals=SignalMap(self.rig.channels, "table")
+            ),
             Stream(self.rig.clock, subscribers),
             self.requests,
             self.operator,

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bench.analysis.signals import SignalMap
 from bench.guard.guard import Exchange, Guard
 from bench.guard.limits import Debounce, Limits, Ramps, Warnings
 from bench.guard.quantities import Mover, Quantities
@@ -243,7 +244,7 @@ def _nothing(volts: np.ndarray) -> np.ndarray:
 
 def _until_violation(rig: LoopbackRig, limits: Limits, volts: float, mover: Mover | None = None) -> Exchange:
     """A slow rise to `volts`, then hold; the first exchange with a violation."""
-    guard = Guard(rig, limits, RAMPS, mover)
+    guard = Guard(rig, limits, RAMPS, mover, SignalMap(rig.channels, "table"))
     guard.arm()
     guard.tare(guard.exchange(np.zeros(N)).values)
     levels = [np.linspace(volts * k / 30, volts * (k + 1) / 30, N) for k in range(30)]

@@ -55,8 +55,7 @@ class Bench:
         self.rig, self.events, self.requests = rig, list[Event](), Requests()
         self.engine = Engine(
             rig,
-            Guard(rig, LIMITS, Ramps(stop=1.0, abort=0.2)),
-            SignalMap(rig.channels, "table"),
+            Guard(rig, LIMITS, Ramps(stop=1.0, abort=0.2), signals=SignalMap(rig.channels, "table")),
             Stream(rig.clock, [self.events.append, *([listener] if listener else [])]),
             self.requests,
             Unattended(),

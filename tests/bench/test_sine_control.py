@@ -45,8 +45,7 @@ class Bench:
         self._drive: list[NDArray[np.float64]] = []
         self.engine = Engine(
             self.rig,
-            Guard(self.rig, Limits(), Ramps()),
-            SignalMap(self.rig.channels, "ground"),
+            Guard(self.rig, Limits(), Ramps(), signals=SignalMap(self.rig.channels, "ground")),
             Stream(self.rig.clock, [self._keep]),
             Requests(),
             Unattended(),

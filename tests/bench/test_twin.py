@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from bench.analysis.signals import SignalMap
 from bench.config.twin import Twin
 from bench.engine.steps import Handle, Plan
 from bench.events import Acquired, Event, RunningGain, SpecimenMounted, State, StateChanged, TwinEstimate
@@ -22,7 +21,7 @@ from bench.twin.ensemble import candidates
 from bench.twin.estimator import Estimator, Setting
 from bench.twin.standing import Standing
 from drivers.clock import VirtualClock
-from drivers.rig import Block, Handwork
+from drivers.rig import Handwork
 from drivers.simulated import SimulatedRig
 from sim.excitation import SampledRecord
 from sim.rocking import simulate
@@ -102,17 +101,16 @@ def test_the_band_holds_a_specimen_within_what_is_left_open_of_it() -> None:
 def test_how_the_samples_are_cut_into_blocks_changes_no_motion() -> None:
     bench = Beside(configuration(enabled=False))
     bench.run(shaken(3.0))
-    counts = np.concatenate([event.block.counts for event in bench.events if isinstance(event, Acquired)])
-    with SimulatedRig(bench.configuration.simulation.bench, COUPLED, seed=1) as rig:
-        signals = SignalMap(rig.channels, "ground")
-        setting = Setting(rig.channels, RATE, signals, True, (1e-4, 6e-4), (1e-4, 1e-4))
-    signals.tare(np.column_stack([each.to_unit(counts[:400, k]) for k, each in enumerate(rig.channels)]))
+    signals = np.concatenate([event.signals for event in bench.events if isinstance(event, Acquired)])
+    setting = Setting(RATE, True, (1e-4, 6e-4), (1e-4, 1e-4))
     ends: list[TwinEstimate] = []
     traces: list[Array] = []
     for size in (7, 37, 500):
         estimator = Estimator(1, setting, candidates(COUPLED, configuration(members=3)))
-        blocks = [Block(first, counts[first : first + size]) for first in range(0, len(counts), size)]
-        came = [one for block in blocks if (one := estimator.take(0.0, block, None)) is not None]
+        blocks = [signals[first : first + size] for first in range(0, len(signals), size)]
+        ends_at = np.cumsum([len(block) for block in blocks]).tolist()
+        taken = [estimator.take(0.0, end, block, None) for end, block in zip(ends_at, blocks, strict=True)]
+        came = [one for one in taken if one is not None]
         traces.append(trace(came))
         ends.append(came[-1])
     for other, end in zip(traces[1:], ends[1:], strict=True):

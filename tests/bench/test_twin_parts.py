@@ -16,7 +16,6 @@ from bench.twin.lag import laser_lag
 from bench.twin.resampling import Resampler
 from bench.twin.residual import Limit, Residual
 from drivers.hardware.parameters import Hardware, Lasers
-from drivers.rig import Block
 from sim.excitation import SampledRecord
 from sim.linear import steady_peaks
 from sim.rocking import simulate
@@ -109,17 +108,17 @@ def test_without_the_acceleration_of_the_table_there_is_no_model_and_without_a_l
     rig = LoopbackRig()
     names = [channel.name for channel in rig.channels]
     signals = SignalMap(rig.channels, "ground")
-    setting = Setting(rig.channels, rig.sample_rate, signals, True, (0.0, 0.0), (1e-4, 1e-4))
-    counts = np.zeros((1500, 4), dtype=np.int16)
-    counts[:, names.index("laser_2")] = -32768
+    setting = Setting(rig.sample_rate, True, (0.0, 0.0), (1e-4, 1e-4))
+    values = np.zeros((1500, 4))
+    values[:, names.index("laser_2")] = np.nan
     estimator = Estimator(1, setting, Candidates([COUPLED], np.ones(1)))
-    estimate = estimator.take(0.0, Block(0, counts), None)
+    estimate = estimator.take(0.0, 1500, signals.of(values), None)
     assert estimate is not None
     assert (estimate.drift, estimate.u1_measured, estimate.standing) == (0.0, 0.0, 1.0)
     assert np.isnan([estimate.u2_measured, estimate.drift_measured, estimate.residual, estimate.excess]).all()
-    counts[700, names.index("table_acceleration")] = -32768
+    values[700, names.index("table_acceleration")] = np.nan
     with pytest.raises(Blind, match="acceleration"):
-        estimator.take(0.0, Block(1500, counts), None)
+        estimator.take(0.0, 3000, signals.of(values), None)
 
 
 def test_without_a_block_there_is_no_alpha_2() -> None:

@@ -33,9 +33,9 @@ def _run(laser_2: Callable[[np.ndarray], np.ndarray], *steps: Step) -> tuple[End
         for step in steps:
             outcomes.append((yield step))
 
-    guard = Guard(rig, LIMITS, Ramps(stop=1.0, abort=0.2))
+    guard = Guard(rig, LIMITS, Ramps(stop=1.0, abort=0.2), signals=SignalMap(rig.channels, "table"))
     stream = Stream(rig.clock, [])
-    engine = Engine(rig, guard, SignalMap(rig.channels, "table"), stream, requests, Unattended(), block=100)
+    engine = Engine(rig, guard, stream, requests, Unattended(), block=100)
     return engine.run(plan()), outcomes
 
 

@@ -78,9 +78,9 @@ class Beside:
         with SimulatedRig(simulation.bench, specimen, seed=simulation.seed) as rig:
             stream = Stream(rig.clock, [self.events.append, lambda event: self._look(rig, event), *self.listeners])
             signals = SignalMap(rig.channels, self.configuration.laser_reference)
-            guard = Guard(rig, self.configuration.limits, self.configuration.ramps)
-            engine = Engine(rig, guard, signals, stream, requests, Unattended(), self.block)
-            with twin_beside(stream, rig, self.configuration, signals, requests, patient=self.patient):
+            guard = Guard(rig, self.configuration.limits, self.configuration.ramps, signals=signals)
+            engine = Engine(rig, guard, stream, requests, Unattended(), self.block)
+            with twin_beside(stream, rig, self.configuration, requests, patient=self.patient):
                 return engine.run(_one_after_the_other(plans))
 
     def _look(self, rig: SimulatedRig, event: Event) -> None:

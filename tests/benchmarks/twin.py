@@ -99,7 +99,8 @@ def paced(bench: Recorded, enabled: bool) -> Paced:
     signals = SignalMap(bench.channels, configuration.laser_reference)
     rest = bench.counts[: round(REST * rate)]
     signals.tare(np.column_stack([each.to_unit(rest[:, k]) for k, each in enumerate(bench.channels)]))
-    with twin_beside(stream, bench, configuration, signals, Requests(), patient=False):  # type: ignore[arg-type]
+    every = signals.of(np.column_stack([each.to_unit(bench.counts[:, k]) for k, each in enumerate(bench.channels)]))
+    with twin_beside(stream, bench, configuration, Requests(), patient=False):  # type: ignore[arg-type]
         stream.publish(SpecimenMounted(COUPLED, Handwork.MOUNT_SPRING, time=0.0))
         time.sleep(2.0)
         stream.publish(StateChanged(State.ARMED, State.RUNNING, "at rest, zero taken", time=0.0))
@@ -109,7 +110,8 @@ def paced(bench: Recorded, enabled: bool) -> Paced:
             time.sleep(max(moment - time.perf_counter(), 0.0))
             due[float(number)] = moment
             block = Block(first, bench.counts[first : first + size])
-            stream.publish(Acquired(1, block, np.zeros(size), time=float(number)))
+            shown = every[first : first + size]
+            stream.publish(Acquired(1, block, np.zeros(size), shown, time=float(number)))
         processor = time.process_time() - before
     return Paced(processor, np.array(delays), len(due), members[-1] if members else 0)
 

@@ -163,24 +163,25 @@ def start_up(code: str) -> tuple[float, float]:
     return min(found)
 
 
-def made(n: int) -> tuple[Reduction, np.ndarray, np.ndarray]:
-    """The reduction of a session, and a block of `n` samples of six channels with its drive."""
+def made(n: int) -> tuple[Reduction, np.ndarray, np.ndarray, np.ndarray]:
+    """The reduction of a session, and a block of `n` samples of six channels with its drive and signals."""
     channels = SimulatedRig(PARAMETERS, Specimen(), seed=1).channels
     six = (*channels, *channels)[:CHANNELS]
     phase = 2.0 * np.pi * 5.0 * np.arange(n) / RATE
     noise = np.random.default_rng(1).normal(0.0, 30.0, (n, CHANNELS))
     counts = np.round(3000.0 * np.sin(phase)[:, None] + noise).astype(np.int16)
-    return Reduction(six, RATE, SignalMap(six, "ground")), counts, np.sin(phase)
+    values = np.column_stack([channel.to_unit(counts[:, k]) for k, channel in enumerate(six)])
+    return Reduction(RATE), counts, np.sin(phase), SignalMap(six, "ground").of(values)
 
 
 def feed(connection: Connection, length: float, seconds: float) -> None:
     """The session's side: blocks of `length` seconds at the pace of the clock; at the end, its processor's time."""
     n = round(length * RATE)
-    reduction, counts, drive = made(n)
+    reduction, counts, drive, signals = made(n)
     start, used = now(), time.process_time()
     for block in range(int(seconds / length)):
         time.sleep(max(start + (block + 1) * length - now(), 0.0))
-        connection.send(reduction(Acquired(1, Block(block * n, counts), drive, time=(block + 1) * length)))
+        connection.send(reduction(Acquired(1, Block(block * n, counts), drive, signals, time=(block + 1) * length)))
     connection.send((time.process_time() - used) / seconds)
 
 
@@ -222,8 +223,8 @@ def live(window: Window, application: QApplication, controller: Controller, leng
 def hour(application: QApplication, controller: Controller, length: float) -> None:
     """An hour of blocks as fast as they are taken, drawn thirty at a time; resident memory over its second half."""
     n = round(length * RATE)
-    reduction, counts, drive = made(n)
-    low_high = reduction(Acquired(1, Block(0, counts), drive, time=length))
+    reduction, counts, drive, signals = made(n)
+    low_high = reduction(Acquired(1, Block(0, counts), drive, signals, time=length))
     begun, sizes, total = now(), list[tuple[float, float]](), int(HOUR / length)
     low, high, step = low_high.low, low_high.high, low_high.step
     for first in range(0, total, TOGETHER):

@@ -88,11 +88,12 @@ class FaultyBench:
             spoil(recorder, self.disk)
             subscribers.append(recorder)
         self.stream = Stream(self.rig.clock, [*subscribers, self._fail])
-        self.guard = Guard(self.rig, self.setting.limits, self.setting.ramps, MOVER)
+        self.guard = Guard(
+            self.rig, self.setting.limits, self.setting.ramps, MOVER, SignalMap(self.rig.channels, "ground")
+        )
         self.engine = Engine(
             self.rig,
             self.guard,
-            SignalMap(self.rig.channels, "ground"),
             self.stream,
             self.requests,
             self.person,

@@ -12,61 +12,55 @@ from pytestqt.qtbot import QtBot
 
 from bench.gui import texts
 from bench.gui.drawing import FLASH, Drawing, Pose
-from bench.gui.model_block import ModelBlock
 from bench.gui.palette import LIGHT
-from bench.gui.physical import FACTOR, LARGEST, PhysicalPicture
+from bench.gui.physical import BEHIND, FACTOR, LARGEST, STEP, BlockAngle, PhysicalPicture
 from bench.link.messages import Traces
 from bench.link.reduction import TRACES
 from sim.excitation import SampledRecord
 from sim.rocking import simulate
 from sim.specimen import Specimen
+from tests.bench.twin_bench import estimate
 
-STEP = 0.002
 COUPLED = Specimen().coupled(0.4)
 
 
-def _blocks(acceleration: np.ndarray, begin: float, run: int = 1) -> list[Traces]:
-    values = np.zeros((acceleration.size, len(TRACES)), np.float32)
-    values[:, TRACES.index("acceleration")] = acceleration
-    return [
-        Traces(run, begin + STEP * first, STEP, values[first : first + 50], values[first : first + 50], 0.0)
-        for first in range(0, acceleration.size, 50)
-    ]
+def _traces(run: int, origin: float) -> Traces:
+    still = np.zeros((50, len(TRACES)), np.float32)
+    return Traces(run, origin, 0.002, still, still, 0.0, origin)
 
 
-def test_the_block_moves_as_the_model_does_under_the_measured_table(qtbot: QtBot) -> None:
-    """Against one integration of the whole record."""
-    time = STEP * np.arange(1500)
-    acceleration = (1.3 * COUPLED.uplift_acceleration * np.sin(16.0 * time) * np.minimum(time, 1.0)).astype(np.float32)
-    expected = simulate(COUPLED, SampledRecord(acceleration.astype(float), STEP), sample_times=time).samples
+def test_the_block_moves_as_the_twin_says_and_is_shown_at_the_moment_it_is_for() -> None:
+    """Against the integration of the whole record that the twin's trace was taken from."""
+    time = STEP * np.arange(300)
+    acceleration = 1.3 * COUPLED.uplift_acceleration * np.sin(16.0 * time) * np.minimum(time, 1.0)
+    expected = simulate(COUPLED, SampledRecord(acceleration, STEP), sample_times=time).samples
     assert expected is not None
     assert np.abs(expected[:, 4]).max() > 0.01, "it rocks"
-    block = ModelBlock()
-    blocks = _blocks(acceleration, 7.0)
-    for each in blocks[:20]:
-        block.add(each)
-    assert block.at(7.5) is None
-    assert block.nearest(7.5) == 7.5
-    block.couple(COUPLED)
-    for each in blocks[20:]:
-        block.add(each)
-    end = 7.0 + STEP * (time.size - 0.5)
-    qtbot.waitUntil(lambda: block.at(end) is not None, timeout=60_000)
+    trace = np.column_stack((time, expected[:, [0, 1, 4]], np.zeros((time.size, 2))))
+    block = BlockAngle()
+    block.add(estimate(run=1, trace=trace[:10]))
+    assert block.at(7.05) is None, "nothing is known of when that run began"
+    block.place(_traces(1, 7.0))
+    for first in range(0, 300, 10):
+        block.add(estimate(run=1, trace=trace[first : first + 10]))
+    end = 7.0 + float(time[-1])
     assert block.nearest(end + 1.0) == pytest.approx(end)
+    assert block.nearest(end + BEHIND + 1.0) == end + BEHIND + 1.0
     crossings = np.flatnonzero(np.sign(expected[1:, 4]) != np.sign(expected[:-1, 4])) + 1
-    for k in range(700, 1500, 7):
-        found = block.at(7.0 + STEP * (k + 0.5) + 1e-6)
+    for k in range(150, 300, 7):
+        found = block.at(7.0 + STEP * k + 1e-6)
         assert found is not None
-        assert found[0] == pytest.approx(expected[k, 4], abs=1e-5)
+        assert found[0] == pytest.approx(expected[k, 4])
         since = STEP * (k - crossings[crossings <= k].max())
-        assert found[1] == pytest.approx(since, abs=1.5 * STEP)
-    # what follows a gap, and another run, is not known
-    block.add(_blocks(acceleration, 90.0)[0])
-    block.add(_blocks(acceleration, 95.0, run=2)[0])
-    block.close()
-    assert block.at(90.05) is None
-    assert block._thread is not None
-    block._thread.join(10.0)
+        assert found[1] == pytest.approx(since, abs=1e-5)
+    # a block that has fallen, and another run, are not known
+    fallen = trace[:10].copy()
+    fallen[:, 0] += 3.0
+    fallen[:, 3] = np.nan
+    block.add(estimate(run=1, trace=fallen))
+    assert block.at(10.05) is None
+    block.place(_traces(2, 95.0))
+    block.add(estimate(run=1, trace=trace))
     assert block.at(95.05) is None
 
 

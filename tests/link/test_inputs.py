@@ -9,12 +9,12 @@ from typing import cast
 import numpy as np
 import pytest
 
+from bench.analysis.signals import SIGNALS
 from bench.engine.requests import Requests
 from bench.events import Acquired, State, StateChanged
 from bench.link.host import AtTheClient, Host, Teller
 from bench.link.inputs import PERIOD
 from bench.link.messages import Answer, Question, SafetyInputs
-from bench.link.reduction import Reduction
 from drivers.rig import Block, Rig, RigError
 
 
@@ -53,13 +53,15 @@ def rig() -> Wired:
 
 @pytest.fixture
 def teller(host: Host, rig: Wired) -> Teller:
-    told = Teller(host, lambda _rig: cast(Reduction, lambda _event: None))
+    told = Teller(host)
     told.opened(cast(Rig, rig))
     return told
 
 
 def _block(second: float) -> Acquired:
-    return Acquired(1, Block(0, np.zeros((10, 0), dtype=np.int16)), np.zeros(10), time=second)
+    return Acquired(
+        1, Block(0, np.zeros((10, 0), dtype=np.int16)), np.zeros(10), np.zeros((10, len(SIGNALS))), time=second
+    )
 
 
 @pytest.fixture

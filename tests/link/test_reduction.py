@@ -43,10 +43,18 @@ def _counts(motion: np.ndarray, reference: str) -> np.ndarray:
 def test_traces_hold_the_extremes_of_the_motion_that_was_made(reference: str) -> None:
     drive, motion = _motion()
     counts = _counts(motion, reference)
-    reduction = Reduction(CHANNELS, RATE, SignalMap(CHANNELS, reference))  # type: ignore[arg-type]
+    signals, reduction = SignalMap(CHANNELS, reference), Reduction(RATE)  # type: ignore[arg-type]
+    values = np.column_stack([channel.to_unit(counts[:, k]) for k, channel in enumerate(CHANNELS)])
+    signals.tare(values[:BLOCK])
     traces = [
         reduction(
-            Acquired(1, Block(first, counts[first : first + BLOCK]), drive[first:][:BLOCK], time=(first + BLOCK) / RATE)
+            Acquired(
+                1,
+                Block(first, counts[first : first + BLOCK]),
+                drive[first:][:BLOCK],
+                signals.of(values[first : first + BLOCK]),
+                time=4.0 + (first + BLOCK) / RATE,
+            )
         )
         for first in range(0, N, BLOCK)
     ]
@@ -62,5 +70,6 @@ def test_traces_hold_the_extremes_of_the_motion_that_was_made(reference: str) ->
         for got, wanted in (("low", bins.min(axis=1)), ("high", bins.max(axis=1))):
             found = np.concatenate([getattr(each, got)[:, column] for each in traces])
             np.testing.assert_allclose(found, wanted, atol=close, rtol=1e-6, err_msg=f"{name}, {got}")
-    assert [each.begin for each in traces] == pytest.approx(np.arange(0, N, BLOCK) / RATE)
+    assert [each.begin for each in traces] == pytest.approx(4.0 + np.arange(0, N, BLOCK) / RATE)
+    assert {each.origin for each in traces} == {traces[0].begin}
     assert {each.step for each in traces} == {width / RATE}

@@ -52,9 +52,8 @@ class Bench:
     def __init__(self, rig: Rig, subscriber: Callable[[Event], None] | None = None) -> None:
         self.events, self.found = list[Event](), list[Replicated]()
         stream = Stream(rig.clock, [self._keep, *([subscriber] if subscriber else [])])
-        guard = Guard(rig, Limits(), Ramps(stop=1.0, abort=0.5))
-        signals = SignalMap(rig.channels, "ground")
-        self.engine = Engine(rig, guard, signals, stream, Requests(), Unattended(), block=200)
+        guard = Guard(rig, Limits(), Ramps(stop=1.0, abort=0.5), signals=SignalMap(rig.channels, "ground"))
+        self.engine = Engine(rig, guard, stream, Requests(), Unattended(), block=200)
 
     def _keep(self, event: Event) -> None:
         if not isinstance(event, Acquired):

@@ -56,7 +56,7 @@ class Decay:
 
 
 def pulsed_decay(signals: Array, setting: Setting, quiet: float, begin: float) -> Decay:
-    """The decay after a pulse of the table, from `signals`, shape (n, 6), as `bench.analysis.signals` numbers them.
+    """The decay after a pulse of the table, from `signals` as `bench.analysis.signals` numbers them.
 
     All is at rest until `quiet` [s], and the pulse is over at `begin`. Raises Unusable when it tells nothing.
     """
