@@ -27,6 +27,7 @@ QUICK = (
     "tests/bench/test_console.py",
     "tests/bench/test_devices.py",
     "tests/bench/test_export.py",
+    "tests/bench/test_help_and_completion.py",
     "tests/bench/test_record_nexus.py",
     "tests/bench/test_report_page.py",
     "tests/gui/test_gain_plot.py",
@@ -67,7 +68,11 @@ def interpreter(python: str) -> str | None:
         text=True,
         check=False,
     )
-    return found.stdout.strip() if found.returncode == 0 else None
+    if found.returncode == 0:
+        return found.stdout.strip()
+    # pyenv hides those that are not chosen
+    there = sorted(Path.home().glob(f".pyenv/versions/{python}.*/bin/python"))
+    return str(there[-1]) if there else None
 
 
 def tried(python: str, resolution: str, folder: Path) -> Row:
