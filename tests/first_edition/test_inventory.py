@@ -1,6 +1,7 @@
 """Nothing that the first edition offered is gone: commands, options, keys, settings, tables, exports, sections."""
 
 import json
+import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -8,7 +9,7 @@ from typing import Any
 import pytest
 
 from tests.first_edition import inventory
-from tests.first_edition.command import DATA
+from tests.first_edition.command import DATA, Rockbench
 
 BEFORE: dict[str, Any] = json.loads((DATA / "inventory.json").read_text(encoding="utf-8"))
 
@@ -76,6 +77,23 @@ def test_every_key_of_the_configuration_is_there_with_its_unit_default_and_bound
     before, after = BEFORE["configuration"], inventory.configuration()
     assert len(before) == 248
     assert not list(missing("configuration", before, after, ("absent", "default", "unit", "allowed")))
+
+
+def test_a_configuration_with_every_key_is_still_good(rockbench: Rockbench) -> None:
+    done = rockbench("config", "check", DATA / "every_key.toml")
+    assert done.code == 0, done.err
+
+    def keys(table: dict[str, Any], path: str = "") -> Iterator[str]:
+        for name, value in table.items():
+            if isinstance(value, dict):
+                yield from keys(value, f"{path}{name}.")
+            else:
+                yield path + name
+
+    given = tomllib.loads((DATA / "every_key.toml").read_text(encoding="utf-8"))
+    files = {"specimen_file", "laser_calibration", "table_model"}
+    protocols = {f"{table}.{key}" for table in ("specimen", "simulation.specimen") for key in ("beta", "spring_label")}
+    assert {*keys(given)} == BEFORE["configuration"].keys() - files - protocols
 
 
 @pytest.mark.parametrize("name", sorted(BEFORE["exports"]))
