@@ -9,7 +9,8 @@ from typing import Any, get_args
 
 import pytest
 
-from bench.cli.main import main
+from bench.cli.examples import commands
+from bench.cli.main import main, rockbench_app
 from bench.cli.refusal import Code
 from drivers.errors import ConnectionLost
 from sim.errors import InvalidInput, RockbenchError
@@ -61,6 +62,16 @@ def test_what_is_refused_has_a_code(
         assert error["remedy"]
         assert item in (None, error["item"])
     assert list(tmp_path.iterdir()) == []
+
+
+def test_every_command_with_json_has_it_for_what_cannot_be_parsed(capsys: Said) -> None:
+    tried = 0
+    for path, command in commands(rockbench_app()):
+        if command.default_command is not None and "--json" in command.assemble_argument_collection():
+            assert main([*path, "--json", "--no-such-option"]) == 2, path
+            assert _error(capsys)["code"] == "usage", path
+            tried += 1
+    assert tried > 20
 
 
 @pytest.mark.parametrize(("error", "code"), [(ConnectionLost("gone"), "connection_lost"), (OSError("full"), "system")])
