@@ -34,15 +34,19 @@ def images(
     peaks_from = 0.0 if watch_peaks else np.inf
     for i in range(x.shape[0]):
         row = q[i // starts]
-        out[i] = np.nan
-        peaks[i] = 0.0
+        # loops: assignments of arrays make numba compile the text of their errors
+        for k in range(6):
+            out[i, k] = np.nan
+        for k in range(3):
+            peaks[i, k] = 0.0
         if not x[i, 5] > 0.0:
             continue
         omega = row[16]
         # an orbit that has not returned after three periods is not one of the drive's period
         segments[0, 0] = 6.0 * np.pi / omega
         segments[0, 1], segments[0, 5], segments[0, 6] = row[17], x[i, 0], omega
-        state[:4] = x[i, 1:5]
+        for k in range(4):
+            state[k] = x[i, 1 + k]
         state[4], state[5] = 0.0, x[i, 5]
         run(
             row[:16],
@@ -59,8 +63,10 @@ def images(
             2,
             report,
         )
-        peaks[i] = report[PEAKS:]
+        for k in range(3):
+            peaks[i, k] = report[PEAKS + k]
         if report[STATUS] == IMPACT_LIMIT and state[5] > 0.0:
             out[i, 0] = x[i, 0] + omega * report[END] - 2.0 * np.pi
-            out[i, 1:5] = state[:4]
+            for k in range(4):
+                out[i, 1 + k] = state[k]
             out[i, 5] = state[5]
