@@ -107,7 +107,7 @@ def gain_map(
     coupled = [specimen.coupled(float(beta)) for beta in rows]
 
     first = _first_row(coupled[0], columns, amplitude)
-    parts = np.array_split(np.arange(columns.size), min(columns.size, STRIPS * processors()))
+    parts = np.array_split(np.arange(columns.size), min(columns.size, STRIPS * processors(scheduler)))
     strips = [_Strip(coupled, columns[part], amplitude, _rows(first, part)) for part in parts]
     followed = sweep(_follow_strip, strips, scheduler)
     sections, peaks, jacobians = (np.concatenate(layer, axis=1) for layer in zip(*followed, strict=True))

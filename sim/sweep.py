@@ -1,9 +1,10 @@
 """One function over many items: on this machine's processors, or on those of a dask.distributed scheduler."""
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import FIRST_EXCEPTION, Future, ThreadPoolExecutor
 from concurrent.futures import wait as wait_for
+from contextlib import contextmanager
 from importlib import import_module
 from time import sleep
 from typing import Any, TypeVar
@@ -30,9 +31,16 @@ class SchedulerUnavailable(RockbenchError):
     error_code = "scheduler_unavailable"
 
 
-def processors() -> int:
-    """Processors that this machine has for a sweep."""
-    return os.cpu_count() or 1
+def processors(scheduler: str | None = None) -> int:
+    """Processors that a sweep has: this machine's, or the threads of all workers of a `scheduler`.
+
+    Without a worker yet, this machine's. Raises what `sweep` does for its scheduler.
+    """
+    here = os.cpu_count() or 1
+    if scheduler is None:
+        return here
+    with _connected(scheduler) as client:
+        return sum(client.nthreads().values()) or here
 
 
 def sweep(
@@ -88,6 +96,20 @@ def in_threads(
 def _distributed(
     function: Callable[[Item], Result], items: list[Item], scheduler: str, batch: int, done: Done | None
 ) -> list[Result]:
+    with _connected(scheduler) as client:
+        # items are the same function's: equal ones may share a result, but never one of an earlier sweep
+        groups = [items[i : i + batch] for i in range(0, len(items), batch)]
+        futures: Any = client.map(_each, groups, function=function, pure=False)
+        while not all(future.done() for future in futures):
+            if done is not None:
+                done(sum(future.done() for future in futures), len(futures))
+            sleep(STEP)
+        gathered: list[list[Result]] = client.gather(futures)
+    return [result for group in gathered for result in group]
+
+
+@contextmanager
+def _connected(scheduler: str) -> Generator[Any, None, None]:
     require("distributed", f"scheduler = {scheduler!r}")
     # `Any`: an optional dependency, which publishes no types
     distributed: Any = import_module("distributed")
@@ -98,15 +120,7 @@ def _distributed(
             f"scheduler = {scheduler!r} does not answer ({error}): start it, or give the address that it prints"
         ) from error
     with client:
-        # items are the same function's: equal ones may share a result, but never one of an earlier sweep
-        groups = [items[i : i + batch] for i in range(0, len(items), batch)]
-        futures: Any = client.map(_each, groups, function=function, pure=False)
-        while not all(future.done() for future in futures):
-            if done is not None:
-                done(sum(future.done() for future in futures), len(futures))
-            sleep(STEP)
-        gathered: list[list[Result]] = client.gather(futures)
-    return [result for group in gathered for result in group]
+        yield client
 
 
 def _each(group: list[Item], function: Callable[[Item], Result]) -> list[Result]:

@@ -12,10 +12,10 @@ import pytest
 
 from sim.errors import InvalidInput
 from sim.extras import MissingExtra
-from sim.maps import gain_map
+from sim.maps import STRIPS, gain_map
 from sim.outcomes import outcome_map
 from sim.specimen import Specimen
-from sim.sweep import SchedulerUnavailable, sweep
+from sim.sweep import SchedulerUnavailable, processors, sweep
 from tests.sim.runs import A_S
 
 
@@ -83,6 +83,22 @@ def test_a_scheduler_s_workers_do_the_work(cluster: Any) -> None:
     assert sweep(inverse, range(1, 8), address, batch=3) == [1.0 / value for value in range(1, 8)]
     with pytest.raises(ZeroDivisionError):
         sweep(inverse, [1, 0], address)
+
+
+def test_a_map_is_divided_for_the_cluster_s_processors(cluster: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    strips: list[int] = []
+
+    def counted(function: Any, items: Any, scheduler: str | None) -> list[Any]:
+        strips.append(len(items))
+        return sweep(function, items, scheduler)
+
+    monkeypatch.setattr("sim.maps.sweep", counted)
+    # this machine's own number is another one
+    monkeypatch.setattr("os.cpu_count", lambda: 64)
+    address, omegas = str(cluster.scheduler_address), np.linspace(14.0, 20.0, 12)
+    gain_map(Specimen(), [0.2, 0.6], omegas, A_S, scheduler=address)
+    assert processors(address) == 2
+    assert strips == [STRIPS * 2]
 
 
 def test_a_map_and_its_outcomes_are_the_same_on_workers(cluster: Any) -> None:
