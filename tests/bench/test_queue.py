@@ -1,8 +1,10 @@
 """A queue: what may be done with a test, the file that keeps it, and the command that runs it."""
 
+import errno
 import json
 import subprocess
 import sys
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -18,6 +20,7 @@ from bench.preflight.compiled import Preflight
 from bench.preflight.disk import Room
 from bench.preflight.forecast import Forecast
 from bench.queue.file import LEFT, QueueFile
+from bench.queue.owner import Owner
 from bench.queue.queue import Queue
 from bench.queue.queued import OPEN, Queued, Stage
 from drivers.rig import RigError
@@ -283,7 +286,7 @@ def test_a_queue_has_one_owner_and_none_when_that_one_dies(
     before = Path("queue.json").read_bytes()
     program = (
         "import sys, time; from pathlib import Path; from bench.queue.owner import Owner\n"
-        "Owner(Path(sys.argv[1]), 'another window'); print('owned', flush=True); time.sleep(60)"
+        "owner = Owner(Path(sys.argv[1]), 'another window'); print('owned', flush=True); time.sleep(60)"
     )
     command = [sys.executable, "-c", program, str(Path("queue.json").absolute())]
     with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as other:
@@ -297,9 +300,39 @@ def test_a_queue_has_one_owner_and_none_when_that_one_dies(
         assert Path("queue.json").read_bytes() == before
         assert _queue(session, "--dry-run") == 0, "what only looks is let"
         other.kill()
+    # the name of the dead owner is still there; its lock is not
+    assert Path("queue.json.owner").exists()
     assert session.calls == []
     assert _queue(session) == 0
     assert _stages() == [Stage.DONE]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="every file system of Windows has locks")
+def test_a_file_system_without_locks_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As a network share may be: a file that merely exists would be taken for a lock after its owner died."""
+
+    def no_locks(_handle: int, _operation: int) -> None:
+        raise OSError(errno.ENOSYS, "Function not implemented")
+
+    monkeypatch.setattr("fcntl.flock", no_locks)
+    with pytest.raises(InvalidInput, match=r"queue\.json\.lock cannot be locked: Function not implemented"):
+        Owner(tmp_path / "queue.json", "a window")
+    assert not (tmp_path / "queue.json.owner").exists()
+
+
+def test_the_lock_is_released_once_and_by_any_thread(tmp_path: Path) -> None:
+    path = tmp_path / "queue.json"
+    first = Owner(path, "first")
+    with pytest.raises(InvalidInput, match=r"first \(process \d+\) has it"):
+        Owner(path, "second")
+    thread = threading.Thread(target=first.release)
+    thread.start()
+    thread.join()
+    second = Owner(path, "second")
+    first.release()
+    with pytest.raises(InvalidInput, match="second"):
+        Owner(path, "third")
+    second.release()
 
 
 def test_while_a_queue_runs_nothing_is_added_to_it(session: FakeSession, capsys: pytest.CaptureFixture[str]) -> None:
