@@ -11,8 +11,9 @@ from typing import Any, cast
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic.fields import FieldInfo
 
-NEAR, NEAR_ANGULAR = 20.0, 5.0
-"""Factors around a default within which a value calls for no notice: a slip of units is 1000, one of angles 2 pi."""
+NEAR, NEAR_ANGULAR = 20.0, 3.0
+"""Factors around a default within which a value calls for no notice: a slip of units is 1000, one of angles 2 pi, so
+that either shows while what was meant is within a factor of 50 or of 2 of the default."""
 
 COUPLING = (0.02, 5.0)
 """Usual stiffness ratios of coupling springs: the paper has 0.25 to 0.97 and computes up to 1.2."""

@@ -42,12 +42,10 @@ class VirtualBenchParameters(Parameters):
 
     @model_validator(mode="after")
     def _filter_below_half_the_sample_rate(self) -> "VirtualBenchParameters":
-        if self.filter_unit.cutoff >= 0.5 * self.sample_rate:
-            raise InvalidInput(
-                "filter_unit.cutoff",
-                self.filter_unit.cutoff,
-                f"it must be below sample_rate / 2 = {self.sample_rate / 2}",
-            )
+        rate = self.sample_rate
+        if self.filter_unit.cutoff >= 0.5 * rate:
+            allowed = f"it must be below sample_rate / 2 = {rate / 2:g} Hz, sample_rate = {rate:g} 1/s"
+            raise InvalidInput("filter_unit.cutoff", self.filter_unit.cutoff, allowed)
         return self
 
     @model_validator(mode="after")

@@ -8,12 +8,13 @@ nothing is run: files are read and flags validated as the commands do.
 import contextlib
 import io
 import random
+import re
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from math import pi, sqrt
+from math import isclose, pi, sqrt
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -38,6 +39,8 @@ from sim.errors import InvalidInput
 from sim.parameters import Parameters
 from sim.specimen import Specimen
 
+SPREAD = 1.5
+"""What was meant lies within this factor of the default or of a typical value."""
 ANGLES = ("rad/s", "rad")
 CYCLES = ("rad/s", "Hz", "rad", "N/m")
 PREDICTIONS: tuple[type[Parameters], ...] = (
@@ -122,57 +125,70 @@ class Slip:
     said: tuple[str, ...] = ()
 
 
-def slips() -> Iterator[Slip]:
-    """Every slip of the kinds below, in a fixed order."""
-    yield from _in_configuration()
-    yield from _in_protocols()
-    yield from _in_predictions()
-    yield from _elsewhere()
+def slips(seed: int) -> Iterator[Slip]:
+    """Every slip of the kinds below; what was meant is the default or typical value times a random factor."""
+    meant = random.Random(seed)
+    yield from _in_configuration(meant)
+    yield from _in_protocols(meant)
+    yield from _in_predictions(meant)
+    yield from _elsewhere(meant)
 
 
-def _variants(entry: Declared, value: float, *, whole_list: bool) -> Iterator[tuple[str, str]]:
-    """(kind, text) for each slip of one value. A list of values is scaled by its first."""
-    whole = entry.kind is int
-    if not whole:
-        text = f"{value:g}" if "." in f"{value:g}" and "e" not in f"{value:g}" else f"{abs(value) + 0.5:.1f}"
-        yield "comma", text.replace(".", ",")
+def _variants(entry: Declared, values: Sequence[float], meant: random.Random) -> Iterator[tuple[str, list[str]]]:
+    """(kind, tokens) for each slip of a value, or of all values of a list."""
+    whole, value = entry.kind is int, values[0]
+    text = f"{value:g}"
+    if whole:
+        yield "comma", [f"{text},5"]
     else:
-        yield "comma", f"{int(value)},5"
-    yield "thousands comma", "1,000"
+        yield (
+            "comma",
+            [
+                text.replace(".", ",")
+                if "." in text and "e" not in text
+                else f"{abs(value) + 0.5:.1f}".replace(".", ",")
+            ],
+        )
+    yield "thousands comma", ["1,000"]
     for name, text in (("not a number", "nan"), ("infinite", "-inf"), ("hexadecimal", "0x1F"), ("underscore", "1_0")):
-        yield name, text
-    if whole_list:
-        yield "list by commas", "0.25,0.64"
-        yield "reversed range", "21:12:4"
-        yield "range of zero values", "12:21:0"
+        yield name, [text]
+    if len(values) > 1 or entry.many:
+        yield "list by commas", ["0.25,0.64"]
+        yield "reversed range", ["21:12:4"]
+        yield "range of zero values", ["12:21:0"]
     if entry.unit in ("", "1"):
         return
     for kind, factor in (("1000", 1000.0), ("2 pi", 2.0 * pi), ("degrees", 180.0 / pi)):
         if (kind == "2 pi" and entry.unit not in CYCLES) or (kind == "degrees" and entry.unit not in ANGLES):
             continue
         for sign, times in (("times", factor), ("over", 1.0 / factor)):
-            slipped = value * times
-            yield f"{sign} {kind}", str(round(slipped)) if whole and slipped >= 1 else f"{slipped:.6g}"
+            off = times * meant.uniform(1.0 / SPREAD, SPREAD)
+            yield (
+                f"{sign} {kind}",
+                [f"{round(each * off)}" if whole and each * off >= 1 else f"{each * off:.6g}" for each in values],
+            )
 
 
-def _typical(key: str, entry: Declared) -> float:
+def _typical(key: str, entry: Declared) -> list[float]:
+    """What a person means to give; of a long list its ends and some between."""
     if key in TYPICAL:
-        return TYPICAL[key]
-    default = entry.default[0] if entry.many and entry.default else entry.default
-    for value in (default, entry.example):
+        return [TYPICAL[key]]
+    if entry.many and entry.default:
+        return [float(each) for each in entry.default[:: max(1, len(entry.default) // 5)]]
+    for value in (entry.default, entry.example):
         if isinstance(value, float | int) and not isinstance(value, bool) and value != 0:
-            return float(value)
+            return [float(value)]
     if entry.usual is not None:
-        return float(f"{sqrt(entry.usual[0] * entry.usual[1]):.3g}")
-    return 0.5
+        return [float(f"{sqrt(entry.usual[0] * entry.usual[1]):.3g}")]
+    return [0.5]
 
 
-def _in_configuration() -> Iterator[Slip]:
+def _in_configuration(meant: random.Random) -> Iterator[Slip]:
     for path, entry in _numeric(BenchConfiguration, ()):
         key = ".".join(str(part) for part in path if part != 0).replace("laser_1", "laser").replace("laser_2", "laser")
-        value = _typical(key.removeprefix("simulation.") if key not in TYPICAL else key, entry)
-        for kind, text in _variants(entry, value, whole_list=False):
-            raw = "[" + ", ".join([text] * 2) + "]" if entry.many else text
+        values = _typical(key.removeprefix("simulation.") if key not in TYPICAL else key, entry)
+        for kind, (text, *_) in _variants(entry, values, meant):
+            raw = f"[{text}, {text}]" if entry.many else text
             yield Slip(f"config {'.'.join(map(str, path))}", text, kind, partial(_checked, path, raw), (str(path[-1]),))
         name = str(path[-1])
         typo = name[:-1] + name[-1] * 2 if len(name) < 4 else name[0] + name[2] + name[1] + name[3:]
@@ -180,9 +196,7 @@ def _in_configuration() -> Iterator[Slip]:
             typo = name + "x"
         wrong = (*path[:-1], typo)
         said = ("nearest", name) if len(name) > 2 else ("there is no such key",)
-        yield Slip(
-            f"config {'.'.join(map(str, wrong))}", f"{value:g}", "typo of a key", partial(_checked, wrong, "1.0"), said
-        )
+        yield Slip(f"config {'.'.join(map(str, wrong))}", "1.0", "typo of a key", partial(_checked, wrong, "1.0"), said)
 
 
 def _numeric(model: type[Parameters], path: tuple[str | int, ...]) -> Iterator[tuple[tuple[str | int, ...], Declared]]:
@@ -233,51 +247,51 @@ def _copied(data: Any) -> Any:
     return [_copied(each) for each in data] if isinstance(data, list) else data
 
 
-def _in_protocols() -> Iterator[Slip]:
+def _in_protocols(meant: random.Random) -> Iterator[Slip]:
     for each in ENTRIES:
         for entry in declared(each.parameters):
             if entry.kind not in (int, float):
                 continue
-            value = _typical(f"{each.name}.{entry.name}", entry)
-            for kind, text in _variants(entry, value, whole_list=entry.many):
-                answer = partial(_asked, each, entry.name, text, entry.many)
-                yield Slip(f"run {each.name} {flag(entry.name)}", text, kind, answer, (entry.name.replace("_", "-"),))
-            yield _typo_of_option(("run", each.name) if each.name != "check" else ("check",), entry)
+            for kind, tokens in _variants(entry, _typical(f"{each.name}.{entry.name}", entry), meant):
+                answer = partial(_asked, each, entry.name, tokens if entry.many else tokens[0])
+                place = f"run {each.name} {flag(entry.name)}"
+                yield Slip(place, " ".join(tokens), kind, answer, (entry.name.replace("_", "-"),))
+            yield _typo_of_option(("run", each.name) if each.name != "check" else ("check",), entry, f"run {each.name}")
 
 
-def _asked(entry: Any, name: str, text: str, many: bool) -> Outcome:
+def _asked(entry: Any, name: str, typed: str | list[str]) -> Outcome:
     """What `rockbench run` says of a flag before it plans, and where that is nothing, its check of the whole."""
-    parameters: Parameters = parameters_from(entry.parameters, {name: (text,) if many else text}, None)
+    parameters: Parameters = parameters_from(entry.parameters, {name: typed}, None)
     if notices := notices_of(parameters, Specimen()):
         return Outcome(None, notices)
     entry.campaign(parameters).check(BenchConfiguration())
     return Outcome(None)
 
 
-def _in_predictions() -> Iterator[Slip]:
+def _in_predictions(meant: random.Random) -> Iterator[Slip]:
     for model in PREDICTIONS:
         name = model.__name__.removesuffix("Request").lower()
         for entry in declared(model):
             if entry.kind not in (int, float):
                 continue
-            for kind, text in _variants(entry, _typical(f"{name}.{entry.name}", entry), whole_list=entry.many):
-                answer = partial(_requested, model, entry.name, text, entry.many)
+            for kind, tokens in _variants(entry, _typical(f"{name}.{entry.name}", entry), meant):
+                answer = partial(_requested, model, entry.name, tokens if entry.many else tokens[0])
                 place = f"predict {name} {flag(entry.name)}"
-                yield Slip(place, text, kind, answer, (entry.name.replace("_", "-"),))
+                yield Slip(place, " ".join(tokens), kind, answer, (entry.name.replace("_", "-"),))
             command = {"bandstudy": ("predict", "band-study"), "strokefit": ("records", "fit", "x")}
-            yield _typo_of_option(command.get(name, ("predict", name)), entry)
+            yield _typo_of_option(command.get(name, ("predict", name)), entry, f"predict {name}")
 
 
-def _requested(model: type[Parameters], name: str, text: str, many: bool) -> Outcome:
-    request = request_from(model, {name: (text,) if many else text})
+def _requested(model: type[Parameters], name: str, typed: str | list[str]) -> Outcome:
+    request = request_from(model, {name: typed})
     return Outcome(None, notices_of(request, Specimen()))
 
 
-def _typo_of_option(command: Sequence[str], entry: Declared) -> Slip:
+def _typo_of_option(command: Sequence[str], entry: Declared, place: str = "") -> Slip:
     name = flag(entry.name)
     typo = name[:3] + name[4] + name[3] + name[5:] if len(name) > 5 and name[3] != name[4] else f"{name}x"
     answer = partial(_commanded, [*command, typo, "1"])
-    return Slip(f"{' '.join(command)} {typo}", typo, "typo of an option", answer, (name,))
+    return Slip(f"{place or ' '.join(command)} {name}", typo, "typo of an option", answer, (name,))
 
 
 def _commanded(arguments: list[str]) -> Outcome:
@@ -287,7 +301,7 @@ def _commanded(arguments: list[str]) -> Outcome:
     return Outcome(said.getvalue() if code == 2 else None)
 
 
-def _elsewhere() -> Iterator[Slip]:
+def _elsewhere(meant: random.Random) -> Iterator[Slip]:
     """Options that are no parameter of a protocol or a prediction, and the numbers within texts."""
     spots: list[tuple[str, Declared | None, float, Callable[[str], Any]]] = [
         ("--seed", _declared("simulation.seed"), 7.0, lambda text: configuration_from(None, text)),
@@ -300,7 +314,7 @@ def _elsewhere() -> Iterator[Slip]:
         ("dt", _declared("acquisition.lead"), 0.02, lambda text: RecordReference.parse(f"a.txt@unit=g,dt={text}")),
     ]
     for place, entry, value, read in spots:
-        for kind, text in _variants(entry or _declared("limits.laser_range"), value, whole_list=False):
+        for kind, (text, *_) in _variants(entry or _declared("limits.laser_range"), [value], meant):
             yield Slip(place, text, kind, partial(_read, read, text), (place.strip("-").split("-")[0][0],))
     for kind, text in (("comma", "1,5:25"), ("reversed range", "25:1.5"), ("not a number", "nan:25")):
         yield Slip(
@@ -337,14 +351,24 @@ def answered(slip: Slip) -> Outcome:
 
 
 def silent(slip: Slip, outcome: Outcome) -> bool:
-    """Whether neither a refusal nor a notice names the place."""
+    """Whether neither a refusal nor a notice names the place, and where a value is off by a factor, that value."""
     words = (outcome.refusal,) if outcome.refusal is not None else outcome.notices
-    return not any(all(word in said.replace("_", "-") or word in said for word in slip.said) for said in words)
+    values = slip.typed.split() if slip.kind.startswith(("times", "over")) else []
+    return not any(
+        all(word in said.replace("_", "-") or word in said for word in slip.said)
+        and (not values or any(_states(said, float(value)) for value in values))
+        for said in words
+    )
+
+
+def _states(said: str, value: float) -> bool:
+    numbers = re.findall(r"-?\d+\.?\d*(?:e[+-]?\d+)?", said)
+    return any(isclose(float(number), value, rel_tol=1e-3) for number in numbers)
 
 
 def chosen(count: int, seed: int) -> list[Slip]:
     """`count` slips, every place at least once if there are as many, the rest at random."""
-    everything = list(slips())
+    everything = list(slips(seed))
     random.Random(seed).shuffle(everything)
     first = {slip.place: slip for slip in reversed(everything)}
     rest = [slip for slip in everything if first[slip.place] is not slip]

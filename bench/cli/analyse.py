@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import App, Parameter
 
 from bench.cli.analyse_output import side_by_side
-from bench.cli.analyse_settings import Choice, choice_of, listed
+from bench.cli.analyse_settings import Choice, choice_of, listed, unusual_of
 from bench.cli.interrupt import answer
 from bench.cli.prose import prose
-from bench.cli.refusal import fail
+from bench.cli.refusal import fail, warn
 from sim.errors import InvalidInput
 from sim.parameters import Parameters
 
@@ -92,6 +92,8 @@ def analyse(
         if list_:
             print(listed(choice))
             return 0
+        for notice in unusual_of(choice):
+            warn(notice)
         try:
             with choice.entry.progress(sys.stderr, False) as progress, redirect_stdout(sys.stderr):
                 experiment, replayed, points = _carried_out(record, choice, [progress])

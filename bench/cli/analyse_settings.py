@@ -104,6 +104,15 @@ def choice_of(record: "Record", changes: Sequence[str], config: Path | None, spe
     return Choice(entry, recorded, changed, asked, settings, given, follower)
 
 
+def unusual_of(choice: Choice) -> tuple[str, ...]:
+    """Notices of what is unusual in the settings and was not in what was recorded."""
+    from bench.config.review import notices_of, review
+
+    before = set(review(choice.recorded).notices)
+    new = [notice for notice in review(choice.changed).notices if notice not in before]
+    return (*new, *notices_of(choice.settings, choice.changed.known_specimen))
+
+
 def listed(choice: Choice) -> str:
     """Every setting that can be changed: value as it is now, unit, and what it is."""
     from bench.config.declared import at, keys

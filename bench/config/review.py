@@ -19,6 +19,10 @@ from sim.specimen import Specimen
 _ESTIMATE = 2.0
 """An estimated force or current may be limited up to so many times what the accelerometer's range comes to: such a
 limit is a last resort, one beyond it a slip."""
+_LONGEST_WAIT, _LONGEST_DEBOUNCE, _WORST_CLOCK = 60.0, 1.0, 0.1
+"""What the guard may wait for a sensor or a block at most, and for a limit that is exceeded [s]: at full velocity the
+table passes its stroke in a quarter of a second; and a relative error of a clock that no quartz has.
+"""
 _LEAST_ERROR = 1e-7
 """A triangulation laser that is true to less [m] over its range does not exist: the optoNCDT 1420 resolves 8 um."""
 _SPRING_OFF = 2.0
@@ -91,6 +95,8 @@ def specimen_notices(specimen: Specimen, prefix: str = "specimen.") -> Iterator[
             ratios = f"{prefix}frame.xi1 = {frame.xi1:g}, xi2 = {frame.xi2:g}"
             yield f"{ratios} make dashpot c{number} = {dashpot:.3g} N s/m: a negative one feeds energy in"
     nominal = specimen.spring_k1 or frame.k1
+    if not 1.0 / _SPRING_OFF <= nominal / frame.k1 <= _SPRING_OFF:
+        yield f"{prefix}spring_k1 = {nominal:g} N/m is {nominal / frame.k1:.3g} times frame.k1 = {frame.k1:g} N/m"
     for place, spring in enumerate(specimen.springs):
         ratio = spring.k_c / (spring.label * nominal)
         if not 1.0 / _SPRING_OFF <= ratio <= _SPRING_OFF:
@@ -128,9 +134,10 @@ def _loads(configuration: BenchConfiguration, acceleration: float) -> Iterator[_
     mover, hardware = configuration.mover, configuration.hardware
     if configuration.backend == "simulated":
         shaker, key = configuration.simulation.bench.shaker, "simulation.bench.shaker"
-        owner = f"what the shaker can give ({key}.bl times {key}.current_limit = {shaker.current_limit:g} A)"
+        current = f"current_limit = {shaker.current_limit:g} A"
+        owner = f"what the shaker can give ({key}.bl = {shaker.bl:g} N/A times {current})"
         found["force"] = _Reach("force", shaker.bl * shaker.current_limit, "N", owner)
-        owner = f"what the amplifier can give ({key}.current_limit)"
+        owner = f"what the amplifier can give ({key}.{current})"
         found["current"] = _Reach("current", shaker.current_limit, "A", owner)
     else:
         if mover is not None:
@@ -181,6 +188,9 @@ def _contradictions(configuration: BenchConfiguration) -> Iterator[InvalidInput]
     simulated = configuration.backend == "simulated"
     if (refused := ramp_refusal(configuration.limits, configuration.ramps)) is not None:
         yield refused
+    for key, (value, most, unit) in _waits(configuration).items():
+        if value > most:
+            yield InvalidInput(f"limits.{key}", value, f"it guards nothing beyond {most:g}{unit}")
     table = "simulation.bench.shaker" if simulated else "hardware"
     low, high = configuration.table_band
     if low >= high:
@@ -197,9 +207,21 @@ def _contradictions(configuration: BenchConfiguration) -> Iterator[InvalidInput]
             allowed = (
                 f"the uplift acceleration takes {needed:.4g} N, the shaker gives {most:.4g} N: are the masses in kg, "
                 f"the density in kg/m3 (m1 = {frame.m1:g}, m2 = {frame.m2:g}, specimen.block.rho = {block.rho:g}, "
+                f"s = {block.s:g}, specimen.g = {specimen.g:g}, "
                 f"simulation.bench.shaker.moving_mass = {shaker.moving_mass:g})?"
             )
             yield InvalidInput("specimen.frame.m1", specimen.frame.m1, allowed)
+
+
+def _waits(configuration: BenchConfiguration) -> dict[str, tuple[float, float, str]]:
+    """How long the guard waits before a limit counts [s], or which clock it believes, and what it may be at most."""
+    limits = configuration.limits
+    found = {key: (float(getattr(limits, key)), _LONGEST_WAIT, " s") for key in ("sensor_loss", "stuck", "late")}
+    found["clock"] = limits.clock, _WORST_CLOCK, ""
+    for key in type(limits.debounce).model_fields:
+        most = _LONGEST_WAIT if key == "heating" else _LONGEST_DEBOUNCE
+        found[f"debounce.{key}"] = float(getattr(limits.debounce, key)), most, " s"
+    return found
 
 
 def _unusual(configuration: BenchConfiguration) -> Iterator[str]:

@@ -123,7 +123,7 @@ def _value_lines(entry: Declared, prefix: str = "", mark: str = "") -> Iterator[
         return
     yield f"# {_meaning(entry)}"
     if entry.default is None:
-        yield f"#{prefix}{entry.name} = {_as_toml(entry.example)}"
+        yield f"#{prefix}{entry.name} = {_as_toml(entry.example)}  # example"
     else:
         yield f"{mark}{prefix}{entry.name} = {_as_toml(list(entry.default) if entry.many else entry.default)}"
 

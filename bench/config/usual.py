@@ -11,7 +11,7 @@ from sim.parameters import Parameters
 ANGULAR = "rad/s"
 """The unit of circular frequencies: said in Hz too wherever one looks unusual."""
 
-_SLOW, _FAST = 0.6, 3.0
+_SLOW, _FAST = 0.6, 2.5
 """Shares of the first and of the second natural frequency of the bare frame outside which a frequency is unusual."""
 
 

@@ -22,14 +22,14 @@ class IdentifyParameters(Parameters):
         "Hz",
         "lower end of the band; absent: half that of the table's band, as a replication needs it",
         gt=0,
-        usual=(0.1, 3.0),
+        usual=(0.2, 1.8),
     )
     band_high: float | None = quantity(
         None,
         "Hz",
         "upper end of the band; absent: twice that of the table's band, as a replication needs it",
         gt=0,
-        usual=(5.0, 100.0),
+        usual=(8.0, 80.0),
     )
     corner: float = quantity(
         1.0, "Hz", "the motion is flat in displacement below this frequency, in acceleration above", gt=0, le=50

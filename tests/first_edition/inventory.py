@@ -76,18 +76,24 @@ def configuration() -> dict[str, Any]:
         lines = path.read_text(encoding="utf-8").splitlines()
     table, found = "", {}
     for above, line in zip(["", *lines], lines, strict=False):
-        if match := re.match(r"(?:# ?)?\[([\w.]+)\]$", line):
+        if match := re.match(r"\[([\w.]+)\]$", line):
             table = match[1] + "."
-        elif match := re.match(r"(#?)(\w+) = (.*)$", line):
-            text, _, allowed = above.removeprefix("# ").rpartition("; ")
-            unit = re.search(r" \[([^\[\]]+)\]$", text)
-            value = None if match[1] and match[3].startswith("<") else match[3]
-            found[table + match[2]] = {
-                "absent": bool(match[1]),
-                "default": value,
-                "unit": unit[1] if unit else "",
-                "allowed": allowed,
-            }
+            continue
+        if match := re.match(r"(#?)([\w.]+) = (.*)$", line):
+            described, default = above.removeprefix("# "), match[3]
+        elif match := re.match(r"(#) ([\w.]+), (?:which a run writes|not to be given here): (.*)$", line):
+            described, default = match[3], "# example"
+        else:
+            continue
+        text, _, allowed = described.rpartition("; ")
+        unit = re.search(r" \[([^\[\]]+)\]$", text)
+        found[table + match[2]] = {
+            "absent": bool(match[1]),
+            # what stands there is an example: there is no default
+            "default": None if default.endswith("# example") else default,
+            "unit": unit[1] if unit else "",
+            "allowed": allowed,
+        }
     return found
 
 
