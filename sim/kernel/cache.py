@@ -13,7 +13,6 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from contextlib import suppress
-from importlib import resources
 from pathlib import Path
 
 if sys.platform != "win32":
@@ -36,20 +35,20 @@ class KernelCache:
     """Finds the folder for the compiled kernel once, and gives it up for good when it turns out to be unusable.
 
     given : folder that the user named for numba's caches, or empty: then it is the installation, or the user's folder
-    for caches.  versions : whatever else decides about the compiled code.  package : the kernel's.
+    for caches.  versions : whatever else decides about the compiled code.
     """
 
-    def __init__(self, given: str, versions: Sequence[object], package: str = "sim.kernel") -> None:
-        self._sources = Path(str(resources.files(package)))
+    def __init__(self, given: str, versions: Sequence[object]) -> None:
+        self._sources = Path(__file__).parent
         self._stamp = _stamp(self._sources)
         self._folder: Path | None = None
         self._handle: int | None = None
-        sources = _read(package)
-        if not sources or not self._stamp:
-            # numba's own locators need files, and without sources nothing says when the code has changed
+        if not self._stamp:
+            # in an archive: numba's locator needs files, and without sources nothing says when the code has changed
             self.give_up(f"{self._sources} is no folder of source files")
             return
-        name = PREFIX + _digest([*sources, *versions, self._sources])
+        sources = [(name, (self._sources / name).read_bytes()) for name, *_ in self._stamp]
+        name = PREFIX + hashlib.sha256(repr([sources, *versions, self._sources]).encode()).hexdigest()[:12]
         reasons: list[str] = []
         for base in [Path(given).absolute()] if given else _places(self._sources):
             try:
@@ -99,15 +98,6 @@ def _stamp(folder: Path) -> list[tuple[str, int, int]]:
         sources = [entry for entry in entries if entry.name.endswith(".py")]
         return sorted((entry.name, entry.stat().st_mtime_ns, entry.stat().st_size) for entry in sources)
     return []
-
-
-def _read(package: str) -> list[tuple[str, bytes]]:
-    files = [entry for entry in resources.files(package).iterdir() if entry.name.endswith(".py")]
-    return sorted((entry.name, entry.read_bytes()) for entry in files)
-
-
-def _digest(parts: Sequence[object]) -> str:
-    return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
 
 
 def _places(sources: Path) -> list[Path]:

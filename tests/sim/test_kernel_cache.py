@@ -14,6 +14,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from _pytest.mark import ParameterSet
 
 import sim.kernel
 
@@ -21,6 +22,12 @@ posix = pytest.mark.skipif(sys.platform == "win32", reason="permissions of POSIX
 root = pytest.mark.skipif(
     sys.platform == "win32" or os.geteuid() != 0, reason="only root can give files to another user"
 )
+
+
+def long(*values: object) -> ParameterSet:
+    """Another place for what is shown in one already: only when long tests are asked for."""
+    return pytest.param(*values, marks=pytest.mark.soak)
+
 
 CALLEE = """from sim.kernel.compiled import compiled
 @compiled("float64(float64)")
@@ -185,7 +192,7 @@ def test_numba_functions_of_others_keep_their_own_caches(installation: Installat
     assert list((installation.site / "__pycache__").glob("theirs.f*.nbc"))
 
 
-@pytest.mark.parametrize(("kind", "kept"), [("nbi", 0), ("nbc", 40)])
+@pytest.mark.parametrize(("kind", "kept"), [("nbi", 0), long("nbc", 40)])
 def test_a_damaged_file_in_the_cache_is_not_the_end(installation: Installation, kind: str, kept: int) -> None:
     installation.run()
     for path in beside(installation).rglob(f"*.{kind}"):
@@ -213,7 +220,7 @@ def poison(place: Path, marker: Path) -> None:
 
 
 @posix
-@pytest.mark.parametrize(("choose", "mode"), [(beside, 0o770), (at_home, 0o1777), (where_the_user_says, 0o777)])
+@pytest.mark.parametrize(("choose", "mode"), [(beside, 0o770), long(at_home, 0o1777), long(where_the_user_says, 0o777)])
 def test_a_cache_that_others_can_write_is_not_loaded(installation: Installation, choose: Choice, mode: int) -> None:
     place = choose(installation)
     installation.run()
@@ -228,7 +235,7 @@ def test_a_cache_that_others_can_write_is_not_loaded(installation: Installation,
 
 
 @posix
-@pytest.mark.parametrize("choose", [beside, where_the_user_says])
+@pytest.mark.parametrize("choose", [beside, long(where_the_user_says)])
 def test_nor_is_one_in_a_folder_in_which_others_can_replace_it(installation: Installation, choose: Choice) -> None:
     place = choose(installation)
     installation.run()
@@ -241,7 +248,7 @@ def test_nor_is_one_in_a_folder_in_which_others_can_replace_it(installation: Ins
 
 
 @root
-@pytest.mark.parametrize("choose", [beside, at_home])
+@pytest.mark.parametrize("choose", [long(beside), at_home])
 def test_a_cache_of_another_user_is_not_loaded(installation: Installation, choose: Choice) -> None:
     place = choose(installation)
     installation.run()
