@@ -16,7 +16,8 @@ from bench.engine.steps import Plan
 from bench.engine.stream import Stream
 from bench.events import Event, PointFinished, Subscriber, Warned
 from bench.guard.guard import Guard
-from bench.preflight.compiled import compile_run
+from bench.preflight.compiled import compile_run, load_bench
+from bench.progress import Progress, silent
 from bench.provenance import revision, software
 from bench.record.recorder import PATIENCE, Recorder
 from bench.record.tables import Table
@@ -159,21 +160,26 @@ def run_session(
     requests: Requests,
     realtime: bool,
     about: Mapping[str, str] | None = None,
+    progress: Progress = silent,
 ) -> SessionResult:
     """Run `protocol` on the configured bench and leave data file, figure and summary in the folder `out`.
 
-    `about` is kept in the data file beside what is known of the run: the operator's name, notes.
+    `about` is kept in the data file beside what is known of the run: the operator's name, notes. `progress` is told
+    what is done before the rig is opened and after it is closed.
     Raises InvalidInput, or KeyboardInterrupt when an end was asked for, before anything moves. Once the rig is armed
     every ending is a result, with its status.
     """
     started = time.monotonic()
     with requests.without_rig():
         require_drivers(configuration)
+        load_bench(configuration, progress)
+        progress("checking the protocol against the bench")
         protocol.check(configuration)
-        preflight = compile_run(protocol, configuration, out)
+        preflight = compile_run(protocol, configuration, out, progress)
         preflight.require()
         # after the hash of the plan: it is the same at every pace
         configuration = configuration.at_pace(realtime=realtime)
+        progress("predicting the results")
         prediction = protocol.predict(configuration)
         sources = protocol.sources(configuration) if isinstance(protocol, Sourced) else dict[str, Table]()
         metadata = _metadata(protocol, configuration) | {"plan_hash": preflight.plan_hash, **(about or {})}
@@ -242,6 +248,7 @@ def run_session(
     if not requests.interrupted:
         # who interrupts does not wait for pictures: `rockbench report` draws them from the file
         with requests.without_rig():
+            progress("drawing the figures")
             protocol.figure(points.all, prediction, out / protocol.figure_name)
             if more:
                 more.draw_further(out)

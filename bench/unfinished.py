@@ -10,6 +10,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 _paths: set[Path] = set()
+_reserved: set[Path] = set()
 
 
 @contextmanager
@@ -30,11 +31,21 @@ def whole(path: Path) -> None:
     _paths.discard(path)
 
 
+def reserve(folder: Path) -> None:
+    """`folder` was made for results to come: an ending that runs no `finally` removes it if it is still empty."""
+    _reserved.add(folder)
+
+
 def remove_unfinished() -> None:
     """Remove every file and folder in the making; from any thread, just before the process is ended."""
     for path in tuple(_paths):
         with suppress(OSError):
             _remove(path)
+    for folder in tuple(_reserved):
+        with suppress(OSError):
+            # neither is removed while anything is in it
+            folder.rmdir()
+            folder.parent.rmdir()
 
 
 def _remove(path: Path) -> None:

@@ -16,7 +16,7 @@ from sim.return_map import follow, jacobians, newton, parameters
 from sim.rocking import Status, simulate_many
 from sim.specimen import Specimen
 from sim.steady import Orbit, resting_level
-from sim.sweep import processors, sweep
+from sim.sweep import Done, processors, sweep
 
 Floats = NDArray[np.float64]
 
@@ -26,22 +26,29 @@ RUN_TOLERANCE = 1e-8
 _Member = tuple[Orbit, Specimen]
 """A specimen, and the orbit near which its own is looked for."""
 
+CHUNK = 500
+"""Members that are followed together: enough to share what a step costs, few enough to be done within a second."""
+
 
 def steady_gains(
-    orbits: Sequence[Orbit], members: Sequence[Sequence[Specimen]], bare_amplitude: float | None = None
+    orbits: Sequence[Orbit],
+    members: Sequence[Sequence[Specimen]],
+    bare_amplitude: float | None = None,
+    done: Done | None = None,
 ) -> Floats:
     """alpha_1 and alpha_2 of m specimens on the layer of each of n orbits, shape (n, m, 2), on all processors.
 
     `members[i]` are the specimens at `orbits[i]`, under its frequency and amplitude; `bare_amplitude` [m/s2] is that of
     the test without block, when it was another. NaN where a member has no such motion: it does not rest, or its orbit
-    cannot be followed there.
+    cannot be followed there. `done` counts parts of the work.
     """
     every = [(orbit, specimen) for orbit, own in zip(orbits, members, strict=True) for specimen in own]
-    bounds = np.linspace(0, len(every), processors() + 1).astype(int).tolist()
+    parts = max(processors(), len(every) // CHUNK)
+    bounds = np.linspace(0, len(every), parts + 1).astype(int).tolist()
     chunks = [every[first:last] for first, last in pairwise(bounds) if last > first]
     if not chunks:
         return np.empty((len(orbits), 0, 2))
-    peaks = np.concatenate(sweep(_peaks, chunks))
+    peaks = np.concatenate(sweep(_peaks, chunks, done=done))
     bare = np.array([_bare(specimen, orbit, bare_amplitude) for orbit, specimen in every])
     return (peaks / bare).reshape(len(orbits), -1, 2)
 

@@ -17,7 +17,7 @@ from sim.linear import frame_matrices
 from sim.return_map import MOST_KNOWN, Solution, Solutions, extrapolated, follow, newton, parameters
 from sim.specimen import Specimen
 from sim.steady import NoOrbit, branch_solutions, check_steady, resting_rates
-from sim.sweep import processors, sweep
+from sim.sweep import Done, processors, sweep
 
 Floats = NDArray[np.float64]
 
@@ -92,11 +92,13 @@ def gain_map(
     amplitude: float,
     bare_amplitude: float | None = None,
     scheduler: str | None = None,
+    done: Done | None = None,
 ) -> GainMap:
     """Gain coefficients, both layers, at every stiffness ratio of `betas` and frequency of `omegas` [rad/s].
 
     The base moves with `amplitude` [m/s2] sin(omega t), in the test without block with `bare_amplitude` if that was
-    another. `scheduler` is that of `sim.sweep.sweep`. Raises InvalidInput for an empty axis or meaningless numbers.
+    another. `scheduler` and `done` are those of `sim.sweep.sweep`. Raises InvalidInput for an empty axis or meaningless
+    numbers.
     """
     rows, row_of = np.unique(np.asarray(betas, dtype=np.float64), return_inverse=True)
     columns, column_of = np.unique(np.asarray(omegas, dtype=np.float64), return_inverse=True)
@@ -109,7 +111,7 @@ def gain_map(
     first = _first_row(coupled[0], columns, amplitude)
     parts = np.array_split(np.arange(columns.size), min(columns.size, STRIPS * processors(scheduler)))
     strips = [_Strip(coupled, columns[part], amplitude, _rows(first, part)) for part in parts]
-    followed = sweep(_follow_strip, strips, scheduler)
+    followed = sweep(_follow_strip, strips, scheduler, done=done)
     sections, peaks, jacobians = (np.concatenate(layer, axis=1) for layer in zip(*followed, strict=True))
 
     multipliers = np.full((*sections.shape[:2], 6), np.nan, dtype=np.complex128)

@@ -18,7 +18,7 @@ from sim.maps import GainMap, LayerMap
 from sim.rocking import Mode, Motion, Peaks, Status, simulate
 from sim.specimen import Specimen
 from sim.steady import NoOrbit, check_steady, resting_state, rocking_orbit
-from sim.sweep import sweep
+from sim.sweep import Done, sweep
 
 START_DURATION = 120.0
 """Length [s] of the default start."""
@@ -125,7 +125,9 @@ def reached(
     return Reached(outcome, time, motion.overturned, motion.peaks if motion.status is Status.COMPLETED else None)
 
 
-def outcome_map(gain_map: GainMap, start: StartProgram = switched_on, scheduler: str | None = None) -> OutcomeMap:
+def outcome_map(
+    gain_map: GainMap, start: StartProgram = switched_on, scheduler: str | None = None, done: Done | None = None
+) -> OutcomeMap:
     """What `start` leads to in every cell of a gain map. Raises InvalidInput as `reached` does.
 
     `scheduler` is that of `sim.sweep.sweep`; there `start` must be picklable: a function of a module.
@@ -146,7 +148,7 @@ def outcome_map(gain_map: GainMap, start: StartProgram = switched_on, scheduler:
         for i in range(n)
         for j in range(m)
     ]
-    results = sweep(_reached_in, cells, scheduler, batch=m)
+    results = sweep(_reached_in, cells, scheduler, batch=m, done=done)
     return OutcomeMap(
         outcome=np.array([str(result.outcome) for result in results]).reshape(n, m),
         time=np.array([result.time for result in results]).reshape(n, m),

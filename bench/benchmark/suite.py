@@ -9,8 +9,10 @@ from pathlib import Path
 
 from bench.benchmark.machine import machine, versions
 from bench.benchmark.section import Section, targets_section
+from bench.progress import Progress, silent
 from bench.report.files import write_new
 from sim.errors import InvalidInput
+from sim.loading import load_model
 
 MARKDOWN, JSON, FIGURE = "benchmark.md", "benchmark.json", "work_precision.png"
 RESULTS = (MARKDOWN, JSON, FIGURE)
@@ -97,7 +99,12 @@ PARTS: dict[str, Callable[[Scale], Section]] = {
 
 
 def run_benchmark(
-    scale: Scale, out: Path, *, parts: Sequence[str] = tuple(PARTS), say: Callable[[str], None] = print
+    scale: Scale,
+    out: Path,
+    *,
+    parts: Sequence[str] = tuple(PARTS),
+    say: Callable[[str], None] = print,
+    progress: Progress = silent,
 ) -> list[Section]:
     """Measure the `parts` and leave their results in the folder `out`, which is made if missing.
 
@@ -110,10 +117,11 @@ def run_benchmark(
     for name in RESULTS:
         if (out / name).exists():
             raise InvalidInput("out", str(out), f"it holds {name} already; results are never overwritten")
-    out.mkdir(parents=True, exist_ok=True)
+    load_model(progress)
     begin, started = time.perf_counter(), datetime.now().astimezone()
     sections: list[Section] = []
-    for name in parts:
+    for number, name in enumerate(parts):
+        progress(f"measuring {name.replace('_', ' ')}, part {number + 1} of {len(parts)}", number, len(parts))
         section = PARTS[name](scale)
         sections.append(section)
         say(f"{section.text()}\n")
@@ -126,6 +134,8 @@ def run_benchmark(
         "machine": machine(),
         "versions": versions(),
     }
+    progress("writing the results")
+    out.mkdir(parents=True, exist_ok=True)
     _write(out, context, sections)
     return sections
 

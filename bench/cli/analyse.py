@@ -12,9 +12,12 @@ from cyclopts import App, Parameter
 from bench.cli.analyse_output import side_by_side
 from bench.cli.analyse_settings import Choice, choice_of, listed, unusual_of
 from bench.cli.interrupt import answer
+from bench.cli.progress import Handed
 from bench.cli.prose import prose
 from bench.cli.refusal import fail, warn
+from bench.progress import silent
 from sim.errors import InvalidInput
+from sim.loading import load_model
 from sim.parameters import Parameters
 
 if TYPE_CHECKING:
@@ -70,6 +73,7 @@ def analyse(
     as_json: Annotated[
         bool, Parameter(name="--json", negative=(), show_default=False, help="Print one JSON object, nothing else.")
     ] = False,
+    progress: Handed = silent,
 ) -> int:
     """Compute every result of a recorded campaign anew from its samples, with other settings.
 
@@ -81,6 +85,7 @@ def analyse(
     The exit code is 0 when the results were written, 1 when the recorded samples do not answer what was asked, 2 when
     something was refused.
     """
+    progress("loading the program")
     from bench.record.reader import open_record
     from bench.replaying.analysis import NotComparable
     from bench.replaying.beside import Analysis, write_analysis
@@ -95,8 +100,10 @@ def analyse(
         for notice in unusual_of(choice):
             warn(notice)
         try:
-            with choice.entry.progress(sys.stderr, False) as progress, redirect_stdout(sys.stderr):
-                experiment, replayed, points = _carried_out(record, choice, [progress])
+            load_model(progress)
+            progress("computing the results from the recorded samples")
+            with choice.entry.progress(sys.stderr, False) as display, redirect_stdout(sys.stderr):
+                experiment, replayed, points = _carried_out(record, choice, [display])
         except NotComparable as error:
             fail(error)
             return 1

@@ -7,6 +7,8 @@ from typing import Annotated
 from cyclopts import App, Parameter
 
 from bench.cli.output import check_folder, default_folder, make_folder, remove_unused
+from bench.cli.progress import Handed
+from bench.progress import silent
 
 
 def benchmark_app() -> App:
@@ -29,6 +31,7 @@ def benchmark(
             show_default="runs/benchmark-<local date and time>",
         ),
     ] = None,
+    progress: Handed = silent,
 ) -> int:
     """Measure speed and error of the engine beside its peers.
 
@@ -36,6 +39,7 @@ def benchmark(
     work_precision.png. Peers that are not installed are named as such: uv sync --group benchmark installs them.
     The exit code is 0 whatever the numbers are, and 2 when something was refused.
     """
+    progress("loading the program")
     from bench.benchmark.suite import FULL, QUICK, RESULTS, run_benchmark
 
     folder = out or default_folder("benchmark", datetime.now())
@@ -43,7 +47,7 @@ def benchmark(
     if out is None:
         folder = make_folder(folder)
     try:
-        run_benchmark(QUICK if quick else FULL, folder)
+        run_benchmark(QUICK if quick else FULL, folder, progress=progress)
     finally:
         if out is None:
             remove_unused(folder)

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any, Protocol, TextIO
 
 from protocols.coupling_stiffness.parameters import CouplingStiffnessParameters
 from protocols.earthquake.parameters import EarthquakeParameters
@@ -15,14 +15,27 @@ from protocols.laser_calibration.parameters import LaserCalibrationParameters
 from sim.parameters import Parameters
 
 if TYPE_CHECKING:
-    from bench.events import Subscriber
+    from bench.events import Event
     from bench.session import Experiment
 
-Progress = Callable[[TextIO, bool], "AbstractContextManager[Subscriber]"]
+
+class Display(Protocol):
+    """Shows a run: a `bench.events.Subscriber`, and a `bench.progress.Progress` for what is done without a rig."""
+
+    def __call__(self, event: "Event") -> None:
+        """Show an event."""
+        ...
+
+    def prepare(self, phase: str, done: int = 0, total: int = 0, /) -> None:
+        """Show what is done before the rig is opened and after it is closed."""
+        ...
+
+
+Progress = Callable[[TextIO, bool], AbstractContextManager[Display]]
 """Shows a run on a stream; the second argument says whether a person answers its questions there."""
 
 
-def _live(stream: TextIO, person_answers: bool) -> "AbstractContextManager[Subscriber]":
+def _live(stream: TextIO, person_answers: bool) -> AbstractContextManager[Display]:
     from bench.cli.console import progress_on
 
     return progress_on(stream, person_answers)

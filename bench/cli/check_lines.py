@@ -15,6 +15,7 @@ class CheckLines:
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
+        self._phase = ""
 
     def __enter__(self) -> Self:
         return self
@@ -23,6 +24,12 @@ class CheckLines:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._stream.flush()
+
+    def prepare(self, phase: str, done: int = 0, total: int = 0, /) -> None:  # noqa: ARG002 - a line for each phase
+        """A `bench.progress.Progress` for what is done before the rig is opened and after it is closed."""
+        if phase != self._phase:
+            self._phase = phase
+            print(f"{clock(0.0):>8}  plan: {one_line(phase)}", file=self._stream, flush=True)
 
     def __call__(self, event: Event) -> None:
         if isinstance(event, Acquired):

@@ -51,6 +51,14 @@ class LiveConsole:
         finally:
             self._hide()
 
+    def prepare(self, phase: str, done: int = 0, total: int = 0, /) -> None:
+        """A `bench.progress.Progress` for what is done before the rig is opened and after it is closed."""
+        with self._lock:
+            self._scene.prepare(phase, done, total)
+        if self._live is None:
+            self._show()
+        self._changed.set()
+
     def __call__(self, event: Event) -> None:
         if isinstance(event, Acquired):
             return

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import App, Parameter
 
 from bench.cli.inputs import configuration_from
+from bench.cli.progress import Handed
+from bench.progress import silent
 from drivers.errors import RigError
 from sim.extras import MissingExtra, require
 
@@ -45,12 +47,14 @@ def devices(
     as_json: Annotated[
         bool, Parameter(name="--json", negative=(), show_default=False, help="Print one JSON object.")
     ] = False,
+    progress: Handed = silent,
 ) -> int:
     """List the NI devices with their channels and ranges, and what answers on the serial ports.
 
     A port is asked at every baud rate; name the ports when other instruments must not be disturbed. Nothing found is
     a result: the exit code is 0 then, and 2 when what was given is refused.
     """
+    progress("asking for NI devices")
     if server is not None:
         require("ni", "--server")
     if port:
@@ -58,6 +62,7 @@ def devices(
     hardware = None if config is None else configuration_from(config, None).hardware
     server = server if server is not None or hardware is None else hardware.daq.server
     found, missing = _daq(server)
+    progress("asking on the serial ports, about 4 s")
     lasers, no_ports = _lasers(port or _configured(hardware))
     if as_json:
         print(_json_text(server, found, missing, lasers, no_ports))

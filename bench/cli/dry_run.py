@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from bench.cli.refusal import error_object, tell
 from bench.cli.words import ABSENT, clock
+from bench.progress import Progress
 from bench.report.text_table import TextColumn, text_table
 
 if TYPE_CHECKING:
@@ -32,14 +33,19 @@ _MARGINS = (
 )
 
 
-def dry_run(experiment: "Experiment", configuration: "BenchConfiguration", out: Path, *, as_json: bool) -> int:
+def dry_run(
+    experiment: "Experiment", configuration: "BenchConfiguration", out: Path, progress: Progress, *, as_json: bool
+) -> int:
     """Print the preflight on standard output. Returns 0 when the run may begin, 2 when it is refused."""
-    from bench.preflight.compiled import compile_run
+    progress("loading the program")
+    from bench.preflight.compiled import compile_run, load_bench
 
     # standard output belongs to the result
     with redirect_stdout(sys.stderr):
+        load_bench(configuration, progress)
+        progress("checking the protocol against the bench")
         experiment.check(configuration)
-        found = compile_run(experiment, configuration, out)
+        found = compile_run(experiment, configuration, out, progress)
     print(json.dumps(_content(found), allow_nan=False) if as_json else _text(found))
     if found.refusal is not None:
         tell(found.refusal)

@@ -13,7 +13,9 @@ from cyclopts import App, Parameter
 
 from bench.cli.inputs import Seed, configuration_from
 from bench.cli.interrupt import SIGNALS
+from bench.cli.progress import Handed
 from bench.cli.refusal import warn
+from bench.progress import silent
 from sim.errors import InvalidInput
 from sim.extras import require
 
@@ -69,6 +71,7 @@ def emulate(
             metavar="FILE", help="File for the configuration; never overwritten.", show_default="standard output"
         ),
     ] = None,
+    progress: Handed = silent,
 ) -> int:
     """Serve an emulated laboratory: the virtual bench in real time behind the instruments' real protocols.
 
@@ -76,6 +79,7 @@ def emulate(
     Ctrl-C. Pseudo-terminals, which serial lasers need, exist on Linux and macOS only.
     """
     require("ni", "rockbench emulate")
+    progress("loading the program")
     given = configuration_from(config, seed)
     if given.backend != "simulated":
         raise InvalidInput("backend", given.backend, "an emulated laboratory is made of a simulated bench")
@@ -89,8 +93,11 @@ def emulate(
     errors = None if clock_error is None else _ratios(clock_error)
     if write is not None and write.exists():
         raise InvalidInput("--write", str(write), "it exists and is never overwritten; name another")
+    from bench.preflight.compiled import load_bench
     from drivers.emulation.laboratory import ClockErrors, Laboratory
 
+    load_bench(configuration, progress)
+    progress("starting the emulated laboratory")
     simulation = configuration.simulation
     laboratory = Laboratory(
         simulation.bench,

@@ -6,8 +6,10 @@ from typing import Annotated, Literal
 from cyclopts import App, Parameter
 
 from bench.cli.interrupt import answer
+from bench.cli.progress import Handed
 from bench.cli.prose import prose
 from bench.cli.refusal import tell, warn
+from bench.progress import silent
 
 
 def export_app() -> App:
@@ -39,6 +41,7 @@ def export(
             help="Counts as converted, with scale and offset beside them, in place of physical values.",
         ),
     ] = False,
+    progress: Handed = silent,
 ) -> int:
     """Write a recorded campaign for other programs: one file per run with every channel and the drive, names and units
     kept, and the tables of results beside them.
@@ -47,13 +50,14 @@ def export(
     folder gets a file DAMAGED.txt that names it. The exit code is 0 when everything was written, 1 when the disk
     failed, 2 when something was refused; nothing is left behind then.
     """
+    progress("loading the program")
     from bench.export.folder import export as write
     from bench.record.reader import open_record
 
     out = out or file.with_name(f"{file.stem}-{to}")
     try:
         with open_record(file) as record:
-            written, integrity = write(record, file, to, out, raw=raw)
+            written, integrity = write(record, file, to, out, raw=raw, progress=progress)
     except OSError as error:
         tell(f"{out} could not be written ({error.strerror or error}): see to the disk")
         return 1

@@ -7,7 +7,9 @@ from typing import Annotated
 from cyclopts import App, Parameter
 
 from bench.cli.file_text import text_of
+from bench.cli.progress import Handed
 from bench.cli.refusal import error_object, tell
+from bench.progress import counting, silent
 
 _File = Annotated[Path, Parameter(metavar="FILE", help="Data file of a campaign.")]
 _Json = Annotated[
@@ -24,11 +26,12 @@ def file_app() -> App:
     return app
 
 
-def info(file: _File, /, *, as_json: _Json = False) -> int:
+def info(file: _File, /, *, as_json: _Json = False, progress: Handed = silent) -> int:
     """Say what a data file holds: how the campaign ended, its channels, runs, points and tables.
 
     A file that is being written can be looked into as well. The exit code is 0, or 2 when the file is refused.
     """
+    progress("reading the file")
     from bench.record.overview import overview
 
     content = overview(file)
@@ -38,14 +41,15 @@ def info(file: _File, /, *, as_json: _Json = False) -> int:
     return 0
 
 
-def verify(file: _File, /, *, as_json: _Json = False) -> int:
+def verify(file: _File, /, *, as_json: _Json = False, progress: Handed = silent) -> int:
     """Read a whole data file and hold every dataset against its checksum and the layout.
 
     The exit code is 0 when the file is complete and as it was written, 2 when it is not or is refused.
     """
+    progress("loading the program")
     from bench.record.verification import verify as judge
 
-    verdict = judge(file)
+    verdict = judge(file, counting(progress, "comparing the file with its checksums"))
     sound = not verdict.problems
     if as_json:
         content = {"file": str(file), "sound": sound, "datasets": verdict.datasets, "compared": verdict.compared}
@@ -69,15 +73,17 @@ def recover(
         ),
     ] = None,
     as_json: _Json = False,
+    progress: Handed = silent,
 ) -> int:
     """Make a clean file from one whose writer died, whose disk was full, or that an older version wrote.
 
     The original is only read. What was whole and can be read is kept, in today's layout and with checksums; events
     that it lost come from the journal beside it. The exit code is 0, or 2 when the file is refused.
     """
+    progress("loading the program")
     from bench.record.recovery import recover as rebuild
 
-    found = rebuild(file, out or file.with_name(f"{file.stem}-recovered.h5"))
+    found = rebuild(file, out or file.with_name(f"{file.stem}-recovered.h5"), progress)
     if as_json:
         told = {"file": str(found.target), "samples": found.rows, "unreadable": found.unreadable}
         told |= {"damage": list(found.damage), "lost": dict(found.lost)}

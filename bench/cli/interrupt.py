@@ -136,14 +136,22 @@ class Watch:
         texts = ("the run is ended: the output is ramped to zero; Ctrl-C again cuts it", "the output is cut at once")
         if len(self._told) < len(texts):
             self._told.append(texts[len(self._told)])
-            with suppress(OSError, ValueError):
-                print(f"rockbench: interrupted: {self._told[-1]}", file=sys.stderr, flush=True)
+            self._say(f"rockbench: interrupted: {self._told[-1]}")
+
+    @staticmethod
+    def _say(text: str) -> None:
+        """Past whatever draws on the terminal: its locks may be held by the thread that does not answer."""
+        with suppress(OSError, ValueError):
+            if sys.__stderr__ is not None:
+                print(f"\r\x1b[2K{text}" if sys.__stderr__.isatty() else text, file=sys.__stderr__, flush=True)
 
     def _end(self, number: int) -> None:
         threading.Event().wait(ANSWER)
         if self.claim():
-            with suppress(OSError, ValueError):
-                fail("interrupted", "interrupted")
+            # whatever draws on the terminal may be held by the thread that does not answer
+            saying = threading.Thread(target=fail, args=("interrupted", "interrupted"), daemon=True)
+            saying.start()
+            saying.join(ANSWER)
         threading.Event().wait(ORDERLY - ANSWER)
         handler = signal.getsignal(number)
         if isinstance(handler, Interrupts) and handler.leavable:

@@ -26,6 +26,7 @@ from bench.cli.replay import replay_app
 from bench.cli.report import report_app
 from bench.cli.run import Start, run_app
 from bench.cli.window import gui_app
+from bench.progress import Progress, silent
 from sim.errors import RockbenchError
 
 
@@ -62,8 +63,9 @@ def rockbench_app(start: Start | None = None) -> App:
     return app
 
 
-def main(argv: Sequence[str] | None = None, start: Start | None = None) -> int:
-    """Carry out a command line and return its exit code; `start` stands in for `bench.session.run_session`.
+def main(argv: Sequence[str] | None = None, start: Start | None = None, progress: Progress = silent) -> int:
+    """Carry out a command line and return its exit code; `start` stands in for `bench.session.run_session`, `progress`
+    is told what is being done.
 
     0: done. 1: a run failed or was aborted. 2: refused before anything started. 130: ended by Ctrl-C.
     What went wrong is one line on standard error, and with --json an object on standard output (docs/errors.md).
@@ -73,7 +75,8 @@ def main(argv: Sequence[str] | None = None, start: Start | None = None) -> int:
     # also for what cannot be parsed
     reply_in_json(sys.stdout if "--json" in given else None)
     try:
-        code = app(given)
+        command, bound, handed = app.parse_args(given, exit_on_error=False, print_error=False)
+        code = command(*bound.args, **bound.kwargs, **dict.fromkeys(handed, progress))
     except UnusedCliTokensError as error:
         fail(f"unexpected argument: {' '.join(error.unused_tokens or [])} (see --help)", "usage")
         return 2

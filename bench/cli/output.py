@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bench.results import FILE, SUMMARY
+from bench.unfinished import reserve
 from sim.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -42,6 +43,7 @@ def make_folder(first: Path, taken: Container[Path] = ()) -> Path:
                 with suppress(FileNotFoundError):
                     _make_parent(folder)
                     folder.mkdir()
+                    reserve(folder)
                     return folder
         except FileExistsError:
             continue

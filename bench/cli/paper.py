@@ -5,8 +5,10 @@ from typing import Annotated, Literal
 
 from cyclopts import App, Parameter
 
+from bench.cli.progress import Handed
 from bench.cli.prose import prose
 from bench.cli.report import HTML, OVERWRITE, PDF, check_outputs, written
+from bench.progress import silent
 
 BAND = "1.5:25"
 """Band [Hz] of the table that the records are limited to, beside the whole ones: that of a seismic campaign."""
@@ -60,6 +62,7 @@ def paper(
         ),
     ] = None,
     overwrite: OVERWRITE = False,
+    progress: Handed = silent,
 ) -> int:
     """Reproduce the paper from simulation alone, statement by statement.
 
@@ -68,6 +71,7 @@ def paper(
     the verdicts are, 1 when it could not be written, 2 when something was refused before. Files that exist are kept
     unless --overwrite is given.
     """
+    progress("loading the program")
     from bench.cli.paper_inputs import named_records
     from bench.cli.predict_inputs import specimen_from, warn_of_unusual
     from bench.cli.predict_records import records_from
@@ -87,7 +91,7 @@ def paper(
         parts=only or PARTS,
     )
     warn_of_unusual(SpectrumRequest(), request.specimen)
-    document, named = paper_report(request)
+    document, named = paper_report(request, progress)
     for number, statement in named:
         print(f"statement {number}: {statement.title}: {statement.verdict}")
-    return written(document, html, pdf, overwrite=overwrite)
+    return written(document, html, pdf, overwrite=overwrite, progress=progress)

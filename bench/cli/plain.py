@@ -4,7 +4,7 @@ from types import TracebackType
 from typing import Self, TextIO
 
 from bench.cli.scene import Scene
-from bench.cli.words import clock
+from bench.cli.words import clock, one_line
 from bench.events import Acquired, Event
 
 
@@ -14,6 +14,7 @@ class PlainLines:
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
         self._scene = Scene()
+        self._phase = ""
 
     def __enter__(self) -> Self:
         return self
@@ -22,6 +23,14 @@ class PlainLines:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._stream.flush()
+
+    def prepare(self, phase: str, done: int = 0, total: int = 0, /) -> None:  # noqa: ARG002 - a line for each phase
+        """A `bench.progress.Progress` for what is done before the rig is opened and after it is closed."""
+        if phase != self._phase:
+            self._phase = phase
+            print(
+                f"{clock(self._scene.time):>8}  {'':5}  {'prepare':<8} {one_line(phase)}", file=self._stream, flush=True
+            )
 
     def __call__(self, event: Event) -> None:
         if isinstance(event, Acquired):

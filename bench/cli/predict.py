@@ -10,6 +10,7 @@ from cyclopts import App, Group
 from bench.cli import flags
 from bench.cli.predict_options import EXIT_CODES, ResultOptions, SpecimenOptions, arguments_of, taken
 from bench.cli.predict_records import RECORDS_PREDICTIONS, records_command
+from bench.cli.progress import HANDED
 from bench.prediction.requests import (
     HistoryRequest,
     MapRequest,
@@ -18,6 +19,7 @@ from bench.prediction.requests import (
     SpectrumRequest,
     SteadyRequest,
 )
+from bench.progress import Progress, silent
 from sim.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -28,7 +30,7 @@ if TYPE_CHECKING:
 MOST_HISTORIES = 6
 """Points that a figure of histories can show."""
 
-Make = Callable[[Any, "Specimen", "SpecimenKnowledge"], "Result"]
+Make = Callable[[Any, "Specimen", "SpecimenKnowledge", Progress], "Result"]
 
 
 @dataclass(frozen=True)
@@ -58,18 +60,19 @@ def _command(prediction: Prediction) -> Callable[..., int]:
     """The function behind a command; its signature is the flags of the request and the common options."""
 
     def execute(**arguments: Any) -> int:
-        return _perform(prediction, arguments)
+        return _perform(prediction, arguments, arguments.pop("progress", silent))
 
     group = Group(f"Parameters of {prediction.name}", sort_key=1)
     asked = flags.arguments_of(prediction.request, group)
     execute.__doc__ = f"{prediction.summary}\n\n{prediction.details}\n\n{EXIT_CODES}"
     execute.__dict__["__signature__"] = Signature(
-        [*asked, *arguments_of(SpecimenOptions), *arguments_of(ResultOptions)]
+        [*asked, *arguments_of(SpecimenOptions), *arguments_of(ResultOptions), HANDED]
     )
     return execute
 
 
-def _perform(prediction: Prediction, arguments: dict[str, Any]) -> int:
+def _perform(prediction: Prediction, arguments: dict[str, Any], progress: Progress) -> int:
+    progress("loading the program")
     from bench.cli.predict_inputs import known_from, request_from, specimen_from, warn_of_unusual
     from bench.cli.predict_output import carried_out, check_files
 
@@ -87,37 +90,41 @@ def _perform(prediction: Prediction, arguments: dict[str, Any]) -> int:
             allowed = f"at most {prediction.drawable} points fit in this figure; ask for fewer"
             raise InvalidInput("--plot", f"{points} points", allowed)
     warn_of_unusual(request, specimen)
-    return carried_out(lambda: prediction.make(request, specimen, known), options)
+    return carried_out(lambda: prediction.make(request, specimen, known, progress), options, progress)
 
 
-def _modes(request: ModesRequest, specimen: "Specimen", _known: "SpecimenKnowledge") -> "Result":
+def _modes(request: ModesRequest, specimen: "Specimen", _known: "SpecimenKnowledge", _: Progress) -> "Result":
     from bench.cli.predict_modes import modes
 
     return modes(request, specimen)
 
 
-def _history(request: HistoryRequest, specimen: "Specimen", _known: "SpecimenKnowledge") -> "Result":
+def _history(
+    request: HistoryRequest, specimen: "Specimen", _known: "SpecimenKnowledge", progress: Progress
+) -> "Result":
     from bench.cli.predict_history import history
 
-    return history(request, specimen)
+    return history(request, specimen, progress)
 
 
-def _steady(request: SteadyRequest, specimen: "Specimen", known: "SpecimenKnowledge") -> "Result":
+def _steady(request: SteadyRequest, specimen: "Specimen", known: "SpecimenKnowledge", progress: Progress) -> "Result":
     from bench.cli.predict_gain import steady
 
-    return steady(request, specimen, known)
+    return steady(request, specimen, known, progress)
 
 
-def _spectrum(request: SpectrumRequest, specimen: "Specimen", known: "SpecimenKnowledge") -> "Result":
+def _spectrum(
+    request: SpectrumRequest, specimen: "Specimen", known: "SpecimenKnowledge", progress: Progress
+) -> "Result":
     from bench.cli.predict_gain import spectrum
 
-    return spectrum(request, specimen, known)
+    return spectrum(request, specimen, known, progress)
 
 
-def _map(request: MapRequest, specimen: "Specimen", known: "SpecimenKnowledge") -> "Result":
+def _map(request: MapRequest, specimen: "Specimen", known: "SpecimenKnowledge", progress: Progress) -> "Result":
     from bench.cli.predict_gain import gain_map
 
-    return gain_map(request, specimen, known)
+    return gain_map(request, specimen, known, progress)
 
 
 PREDICTIONS = (

@@ -11,11 +11,13 @@ from bench.cli.predict_text import extremes, prediction_table
 from bench.prediction.files import provenance, rows_of
 from bench.prediction.requests import GainRequest, HistoryRequest, MapRequest, SpectrumRequest, SteadyRequest
 from bench.prediction.steady import predict_points, predict_spectra, steady_table
+from bench.progress import Progress, counting
 from bench.record.tables import Table, arrays
 from sim.errors import RockbenchError
 from sim.extras import require
 from sim.gain import GainPrediction
 from sim.knowledge import SpecimenKnowledge
+from sim.loading import load_model
 from sim.specimen import Specimen
 
 if TYPE_CHECKING:
@@ -39,9 +41,10 @@ _SHOWN = {
 }
 
 
-def steady(request: SteadyRequest, specimen: Specimen, known: SpecimenKnowledge) -> Result:
+def steady(request: SteadyRequest, specimen: Specimen, known: SpecimenKnowledge, progress: Progress) -> Result:
     """Steady motions at single points."""
-    table = _table(request, specimen, known, predict_points(specimen, request))
+    load_model(progress)
+    table = _table(request, specimen, known, predict_points(specimen, request, progress), progress)
 
     def figure() -> "Figure":
         from bench.cli.predict_history import figure_of
@@ -56,9 +59,10 @@ def steady(request: SteadyRequest, specimen: Specimen, known: SpecimenKnowledge)
     )
 
 
-def spectrum(request: SpectrumRequest, specimen: Specimen, known: SpecimenKnowledge) -> Result:
+def spectrum(request: SpectrumRequest, specimen: Specimen, known: SpecimenKnowledge, progress: Progress) -> Result:
     """Gain spectra, one for each stiffness."""
-    table = _table(request, specimen, known, predict_spectra(specimen, request))
+    load_model(progress)
+    table = _table(request, specimen, known, predict_spectra(specimen, request, progress), progress)
 
     def figure() -> "Figure":
         from bench.report.figure import gain_spectra
@@ -69,17 +73,20 @@ def spectrum(request: SpectrumRequest, specimen: Specimen, known: SpecimenKnowle
     return _result("gain spectra", request, specimen, known, table, extremes(table), figure)
 
 
-def gain_map(request: MapRequest, specimen: Specimen, known: SpecimenKnowledge) -> Result:
+def gain_map(request: MapRequest, specimen: Specimen, known: SpecimenKnowledge, progress: Progress) -> Result:
     """Gain maps."""
     from bench.prediction.gain_map import grids, map_table, resting_margin
 
     if request.scheduler is not None:
         require("distributed", "--scheduler")
+    load_model(progress)
     if request.solver == "taylor":
-        table = map_table(specimen, request, known if request.band or request.members else None)
+        table = map_table(specimen, request, known if request.band or request.members else None, progress)
         _tell_lost(len(request.omega) * len(request.beta) - int((table["layer"].values == "rocking").sum()))
     else:
-        table = _table(request, specimen, known, predict_spectra(specimen, request), request.scheduler)
+        table = _table(
+            request, specimen, known, predict_spectra(specimen, request, progress), progress, request.scheduler
+        )
 
     def figure() -> "Figure":
         from bench.report.map_figure import Layer, map_figure
@@ -101,14 +108,17 @@ def _table(
     specimen: Specimen,
     known: SpecimenKnowledge,
     predictions: list[GainPrediction],
+    progress: Progress,
     scheduler: str | None = None,
 ) -> Table:
     _tell_lost(sum(prediction.rocking is None for prediction in predictions))
     if request.solver == "taylor":
-        return steady_table(predictions, known=known, members=request.members)
+        return steady_table(predictions, known=known, members=request.members, progress=progress)
     from bench.prediction.timed import timed_gains
 
-    return steady_table(predictions, timed_gains(specimen, request, predictions, scheduler))
+    return steady_table(
+        predictions, timed_gains(specimen, request, predictions, scheduler, counting(progress, "simulating in time"))
+    )
 
 
 def _tell_lost(points: int) -> None:

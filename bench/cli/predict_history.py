@@ -8,6 +8,8 @@ from bench.cli.predict_text import prediction_table
 from bench.prediction.files import plain, provenance, rows_of
 from bench.prediction.history import History, histories, history_table, runs_table
 from bench.prediction.requests import HistoryRequest
+from bench.progress import Progress
+from sim.loading import load_model
 from sim.specimen import Specimen
 
 if TYPE_CHECKING:
@@ -26,9 +28,10 @@ _SHOWN = {
 }
 
 
-def history(request: HistoryRequest, specimen: Specimen) -> Result:
+def history(request: HistoryRequest, specimen: Specimen, progress: Progress) -> Result:
     """Time histories from rest, or of steady motions."""
-    made = histories(specimen, request)
+    load_model(progress)
+    made = histories(specimen, request, progress)
     runs = runs_table(made)
     samples = ({name: plain(values) for name, values in each.values.items()} for each in made)
     return Result(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from bench.cli.predict_options import ResultOptions
 from bench.cli.refusal import fail
+from bench.progress import Progress, silent
 from sim.errors import InvalidInput, RockbenchError
 
 if TYPE_CHECKING:
@@ -60,10 +61,10 @@ def check_files(options: ResultOptions) -> None:
             raise InvalidInput(item, str(path), f"{path.parent} cannot be written: {error.strerror}") from None
 
 
-def carried_out(make: Callable[[], Result], options: ResultOptions) -> int:
+def carried_out(make: Callable[[], Result], options: ResultOptions, progress: Progress = silent) -> int:
     """Compute a prediction and deliver it. Returns 0, or 1 with a line on standard error. Raises InvalidInput."""
     try:
-        deliver(make(), options)
+        deliver(make(), options, progress)
     except InvalidInput:
         raise
     except (RockbenchError, OSError) as error:
@@ -72,13 +73,15 @@ def carried_out(make: Callable[[], Result], options: ResultOptions) -> int:
     return 0
 
 
-def deliver(result: Result, options: ResultOptions) -> None:
+def deliver(result: Result, options: ResultOptions, progress: Progress = silent) -> None:
     """Write the files that are asked for, then print.
 
     Raises RockbenchError when there is nothing to draw, before anything is written, or when the disk fails.
     """
     from bench.prediction.files import write_csv, write_hdf5
 
+    if options.plot is not None:
+        progress("drawing the figure")
     figure = result.figure() if options.plot is not None else None
     if options.csv is not None:
         write_csv(options.csv, next(iter(result.tables.values())))

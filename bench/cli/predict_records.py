@@ -11,7 +11,9 @@ from cyclopts import Group, Parameter
 
 from bench.cli import flags
 from bench.cli.predict_options import EXIT_CODES, ResultOptions, SpecimenOptions, arguments_of, taken
+from bench.cli.progress import HANDED
 from bench.prediction.requests import BandStudyRequest, RecordsRequest, SeismicRequest
+from bench.progress import Progress, silent
 from sim.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -21,7 +23,9 @@ if TYPE_CHECKING:
     from sim.knowledge import SpecimenKnowledge
     from sim.specimen import Specimen
 
-Make = Callable[[Any, "Specimen", "SpecimenKnowledge", "Sequence[Accelerogram]", "BenchConfiguration"], "Result"]
+Make = Callable[
+    [Any, "Specimen", "SpecimenKnowledge", "Sequence[Accelerogram]", "BenchConfiguration", Progress], "Result"
+]
 
 _FILES = Argument(
     "files",
@@ -70,18 +74,19 @@ def records_command(prediction: RecordsPrediction) -> Callable[..., int]:
 
     # not named as in the signature: cyclopts would take this annotation for that one
     def execute(*named: str, **arguments: Any) -> int:
-        return _perform(prediction, named, arguments)
+        return _perform(prediction, named, arguments, arguments.pop("progress", silent))
 
     group = Group(f"Parameters of {prediction.name}", sort_key=1)
     asked = flags.arguments_of(prediction.request, group)
     execute.__doc__ = f"{prediction.summary}\n\n{prediction.details}\n\n{EXIT_CODES}"
     execute.__dict__["__signature__"] = Signature(
-        [_FILES, *asked, CONFIG, *arguments_of(SpecimenOptions), *arguments_of(ResultOptions)]
+        [_FILES, *asked, CONFIG, *arguments_of(SpecimenOptions), *arguments_of(ResultOptions), HANDED]
     )
     return execute
 
 
-def _perform(prediction: RecordsPrediction, files: Sequence[str], arguments: dict[str, Any]) -> int:
+def _perform(prediction: RecordsPrediction, files: Sequence[str], arguments: dict[str, Any], progress: Progress) -> int:
+    progress("loading the program")
     from bench.cli.inputs import configuration_from
     from bench.cli.predict_inputs import known_from, request_from, specimen_from, warn_of_unusual
     from bench.cli.predict_output import carried_out, check_files
@@ -94,12 +99,15 @@ def _perform(prediction: RecordsPrediction, files: Sequence[str], arguments: dic
     assumed = configuration.specimen
     specimen = specimen_from(chosen.specimen, chosen.distance, chosen.restitution_factor, assumed, known)
     check_files(options)
+    progress("reading the records")
     records = records_from(files)
     if options.plot is not None and len(records) > prediction.drawable:
         allowed = f"at most {prediction.drawable} fit in this figure; give fewer"
         raise InvalidInput("--plot", f"{len(records)} records", allowed)
     warn_of_unusual(request, specimen)
-    return carried_out(lambda: prediction.make(request, specimen, known, records, configuration), options)
+    return carried_out(
+        lambda: prediction.make(request, specimen, known, records, configuration, progress), options, progress
+    )
 
 
 def records_from(files: Sequence[str]) -> "tuple[Accelerogram, ...]":
@@ -117,10 +125,11 @@ def _seismic(
     known: "SpecimenKnowledge",
     records: "Sequence[Accelerogram]",
     configuration: "BenchConfiguration",
+    progress: Progress,
 ) -> "Result":
     from bench.cli.predict_seismic import seismic
 
-    return seismic(request, specimen, known, records, configuration)
+    return seismic(request, specimen, known, records, configuration, progress)
 
 
 def _band_study(
@@ -129,10 +138,11 @@ def _band_study(
     _known: "SpecimenKnowledge",
     records: "Sequence[Accelerogram]",
     configuration: "BenchConfiguration",
+    progress: Progress,
 ) -> "Result":
     from bench.cli.predict_seismic import study
 
-    return study(request, specimen, records, configuration)
+    return study(request, specimen, records, configuration, progress)
 
 
 RECORDS_PREDICTIONS = (

@@ -15,10 +15,12 @@ from bench.prediction.files import provenance, rows_of
 from bench.prediction.requests import BandStudyRequest, RecordsRequest, SeismicRequest
 from bench.prediction.seismic import SeismicCurve, band_of, band_study, seismic_curves
 from bench.prediction.seismic_tables import gains_table, motions_table
+from bench.progress import Progress
 from bench.record.tables import Column, Table
 from bench.report.band_figure import BandCurve, band_figure
 from bench.report.seismic_figure import GainCurve, seismic_figure
 from sim.knowledge import SpecimenKnowledge
+from sim.loading import load_model
 from sim.specimen import Specimen
 
 if TYPE_CHECKING:
@@ -54,9 +56,11 @@ def seismic(
     known: SpecimenKnowledge,
     records: Sequence[Accelerogram],
     configuration: BenchConfiguration,
+    progress: Progress,
 ) -> Result:
     """Gain curves, one for each record."""
-    curves = seismic_curves(specimen, records, request, configuration, known)
+    load_model(progress)
+    curves = seismic_curves(specimen, records, request, configuration, known, progress)
     band = band_of(request.table_band, configuration)
     words = "none, the records as they are" if band is None else f"{band[0]:g} to {band[1]:g} Hz"
     drawn = [
@@ -87,10 +91,15 @@ def seismic(
 
 
 def study(
-    request: BandStudyRequest, specimen: Specimen, records: Sequence[Accelerogram], configuration: BenchConfiguration
+    request: BandStudyRequest,
+    specimen: Specimen,
+    records: Sequence[Accelerogram],
+    configuration: BenchConfiguration,
+    progress: Progress,
 ) -> Result:
     """Gains against the lower end of the band."""
-    curves = band_study(specimen, records, request, configuration)
+    load_model(progress)
+    curves = band_study(specimen, records, request, configuration, progress)
     band = curves[0].prepared.band
     upper = nan if band is None else band[1]
     drawn = [

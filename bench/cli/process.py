@@ -40,13 +40,15 @@ def _carry_out() -> int:
     from io import TextIOWrapper
 
     from bench.cli.main import main
+    from bench.cli.progress import phases_on
 
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             # a console that cannot show a character shows another, and the run goes on
             stream.reconfigure(errors="replace")
     try:
-        code = main()
+        with phases_on(sys.stderr) as progress:
+            code = main(progress=progress)
         sys.stdout.flush()
     except BrokenPipeError:
         # the reader, such as `head`, has seen enough; what is still held back has nowhere to go at exit either

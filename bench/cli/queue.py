@@ -12,8 +12,10 @@ from cyclopts import App, Parameter
 from bench.cli.inputs import Seed, SpecimenFile
 from bench.cli.interrupt import answer
 from bench.cli.plan_table import plans_text, tests_text
+from bench.cli.progress import Handed
 from bench.cli.refusal import error_object, tell
 from bench.cli.run import Start, carry_out
+from bench.progress import Progress, silent
 from sim.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
     from bench.preflight.compiled import Preflight
     from bench.queue.queue import Queue
     from bench.queue.queued import Queued
+    from bench.session import Experiment
 
 
 def queue_app(start: Start | None = None) -> App:
@@ -55,6 +58,7 @@ def queue_app(start: Start | None = None) -> App:
         as_json: Annotated[
             bool, Parameter(name="--json", negative=(), show_default=False, help="Print one JSON object.")
         ] = False,
+        progress: Handed = silent,
     ) -> int:
         """Check every test that waits, then run them from the top; the file says what became of each.
 
@@ -63,9 +67,10 @@ def queue_app(start: Start | None = None) -> App:
         waiting, and the same command goes on with it. The exit code is 0 when every test that waited was carried out,
         1 when not, 2 when something was refused before anything began, 130 after Ctrl-C.
         """
+        progress("loading the program")
         from bench.cli.inputs import configuration_from
         from bench.cli.queueing import ENTRIES, all_ready, room_refusal
-        from bench.preflight.compiled import compile_run
+        from bench.preflight.compiled import load_bench
         from bench.queue.file import ITEM, QueueFile
         from bench.queue.owner import owned
         from bench.queue.queue import Queue
@@ -80,8 +85,12 @@ def queue_app(start: Start | None = None) -> App:
             store = QueueFile(file)
             tests = Queue(store.read(), store.write)
             with redirect_stdout(sys.stderr):
+                load_bench(configuration, progress)
+                progress("checking the tests against the bench")
                 found = {
-                    index: compile_run(each.experiment, configuration, Path(tests.tests[index].out or "runs"))
+                    index: _plan(
+                        index, each.experiment, configuration, Path(tests.tests[index].out or "runs"), progress
+                    )
                     for index, each in all_ready(tests.tests, ENTRIES, configuration).items()
                 }
             refused = _refusal(found) or room_refusal([each.room for each in found.values()])
@@ -101,6 +110,17 @@ def queue_app(start: Start | None = None) -> App:
 
     app.default(queue)
     return app
+
+
+def _plan(
+    index: int, experiment: "Experiment", configuration: "BenchConfiguration", folder: Path, progress: Progress
+) -> "Preflight":
+    from bench.preflight.compiled import compile_run
+
+    def numbered(phase: str, done: int = 0, total: int = 0, /) -> None:
+        progress(f"test {index + 1}: {phase}", done, total)
+
+    return compile_run(experiment, configuration, folder, numbered)
 
 
 def _refusal(found: "dict[int, Preflight]") -> InvalidInput | None:

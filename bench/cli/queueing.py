@@ -10,6 +10,7 @@ from bench.cli.catalogue import CATALOGUE, Entry
 from bench.cli.check import CHECK
 from bench.cli.output import check_folder, default_folder, make_folder, result_names
 from bench.config.validation import dotted, validated
+from bench.progress import Progress, silent
 from bench.queue.queued import Queued, Stage
 from sim.errors import InvalidInput
 from sim.parameters import Parameters
@@ -96,13 +97,19 @@ def own_folder(test: Queued, moment: datetime, tests: Iterable[Queued] = ()) -> 
 
 
 def add_to_queue(
-    path: Path, entry: Entry, experiment: "Experiment", configuration: "BenchConfiguration", options: "Options"
+    path: Path,
+    entry: Entry,
+    experiment: "Experiment",
+    configuration: "BenchConfiguration",
+    options: "Options",
+    progress: Progress = silent,
 ) -> int:
     """`rockbench run ... --queue FILE`: check the plan as a run would, and add it. Returns the exit code.
 
     Raises InvalidInput also while somebody else owns the queue.
     """
-    from bench.preflight.compiled import compile_run
+    progress("loading the program")
+    from bench.preflight.compiled import compile_run, load_bench
     from bench.queue.file import QueueFile
     from bench.queue.owner import owned
     from bench.queue.queue import Queue
@@ -110,8 +117,10 @@ def add_to_queue(
     with owned(path, "`rockbench run --queue`"):
         store = QueueFile(path)
         queue = Queue(store.read(), store.write)
+        load_bench(configuration, progress)
+        progress("checking the protocol against the bench")
         experiment.check(configuration)
-        compile_run(experiment, configuration, options.out or Path()).require()
+        compile_run(experiment, configuration, options.out or Path(), progress).require()
         queue.add(
             queued(
                 entry,

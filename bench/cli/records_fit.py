@@ -11,8 +11,10 @@ from cyclopts import App, Group, Parameter
 from bench.cli import flags
 from bench.cli.predict_options import ResultOptions
 from bench.cli.predict_records import CONFIG
+from bench.cli.progress import HANDED
 from bench.cli.refusal import fail
 from bench.prediction.requests import StrokeFitRequest
+from bench.progress import Progress, silent
 from sim.errors import InvalidInput, RockbenchError
 
 if TYPE_CHECKING:
@@ -35,12 +37,12 @@ def register_fit(app: App) -> None:
 def _command() -> Callable[..., int]:
     # not named as in the signature: cyclopts would take this annotation for that one
     def execute(named: str, /, **arguments: Any) -> int:
-        return _perform(named, arguments)
+        return _perform(named, arguments, arguments.pop("progress", silent))
 
     group = Group("Parameters of fit", sort_key=1)
     execute.__doc__ = _HELP
     execute.__dict__["__signature__"] = Signature(
-        [_FILE, *flags.arguments_of(StrokeFitRequest, group), CONFIG, _OUT, _PLOT, _JSON]
+        [_FILE, *flags.arguments_of(StrokeFitRequest, group), CONFIG, _OUT, _PLOT, _JSON, HANDED]
     )
     return execute
 
@@ -86,7 +88,8 @@ _JSON = _option(
 )
 
 
-def _perform(file: str, arguments: dict[str, Any]) -> int:
+def _perform(file: str, arguments: dict[str, Any], progress: Progress) -> int:
+    progress("loading the program")
     from bench.accelerograms.reference import RecordReference
     from bench.cli.inputs import configuration_from
     from bench.cli.predict_inputs import request_from, warn_of_unusual
@@ -98,6 +101,7 @@ def _perform(file: str, arguments: dict[str, Any]) -> int:
     request = request_from(StrokeFitRequest, arguments)
     check_files(ResultOptions(out=out, plot=plot))
     warn_of_unusual(request, configuration.known_specimen)
+    progress("fitting the record to the stroke")
     fits = stroke_fits(RecordReference.parse(file).read(), request, configuration)
     try:
         _write(fits, out, plot)

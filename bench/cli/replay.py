@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import App, Parameter
 
 from bench.cli.interrupt import answer
+from bench.cli.progress import Handed
 from bench.cli.prose import prose
 from bench.cli.refusal import error_object, tell
 from bench.cli.words import one_line
+from bench.progress import silent
 from sim.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -39,6 +41,7 @@ def replay(
     as_json: Annotated[
         bool, Parameter(name="--json", negative=(), show_default=False, help="Print one JSON object, nothing else.")
     ] = False,
+    progress: Handed = silent,
 ) -> int:
     """Play a recorded campaign again: its blocks through the same engine, guard, analysis and screens.
 
@@ -49,7 +52,9 @@ def replay(
     The exit code is 0 when everything came as recorded but for rounding, also where a recording breaks off; 1 when
     something differs, which is told; 2 when the file cannot be played; 130 after Ctrl-C.
     """
+    progress("loading the program")
     from bench.cli.recorded import entry_of, experiment_of, parameters_of
+    from bench.preflight.compiled import load_bench
     from bench.record.reader import open_record
     from bench.replaying.session import replay as play
     from bench.replaying.session import stored_configuration
@@ -60,8 +65,10 @@ def replay(
         configuration = stored_configuration(record)
         experiment = experiment_of(record, entry, parameters_of(record, entry))
         try:
-            with entry.progress(sys.stderr, False) as progress, redirect_stdout(sys.stderr):
-                replayed = play(record, experiment, configuration, clock=clock, subscribers=[progress])
+            load_bench(configuration, progress)
+            progress("replaying the file")
+            with entry.progress(sys.stderr, False) as display, redirect_stdout(sys.stderr):
+                replayed = play(record, experiment, configuration, clock=clock, subscribers=[display])
         except KeyboardInterrupt:
             answer("the replay was interrupted")
             return 130

@@ -6,8 +6,10 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, Parameter
 
+from bench.cli.progress import Handed
 from bench.cli.prose import prose
 from bench.cli.refusal import tell, warn
+from bench.progress import Progress, silent
 from sim.errors import InvalidInput, RockbenchError
 from sim.extras import require
 
@@ -36,6 +38,7 @@ def report(
     html: HTML = None,
     pdf: PDF = None,
     overwrite: OVERWRITE = False,
+    progress: Handed = silent,
 ) -> int:
     """Make a report of a campaign from its data file.
 
@@ -45,6 +48,7 @@ def report(
     .report.html. The exit code is 0 when it was made, 1 when it could not be written, 2
     when something was refused before. Files that exist are kept unless --overwrite is given.
     """
+    progress("loading the program")
     from bench.cli.recorded import declared_parameters
     from bench.publication.campaign import Campaign
     from bench.publication.report import campaign_report
@@ -55,11 +59,11 @@ def report(
     check_outputs(html, pdf, overwrite=overwrite)
     with open_record(file) as record:
         campaign = Campaign(file, record, declared_parameters(record))
-        document = campaign_report(campaign)
+        document = campaign_report(campaign, progress)
         integrity = campaign.integrity
     if integrity.failing:
         warn(f"{file}: {integrity}")
-    return written(document, html, pdf, overwrite=overwrite)
+    return written(document, html, pdf, overwrite=overwrite, progress=progress)
 
 
 def check_outputs(html: Path | None, pdf: Path | None, *, overwrite: bool) -> None:
@@ -79,12 +83,15 @@ def check_outputs(html: Path | None, pdf: Path | None, *, overwrite: bool) -> No
         raise InvalidInput("--pdf", str(pdf), "--html goes there already; name another")
 
 
-def written(document: "Document", html: Path | None, pdf: Path | None, *, overwrite: bool) -> int:
+def written(
+    document: "Document", html: Path | None, pdf: Path | None, *, overwrite: bool, progress: Progress = silent
+) -> int:
     """Write a report in the forms that are asked for; returns 0, or 1 with a line on standard error."""
     from bench.report.files import write_new
     from bench.report.page.html import html_page
     from bench.report.page.pdf import write_pdf
 
+    progress("writing the report")
     try:
         if html is not None:
             text = html_page(document).encode("utf-8")

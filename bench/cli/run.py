@@ -16,7 +16,9 @@ from cyclopts import App, Group
 from bench.cli.catalogue import CATALOGUE, Entry
 from bench.cli.flags import arguments_of
 from bench.cli.options import Options, arguments_of_options
+from bench.cli.progress import HANDED
 from bench.cli.refusal import error_object, fail, tell
+from bench.progress import Progress, silent
 from bench.results import SUMMARY
 from sim.errors import InvalidInput, RockbenchError
 
@@ -67,20 +69,22 @@ def command_of(entry: Entry, start: Start | None) -> Callable[..., int]:
     """The function behind a protocol's command; its signature is the protocol's flags and the common options."""
 
     def execute(*values: str, **arguments: Any) -> int:
+        progress = arguments.pop("progress", silent)
         if values and entry.positional is not None:
             arguments[entry.positional] = values
         common = {field.name for field in fields(Options)} & arguments.keys()
         options = Options(**{name: arguments.pop(name) for name in common})
-        return _perform(entry, arguments, options, start)
+        return _perform(entry, arguments, options, start, progress)
 
     group = Group(f"Parameters of the {entry.name} protocol", sort_key=1)
     execute.__doc__ = f"{entry.summary}\n\n{entry.details}\n\n{_EXIT_CODES}"
     asked = arguments_of(entry.parameters, group, entry.positional)
-    execute.__dict__["__signature__"] = Signature([*asked, *arguments_of_options()])
+    execute.__dict__["__signature__"] = Signature([*asked, *arguments_of_options(), HANDED])
     return execute
 
 
-def _perform(entry: Entry, arguments: dict[str, Any], options: Options, start: Start | None) -> int:
+def _perform(entry: Entry, arguments: dict[str, Any], options: Options, start: Start | None, progress: Progress) -> int:
+    progress("reading protocol and bench")
     from bench.cli.inputs import configuration_from, parameters_from
     from bench.cli.operator import choose
     from bench.cli.output import check_folder, default_folder, make_folder, remove_unused, result_names
@@ -92,11 +96,11 @@ def _perform(entry: Entry, arguments: dict[str, Any], options: Options, start: S
     if options.queue is not None:
         from bench.cli.queueing import add_to_queue
 
-        return add_to_queue(options.queue, entry, experiment, configuration, options)
+        return add_to_queue(options.queue, entry, experiment, configuration, options, progress)
     if options.dry_run:
         from bench.cli.dry_run import dry_run
 
-        return dry_run(experiment, configuration, out, as_json=options.json)
+        return dry_run(experiment, configuration, out, progress, as_json=options.json)
     operator = choose(
         serves_itself=configuration.serves_itself, yes=options.yes, ask=options.ask, terminal=sys.stdin.isatty()
     )
@@ -134,10 +138,6 @@ def carry_out(
     from bench.engine.requests import Requests
 
     person = operator if isinstance(operator, AtTheConsole) else None
-    if start is None:
-        from bench.session import run_session
-
-        start = partial(run_session, about=about)
     requests = Requests()
     with (
         interruptible(requests, asking=lambda: person is not None and person.asking) as interrupts,
@@ -146,6 +146,11 @@ def carry_out(
         redirect_stdout(sys.stderr),
     ):
         try:
+            if start is None:
+                progress.prepare("loading the program")
+                with requests.without_rig():
+                    from bench.session import run_session
+                start = partial(run_session, about=about, progress=progress.prepare)
             ended = start(
                 experiment,
                 configuration,

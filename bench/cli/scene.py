@@ -4,6 +4,7 @@ from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import isfinite, nan
+from time import monotonic
 from typing import Any
 
 from bench.cli.twin_line import twin_line
@@ -156,9 +157,22 @@ class Scene:
     twin: str = ""
     live: dict[str, str] = field(default_factory=dict[str, str])
     notices: deque[Notice] = field(default_factory=lambda: deque[Notice](maxlen=NOTICES))
+    _begun: float = 0.0
+    _prepares: bool = False
+
+    def prepare(self, phase: str, done: int, total: int) -> None:
+        """Take in what is done before the rig is opened or after it is closed."""
+        now = monotonic()
+        if phase != self.reason:
+            self.reason, self._begun = one_line(phase), now
+        self.fraction = done / total if total else 0.0
+        self.remaining = (now - self._begun) * (total - done) / done if done else float("nan")
+        self._prepares = True
 
     def update(self, event: Event) -> Notice | None:
         """Take in an event that is not a block of samples; returns its line of the log, if it has one."""
+        if self._prepares:
+            self.fraction, self.remaining, self._prepares = 0.0, float("nan"), False
         self.time = max(self.time, event.time)
         match event:
             case StateChanged():

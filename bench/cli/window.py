@@ -12,6 +12,8 @@ from cyclopts import App, Parameter
 from bench.cli.catalogue import CATALOGUE
 from bench.cli.check import CHECK
 from bench.cli.inputs import Seed, SpecimenFile, configuration_from
+from bench.cli.progress import Handed
+from bench.progress import silent
 from sim.errors import InvalidInput, RockbenchError
 from sim.extras import require
 
@@ -72,6 +74,7 @@ def gui(
     queue: Annotated[
         Path, Parameter(metavar="FILE", help="File that keeps the queue; `rockbench queue` runs the same one.")
     ] = Path("runs", "queue.json"),
+    progress: Handed = silent,
 ) -> int:
     """Open the operator's window.
 
@@ -79,6 +82,7 @@ def gui(
     program; the emergency stop is the red button at the bench.
     """
     require("gui", "rockbench gui")
+    progress("opening the window")
     configuration = configuration_from(config, seed, specimen)
     require_display()
 

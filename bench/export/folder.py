@@ -6,6 +6,7 @@ from uuid import uuid4
 
 from bench.export import matlab, parquet, text, uff
 from bench.export.content import content_of
+from bench.progress import Progress, counting, silent
 from bench.record.integrity import Integrity
 from bench.record.reader import Record
 from bench.unfinished import unfinished
@@ -23,7 +24,9 @@ LIBRARIES = {"uff": "pyuff", "parquet": "pyarrow"}
 _WRITERS = {"mat": matlab.write, "csv": text.write, "uff": uff.write, "parquet": parquet.write}
 
 
-def export(record: Record, path: Path, to: Format, out: Path, *, raw: bool = False) -> tuple[list[Path], Integrity]:
+def export(
+    record: Record, path: Path, to: Format, out: Path, *, raw: bool = False, progress: Progress = silent
+) -> tuple[list[Path], Integrity]:
     """Write an open file, read from `path`, into the new folder `out`; returns the files that are in it then, and
     whether the record is as it was written. What is not stands in the file DAMAGED.txt beside the others.
 
@@ -35,7 +38,8 @@ def export(record: Record, path: Path, to: Format, out: Path, *, raw: bool = Fal
         require("export", f"--to {to}", LIBRARIES[to])
     if out.exists():
         raise InvalidInput("--out", str(out), "it exists, and nothing is ever overwritten; name another folder")
-    integrity = record.integrity(None)
+    integrity = record.integrity(None, counting(progress, "comparing the file with its checksums"))
+    progress("writing the files of the export")
     content = content_of(record, path, raw=raw)
     if to == "mat":
         matlab.check(content)

@@ -12,6 +12,7 @@ from sim.excitation import SampledRecord
 from sim.knowledge import SpecimenKnowledge
 from sim.specimen import Specimen
 from sim.steady import Orbit
+from sim.sweep import Done
 
 INTERVAL = (0.025, 0.975)
 """Ends of a band that holds 95 % of the members of a Monte Carlo."""
@@ -37,7 +38,11 @@ class Bands:
 
 
 def bands(
-    orbits: Sequence[Orbit], alpha_2: Sequence[float] | Floats, known: SpecimenKnowledge, members: int = 0
+    orbits: Sequence[Orbit],
+    alpha_2: Sequence[float] | Floats,
+    known: SpecimenKnowledge,
+    members: int = 0,
+    done: Done | None = None,
 ) -> Bands:
     """The band around each `alpha_2`, shape (n,), of the motions `orbits`.
 
@@ -53,7 +58,7 @@ def bands(
     # what is exactly known of one spring may be open of another: as many members for all
     most = max(map(len, of.values()), default=0)
     own = [of[orbit.specimen] + [orbit.specimen] * (most - len(of[orbit.specimen])) for orbit in orbits]
-    gains = steady_gains(orbits, own)[:, :, 1]
+    gains = steady_gains(orbits, own, done=done)[:, :, 1]
     return _drawn(gains) if members else _first_order(best, gains)
 
 
@@ -74,7 +79,7 @@ def _members(specimen: Specimen, known: SpecimenKnowledge, members: int) -> list
 
 
 def _first_order(best: Floats, gains: Floats) -> Bands:
-    sides = gains.reshape(len(best), -1, 2) - best[:, None, None]
+    sides = gains.reshape(len(best), gains.shape[1] // 2, 2) - best[:, None, None]
     lost = np.isnan(sides)
     # of a side that is lost the other is the mirror image
     one, other = (np.where(lost[:, :, k], -sides[:, :, 1 - k], sides[:, :, k]) for k in (0, 1))

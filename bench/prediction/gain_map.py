@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from bench.prediction.requests import MapRequest
 from bench.prediction.steady import amplitude_of, band_columns, table_of
+from bench.progress import Progress, counting, silent
 from bench.record.tables import Table
 from sim.knowledge import SpecimenKnowledge
 from sim.maps import GainMap, LayerMap, gain_map
@@ -19,7 +20,9 @@ IMPACTS: dict[Literal["rocking", "resting"], int] = {"rocking": 2, "resting": 0}
 """Impacts of each layer in a period of the drive."""
 
 
-def map_table(specimen: Specimen, request: MapRequest, known: SpecimenKnowledge | None = None) -> Table:
+def map_table(
+    specimen: Specimen, request: MapRequest, known: SpecimenKnowledge | None = None, progress: Progress = silent
+) -> Table:
     """One row for each layer that exists at a point, ascending in stiffness, then frequency.
 
     With `known`, how well the specimen is, columns more are the band of alpha_2.
@@ -27,7 +30,14 @@ def map_table(specimen: Specimen, request: MapRequest, known: SpecimenKnowledge 
     """
     betas, omegas = np.sort(request.beta), np.sort(request.omega)
     amplitude = amplitude_of(specimen, request)
-    made = gain_map(specimen, betas, omegas, amplitude, scheduler=request.scheduler)
+    made = gain_map(
+        specimen,
+        betas,
+        omegas,
+        amplitude,
+        scheduler=request.scheduler,
+        done=counting(progress, "computing the gain map"),
+    )
     parts = [
         _columns(name, layer, omegas, betas, amplitude)
         for name, layer in zip(IMPACTS, (made.rocking, made.resting), strict=True)
@@ -35,12 +45,13 @@ def map_table(specimen: Specimen, request: MapRequest, known: SpecimenKnowledge 
     if request.outcomes:
         from sim.outcomes import outcome_map
 
-        came = outcome_map(made, scheduler=request.scheduler)
+        came = outcome_map(made, scheduler=request.scheduler, done=counting(progress, "simulating from rest"))
         for part, layer in zip(parts, (made.rocking, made.resting), strict=True):
             part |= {"outcome": came.outcome[layer.exists], "outcome_time_s": came.time[layer.exists]}
     if known is not None:
+        done = counting(progress, "computing the uncertainty band")
         for part, name in zip(parts, IMPACTS, strict=True):
-            part |= band_columns(_orbits(made, name), part["alpha_2"], known, request.members)
+            part |= band_columns(_orbits(made, name), part["alpha_2"], known, request.members, done)
     whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     # stable: of two layers at one point, the rocking one stays first
     order = np.lexsort((whole["omega_rad_s"], whole["beta"]))

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from bench.prediction.requests import HistoryRequest
 from bench.prediction.steady import amplitude_of
+from bench.progress import Progress, silent
 from bench.record.tables import Column, Table
 from sim.errors import InvalidInput
 from sim.excitation import SineProgram, Sweep
@@ -56,7 +57,7 @@ class History:
         return float(np.nanmax(values)) if np.isfinite(values).any() else float("nan")
 
 
-def histories(specimen: Specimen, request: HistoryRequest) -> list[History]:
+def histories(specimen: Specimen, request: HistoryRequest, progress: Progress = silent) -> list[History]:
     """A history for every frequency at every stiffness, or one for each steady motion that exists there.
 
     Raises InvalidInput for steady motions by another solver than taylor, or a tolerance that the solver refuses.
@@ -65,9 +66,12 @@ def histories(specimen: Specimen, request: HistoryRequest) -> list[History]:
         raise InvalidInput("--solver", request.solver, "steady histories are those of taylor; leave --steady out")
     amplitude = amplitude_of(specimen, request)
     made: list[History] = []
+    points, begun = len(request.beta) * len(request.omega), 0
     for beta in request.beta:
         coupled = specimen.coupled(beta)
         for omega in request.omega:
+            progress("computing the histories", begun, points)
+            begun += 1
             if request.steady:
                 prediction = predict_gain(coupled, omega, amplitude)
                 made += [_steady(layer.orbit, request) for layer in prediction.layers.values()]

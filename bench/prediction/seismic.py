@@ -11,6 +11,7 @@ from bench.control.stroke.fit import Method, periods_of
 from bench.control.stroke.reach import Reach
 from bench.prediction.bands import Bands, record_bands
 from bench.prediction.requests import BandStudyRequest, RecordsRequest, SeismicRequest
+from bench.progress import Progress, silent
 from sim.errors import InvalidInput
 from sim.gain import SeismicGain, seismic_curve
 from sim.knowledge import SpecimenKnowledge
@@ -51,6 +52,7 @@ def seismic_curves(
     request: SeismicRequest,
     configuration: BenchConfiguration,
     known: SpecimenKnowledge | None = None,
+    progress: Progress = silent,
 ) -> list[SeismicCurve]:
     """A curve for each record, with the bands that are asked for, where it is `known` how well the specimen is.
 
@@ -59,17 +61,26 @@ def seismic_curves(
     band, betas = band_of(request.table_band, configuration), sorted(request.beta)
     reach = None if request.stroke_fit == "none" else Reach.of(configuration)
     method = Method.HIGH_PASS if request.stroke_fit == "high-pass" else Method.LEAST_CHANGE
-    curves = [_curve(specimen, record, request, betas, band, reach, method) for record in records]
+    curves: list[SeismicCurve] = []
+    for record in records:
+        progress("simulating the records", len(curves), len(records))
+        curves.append(_curve(specimen, record, request, betas, band, reach, method))
     if known is None or not request.members:
         return curves
     coupled = [specimen.coupled(beta) for beta in betas]
-    return [
-        replace(curve, bands=record_bands(coupled, curve.prepared.record, known, request.members)) for curve in curves
-    ]
+    banded: list[SeismicCurve] = []
+    for curve in curves:
+        progress("computing the uncertainty bands", len(banded), len(curves))
+        banded.append(replace(curve, bands=record_bands(coupled, curve.prepared.record, known, request.members)))
+    return banded
 
 
 def band_study(
-    specimen: Specimen, records: Sequence[Accelerogram], request: BandStudyRequest, configuration: BenchConfiguration
+    specimen: Specimen,
+    records: Sequence[Accelerogram],
+    request: BandStudyRequest,
+    configuration: BenchConfiguration,
+    progress: Progress = silent,
 ) -> list[SeismicCurve]:
     """A curve for each record at each lower end of the band, ascending; each is scaled to the peak by itself.
 
@@ -80,11 +91,12 @@ def band_study(
         raise InvalidInput("--table-band", "none", "the study moves the band's lower end: leave it out, or LOW:HIGH")
     if max(request.corner) >= band[1]:
         raise InvalidInput("--corner", max(request.corner), f"it must be below the band's upper end, {band[1]:g} Hz")
-    return [
-        _curve(specimen, record, request, betas, (corner, band[1]))
-        for record in records
-        for corner in sorted(request.corner)
-    ]
+    bands = [(record, (corner, band[1])) for record in records for corner in sorted(request.corner)]
+    curves: list[SeismicCurve] = []
+    for record, limited in bands:
+        progress("simulating the records", len(curves), len(bands))
+        curves.append(_curve(specimen, record, request, betas, limited))
+    return curves
 
 
 def _curve(

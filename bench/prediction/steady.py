@@ -8,11 +8,13 @@ from numpy.typing import NDArray
 
 from bench.prediction.bands import bands
 from bench.prediction.requests import SineRequest
+from bench.progress import Progress, counting, silent
 from bench.record.tables import Column, Table
 from sim.gain import GainPrediction, gain_spectrum, predict_gain
 from sim.knowledge import SpecimenKnowledge
 from sim.specimen import Specimen
 from sim.steady import Orbit
+from sim.sweep import Done
 
 if TYPE_CHECKING:
     from bench.prediction.timed import Timed
@@ -68,18 +70,25 @@ def amplitude_of(specimen: Specimen, request: SineRequest) -> float:
     return request.amplitude_factor * specimen.uplift_acceleration
 
 
-def predict_points(specimen: Specimen, request: SineRequest) -> list[GainPrediction]:
+def predict_points(specimen: Specimen, request: SineRequest, progress: Progress = silent) -> list[GainPrediction]:
     """A prediction for every frequency at every stiffness; each is found by itself, whatever else is asked for."""
     amplitude = amplitude_of(specimen, request)
-    return [predict_gain(specimen.coupled(beta), omega, amplitude) for beta in request.beta for omega in request.omega]
+    points = [(beta, omega) for beta in request.beta for omega in request.omega]
+    found: list[GainPrediction] = []
+    for beta, omega in points:
+        progress("computing the steady motions", len(found), len(points))
+        found.append(predict_gain(specimen.coupled(beta), omega, amplitude))
+    return found
 
 
-def predict_spectra(specimen: Specimen, request: SineRequest) -> list[GainPrediction]:
+def predict_spectra(specimen: Specimen, request: SineRequest, progress: Progress = silent) -> list[GainPrediction]:
     """The same along ascending frequency, each from its neighbours: five times cheaper."""
     amplitude, omegas = amplitude_of(specimen, request), sorted(request.omega)
-    return [
-        prediction for beta in request.beta for prediction in gain_spectrum(specimen.coupled(beta), omegas, amplitude)
-    ]
+    found: list[GainPrediction] = []
+    for i, beta in enumerate(request.beta):
+        progress("computing the steady motions", i, len(request.beta))
+        found += gain_spectrum(specimen.coupled(beta), omegas, amplitude)
+    return found
 
 
 def steady_table(
@@ -87,6 +96,7 @@ def steady_table(
     timed: "Sequence[Timed | None] | None" = None,
     known: SpecimenKnowledge | None = None,
     members: int = 0,
+    progress: Progress = silent,
 ) -> Table:
     """One row for each layer of each prediction, to the digits that are known.
 
@@ -108,15 +118,25 @@ def steady_table(
     columns: dict[str, NDArray[Any]] = {name: np.array([row[name] for row in rows]) for name in names}
     if known is not None:
         layers = [layer for prediction in predictions for layer in prediction.layers.values()]
-        columns |= band_columns([layer.orbit for layer in layers], columns["alpha_2"], known, members)
+        columns |= band_columns(
+            [layer.orbit for layer in layers],
+            columns["alpha_2"],
+            known,
+            members,
+            counting(progress, "computing the uncertainty band"),
+        )
     return table_of(columns)
 
 
 def band_columns(
-    orbits: Sequence[Orbit], alpha_2: NDArray[np.float64], known: SpecimenKnowledge, members: int
+    orbits: Sequence[Orbit],
+    alpha_2: NDArray[np.float64],
+    known: SpecimenKnowledge,
+    members: int,
+    done: Done | None = None,
 ) -> dict[str, NDArray[np.float64]]:
     """The columns of a band of alpha_2, by name."""
-    found = bands(orbits, alpha_2, known, members)
+    found = bands(orbits, alpha_2, known, members, done)
     return {
         "alpha_2_uncertainty": found.uncertainty,
         "alpha_2_low": found.low,

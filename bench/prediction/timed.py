@@ -10,7 +10,7 @@ from sim.gain import GainPrediction
 from sim.rocking import Status
 from sim.solvers.steady import steady_gain_by_time
 from sim.specimen import Specimen
-from sim.sweep import sweep
+from sim.sweep import Done, sweep
 
 DURATION = 120.0
 """Length of a run [s]: that of the paper."""
@@ -42,13 +42,17 @@ class Timed:
 
 
 def timed_gains(
-    specimen: Specimen, request: SineRequest, predictions: Sequence[GainPrediction], scheduler: str | None = None
+    specimen: Specimen,
+    request: SineRequest,
+    predictions: Sequence[GainPrediction],
+    scheduler: str | None = None,
+    done: Done | None = None,
 ) -> list[Timed | None]:
     """A run by the request's solver for each prediction, on all processors; None where there is no rocking orbit.
 
     Raises InvalidInput for a tolerance that the solver refuses.
     """
-    return sweep(partial(_timed, specimen, request.solver, request.tolerance), predictions, scheduler)
+    return sweep(partial(_timed, specimen, request.solver, request.tolerance), predictions, scheduler, done=done)
 
 
 def _timed(specimen: Specimen, solver: str, tolerance: float | None, prediction: GainPrediction) -> Timed | None:

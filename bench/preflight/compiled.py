@@ -14,9 +14,11 @@ from bench.preflight.fingerprint import plan_hash
 from bench.preflight.forecast import Forecast, Forecasting
 from bench.preflight.margins import Margin, margins, refusal, warnings
 from bench.preflight.tables import drive_table, margins_table
+from bench.progress import Progress, silent
 from bench.provenance import software
 from bench.record.tables import Table
 from sim.errors import InvalidInput
+from sim.loading import BENCH, load_model
 from sim.parameters import Parameters
 
 
@@ -83,12 +85,20 @@ class Preflight:
             raise refused
 
 
-def compile_run(experiment: Asked, configuration: BenchConfiguration, folder: Path) -> Preflight:
+def load_bench(configuration: BenchConfiguration, progress: Progress = silent) -> None:
+    """Load what simulates this bench, or compile it at the first use, where it is a simulated one."""
+    if configuration.backend == "simulated":
+        load_model(progress, BENCH)
+
+
+def compile_run(
+    experiment: Asked, configuration: BenchConfiguration, folder: Path, progress: Progress = silent
+) -> Preflight:
     """Compute and check the whole run; its results would go to `folder`. Opens nothing, creates nothing.
 
     Raises InvalidInput only for what cannot be planned at all: a refusal is part of the answer.
     """
-    forecast = experiment.preflight(configuration) if isinstance(experiment, Forecasting) else Forecast()
+    forecast = experiment.preflight(configuration, progress) if isinstance(experiment, Forecasting) else Forecast()
     found, specimen = review(configuration), configuration.known_specimen
     return Preflight(
         forecast=forecast,

@@ -5,6 +5,7 @@ from typing import Protocol, runtime_checkable
 
 from bench.config.model import BenchConfiguration
 from bench.control.legs import Leg
+from bench.progress import Progress, silent
 
 
 @dataclass(frozen=True)
@@ -49,6 +50,9 @@ class Forecast:
 class Forecasting(Protocol):
     """An experiment that predicts what it will ask of the bench. One that does not is run without margins."""
 
-    def preflight(self, configuration: BenchConfiguration) -> Forecast:
-        """The forecast on this bench. Raises InvalidInput for what cannot be planned at all."""
+    def preflight(self, configuration: BenchConfiguration, progress: Progress = silent) -> Forecast:
+        """The forecast on this bench, reporting to `progress` what takes long.
+
+        Raises InvalidInput for what cannot be planned at all.
+        """
         ...

@@ -11,6 +11,7 @@ from bench.prediction.seismic import SeismicCurve, seismic_curves
 from bench.prediction.seismic_statement import seismic_statement
 from bench.prediction.statements import POINTS, POINTS_BETA, SECTIONS, harmonic_statements
 from bench.prediction.steady import predict_spectra, steady_table
+from bench.progress import Progress, silent
 from bench.provenance import revision, software
 from bench.publication.facts import facts_table
 from bench.publication.predicted import histories_picture, map_section
@@ -21,6 +22,7 @@ from bench.publication.verdicts import Named, statement_table, verdicts_table
 from bench.record.tables import arrays
 from bench.report.figure import gain_spectra
 from bench.report.page.document import Column, Document, Notice, Part, Picture, Section, Table
+from sim.loading import load_model
 from sim.specimen import Specimen
 
 PARTS = ("statements", "modes", "map", "histories", "spectra", "records", "seismic")
@@ -48,7 +50,7 @@ class PaperRequest:
 class _Paper:
     """Computes what is asked for, each thing once."""
 
-    def __init__(self, request: PaperRequest) -> None:
+    def __init__(self, request: PaperRequest, progress: Progress) -> None:
         self._request, self._specimen = request, request.specimen
         self._amplitude = AMPLITUDE_FACTOR * request.specimen.uplift_acceleration
         self.named: list[Named] = []
@@ -56,7 +58,13 @@ class _Paper:
         if {"seismic", "statements"} & {*request.parts}:
             for words, band in (("as recorded", "none"), (f"within {self._band}", request.band)):
                 asked = SeismicRequest(table_band=band)
-                self._curves[words] = seismic_curves(self._specimen, request.records, asked, BenchConfiguration())
+
+                def under(phase: str, done: int = 0, total: int = 0, /, words: str = words) -> None:
+                    progress(f"{phase}, {words}", done, total)
+
+                self._curves[words] = seismic_curves(
+                    self._specimen, request.records, asked, BenchConfiguration(), progress=under
+                )
 
     @property
     def _band(self) -> str:
@@ -133,14 +141,19 @@ class _Paper:
         return Section("seismic", "Gain curves under records (as Fig. 8 and 9 of the paper)", [*parts, softest])
 
 
-def paper_report(request: PaperRequest) -> tuple[Document, list[Named]]:
+def paper_report(request: PaperRequest, progress: Progress = silent) -> tuple[Document, list[Named]]:
     """The report, and the statements where they were asked for.
 
     Raises InvalidInput for a record that cannot be prepared, RockbenchError where no motion is found.
     """
-    paper = _Paper(request)
+    load_model(progress)
+    paper = _Paper(request, progress)
     builders: Mapping[str, Callable[[], Section]] = {name: getattr(paper, name) for name in PARTS}
-    sections = [builders[name]() for name in PARTS if name in request.parts]
+    asked = [name for name in PARTS if name in request.parts]
+    sections: list[Section] = []
+    for name in asked:
+        progress("computing and drawing the parts of the report", len(sections), len(asked))
+        sections.append(builders[name]())
     sections.append(specimen_section(request.specimen, None))
     sections.append(_provenance(request))
     summary: list[Part] = [

@@ -1,8 +1,9 @@
 """The report of a campaign from its file: what was tested on what, how, and what came out beside the prediction."""
 
-from collections.abc import Iterator
+from collections.abc import Callable
 from typing import Any
 
+from bench.progress import Progress, silent
 from bench.publication.campaign import Campaign
 from bench.publication.conditions import damage_notice, limits_section
 from bench.publication.fits import fits_section
@@ -17,40 +18,56 @@ from bench.publication.seismic import seismic_section
 from bench.publication.specimen import modes_section, specimen_section
 from bench.publication.typography import listed, moment
 from bench.report.page.document import Document, Notice, Part, Section
+from sim.loading import load_model
 
 USUAL_BETAS = (0.25, 0.64, 0.97)
 MOST_MODES = 4
 """Stiffnesses whose modes are drawn."""
 
 
-def campaign_report(campaign: Campaign) -> Document:
+def campaign_report(campaign: Campaign, progress: Progress = silent) -> Document:
     """Everything that the file has. Raises InvalidInput for a file without a specimen that can be used."""
+    load_model(progress)
+    sections: list[Section] = []
+    makers = _sections(campaign)
+    for number, make in enumerate(makers):
+        progress("computing and drawing the report", number, len(makers))
+        section = make()
+        if section is not None:
+            sections.append(section)
     return Document(
         title=f"Test report: {campaign.path.stem}" if campaign.path.stem != "campaign" else _title(campaign),
         summary=_summary(campaign),
-        sections=[section for section in _sections(campaign) if section is not None],
+        sections=sections,
         provenance=provenance_line(),
     )
 
 
-def _sections(campaign: Campaign) -> Iterator[Section | None]:
+def _sections(campaign: Campaign) -> list[Callable[[], Section | None]]:
+    """What makes each section, or finds that there is none."""
+    made: list[Callable[[], Section | None]] = []
     if campaign.harmonic_points:
-        yield results_section(campaign)
-        yield spectra_section(campaign)
         # the map is that of the test's amplitude: without a test there is none to draw
-        yield map_section(campaign.specimen, _amplitude_factor(campaign), map_points(campaign))
-        yield histories_section(campaign)
+        made += [
+            lambda: results_section(campaign),
+            lambda: spectra_section(campaign),
+            lambda: map_section(campaign.specimen, _amplitude_factor(campaign), map_points(campaign)),
+            lambda: histories_section(campaign),
+        ]
     if campaign.seismic_points:
-        yield seismic_section(campaign)
-    yield rocking_section(campaign) or vibration_section(campaign) or points_section(campaign)
-    yield identified_section(campaign)
-    yield fits_section(campaign)
+        made.append(lambda: seismic_section(campaign))
     configuration = campaign.configuration
     identified = None if configuration is None else configuration.identified
-    yield specimen_section(campaign.specimen, campaign.uncertainty, identified)
-    yield modes_section(campaign.specimen, _betas(campaign)[:MOST_MODES])
-    yield limits_section(campaign)
-    yield provenance_section(campaign)
+    made += [
+        lambda: rocking_section(campaign) or vibration_section(campaign) or points_section(campaign),
+        lambda: identified_section(campaign),
+        lambda: fits_section(campaign),
+        lambda: specimen_section(campaign.specimen, campaign.uncertainty, identified),
+        lambda: modes_section(campaign.specimen, _betas(campaign)[:MOST_MODES]),
+        lambda: limits_section(campaign),
+        lambda: provenance_section(campaign),
+    ]
+    return made
 
 
 def _title(campaign: Campaign) -> str:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 from bench.record import checksums, hdf5
 from bench.record.errors import UNREADABLE, reason
+from sim.sweep import Done
 
 SMALL = 2**20
 """Bytes of a dataset that are hashed in a few milliseconds."""
@@ -30,8 +31,11 @@ class Integrity:
         return f"{self.compared} datasets are as they were written{left}"
 
 
-def integrity(entry: hdf5.Group, largest: int | None = SMALL) -> Integrity:
-    """Hold the datasets of at most `largest` bytes, or all, and the attributes of everything against the checksums."""
+def integrity(entry: hdf5.Group, largest: int | None = SMALL, done: Done = lambda _done, _all: None) -> Integrity:
+    """Hold the datasets of at most `largest` bytes, or all, and the attributes of everything against the checksums.
+
+    `done` counts the datasets.
+    """
     if not hdf5.has(entry, checksums.GROUP):
         lost: dict[str, str] = {}
         return Integrity(0, lost, tuple(each.name for each in hdf5.datasets(entry, lost)))
@@ -41,7 +45,8 @@ def integrity(entry: hdf5.Group, largest: int | None = SMALL) -> Integrity:
         return Integrity(0, {f"/entry/{checksums.GROUP}": f"the checksums cannot be read ({reason(error)})"})
     failing: dict[str, str] = {}
     unchecked: list[str] = []
-    for path, (values, attributes) in known.items():
+    for number, (path, (values, attributes)) in enumerate(known.items()):
+        done(number, len(known))
         try:
             stored = hdf5.dataset(entry, path)
             looked = bool(values) and (largest is None or stored.nbytes <= largest)

@@ -19,6 +19,7 @@ from bench.record.stored import StoredSamples
 from bench.record.tables import Column, as_rows
 from drivers.rig import Alignment
 from sim.identified import Identified
+from sim.sweep import Done
 
 
 @dataclass(frozen=True)
@@ -96,12 +97,13 @@ class Record(StoredSamples):
         """SHA-256 of values and attributes by dataset; those of values are empty where the file was not closed."""
         return checksums.read(self._entry) if hdf5.has(self._entry, checksums.GROUP) else {}
 
-    def integrity(self, largest: int | None = SMALL) -> Integrity:
+    def integrity(self, largest: int | None = SMALL, done: Done = lambda _done, _all: None) -> Integrity:
         """What is not as it was written: `record.integrity().failing`, one line by path; `str` of it is one line.
 
         Datasets of at most `largest` bytes are read for it, every one when it is None; that takes as long as reading.
+        `done` counts them.
         """
-        return integrity(self._entry, largest)
+        return integrity(self._entry, largest, done)
 
     @property
     def status(self) -> str:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.progress import Progress, counting, silent
 from bench.record import diary, fits, hdf5
 from bench.record.aftermath import NOTE, Recovery, write_ends, write_note
 from bench.record.checksums import GROUP as CHECKSUMS
@@ -36,7 +37,7 @@ _MADE_ANEW = frozenset(
 _ROWS_TOGETHER = 2**18
 
 
-def recover(path: Path, target: Path) -> Recovery:
+def recover(path: Path, target: Path, progress: Progress = silent) -> Recovery:
     """Write to `target` what `path` holds.
 
     Raises InvalidInput when `target` exists or `path` is no record, RecordError when it is too damaged.
@@ -48,15 +49,16 @@ def recover(path: Path, target: Path) -> Recovery:
                 raise InvalidInput("recovered file", str(taken), "the file exists and is never overwritten")
         try:
             with unfinished(temporary):
-                result = _rebuild(record, path, temporary, target)
+                result = _rebuild(record, path, temporary, target, progress)
                 os.rename(temporary, target)
         except UNREADABLE as error:
             raise RecordError(f"{path} could not be recovered into {target} ({reason(error)})") from error
     return result
 
 
-def _rebuild(record: Record, path: Path, temporary: Path, target: Path) -> Recovery:
-    judged = record.integrity(None)
+def _rebuild(record: Record, path: Path, temporary: Path, target: Path, progress: Progress) -> Recovery:
+    judged = record.integrity(None, counting(progress, "comparing the file with its checksums"))
+    progress("copying what is whole")
     file = hdf5.create(temporary)
     try:
         copying = Copying(_counted(record, judged), path.stat().st_size, _MADE_ANEW)
@@ -84,6 +86,7 @@ def _rebuild(record: Record, path: Path, temporary: Path, target: Path) -> Recov
         result = Recovery(target, lengths["samples"], events, points, lost, tuple(damage.values()))
         write_ends(record, path, entry, lengths, "; ".join(filter(None, (result.loss, *gone.values()))))
         write_note(record, path, entry, result)
+        progress("computing the checksums of the new file")
         fits.add_views(entry, fits.whole(entry))
         Checksums(entry, ())
     finally:

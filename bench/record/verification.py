@@ -15,6 +15,7 @@ from bench.record.opening import ANALYSIS, FORMAT, open_file
 from bench.record.plot import GROUP as PLOT
 from bench.record.reader import Record
 from bench.record.superblock import is_let_go
+from sim.sweep import Done
 
 
 @dataclass(frozen=True)
@@ -26,9 +27,9 @@ class Verdict:
     problems: tuple[str, ...]
 
 
-def verify(path: Path) -> Verdict:
+def verify(path: Path, done: Done = lambda _done, _all: None) -> Verdict:
     """Read the whole file, of a campaign or a re-analysis, and hold it against itself piece by piece: memory stays
-    bounded.
+    bounded. `done` counts the datasets.
 
     Raises InvalidInput for what is no record of ours, RecordError for one that cannot be opened.
     """
@@ -36,19 +37,19 @@ def verify(path: Path) -> Verdict:
     with open_file(path, judging=judging, kinds=(FORMAT, ANALYSIS)) as file:
         try:
             if hdf5.attribute(file, "format") == ANALYSIS:
-                return _verdict(hdf5.group(file, "entry"), reanalysis.problems(file, path))
+                return _verdict(hdf5.group(file, "entry"), reanalysis.problems(file, path), done)
             record = Record(file)
-            return _verdict(hdf5.group(file, "entry"), _of_record(record, path.stat().st_size))
+            return _verdict(hdf5.group(file, "entry"), _of_record(record, path.stat().st_size), done)
         except RecordError as error:
             return Verdict(0, 0, (str(error),))
         except UNREADABLE as error:
             return Verdict(0, 0, (f"the file is damaged ({reason(error)})",))
 
 
-def _verdict(entry: hdf5.Group, problems: Iterator[str]) -> Verdict:
+def _verdict(entry: hdf5.Group, problems: Iterator[str], done: Done) -> Verdict:
     found = [*problems]
     has = hdf5.has(entry, GROUP)
-    judged = integrity(entry, None)
+    judged = integrity(entry, None, done)
     found += [*(added(entry) if has else ()), *judged.failing.values()]
     stored = [each for each in hdf5.datasets(entry) if not each.name.startswith(f"/entry/{GROUP}/")]
     return Verdict(len(stored), judged.compared if has else 0, tuple(found))

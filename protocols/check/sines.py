@@ -61,6 +61,7 @@ def measured_sines(parameters: CheckParameters) -> Generator[Step, Outcome, Sine
         cycles = outcome.cycles[SETTLING:]
         need_cycles(cycles, parameters.cycles)
         found.append(np.mean([cycle.fundamental for cycle in cycles], axis=0))
+    yield Say(Progress(1.0, 0.0, "finished the common motion"))
     columns = np.array(found).T
     return Sines(
         omega=np.array(omegas),

@@ -6,6 +6,7 @@ from pathlib import Path
 from bench.config.model import BenchConfiguration
 from bench.engine.steps import Plan
 from bench.preflight.forecast import Forecast
+from bench.progress import Progress, silent
 from bench.record.tables import Column, Table
 from protocols.coupling_stiffness.parameters import CouplingStiffnessParameters
 from protocols.coupling_stiffness.point import SpringPoint
@@ -42,12 +43,13 @@ class CouplingStiffness:
         for specimen in specimens_of(self.parameters, configuration).values():
             check_pulse(self.parameters, configuration, specimen)
 
-    def preflight(self, configuration: BenchConfiguration) -> Forecast:
+    def preflight(self, configuration: BenchConfiguration, progress: Progress = silent) -> Forecast:
         """The most that is asked of every limited quantity."""
         from protocols.coupling_stiffness.sheet import expected_duration, specimens_of
         from protocols.free_vibration.preflight import pulse_forecast
         from protocols.free_vibration.pulse import planned
 
+        progress("predicting what the run asks of the bench")
         plans = {
             name: planned(self.parameters, configuration, specimen)
             for name, specimen in specimens_of(self.parameters, configuration).items()

@@ -138,7 +138,8 @@ def _decays(
     pace: Pace,
     told: Callable[[FrameResult, int], SpringPoint] | None = None,
 ) -> Generator[Step, Outcome, FrameResult]:
-    """The decays of one frame, with a point for each."""
+    """The decays of one frame, which has just been mounted, with a point for each."""
+    pace.gone += BY_HAND
     found = planned(parameters, configuration, specimen)
     decays = yield from pulsed_decays(parameters, configuration, found, setting, pace, name, told=told or bare_point)
     result = result_of(decays, setting.masses, setting.weighed)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from bench.config.model import BenchConfiguration
 from bench.engine.steps import Plan
 from bench.preflight.forecast import Forecast
+from bench.progress import Progress, silent
 from bench.record.tables import Table
 from protocols.earthquake.parameters import EarthquakeParameters
 from protocols.earthquake.point import EarthquakePoint
@@ -54,11 +55,11 @@ class EarthquakeCampaign:
 
         self._sources = Sources.stored(tables)
 
-    def preflight(self, configuration: BenchConfiguration) -> Forecast:
+    def preflight(self, configuration: BenchConfiguration, progress: Progress = silent) -> Forecast:
         """Every record with every specimen: the most that is asked of every limit, and the chance that it stands."""
         from protocols.earthquake.preflight import forecast
 
-        return forecast(self.parameters, configuration)
+        return forecast(self.parameters, configuration, progress)
 
     def predict(self, configuration: BenchConfiguration) -> Table:
         """Gain curves of every record under the asked motion."""

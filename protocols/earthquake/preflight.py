@@ -1,7 +1,6 @@
 """What a seismic campaign will ask of the bench: every record with every specimen, over what is not known of it."""
 
 from collections.abc import Sequence
-from importlib import import_module
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +10,7 @@ from bench.preflight.asked import UNKNOWN_SHAKER, Asked, demand
 from bench.preflight.bounds import bounds
 from bench.preflight.forecast import Forecast, Stage
 from bench.preflight.response import response_of
+from bench.progress import Progress, counting, silent
 from protocols.earthquake.asked import Travel, load, travel
 from protocols.earthquake.pace import Pace
 from protocols.earthquake.parameters import EarthquakeParameters
@@ -18,6 +18,7 @@ from protocols.earthquake.records import Shaking, shakings
 from protocols.earthquake.table import identification, stored_table, table_warnings
 from protocols.identify.level import planned
 from protocols.identify.sheet import expected_duration
+from sim.loading import load_model
 from sim.specimen import Specimen
 from sim.sweep import in_threads
 
@@ -44,17 +45,26 @@ _UNKNOWN = {
 }
 
 
-def forecast(parameters: EarthquakeParameters, configuration: BenchConfiguration) -> Forecast:
+def forecast(
+    parameters: EarthquakeParameters, configuration: BenchConfiguration, progress: Progress = silent
+) -> Forecast:
     """The demands of the identification and of every record with the bare frame and with every spring, and the chance
     that the block stands.
 
     Raises InvalidInput for a record that cannot be read or prepared, a table model that cannot be used or a table that
     cannot be identified.
     """
+    load_model(progress)
+    progress("preparing the records")
     found = shakings(parameters, configuration)
+    progress("planning the identification of the table")
     first, duration = _identification(parameters, configuration)
     specimens = [configuration.known_specimen.bare(), *map(configuration.known_specimen.coupled, parameters.beta)]
-    asked = [*first, *(_asked(shaking, specimen, configuration) for shaking in found for specimen in specimens)]
+    asked, done = [*first], counting(progress, f"simulating every record with {1 + DRAWS} specimens")
+    for shaking in found:
+        for specimen in specimens:
+            asked.append(_asked(shaking, specimen, configuration))
+            done(len(asked) - len(first), len(found) * len(specimens))
     return Forecast(
         demands=tuple(demand(quantity, asked, _UNKNOWN) for quantity in bounds(configuration)),
         stages=tuple(Stage(each.name, (), each.chance) for each in asked),
@@ -102,7 +112,6 @@ def _travels(
     shaking: Shaking, specimen: Specimen, factors: Array, configuration: BenchConfiguration
 ) -> Sequence[Travel]:
     """Motion of the specimen as assumed and as drawn, on all processors."""
-    import_module("sim.kernel.rocking")  # compiled once, before the threads start
     drawn = [specimen, *configuration.known.draws(specimen, DRAWS, np.random.default_rng(SEED))]
     grounded = configuration.laser_reference == "ground"
 

@@ -119,7 +119,7 @@ def table_for(
     step = next(plan)
     while True:
         # its thirds of an octave are no points of this campaign, and its progress is a part of the campaign's
-        if isinstance(step, Say) and isinstance(step.event, PointFinished):
+        if isinstance(step, Say) and isinstance(step.event, PointFinished | Progress):
             outcome = Done()
         else:
             outcome = yield replace(step, watch=_counted(step.watch, pace)) if isinstance(step, Play) else step

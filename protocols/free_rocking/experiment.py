@@ -8,6 +8,7 @@ import numpy as np
 from bench.config.model import BenchConfiguration
 from bench.engine.steps import Plan
 from bench.preflight.forecast import Forecast
+from bench.progress import Progress, silent
 from bench.record.tables import Column, Table
 from protocols.free_rocking.parameters import FreeRockingParameters
 from protocols.free_rocking.point import RockingPoint
@@ -33,10 +34,11 @@ class FreeRockingTest:
 
         check(self.parameters, configuration)
 
-    def preflight(self, configuration: BenchConfiguration) -> Forecast:
+    def preflight(self, configuration: BenchConfiguration, progress: Progress = silent) -> Forecast:
         """No drive; the laser's share of its range; how long it takes."""
         from protocols.free_rocking.preflight import forecast
 
+        progress("predicting what the run asks of the bench")
         return forecast(self.parameters, configuration)
 
     def predict(self, configuration: BenchConfiguration) -> Table:

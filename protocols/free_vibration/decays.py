@@ -11,8 +11,8 @@ from bench.engine.steps import Handle, Outcome, Say, Step
 from bench.events import PointFinished, StepStarted, Warned
 from drivers.rig import Handwork
 from protocols.free_vibration.parameters import DecayParameters, FreeVibrationParameters
-from protocols.free_vibration.playing import Pace, found_level, played
-from protocols.free_vibration.pulse import QUIET, Planned, window_of
+from protocols.free_vibration.playing import WAITING, Pace, found_level, played
+from protocols.free_vibration.pulse import QUIET, Planned, Pulse, window_of
 from protocols.free_vibration.results import FrameResult, point_of, result_of
 from protocols.free_vibration.told import fit_finished
 from protocols.harmonic.evidence import Unmeasurable
@@ -24,6 +24,9 @@ LETTING_GO = 6.0
 
 Telling = Callable[[FrameResult, int], Parameters]
 """Makes the point of a result; the number is 0 for all decays together."""
+
+PROBES = 3
+"""Probes that most tables take: for the expected duration."""
 
 _TRIES = 2
 """How often a decay is tried that cannot be used."""
@@ -44,14 +47,17 @@ def pulsed_decays(
     """
     yield Say(StepStarted(f"{name}: {1e3 * found.drift:.3g} mm of drift, {_reason(found)}"))
     pulse = found.pulse
+    begun = pace.gone
     volts = yield from found_level(pulse, found.drift, configuration, pace)
+    pace.over(begun, probing_duration(pulse))
 
     def once(activity: str) -> Generator[Step, Outcome, Decay]:
         signals = yield from played(pulse.record(volts), pulse.sample_rate, pace, activity)
         return pulsed_decay(signals, setting, QUIET, pulse.begin)
 
     how = f"a pulse of {volts:.3g} V, {pulse.length:.0f} s"
-    return (yield from _repeated(parameters, setting, once, name, how, told))
+    planned = pulse.length + WAITING
+    return (yield from _repeated(parameters, setting, pace, planned, once, name, how, told))
 
 
 def released_decays(
@@ -70,19 +76,24 @@ def released_decays(
         return released_decay(signals, setting)
 
     how = f"let go by hand, {window:.0f} s"
-    return (yield from _repeated(parameters, setting, once, "free vibration", how, point_of))
+    planned = LETTING_GO + window + WAITING
+    return (yield from _repeated(parameters, setting, pace, planned, once, "free vibration", how, point_of))
 
 
 def _repeated(
     parameters: DecayParameters,
     setting: Setting,
+    pace: Pace,
+    planned: float,
     once: Callable[[str], Generator[Step, Outcome, Decay]],
     name: str,
     how: str,
     told: Telling,
 ) -> Generator[Step, Outcome, list[Decay]]:
+    """`planned` is the expected time of one decay [s]."""
     decays: list[Decay] = []
     for number in range(1, parameters.repeats + 1):
+        begun = pace.gone
         for attempt in range(_TRIES):
             yield Say(StepStarted(f"{name} {number} of {parameters.repeats}: {how}"))
             try:
@@ -95,9 +106,16 @@ def _repeated(
             yield Say(fit_finished(decay, f"{name} {number}"))
             yield Say(PointFinished(told(result_of([decay], setting.masses, setting.weighed), number)))
             break
+        pace.over(begun, planned)
+        yield Say(pace.progress(f"finished {name} {number} of {parameters.repeats}"))
     if not decays:
         raise Unmeasurable("no decay could be used: see the warnings of this run")
     return decays
+
+
+def probing_duration(pulse: Pulse) -> float:
+    """Expected time of the probes before the decays [s]."""
+    return PROBES * (pulse.begin + WAITING)
 
 
 def _reason(found: Planned) -> str:

@@ -6,6 +6,7 @@ from pathlib import Path
 from bench.config.model import BenchConfiguration
 from bench.engine.steps import Plan
 from bench.preflight.forecast import Forecast
+from bench.progress import Progress, silent
 from bench.record.tables import Column, Table
 from protocols.free_vibration.parameters import FreeVibrationParameters
 from protocols.free_vibration.point import DecayPoint
@@ -39,12 +40,13 @@ class FreeVibration:
         else:
             check_pulse(self.parameters, configuration, specimen)
 
-    def preflight(self, configuration: BenchConfiguration) -> Forecast:
+    def preflight(self, configuration: BenchConfiguration, progress: Progress = silent) -> Forecast:
         """The most that is asked of every limited quantity."""
         from protocols.free_vibration.preflight import hand_forecast, pulse_forecast
         from protocols.free_vibration.pulse import planned
         from protocols.free_vibration.sheet import expected_duration
 
+        progress("predicting what the run asks of the bench")
         duration = expected_duration(self.parameters, configuration)
         if self.parameters.excitation == "hand":
             return hand_forecast(configuration, self.parameters.pull, duration)

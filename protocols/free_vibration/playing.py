@@ -48,6 +48,17 @@ class Pace:
     expected: float
     gone: float = 0.0
 
+    def progress(self, activity: str) -> Progress:
+        """Where the run stands."""
+        return Progress(self.gone / self.expected, self.expected - self.gone, activity)
+
+    def over(self, begun: float, planned: float) -> None:
+        """A part for which `planned` [s] were expected, and which began when `begun` [s] were gone, is over.
+
+        The time that it really took, with more probes or fewer, or a repetition, is expected in its place.
+        """
+        self.expected += self.gone - begun - planned
+
     def watch(self, sample_rate: float, activity: str) -> Callable[[Array], Event]:
         """Tells how far it is, block by block."""
         since = 0
@@ -66,7 +77,8 @@ def played(volts: Array, sample_rate: float, pace: Pace, activity: str) -> Gener
     yield Arm(REST, STILL)
     outcome = yield Play(volts, pace.watch(sample_rate, activity))
     end = yield RampOut(fast=isinstance(outcome, Fallen))
-    pace.gone = min(pace.gone + volts.size / sample_rate + WAITING, pace.expected)
+    pace.gone += volts.size / sample_rate + WAITING
+    pace.expected = max(pace.expected, pace.gone)
     if not isinstance(outcome, Played) or isinstance(end, Fallen):
         raise Unmeasurable(
             "storey 1 has moved aside for good: see to the frame, to what holds the block, and to laser 1"

@@ -14,7 +14,7 @@ from bench.config.model import BenchConfiguration
 from bench.engine.steps import Handle, Outcome, Plan, Say, Step
 from bench.events import PointFinished, SpecimenIdentified, Warned
 from drivers.rig import Handwork
-from protocols.free_vibration.decays import LETTING_GO, pulsed_decays, released_decays
+from protocols.free_vibration.decays import LETTING_GO, probing_duration, pulsed_decays, released_decays
 from protocols.free_vibration.parameters import DecayParameters, FreeVibrationParameters
 from protocols.free_vibration.playing import WAITING, Pace
 from protocols.free_vibration.pulse import Pulse, planned, window_of
@@ -24,10 +24,6 @@ from protocols.free_vibration.weighed import masses_told, masses_weighed
 from sim.errors import RockbenchError
 from sim.identified import Identified
 from sim.specimen import Specimen
-
-PROBES = 3
-"""Probes that most tables take: for the expected duration."""
-
 
 LOCK = "Clamp the table to the ground: it must not move, and it is not driven."
 
@@ -63,7 +59,7 @@ def expected_duration(parameters: FreeVibrationParameters, configuration: BenchC
 
 def pulsed_duration(parameters: DecayParameters, pulse: Pulse) -> float:
     """Expected length of the decays after pulses [s]."""
-    return PROBES * (pulse.begin + WAITING) + parameters.repeats * (pulse.length + WAITING)
+    return probing_duration(pulse) + parameters.repeats * (pulse.length + WAITING)
 
 
 def free_vibration_plan(parameters: FreeVibrationParameters, configuration: BenchConfiguration, bench: Bench) -> Plan:

@@ -6,6 +6,7 @@ from pathlib import Path
 from bench.config.model import BenchConfiguration
 from bench.engine.steps import Plan
 from bench.preflight.forecast import Forecast
+from bench.progress import Progress, silent
 from bench.record.tables import Table
 from protocols.harmonic.parameters import HarmonicParameters
 from protocols.harmonic.point import HarmonicPoint
@@ -29,11 +30,11 @@ class HarmonicCampaign:
         check_table(self.parameters, configuration)
         check_storeys(self.parameters, configuration)
 
-    def preflight(self, configuration: BenchConfiguration) -> Forecast:
+    def preflight(self, configuration: BenchConfiguration, progress: Progress = silent) -> Forecast:
         """Every stage of the drive, and the most that is asked of every limited quantity; plans the starts."""
         from protocols.harmonic.preflight import forecast
 
-        return forecast(self.parameters, configuration)
+        return forecast(self.parameters, configuration, progress)
 
     def predict(self, configuration: BenchConfiguration) -> Table:
         """Gain spectra of every spring on both layers, wide enough to frame the measured points."""

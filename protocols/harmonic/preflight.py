@@ -1,7 +1,6 @@
 """What a harmonic campaign will ask of the bench: predicted for every stage, over what is not known of the specimen."""
 
 from collections.abc import Sequence
-from importlib import import_module
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +14,14 @@ from bench.preflight.forecast import Forecast
 from bench.preflight.load import load
 from bench.preflight.motion import Travel, travel
 from bench.preflight.response import TableResponse, response_of
+from bench.progress import Progress, counting, silent
 from protocols.harmonic.pace import Pace
 from protocols.harmonic.parameters import HarmonicParameters
 from protocols.harmonic.reach import bare_travel, rocking_travel
 from protocols.harmonic.stages import Trial, payload_of, trials
+from sim.loading import load_model
 from sim.specimen import Specimen
-from sim.sweep import in_threads
+from sim.sweep import Done, in_threads
 
 Array = NDArray[np.float64]
 
@@ -47,16 +48,20 @@ _UNKNOWN = {
 }
 
 
-def forecast(parameters: HarmonicParameters, configuration: BenchConfiguration) -> Forecast:
+def forecast(
+    parameters: HarmonicParameters, configuration: BenchConfiguration, progress: Progress = silent
+) -> Forecast:
     """The campaign's stages with the demands of them all. Plans the starts, which are kept for the run.
 
     A drawn specimen is the same one throughout the campaign, and so is how far its drive is off.
     Raises InvalidInput when a table model is named that cannot be read or does not reach far enough.
     """
     response = response_of(configuration)
-    found = list(trials(parameters, configuration, response))
+    load_model(progress)
+    found = list(trials(parameters, configuration, response, counting(progress, "planning the starts")))
     factors = np.concatenate(([1.0], 1.0 + DRIVE * np.random.default_rng(SEED).uniform(-1.0, 1.0, DRAWS)))
-    moved = _travels(found, factors, configuration)
+    simulating = counting(progress, f"simulating every stage with {1 + DRAWS} specimens")
+    moved = _travels(found, factors, configuration, simulating)
     asked = [
         _asked(trial, travels, factors, parameters, configuration, response)
         for trial, travels in zip(found, moved, strict=True)
@@ -68,9 +73,10 @@ def forecast(parameters: HarmonicParameters, configuration: BenchConfiguration) 
     )
 
 
-def _travels(found: Sequence[Trial], factors: Array, configuration: BenchConfiguration) -> list[list[Travel]]:
+def _travels(
+    found: Sequence[Trial], factors: Array, configuration: BenchConfiguration, done: Done
+) -> list[list[Travel]]:
     """Motion of the specimen in each trial, as assumed and as drawn, on all processors."""
-    import_module("sim.kernel.rocking")  # compiled once, before the threads start
     drawn: dict[Specimen, list[Specimen]] = {}
     for trial in found:
         if trial.specimen not in drawn:
@@ -84,7 +90,7 @@ def _travels(found: Sequence[Trial], factors: Array, configuration: BenchConfigu
         return travel(specimen, program(legs), trial.begin, configuration.laser_reference, CATCH_ANGLE)
 
     n = len(factors)
-    every = in_threads(one, [(trial, i) for trial in found for i in range(n)])
+    every = in_threads(one, [(trial, i) for trial in found for i in range(n)], done)
     return [every[k * n : (k + 1) * n] for k in range(len(found))]
 
 

@@ -22,6 +22,7 @@ from sim.gain import predict_gain
 from sim.knowledge import SpecimenKnowledge
 from sim.specimen import Specimen
 from sim.steady import resting_level
+from sim.sweep import Done
 
 BARE_CHANGE = 4.0
 """Time in which the bare frame goes from one frequency to the next [s], as the lab sheet has it."""
@@ -80,9 +81,13 @@ def _planned_starts(
 
 
 def trials(
-    parameters: HarmonicParameters, configuration: BenchConfiguration, response: TableResponse | None
+    parameters: HarmonicParameters,
+    configuration: BenchConfiguration,
+    response: TableResponse | None,
+    done: Done = lambda _done, _all: None,
 ) -> Iterator[Trial]:
-    """Every stage that the lab sheet may come to, each planned start among them.
+    """Every stage that the lab sheet may come to, each planned start among them. `done` counts the points whose starts
+    are planned.
 
     Without a `response` of the table the calibration of the bare frame is taken to move it as asked.
     """
@@ -90,13 +95,14 @@ def trials(
     amplitude = parameters.amplitude_factor * specimen.uplift_acceleration
     yield _bare_calibration(parameters, specimen, response)
     yield from _bare_tests(parameters, specimen)
-    longest = _longest_dwell(parameters)
+    longest, planned = _longest_dwell(parameters), 0
     for beta in parameters.beta:
         coupled = specimen.coupled(beta)
-        plans = {
-            omega: planned_starts(coupled, omega, amplitude, parameters.starts, configuration.known)
-            for omega in parameters.omega
-        }
+        plans: dict[float, tuple[Start, ...]] = {}
+        for omega in parameters.omega:
+            plans[omega] = planned_starts(coupled, omega, amplitude, parameters.starts, configuration.known)
+            planned += 1
+            done(planned, len(parameters.beta) * len(parameters.omega))
         wanted, level = spring_calibration(parameters, coupled, [start for each in plans.values() for start in each])
         legs = _calibration_legs([(omega, level) for omega in wanted])
         yield Trial(Stage(f"calibration of the drive with beta = {beta:g}", legs), coupled)

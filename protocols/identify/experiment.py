@@ -9,6 +9,7 @@ from bench.config.model import BenchConfiguration
 from bench.control.table_model import TableModel
 from bench.engine.steps import Plan
 from bench.preflight.forecast import Forecast
+from bench.progress import Progress, silent
 from bench.record.tables import Column, Table
 from protocols.identify.parameters import IdentifyParameters
 from protocols.identify.point import IdentifiedBand
@@ -33,10 +34,11 @@ class Identification:
 
         planned(self.parameters, configuration)
 
-    def preflight(self, configuration: BenchConfiguration) -> Forecast:
+    def preflight(self, configuration: BenchConfiguration, progress: Progress = silent) -> Forecast:
         """The most that is asked of every limited quantity."""
         from protocols.identify.preflight import forecast
 
+        progress("predicting what the run asks of the bench")
         return forecast(self.parameters, configuration)
 
     def predict(self, configuration: BenchConfiguration) -> Table:

@@ -44,6 +44,14 @@ class Rules:
                 " for a narrower band"
             )
 
+    def progress(self, activity: str) -> Progress:
+        """Where the identification stands."""
+        return Progress(self.gone / self.expected, self.expected - self.gone, activity)
+
+    def remains(self, seconds: float) -> None:
+        """So long is expected to be left [s]: the probes may have been more or fewer than most tables take."""
+        self.expected = self.gone + seconds
+
     def watch(self) -> Callable[[Array], Event]:
         """Tells how far it is, block by block."""
         since = 0

@@ -59,6 +59,8 @@ def identify_plan(
     response = yield from probed_response(found.motions[0], found.grid, rules)
     if isinstance(response, Fallen):
         raise (yield from _fell(specimen))
+    each = found.grid.duration + OVERHEAD
+    rules.remains(parameters.realisations * each)
     records: list[Played] = []
     for number, motion in enumerate(found.motions, 1):
         yield Say(StepStarted(f"multisine {number} of {parameters.realisations}, {found.grid.duration:.0f} s"))
@@ -69,6 +71,8 @@ def identify_plan(
             raise (yield from _fell(specimen))
         yield from _warned(outcome, specimen, configuration)
         records.append(outcome)
+        rules.remains((parameters.realisations - number) * each)
+        yield Say(rules.progress(f"finished multisine {number} of {parameters.realisations}"))
     model, agreement = _identified(records, found, specimen)
     keep(model)
     yield from _told(model, agreement)

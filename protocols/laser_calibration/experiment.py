@@ -10,6 +10,7 @@ from bench.analysis.laser_calibration import LaserCalibration
 from bench.config.model import BenchConfiguration
 from bench.engine.steps import Plan
 from bench.preflight.forecast import Forecast
+from bench.progress import Progress, silent
 from bench.record.tables import Column, Table
 from protocols.laser_calibration.parameters import LaserCalibrationParameters
 from protocols.laser_calibration.point import CalibratedSensor
@@ -64,10 +65,11 @@ class LasersCalibrated:
                 needs = f"{p.amplitude:g} m needs {value:.3g} {unit} there, limits.{quantity} = {most:g} {unit}"
                 raise InvalidInput("omega", p.omega, needs)
 
-    def preflight(self, configuration: BenchConfiguration) -> Forecast:
+    def preflight(self, configuration: BenchConfiguration, progress: Progress = silent) -> Forecast:
         """The most that is asked of every limited quantity."""
         from protocols.laser_calibration.preflight import forecast
 
+        progress("predicting what the run asks of the bench")
         return forecast(self.parameters, configuration)
 
     def predict(self, configuration: BenchConfiguration) -> Table:  # noqa: ARG002

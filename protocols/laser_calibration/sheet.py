@@ -45,6 +45,9 @@ REST = 2.0
 SMALLER = 0.01
 """Share by which each pass is smaller than the first for every pass before it."""
 
+END = 5.0
+"""Expected time of the last ramp, and of what is computed after it [s]."""
+
 START, CHANGE = 12.0, 3.0
 """Time in which the table goes to the first pass, and from one to the next [s]. An amplifier that makes a velocity
 displaces the table by what its ramp does not make even, and only the suspension takes it back, within seconds.
@@ -71,8 +74,13 @@ def expected_duration(parameters: LaserCalibrationParameters) -> float:
     """Expected length of the calibration [s]."""
     slow = 2.0 * tau / parameters.omega
     probing = 2 * (SETTLING + 8) * slow + len(LEVELS) * 2 * (6 * slow + 2.0)
-    measuring = sum(CHANGE + (SETTLING + parameters.cycles) * tau / omega for omega, _ in passes_of(parameters))
-    return 2.0 * REST + probing + 3.0 * START + measuring + 5.0
+    return 2.0 * REST + probing + 3.0 * START + _measuring(parameters)
+
+
+def _measuring(parameters: LaserCalibrationParameters, after: int = 0) -> float:
+    """Expected time of the passes but the first `after`, and of the end [s]."""
+    lengths = [CHANGE + (SETTLING + parameters.cycles) * tau / omega for omega, _ in passes_of(parameters)]
+    return sum(lengths[after:]) + (END if after < len(lengths) else 0.0)
 
 
 def calibration_plan(
@@ -131,8 +139,7 @@ def _passes(parameters: LaserCalibrationParameters) -> Generator[Step, Outcome, 
     for number, (omega, amplitude) in enumerate(passes_of(parameters), 1):
         text = f"pass {number} of {parameters.passes}: {1e3 * amplitude:.1f} mm at {omega:g} rad/s"
         yield Say(StepStarted(text))
-        share = (number - 1) / parameters.passes
-        yield Say(Progress(share, (1.0 - share) * expected_duration(parameters), text))
+        yield Say(_progress(parameters, number - 1, text))
         if passes and passes[-1].omega == omega:
             yield Follow((Leg(CHANGE, amplitude * omega**2, omega),))
         else:
@@ -145,7 +152,14 @@ def _passes(parameters: LaserCalibrationParameters) -> Generator[Step, Outcome, 
         cycles = outcome.cycles[SETTLING:]
         need_cycles(cycles, parameters.cycles)
         passes.append(one_pass(cycles, omega))
+    yield Say(_progress(parameters, len(passes), "finished the passes"))
     return passes
+
+
+def _progress(parameters: LaserCalibrationParameters, finished: int, activity: str) -> Progress:
+    """By what is left of the plan: before the first pass the drive has been calibrated."""
+    left = _measuring(parameters, finished)
+    return Progress(1.0 - left / expected_duration(parameters), left, activity)
 
 
 def _rests(heard: Heard) -> tuple[float, float]:

@@ -69,6 +69,12 @@ def compiled(signature: str) -> Callable[[F], F]:
     return decorate
 
 
+def is_compiled(module: str) -> bool:
+    """Whether the cache holds compiled code of `module` of the kernel, such as "rocking"."""
+    folder = _cache.folder()
+    return folder is not None and any(folder.rglob(f"{module}.*.nbi"))
+
+
 def _njit(signature: str, function: F, *, cache: bool) -> F:
     decorator = cast(Any, numba.njit)(signature, cache=cache, nogil=True, error_model="numpy", no_cfunc_wrapper=True)
     return cast(F, decorator(function))

@@ -21,6 +21,7 @@ from bench.preflight.forecast import Demand, Forecast, Stage
 from bench.preflight.load import load
 from bench.preflight.margins import margins, refusal, warnings
 from bench.preflight.response import IdentifiedTable, SimulatedTable, response_of
+from bench.progress import Progress, silent
 from bench.record import tables
 from protocols.harmonic.parameters import HarmonicParameters
 from sim.errors import InvalidInput
@@ -45,7 +46,7 @@ class Telling(Silent):
     def __init__(self, *demands: Demand, duration: float = 100.0) -> None:
         self._forecast = Forecast(demands, (STAGE,), duration)
 
-    def preflight(self, configuration: BenchConfiguration) -> Forecast:
+    def preflight(self, configuration: BenchConfiguration, progress: Progress = silent) -> Forecast:  # noqa: ARG002
         assert configuration is CONFIGURATION
         return self._forecast
 

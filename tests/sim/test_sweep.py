@@ -4,6 +4,7 @@ import os
 import socket
 import sys
 import threading
+import time
 import warnings
 from typing import Any
 
@@ -15,7 +16,7 @@ from sim.extras import MissingExtra
 from sim.maps import STRIPS, gain_map
 from sim.outcomes import outcome_map
 from sim.specimen import Specimen
-from sim.sweep import SchedulerUnavailable, processors, sweep
+from sim.sweep import SchedulerUnavailable, in_threads, processors, sweep
 from tests.sim.runs import A_S
 
 
@@ -110,3 +111,34 @@ def test_a_map_and_its_outcomes_are_the_same_on_workers(cluster: Any) -> None:
     first, second = outcome_map(here), outcome_map(there, scheduler=address)
     assert (first.outcome == second.outcome).all()
     assert np.array_equal(first.time, second.time)
+
+
+def test_an_interrupt_drops_what_has_not_begun_and_waits_for_nothing() -> None:
+    begun = list[int]()
+    free = threading.Event()
+
+    def work(item: int) -> int:
+        begun.append(item)
+        free.wait(30.0)
+        return item
+
+    def interrupt(_done: int, _all: int) -> None:
+        raise KeyboardInterrupt
+
+    before = time.monotonic()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            in_threads(work, range(100), interrupt, threads=2)
+        took = time.monotonic() - before
+    finally:
+        free.set()
+    assert sorted(begun) == [0, 1]
+    assert took < 5.0
+
+
+def test_what_is_done_is_counted_and_stays_in_order() -> None:
+    told = list[tuple[int, int]]()
+    assert in_threads(inverse, [4, 2, 1], lambda done, of: told.append((done, of))) == [0.25, 0.5, 1.0]
+    assert told[-1] == (3, 3)
+    with pytest.raises(ZeroDivisionError):
+        in_threads(inverse, [1, 0])

@@ -1,0 +1,32 @@
+"""Ctrl-C in real processes: answered within half a second in whatever phase a command is, and nothing is left behind.
+
+`python -m tests.interrupts` runs two hundred such moments.
+"""
+
+import sys
+
+import pytest
+
+from tests.interrupts import Bed, Command, moments
+
+if sys.platform == "win32":
+    pytest.skip("sends SIGINT to a group of processes", allow_module_level=True)
+
+COUNT = 20
+
+
+@pytest.fixture(scope="module")
+def bed(tmp_path_factory: pytest.TempPathFactory) -> Bed:
+    return Bed(tmp_path_factory.mktemp("interrupts"))
+
+
+@pytest.mark.parametrize(
+    ("command", "moment", "second"),
+    moments(COUNT, seed=20, latest=6.0),
+    ids=lambda each: each.name if isinstance(each, Command) else None,
+)
+def test_ctrl_c_is_answered_and_leaves_nothing(bed: Bed, command: Command, moment: float, second: float | None) -> None:
+    reaction = bed.react(command, moment, second)
+    if reaction is None:
+        pytest.skip("the command ended before the moment")
+    assert reaction.faults == [], reaction

@@ -1,0 +1,299 @@
+"""Ctrl-C at random moments of every command, as a terminal sends it: to a whole group of real processes.
+
+    python -m tests.interrupts [--moments 200] [--seed 1] [--only NAME ...]
+
+prints the worst reaction of every command, with the phase that the command was in by its own words, and how late this
+machine was meanwhile. `tests/bench/test_interrupts.py` runs a few of the moments.
+"""
+
+import argparse
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from math import inf
+from pathlib import Path
+
+ANSWERED = 0.5
+"""Longest time to the answer [s]."""
+RAMP = 3.0
+"""Longest time to the end where a rig is open [s]: a fast ramp in virtual time, the recorder's last pages, the file."""
+STARTED = 0.25
+"""Earliest moment [s]: Python itself starts before, and answers in its own way."""
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command line in which FILE, QUEUE and CONFIG are files of a bed and NEW is a path that nothing is at.
+
+    Moments are drawn from the first `span` [s]. `cold`: with nothing compiled yet. `serves`: ends well by Ctrl-C.
+    `drives`: opens a rig.
+    """
+
+    name: str
+    line: str
+    span: float
+    cold: bool = False
+    serves: bool = False
+    drives: bool = False
+
+
+_POINT = "--omega 16 --beta 0.4"
+COMMANDS = (
+    Command("run: planning", "run harmonic", 20.0, drives=True),
+    Command("run: point", f"run harmonic {_POINT} --out NEW", 9.0, drives=True),
+    Command("run: earthquake", "run earthquake synthetic:kobe --beta 0.4 --out NEW", 12.0, drives=True),
+    Command("run: free-rocking", "run free-rocking --out NEW", 8.0, drives=True),
+    Command("run: free-vibration", "run free-vibration --out NEW", 8.0, drives=True),
+    Command("run: identify", "run identify --out NEW", 8.0, drives=True),
+    Command("run: json", f"run harmonic {_POINT} --json --out NEW", 9.0, drives=True),
+    Command("run: dry", "run harmonic --dry-run", 20.0),
+    Command("run: first", f"run harmonic {_POINT} --dry-run", 14.0, cold=True),
+    Command("check", "check --out NEW", 6.0, drives=True),
+    Command("queue", "queue QUEUE", 9.0, drives=True),
+    Command("queue: dry", "queue QUEUE --dry-run", 6.0),
+    Command("predict steady", f"predict steady {_POINT}", 2.5),
+    Command("predict steady: first", f"predict steady {_POINT}", 12.0, cold=True),
+    Command("predict map", "predict map --out NEW.h5", 5.0),
+    Command("predict map: band", "predict map --band", 20.0),
+    Command("predict history", f"predict history {_POINT}", 3.0),
+    Command("predict seismic", "predict seismic synthetic:kobe --beta 0.4", 8.0),
+    Command("predict modes", "predict modes", 1.5),
+    Command("paper", "paper --html NEW.html", 18.0),
+    Command("benchmark", "benchmark --quick", 40.0),
+    Command("report", "report FILE --html NEW.html", 4.0),
+    Command("report: pdf", "report FILE --pdf NEW.pdf", 4.0),
+    Command("file info", "file info FILE", 1.2),
+    Command("file verify", "file verify FILE", 1.2),
+    Command("file recover", "file recover FILE --out NEW.h5", 1.5),
+    Command("replay", "replay FILE", 8.0),
+    Command("analyse", "analyse FILE --set measured_cycles=20 --out NEW.h5", 4.0),
+    Command("export mat", "export FILE --to mat --out NEW", 2.0),
+    Command("export csv", "export FILE --to csv --out NEW", 4.0),
+    Command("export uff", "export FILE --to uff --out NEW", 3.0),
+    Command("records info", "records info synthetic:kobe", 1.5),
+    Command("records fit", "records fit synthetic:kobe", 3.0),
+    Command("config", "config check CONFIG", 1.0),
+    Command("devices", "devices", 1.5),
+    Command("emulate", "emulate", 4.0, serves=True),
+    Command("gui", "gui", 4.0, serves=True),
+)
+
+
+@dataclass
+class Reaction:
+    """What came of a signal `moment` [s] after the start. `late` [s]: how late this machine woke a sleeping thread."""
+
+    command: Command
+    moment: float
+    twice: bool
+    phase: str
+    answer: float
+    end: float
+    late: float
+    code: int
+    faults: list[str] = field(default_factory=list[str])
+    driving: bool = False
+
+
+class Lateness:
+    """Measures how late a thread wakes up that sleeps for 5 ms."""
+
+    def __init__(self) -> None:
+        self.worst = 0.0
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._measure)
+
+    def __enter__(self) -> "Lateness":
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._over.set()
+        self._thread.join()
+
+    def _measure(self) -> None:
+        while not self._over.is_set():
+            before = time.monotonic()
+            time.sleep(0.005)
+            self.worst = max(self.worst, time.monotonic() - before - 0.005)
+
+
+class Bed:
+    """A folder with what the commands need: a short campaign and a queue."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.file, self.queue = folder, folder / "run" / "campaign.h5", folder / "queue.json"
+        command = [sys.executable, "-m", "bench", "run", "harmonic", "--omega", "16", "--beta", "0.4", "--json"]
+        subprocess.run([*command, "--out", str(folder / "run")], check=True, capture_output=True)
+        tests = [{"protocol": "harmonic", "parameters": {"omega": [16.0], "beta": [0.4]}}]
+        whole = {"format": "rocking-bench queue", "format_version": 1, "tests": tests}
+        self.queue.write_text(json.dumps(whole), encoding="utf-8")
+        subprocess.run([sys.executable, "-m", "bench", "config", "init"], check=True, cwd=folder, capture_output=True)
+
+    def react(self, command: Command, moment: float, second: float | None) -> Reaction | None:
+        """Start `command` and interrupt it at `moment` [s], and again `second` [s] later; None if it ended before."""
+        with tempfile.TemporaryDirectory(dir=self.folder) as made:
+            work, temporary = Path(made, "work"), Path(made, "temporary")
+            work.mkdir()
+            temporary.mkdir()
+            queue = shutil.copy(self.queue, work)
+            names = {"FILE": str(self.file), "QUEUE": str(queue), "CONFIG": str(self.folder / "rockbench.toml")}
+            line = [names.get(word, word.replace("NEW", str(work / "new"))) for word in command.line.split()]
+            environment = os.environ | {"TMPDIR": str(temporary), "QT_QPA_PLATFORM": "offscreen"}
+            environment.pop("PYTHONDONTWRITEBYTECODE", None)
+            if command.cold:
+                environment["NUMBA_CACHE_DIR"] = str(Path(made, "cache"))
+            process = subprocess.Popen(
+                [sys.executable, "-m", "bench", *line],
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.PIPE,
+                env=environment,
+                cwd=work,
+                start_new_session=True,
+            )
+            lines = list[tuple[float, str]]()
+            reader = threading.Thread(target=_read, args=(process, lines))
+            reader.start()
+            try:
+                time.sleep(moment)
+                if process.poll() is not None:
+                    return None
+                before = len(lines)
+                driving = command.drives and any(work.rglob("campaign.h5"))
+                with Lateness() as lateness:
+                    asked = time.monotonic()
+                    os.killpg(process.pid, signal.SIGINT)
+                    if second is not None:
+                        time.sleep(second)
+                        if process.poll() is None:
+                            os.killpg(process.pid, signal.SIGINT)
+                    process.wait(60.0)
+                    end = time.monotonic() - asked
+            finally:
+                process.kill()
+                process.wait()
+                reader.join()
+            # a command that ended by itself in this very moment has nothing to answer
+            said = [at - asked for at, text in lines[before:] if "interrupt" in text or "closed" in text]
+            phase = next((text for _, text in reversed(lines[:before])), "before the first line")
+            reaction = Reaction(
+                command,
+                moment,
+                second is not None,
+                phase[:90],
+                min([end, *said]),
+                end,
+                lateness.worst,
+                process.returncode,
+                driving=driving or any("ramped" in text for _, text in lines),
+            )
+            _judge(reaction, lines, process.pid, work, temporary)
+        return reaction
+
+
+def _read(process: "subprocess.Popen[bytes]", lines: list[tuple[float, str]]) -> None:
+    assert process.stderr is not None
+    lines.extend((time.monotonic(), line.decode(errors="replace").rstrip()) for line in process.stderr)
+    process.stderr.close()
+
+
+def _judge(found: Reaction, lines: list[tuple[float, str]], group: int, work: Path, temporary: Path) -> None:
+    """Note on `found` everything that must not be."""
+    texts = [text for _, text in lines]
+    faults = found.faults
+    done = found.code == 0
+    if found.code != 130 and not (found.command.serves and done) and not done:
+        faults.append(f"exit code {found.code}")
+    if any("Traceback" in text or "Exception ignored" in text for text in texts):
+        faults.append("a traceback: " + " | ".join(texts[-3:]))
+    if any("\x1b" in text or "\r" in text for text in texts):
+        faults.append("control characters")
+    told = [text for text in texts if text.startswith("rockbench: error")]
+    if len(told) > 1 or (found.code == 130 and not told):
+        faults.append(f"{len(told)} lines of error: {told}")
+    if found.answer > ANSWERED + found.late:
+        faults.append(f"answered after {found.answer:.2f} s")
+    if found.end > (RAMP if found.driving else ANSWERED) + found.late and not found.command.serves:
+        faults.append(f"ended after {found.end:.2f} s")
+    left = [str(path) for path in temporary.rglob("*")]
+    if not (done or found.driving):
+        left += [str(path) for path in work.rglob("*") if path.name not in ("queue.json", "queue.json.lock")]
+    else:
+        left += [str(path) for pattern in (".*", "*.part", "*.new") for path in work.rglob(pattern)]
+    if left:
+        faults.append(f"left behind: {left[:5]}")
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return
+    faults.append("a child is left")
+
+
+def moments(
+    count: int, seed: int, only: Sequence[str] = (), latest: float = inf
+) -> list[tuple[Command, float, float | None]]:
+    """`count` of them, spread over the commands: when the signal comes, and when a second one if one does [s]."""
+    chance = random.Random(seed)
+    chosen = [each for each in COMMANDS if not only or each.name in only]
+    drawn = list[tuple[Command, float, float | None]]()
+    for number in range(count):
+        # in long strides, so that few moments are of different kinds too
+        command = chosen[number * 7 % len(chosen)]
+        moment = chance.uniform(STARTED, min(command.span, latest))
+        second = chance.uniform(0.0, 0.3) if chance.random() < 0.3 else None
+        drawn.append((command, moment, second))
+    return drawn
+
+
+def main() -> int:
+    """Print every reaction, then the worst of each command. Returns 1 when any was at fault."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--moments", type=int, default=200)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--only", nargs="*", default=())
+    asked = parser.parse_args()
+    found = list[Reaction]()
+    with tempfile.TemporaryDirectory() as folder:
+        bed = Bed(Path(folder))
+        for command, moment, second in moments(asked.moments, asked.seed, asked.only):
+            reaction = bed.react(command, moment, second)
+            tries = 0
+            while reaction is None and tries < 6:
+                tries += 1
+                moment = STARTED + (moment - STARTED) / 1.5
+                reaction = bed.react(command, moment, second)
+            if reaction is None:
+                print(f"{command.name:24} ends before every moment", flush=True)
+                continue
+            found.append(reaction)
+            print(
+                f"{command.name:24} {reaction.moment:6.2f} s {'twice' if reaction.twice else 'once ':5} "
+                f"answer {reaction.answer:5.2f} s  end {reaction.end:5.2f} s  late {reaction.late:4.2f} s  "
+                f"code {reaction.code}  {reaction.phase}  {'; '.join(reaction.faults)}",
+                flush=True,
+            )
+    print(f"\n{'command':24} moments  worst answer   worst end  machine late  in the phase of the worst answer")
+    for command in COMMANDS:
+        own = [each for each in found if each.command is command]
+        if own:
+            worst = max(own, key=lambda each: each.answer)
+            print(
+                f"{command.name:24} {len(own):7}  {worst.answer:10.2f} s  {max(each.end for each in own):8.2f} s  "
+                f"{max(each.late for each in own):10.2f} s  {worst.phase}"
+            )
+    bad = [each for each in found if each.faults]
+    print(f"\n{len(found)} moments, {len(bad)} at fault")
+    return 1 if bad else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
