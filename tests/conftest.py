@@ -19,6 +19,8 @@ REAL_TIME = (
     "tests/faults/emulated/",
     "tests/bench/test_devices.py",
     "tests/bench/test_emulate.py",
+    "tests/bench/test_interrupts.py",
+    "tests/protocols/test_interrupt.py",
     "tests/protocols/check/",
     "tests/link/",
     "tests/gui/",

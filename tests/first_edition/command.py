@@ -1,5 +1,6 @@
 """The command `rockbench` and the data of its first edition, reached as a user reaches them: no module is imported."""
 
+import signal
 import sys
 from collections.abc import Callable
 from contextlib import redirect_stderr, redirect_stdout
@@ -29,10 +30,16 @@ def command(*arguments: object) -> Done:
     """Carry out a command line of the installed `rockbench` in this process."""
     (script,) = entry_points(group="console_scripts", name="rockbench")
     out, err, before = StringIO(), StringIO(), sys.argv
+    # what a process of its own would take to its end
+    hook, handlers = sys.unraisablehook, {number: signal.getsignal(number) for number in signal.valid_signals()}
     sys.argv = ["rockbench", *map(str, arguments)]
     try:
         with redirect_stdout(out), redirect_stderr(err), pytest.raises(SystemExit) as ended:
             script.load()()
     finally:
-        sys.argv = before
+        sys.argv, sys.unraisablehook = before, hook
+        signal.set_wakeup_fd(-1)
+        for number, handler in handlers.items():
+            if handler is not signal.getsignal(number):
+                signal.signal(number, handler)
     return Done(int(ended.value.code or 0), out.getvalue(), err.getvalue())
