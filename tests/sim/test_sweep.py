@@ -89,9 +89,9 @@ def test_a_scheduler_s_workers_do_the_work(cluster: Any) -> None:
 def test_a_map_is_divided_for_the_cluster_s_processors(cluster: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     strips: list[int] = []
 
-    def counted(function: Any, items: Any, scheduler: str | None) -> list[Any]:
+    def counted(function: Any, items: Any, scheduler: str | None, *, done: Any) -> list[Any]:
         strips.append(len(items))
-        return sweep(function, items, scheduler)
+        return sweep(function, items, scheduler, done=done)
 
     monkeypatch.setattr("sim.maps.sweep", counted)
     # this machine's own number is another one
