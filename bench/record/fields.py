@@ -124,7 +124,7 @@ def fields_of(row_type: type[Any]) -> tuple[Field, ...]:
         ]
     fields: list[Field] = []
     for name, hint, unit, description in declared:
-        array = get_origin(hint) is np.ndarray
+        array = _is_array(hint)
         kind, optional = (Kind.REAL, False) if array else _classify(f"{row_type.__name__}.{name}", hint)
         fields.append(Field(name, kind, unit, description, optional, array))
     return tuple(fields)
@@ -144,6 +144,12 @@ def _columns(row_type: type[Any]) -> list[tuple[str, Any, Mapping[str, str]]]:
     hints = get_type_hints(row_type)
     declared = dataclasses.fields(row_type)
     return [(each.name, hints[each.name], each.metadata) for each in declared if "unit" in each.metadata]
+
+
+def _is_array(hint: Any) -> bool:
+    origin = get_origin(hint)
+    # NDArray is a generic type in NumPy up to 2.4 and on Python 3.11, an alias of one after that
+    return np.ndarray in (origin, get_origin(getattr(origin, "__value__", None)))
 
 
 def _read(stored: hdf5.Dataset) -> NDArray[Any]:
