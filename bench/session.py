@@ -5,22 +5,22 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol, runtime_checkable
+from typing import Any, runtime_checkable
+from typing import Protocol as Interface
 
 from bench.analysis.signals import SignalMap
 from bench.config.model import BenchConfiguration
 from bench.engine.engine import Engine
 from bench.engine.operator import Operator
 from bench.engine.requests import Requests
-from bench.engine.steps import Plan
 from bench.engine.stream import Stream
 from bench.events import Event, PointFinished, Subscriber, Warned
 from bench.guard.guard import Guard
-from bench.preflight.compiled import compile_run, load_bench
+from bench.preflight.compiled import compile_run
 from bench.progress import Progress, silent
+from bench.protocol import Prepared, Protocol, Result
 from bench.provenance import revision, software
 from bench.record.recorder import PATIENCE, Recorder
-from bench.record.tables import Table
 from bench.report.summary import Summary, write_summary
 from bench.results import FILE, SUMMARY
 from bench.rigs import open_rig, require_drivers
@@ -30,97 +30,8 @@ from drivers.rig import Rig
 from sim.parameters import Parameters
 
 
-class Experiment(Protocol):
-    """What a protocol offers to a session. One that is `bench.preflight.forecast.Forecasting` besides has margins."""
-
-    @property
-    def name(self) -> str:
-        """The protocol's name."""
-        ...
-
-    @property
-    def figure_name(self) -> str:
-        """File name of its figure."""
-        ...
-
-    @property
-    def parameters(self) -> Parameters:
-        """What was asked for."""
-        ...
-
-    @property
-    def point_type(self) -> type[Parameters]:
-        """The type of one result."""
-        ...
-
-    def check(self, configuration: BenchConfiguration) -> None:
-        """Raise InvalidInput when this bench cannot do what is asked."""
-        ...
-
-    def predict(self, configuration: BenchConfiguration) -> Table:
-        """What the model expects, stored before the first sample moves."""
-        ...
-
-    def plan(self, configuration: BenchConfiguration) -> Plan:
-        """The steps."""
-        ...
-
-    def table(self, points: Sequence[Parameters]) -> str:
-        """The results as plain text."""
-        ...
-
-    def figure(self, points: Sequence[Parameters], prediction: Table, path: Path) -> None:
-        """Draw the results beside the prediction."""
-        ...
-
-
 @runtime_checkable
-class Keeping(Protocol):
-    """An experiment that leaves a file of its own beside the others, for other runs to load."""
-
-    @property
-    def kept_name(self) -> str:
-        """Name of the file."""
-        ...
-
-    def keep(self, path: Path) -> None:
-        """Write it, if the run came to something worth keeping."""
-        ...
-
-
-@runtime_checkable
-class Sourced(Protocol):
-    """An experiment that reads files besides its configuration; the data file keeps what they hold."""
-
-    def sources(self, configuration: BenchConfiguration) -> Mapping[str, Table]:
-        """What was read, as tables. Raises InvalidInput as `Experiment.check` does."""
-        ...
-
-    def restore(self, tables: Mapping[str, Table]) -> None:
-        """Take it from the tables of a data file, not from the files, from now on."""
-        ...
-
-
-@runtime_checkable
-class Illustrated(Protocol):
-    """An experiment with more to show than one figure, and more to say than its points."""
-
-    @property
-    def further_figures(self) -> tuple[str, ...]:
-        """File names of its other figures."""
-        ...
-
-    def draw_further(self, folder: Path) -> None:
-        """Draw them into `folder`."""
-        ...
-
-    def findings(self, points: Sequence[Parameters]) -> Mapping[str, object]:
-        """What the points come to, ready for JSON."""
-        ...
-
-
-@runtime_checkable
-class Attending(Protocol):
+class Attending(Interface):
     """A subscriber that is shown the rig before anything moves."""
 
     def opened(self, rig: Rig) -> None:
@@ -130,13 +41,17 @@ class Attending(Protocol):
 
 @dataclass(frozen=True)
 class SessionResult:
-    """How a campaign ended. `summary` is ready for JSON, `table` for the terminal."""
+    """How a campaign ended. `summary` is ready for JSON, `table` for the terminal.
+
+    `passed` is the verdict of a protocol that judges the bench, True of any other.
+    """
 
     status: str
     reason: str
     summary: dict[str, object]
     table: str
     interrupted: bool
+    passed: bool = True
 
 
 class _Points:
@@ -151,8 +66,8 @@ class _Points:
 
 
 def run_session(
-    protocol: Experiment,
-    configuration: BenchConfiguration,
+    protocol: Protocol[Any],
+    prepared: Prepared[Any],
     *,
     out: Path,
     operator: Operator,
@@ -162,7 +77,7 @@ def run_session(
     about: Mapping[str, str] | None = None,
     progress: Progress = silent,
 ) -> SessionResult:
-    """Run `protocol` on the configured bench and leave data file, figure and summary in the folder `out`.
+    """Run a protocol that is `prepared` on its bench; leave data file, figures and summary in the folder `out`.
 
     `about` is kept in the data file beside what is known of the run: the operator's name, notes. `progress` is told
     what is done before the rig is opened and after it is closed.
@@ -171,18 +86,16 @@ def run_session(
     """
     started = time.monotonic()
     with requests.without_rig():
-        require_drivers(configuration)
-        load_bench(configuration, progress)
-        progress("checking the protocol against the bench")
-        protocol.check(configuration)
-        preflight = compile_run(protocol, configuration, out, progress)
+        require_drivers(prepared.configuration)
+        preflight = compile_run(protocol.name, prepared, out, progress)
         preflight.require()
         # after the hash of the plan: it is the same at every pace
-        configuration = configuration.at_pace(realtime=realtime)
+        configuration = prepared.configuration.at_pace(realtime=realtime)
         progress("predicting the results")
-        prediction = protocol.predict(configuration)
-        sources = protocol.sources(configuration) if isinstance(protocol, Sourced) else dict[str, Table]()
-        metadata = _metadata(protocol, configuration) | {"plan_hash": preflight.plan_hash, **(about or {})}
+        prediction = {"prediction": prepared.prediction} if prepared.prediction else {}
+        tables = {**prediction, **preflight.tables, **prepared.sources}
+        metadata = _metadata(protocol, prepared.parameters, configuration)
+        metadata |= {"plan_hash": preflight.plan_hash, **(about or {})}
     if requests.strongest is not None:
         raise KeyboardInterrupt
     out.mkdir(parents=True, exist_ok=True)
@@ -192,9 +105,9 @@ def run_session(
             out / FILE,
             channels=rig.channels,
             sample_rate=rig.sample_rate,
-            point_type=protocol.point_type,
+            point_type=protocol.point,
             metadata=metadata | {"devices": json.dumps(rig.description)},
-            tables={"prediction": prediction, **preflight.tables, **sources},
+            tables=tables,
             # in virtual time nothing moves on while the disk is waited for
             hold_up=PATIENCE if isinstance(rig.clock, VirtualClock) else 0.0,
         )
@@ -220,51 +133,59 @@ def run_session(
             # as long as the model takes, a bench in virtual time stands still
             patient = isinstance(rig.clock, VirtualClock)
             with twin_beside(stream, rig, configuration, requests, patient=patient):
-                ending = engine.run(protocol.plan(configuration))
+                ending = engine.run(prepared.plan())
             status, reason = ending.status, ending.reason
         finally:
             recorder.close(status, reason)
     finally:
         rig.close()
-    more = protocol if isinstance(protocol, Illustrated) else None
+    result = result_of(engine.returned, prepared, points.all)
+    figures = [out / name for name in protocol.figures if name in result.figures]
     summary = Summary(
         protocol=protocol.name,
         status=ending.status,
         points=points.all,
         file=out / FILE,
-        figure=out / protocol.figure_name,
+        figure=figures[0] if figures else None,
         reason=ending.reason,
         software=f"rocking-bench {software()['rocking-bench']}",
         seed=configuration.seed,
         elapsed=time.monotonic() - started,
         bench_time=stream.now(),
         plan_hash=preflight.plan_hash,
-        further_figures=[out / name for name in more.further_figures] if more else (),
-        findings=more.findings(points.all) if more else {},
+        further_figures=figures[1:],
+        findings=result.findings if result.passed is None else {"passed": result.passed, **result.findings},
     )
     write_summary(out / SUMMARY, summary)
-    if isinstance(protocol, Keeping):
-        protocol.keep(out / protocol.kept_name)
+    # first what other runs load: a figure that cannot be drawn costs no result
+    for name in protocol.files:
+        if name in result.files:
+            result.files[name](out / name)
     if not requests.interrupted:
         # who interrupts does not wait for pictures: `rockbench report` draws them from the file
         with requests.without_rig():
             progress("drawing the figures")
-            protocol.figure(points.all, prediction, out / protocol.figure_name)
-            if more:
-                more.draw_further(out)
+            for path in figures:
+                result.figures[path.name](path)
     return SessionResult(
         status=ending.status,
         reason=ending.reason,
         summary=summary.as_dict(),
-        table=protocol.table(points.all),
+        table=result.text,
         interrupted=requests.strongest is not None,
+        passed=result.passed is not False,
     )
 
 
-def _metadata(protocol: Experiment, configuration: BenchConfiguration) -> dict[str, str]:
+def result_of(returned: object, prepared: Prepared[Any], points: Sequence[Parameters]) -> Result:
+    """The result that a plan has `returned`, or that of a run which broke off with these `points`."""
+    return returned if isinstance(returned, Result) else prepared.result(points)
+
+
+def _metadata(protocol: Protocol[Any], parameters: Parameters, configuration: BenchConfiguration) -> dict[str, str]:
     return {
         "protocol": protocol.name,
-        "parameters": protocol.parameters.model_dump_json(),
+        "parameters": parameters.model_dump_json(),
         "configuration": configuration.model_dump_json(),
         "specimen": configuration.known_specimen.model_dump_json(),
         **({} if configuration.seed is None else {"seed": str(configuration.seed)}),

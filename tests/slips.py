@@ -22,12 +22,12 @@ from typing import Any
 import tomlkit
 
 from bench.accelerograms.reference import RecordReference, seconds_of
+from bench.catalogue import all_protocols
 from bench.cli.emulate import _at_rate, _ratios
 from bench.cli.flags import flag
 from bench.cli.inputs import configuration_from, parameters_from
 from bench.cli.main import main as command_line
 from bench.cli.predict_inputs import request_from, specimen_from
-from bench.cli.queueing import ENTRIES
 from bench.cli.replay import _clock
 from bench.config.declared import Declared, at, declared
 from bench.config.model import BenchConfiguration
@@ -248,7 +248,7 @@ def _copied(data: Any) -> Any:
 
 
 def _in_protocols(meant: random.Random) -> Iterator[Slip]:
-    for each in ENTRIES:
+    for each in all_protocols()[0]:
         for entry in declared(each.parameters):
             if entry.kind not in (int, float):
                 continue

@@ -22,7 +22,7 @@ def test_a_specimen_is_described_without_a_compiler() -> None:
 
 
 def test_a_headless_run_needs_no_window_no_driver_and_no_plot_until_its_end() -> None:
-    loaded = _run("import sys; import bench.session, protocols.harmonic.sheet; print(*sys.modules)").split()
+    loaded = _run("import sys; import bench.session, protocols.harmonic.campaign; print(*sys.modules)").split()
     assert not {"PySide6", "pyqtgraph", "nidaqmx", "grpc", "serial", "matplotlib"} & {
         name.split(".")[0] for name in loaded
     }

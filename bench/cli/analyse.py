@@ -21,9 +21,10 @@ from sim.loading import load_model
 from sim.parameters import Parameters
 
 if TYPE_CHECKING:
+    from bench.config.model import BenchConfiguration
+    from bench.protocol import Prepared, Result
     from bench.record.reader import Record
     from bench.replaying.session import Replayed
-    from bench.session import Experiment
 
 
 def analyse_app() -> App:
@@ -86,6 +87,7 @@ def analyse(
     something was refused.
     """
     progress("loading the program")
+    from bench.cli.console import progress_on
     from bench.record.reader import open_record
     from bench.replaying.analysis import NotComparable
     from bench.replaying.beside import Analysis, write_analysis
@@ -102,18 +104,18 @@ def analyse(
         try:
             load_model(progress)
             progress("computing the results from the recorded samples")
-            with choice.entry.progress(sys.stderr, False) as display, redirect_stdout(sys.stderr):
-                experiment, replayed, points = _carried_out(record, choice, [display])
+            with progress_on(sys.stderr, False, choice.protocol) as display, redirect_stdout(sys.stderr):
+                result, replayed, points = _carried_out(record, choice, [display])
         except NotComparable as error:
             fail(error)
             return 1
         except KeyboardInterrupt:
             answer("the analysis was interrupted; nothing was written")
             return 130
-        kind = choice.entry.campaign(choice.asked).point_type
+        kind = choice.protocol.point
         analysis = Analysis(points, kind, choice.given, choice.settings, choice.changed)
         written = write_analysis(file, record, analysis, out)
-        kept = _kept(experiment, written)
+        kept = _kept(result, written)
         stored = record.points
     new = [point.model_dump(mode="json") for point in points]
     if as_json:
@@ -129,25 +131,30 @@ def analyse(
     return 0
 
 
-def _kept(experiment: "Experiment", written: Path) -> Path | None:
+def _kept(result: "Result | None", written: Path) -> Path | None:
     """The file for other runs that an identifying protocol leaves beside its result, such as a specimen file."""
-    from bench.session import Keeping
-
-    if not isinstance(experiment, Keeping):
+    path: Path | None = None
+    if result is None:
         return None
-    path = written.with_name(f"{written.stem}.{experiment.kept_name}")
-    experiment.keep(path)
-    return path if path.exists() else None
+    for name, write in result.files.items():
+        path = written.with_name(f"{written.stem}.{name}")
+        write(path)
+    return path
 
 
 def _carried_out(
     record: "Record", choice: Choice, subscribers: Sequence[Any]
-) -> "tuple[Experiment, Replayed, tuple[Parameters, ...]]":
-    from bench.cli.recorded import experiment_of
+) -> "tuple[Result | None, Replayed, tuple[Parameters, ...]]":
+    """The result of other settings where they are the plan's, the replay, and the points."""
     from bench.replaying.analysis import carry_out, follow
+    from bench.session import result_of
 
-    if choice.follower is None:
-        experiment = experiment_of(record, choice.entry, choice.settings)
-        return experiment, *carry_out(record, experiment, choice.recorded, choice.changed, subscribers)
-    experiment = experiment_of(record, choice.entry, choice.asked)
-    return experiment, *follow(record, experiment, choice.recorded, choice.follower, subscribers)
+    def prepared(parameters: Parameters, configuration: "BenchConfiguration") -> "Prepared[Any]":
+        return choice.protocol.prepare(parameters, configuration, record.tables)
+
+    if choice.follower is not None:
+        recorded = prepared(choice.asked, choice.recorded)
+        return None, *follow(record, recorded, choice.follower, subscribers)
+    changed = prepared(choice.settings, choice.changed)
+    replayed, points = carry_out(record, changed, choice.recorded, subscribers)
+    return result_of(replayed.returned, changed, points), replayed, points

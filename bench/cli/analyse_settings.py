@@ -14,11 +14,10 @@ from sim.parameters import Parameters
 
 if TYPE_CHECKING:
     from bench.analysis.signals import SignalMap
-    from bench.cli.catalogue import Entry
     from bench.config.declared import Declared
     from bench.config.model import BenchConfiguration
+    from bench.protocol import Follower, Protocol
     from bench.record.reader import Record
-    from bench.replaying.analysis import Follower
 
 SECTIONS = ("analysis", "specimen", "uncertainty")
 """Parts of the configuration that say how the measurement is understood, not how the bench is driven."""
@@ -35,7 +34,7 @@ class Choice:
     `follower`; another is carried out again with the settings as its parameters.
     """
 
-    entry: "Entry"
+    protocol: "Protocol[Any]"
     recorded: "BenchConfiguration"
     changed: "BenchConfiguration"
     asked: Parameters
@@ -50,16 +49,14 @@ def choice_of(record: "Record", changes: Sequence[str], config: Path | None, spe
 
     Raises InvalidInput for what there is not, or what may not be changed after a measurement.
     """
-    from bench.cli.recorded import entry_of, parameters_of
+    from bench.cli.recorded import parameters_of, protocol_of
     from bench.config.declared import at
     from bench.config.model import BenchConfiguration
     from bench.config.validation import dotted, validated
     from bench.replaying.session import stored_configuration
-    from protocols.harmonic.parameters import HarmonicParameters
-    from protocols.harmonic.reanalysis import HarmonicFollower, HarmonicSettings
 
-    entry, recorded = entry_of(record), stored_configuration(record)
-    asked = parameters_of(record, entry)
+    protocol, recorded = protocol_of(record), stored_configuration(record)
+    asked, reanalysis = parameters_of(record, protocol), protocol.reanalysis
     data: dict[str, Any] = recorded.model_dump(mode="json")
     given = _from_file(config, data) if config is not None else {}
     if specimen is not None:
@@ -68,7 +65,7 @@ def choice_of(record: "Record", changes: Sequence[str], config: Path | None, spe
         given["identified"] = read_specimen(specimen).model_dump(mode="json")
     data |= given
     own: dict[str, Any] = {}
-    settings_type = HarmonicSettings if entry.name == "harmonic" else entry.parameters
+    settings_type = protocol.parameters if reanalysis is None else reanalysis.settings
     for change in changes:
         key, equals, text = change.partition("=")
         if not (key and equals):
@@ -93,15 +90,14 @@ def choice_of(record: "Record", changes: Sequence[str], config: Path | None, spe
         # what is set here by hand goes before what was identified
         by_hand = (key.rpartition(".")[2] for key in given if key.startswith("specimen."))
         changed = changed.model_copy(update={"identified": changed.identified.without(*by_hand)})
-    if entry.name != "harmonic":
-        return Choice(entry, recorded, changed, asked, parameters_of(record, entry, own), given)
-    settings = validated(HarmonicSettings, own, named)
-    parameters = HarmonicParameters.model_validate(asked.model_dump())
+    if reanalysis is None:
+        return Choice(protocol, recorded, changed, asked, parameters_of(record, protocol, own), given)
+    settings = validated(reanalysis.settings, own, named)
 
     def follower(signals: "SignalMap") -> "Follower":
-        return HarmonicFollower(settings, parameters, changed, signals, record.channels, record.sample_rate)
+        return reanalysis.follower(settings, asked, changed, record, signals)
 
-    return Choice(entry, recorded, changed, asked, settings, given, follower)
+    return Choice(protocol, recorded, changed, asked, settings, given, follower)
 
 
 def unusual_of(choice: Choice) -> tuple[str, ...]:

@@ -3,15 +3,17 @@
 import threading
 from collections import deque
 from types import TracebackType
-from typing import TYPE_CHECKING, Self, TextIO
+from typing import TYPE_CHECKING, Any, Self, TextIO
 
-from bench.cli.plain import PlainLines
+from bench.cli.plain import LogLines, PlainLines
 from bench.cli.scene import Notice, Scene
 from bench.events import Acquired, Event, OperatorAsked
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.live import Live
+
+    from bench.protocol import Protocol
 
 REDRAW_INTERVAL = 0.125
 """Shortest time between two drawings [s]."""
@@ -110,8 +112,14 @@ class LiveConsole:
             live.stop()
 
 
-def progress_on(stream: TextIO, person_answers: bool) -> LiveConsole | PlainLines:
-    """The live picture where `stream` is a terminal that can redraw, plain lines elsewhere."""
+def progress_on(
+    stream: TextIO, person_answers: bool, protocol: "Protocol[Any] | None" = None
+) -> LiveConsole | PlainLines | LogLines:
+    """A log of a `protocol` that has lines for one; else the live picture where `stream` is a terminal that can redraw,
+    plain lines elsewhere.
+    """
+    if protocol is not None and protocol.log_line is not None:
+        return LogLines(stream, protocol)
     if stream.isatty():
         from rich.console import Console
 

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from bench.config.model import BenchConfiguration
     from bench.preflight.compiled import Preflight
     from bench.preflight.margins import Margin
-    from bench.session import Experiment
+    from bench.protocol import Protocol
+    from sim.parameters import Parameters
 
 
 WIDTH = 120
@@ -34,18 +35,22 @@ _MARGINS = (
 
 
 def dry_run(
-    experiment: "Experiment", configuration: "BenchConfiguration", out: Path, progress: Progress, *, as_json: bool
+    protocol: "Protocol[Any]",
+    parameters: "Parameters",
+    configuration: "BenchConfiguration",
+    out: Path,
+    progress: Progress,
+    *,
+    as_json: bool,
 ) -> int:
     """Print the preflight on standard output. Returns 0 when the run may begin, 2 when it is refused."""
     progress("loading the program")
-    from bench.preflight.compiled import compile_run, load_bench
+    from bench.preflight.compiled import compile_run, prepare
 
     # standard output belongs to the result
     with redirect_stdout(sys.stderr):
-        load_bench(configuration, progress)
-        progress("checking the protocol against the bench")
-        experiment.check(configuration)
-        found = compile_run(experiment, configuration, out, progress)
+        prepared = prepare(protocol, parameters, configuration, progress)
+        found = compile_run(protocol.name, prepared, out, progress)
     print(json.dumps(_content(found), allow_nan=False) if as_json else _text(found))
     if found.refusal is not None:
         tell(found.refusal)

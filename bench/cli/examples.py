@@ -1,20 +1,14 @@
 """An example below the help of every command."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 
 from cyclopts import App
+
+from bench.catalogue import protocol_names
 
 _EXAMPLES = {
     "": "predict steady --omega 16 --beta 0.4",
     "run": "run harmonic --omega 16 --beta 0.4 --seed 3",
-    "run harmonic": "run harmonic --omega 14:18:5 --beta 0.25 0.64 --yes",
-    "run identify": "run identify --config bench.toml --dry-run",
-    "run earthquake": "run earthquake RECORD.AT2 --beta 0.25 0.64",
-    "run free-vibration": "run free-vibration --config bench.toml --operator Weber",
-    "run free-rocking": "run free-rocking --config bench.toml --specimen FILE",
-    "run coupling-stiffness": "run coupling-stiffness --beta 0.4 --specimen FILE",
-    "run laser-calibration": "run laser-calibration --config bench.toml",
-    "check": "check --config bench.toml",
     "queue": "queue evening.json --config bench.toml --dry-run",
     "gui": "gui --config bench.toml",
     "devices": "devices --port /dev/ttyUSB0",
@@ -48,16 +42,21 @@ _EXAMPLES = {
 """By the command's name, without `rockbench`."""
 
 
-def commands(app: App, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], App]]:
-    """Every command below `app`, and `app` itself, with the words that name it."""
+def commands(
+    app: App, path: tuple[str, ...] = (), leave_out: Collection[str] = ()
+) -> Iterator[tuple[tuple[str, ...], App]]:
+    """Every command below `app`, and `app` itself, with the words that name it; loads what is not left out."""
     yield path, app
     for name in app:
-        if not name.startswith("-"):
-            yield from commands(app[name], (*path, name))
+        if not name.startswith("-") and (path not in ((), ("run",)) or name not in leave_out):
+            yield from commands(app[name], (*path, name), leave_out)
 
 
 def add_examples(app: App) -> None:
-    """End the help of every command with an example; one that has none of its own is its own example."""
-    for path, command in commands(app):
+    """End the help of every command with an example; one that has none of its own is its own example.
+
+    Those of the protocols have theirs from them, when they are loaded.
+    """
+    for path, command in commands(app, leave_out=protocol_names()):
         name = " ".join(path)
         command.help_epilogue = f"Example: rockbench {_EXAMPLES.get(name, name)}"

@@ -6,21 +6,19 @@ from contextlib import suppress
 from datetime import datetime
 from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from bench.results import FILE, SUMMARY
 from bench.unfinished import reserve
 from sim.errors import InvalidInput
 
 if TYPE_CHECKING:
-    from bench.session import Experiment
+    from bench.protocol import Protocol
 
 
-def result_names(experiment: "Experiment") -> tuple[str, ...]:
-    """File names of everything that a run of `experiment` leaves in its folder."""
-    kept = getattr(experiment, "kept_name", None)
-    further = getattr(experiment, "further_figures", ())
-    return (FILE, experiment.figure_name, *further, SUMMARY, *([kept] if kept else []))
+def result_names(protocol: "Protocol[Any]") -> tuple[str, ...]:
+    """File names of everything that a run of `protocol` may leave in its folder."""
+    return (FILE, *protocol.figures, SUMMARY, *protocol.files)
 
 
 def default_folder(protocol: str, now: datetime) -> Path:

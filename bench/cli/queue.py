@@ -14,21 +14,21 @@ from bench.cli.interrupt import answer
 from bench.cli.plan_table import plans_text, tests_text
 from bench.cli.progress import Handed
 from bench.cli.refusal import error_object, tell
-from bench.cli.run import Start, carry_out
+from bench.cli.run import GOOD, carry_out
 from bench.progress import Progress, silent
 from sim.errors import InvalidInput
 
 if TYPE_CHECKING:
+    from bench.cli.queueing import Ready
     from bench.config.model import BenchConfiguration
     from bench.engine.operator import Operator
     from bench.preflight.compiled import Preflight
     from bench.queue.queue import Queue
     from bench.queue.queued import Queued
-    from bench.session import Experiment
 
 
-def queue_app(start: Start | None = None) -> App:
-    """`rockbench queue`; `start` as for `run_app`."""
+def queue_app() -> App:
+    """`rockbench queue`."""
     app = App(name="queue", version_flags=())
 
     def queue(
@@ -69,7 +69,7 @@ def queue_app(start: Start | None = None) -> App:
         """
         progress("loading the program")
         from bench.cli.inputs import configuration_from
-        from bench.cli.queueing import ENTRIES, all_ready, room_refusal
+        from bench.cli.queueing import all_ready, room_refusal
         from bench.preflight.compiled import load_bench
         from bench.queue.file import ITEM, QueueFile
         from bench.queue.owner import owned
@@ -87,11 +87,10 @@ def queue_app(start: Start | None = None) -> App:
             with redirect_stdout(sys.stderr):
                 load_bench(configuration, progress)
                 progress("checking the tests against the bench")
+                prepared = all_ready(tests.tests, configuration)
                 found = {
-                    index: _plan(
-                        index, each.experiment, configuration, Path(tests.tests[index].out or "runs"), progress
-                    )
-                    for index, each in all_ready(tests.tests, ENTRIES, configuration).items()
+                    index: _plan(index, each, Path(tests.tests[index].out or "runs"), progress)
+                    for index, each in prepared.items()
                 }
             refused = _refusal(found) or room_refusal([each.room for each in found.values()])
             if dry_run:
@@ -104,7 +103,7 @@ def queue_app(start: Start | None = None) -> App:
             for test in tests.tests:
                 # nobody to answer is found before the first one begins
                 _operator(test, configuration, yes)
-            code = _run_all(tests, configuration, yes, start)
+            code = _run_all(tests, configuration, yes, dict(prepared))
         print(json.dumps(_content(tests.tests, code), allow_nan=False) if as_json else tests_text(tests.tests))
         return code
 
@@ -112,15 +111,13 @@ def queue_app(start: Start | None = None) -> App:
     return app
 
 
-def _plan(
-    index: int, experiment: "Experiment", configuration: "BenchConfiguration", folder: Path, progress: Progress
-) -> "Preflight":
+def _plan(index: int, each: "Ready", folder: Path, progress: Progress) -> "Preflight":
     from bench.preflight.compiled import compile_run
 
     def numbered(phase: str, done: int = 0, total: int = 0, /) -> None:
         progress(f"test {index + 1}: {phase}", done, total)
 
-    return compile_run(experiment, configuration, folder, numbered)
+    return compile_run(each.protocol.name, each.prepared, folder, numbered)
 
 
 def _refusal(found: "dict[int, Preflight]") -> InvalidInput | None:
@@ -130,48 +127,43 @@ def _refusal(found: "dict[int, Preflight]") -> InvalidInput | None:
     return None
 
 
-def _run_all(tests: "Queue", configuration: "BenchConfiguration", yes: bool, start: Start | None) -> int:
+def _run_all(tests: "Queue", configuration: "BenchConfiguration", yes: bool, prepared: "dict[int, Ready]") -> int:
     """Run what waits until it is over or one does not come to a good end; returns the exit code."""
     while (index := tests.next) is not None:
-        code = _run_one(tests, index, configuration, yes, start)
+        # what was planned is kept only as long as it is needed
+        code = _run_one(tests, index, configuration, yes, prepared.pop(index, None))
         if code is not None:
             return code
     return 0
 
 
 def _run_one(
-    tests: "Queue", index: int, configuration: "BenchConfiguration", yes: bool, start: Start | None
+    tests: "Queue", index: int, configuration: "BenchConfiguration", yes: bool, checked: "Ready | None"
 ) -> int | None:
     """Run a test; None when the next may follow, else the exit code of the whole."""
-    from bench.cli.output import remove_unused
-    from bench.cli.queueing import ENTRIES, own_folder, ready
+    from bench.cli.output import check_folder, remove_unused, result_names
+    from bench.cli.queueing import own_folder, ready
 
     test = tests.tests[index]
     interrupted: int | None = None
     out: Path | None = None
     good, told = False, "the program failed"
     try:
-        each = ready(test, index + 1, ENTRIES, configuration)
+        each = checked or ready(test, index + 1, configuration)
+        if test.out is not None:
+            check_folder(Path(test.out), result_names(each.protocol))
         operator = _operator(test, configuration, yes)
         out = own_folder(test, datetime.now(), tests.tests)
         print(f"test {index + 1} of {len(tests.tests)}: {test.protocol}, results in {out}", file=sys.stderr)
         tests.begin(index, str(out))
         ended, interrupted = carry_out(
-            each.entry,
-            each.experiment,
-            configuration,
-            out,
-            operator,
-            realtime=test.realtime,
-            about=test.about,
-            start=start,
+            each.protocol, lambda _progress: each.prepared, out, operator, realtime=test.realtime, about=test.about
         )
         if isinstance(ended, Exception):
             told = f"failed: {ended}"
         else:
-            passed = each.entry.passed(ended.summary)
-            good = ended.status in ("completed", "stopped") and passed
-            told = f"{ended.status}: {ended.reason}" if passed else f"{ended.status}, but not passed"
+            good = ended.status in GOOD and ended.passed
+            told = f"{ended.status}: {ended.reason}" if ended.passed else f"{ended.status}, but not passed"
             if ended.status == "completed" and good:
                 return None
     except InvalidInput as refused:

@@ -4,10 +4,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from bench.cli.catalogue import CATALOGUE, Entry
-from bench.cli.check import CHECK
+from bench.catalogue import load_protocol
 from bench.cli.output import check_folder, default_folder, make_folder, result_names
 from bench.config.validation import dotted, validated
 from bench.progress import Progress, silent
@@ -19,47 +18,37 @@ if TYPE_CHECKING:
     from bench.cli.options import Options
     from bench.config.model import BenchConfiguration
     from bench.preflight.disk import Room
-    from bench.session import Experiment
-
-ENTRIES = (*CATALOGUE, CHECK)
-"""What can be queued."""
+    from bench.protocol import Prepared, Protocol
 
 
 @dataclass(frozen=True)
 class Ready:
-    """A test whose parameters are good on this bench."""
+    """A test that this bench can do: its parameters are good, and it is prepared."""
 
-    entry: Entry
-    parameters: Parameters
-    experiment: "Experiment"
+    protocol: "Protocol[Any]"
+    prepared: "Prepared[Any]"
 
 
-def queued(entry: Entry, parameters: Parameters, out: Path | None, **how: object) -> Queued:
+def queued(protocol: "Protocol[Any]", parameters: Parameters, out: Path | None, **how: object) -> Queued:
     """A test with these parameters; `how` are other fields of `Queued`."""
-    fields = {"protocol": entry.name, "parameters": parameters.model_dump(mode="json"), **how}
+    fields = {"protocol": protocol.name, "parameters": parameters.model_dump(mode="json"), **how}
     return Queued.model_validate({**fields, "out": None if out is None else str(out)})
 
 
-def ready(test: Queued, number: int, entries: Iterable[Entry], configuration: "BenchConfiguration") -> Ready:
+def ready(test: Queued, number: int, configuration: "BenchConfiguration") -> Ready:
     """Check parameters and folder of a test against the bench. Raises InvalidInput that names the test."""
-    named = {entry.name: entry for entry in entries}
-    entry = named.get(test.protocol)
-    if entry is None:
-        raise InvalidInput(f"test {number}: protocol", test.protocol, f"one of {', '.join(named)}")
-    parameters = validated(entry.parameters, test.parameters, lambda where: f"test {number}: {dotted(where)}")
     try:
-        experiment = entry.campaign(parameters)
-        experiment.check(configuration)
+        protocol = load_protocol(test.protocol)
+        parameters = validated(protocol.parameters, test.parameters, dotted)
+        prepared = protocol.prepare(parameters, configuration, None)
         if test.out is not None:
-            check_folder(Path(test.out), result_names(experiment))
+            check_folder(Path(test.out), result_names(protocol))
     except InvalidInput as refused:
         raise InvalidInput(f"test {number}: {refused.item}", refused.value, refused.allowed) from None
-    return Ready(entry, parameters, experiment)
+    return Ready(protocol, prepared)
 
 
-def all_ready(
-    tests: Sequence[Queued], entries: Iterable[Entry], configuration: "BenchConfiguration"
-) -> Mapping[int, Ready]:
+def all_ready(tests: Sequence[Queued], configuration: "BenchConfiguration") -> Mapping[int, Ready]:
     """Every test that waits, by its index. Raises InvalidInput for the first that cannot run, and for a folder that
     two would write to.
     """
@@ -68,7 +57,7 @@ def all_ready(
     for index, test in enumerate(tests):
         if test.stage is not Stage.WAITING:
             continue
-        found[index] = ready(test, index + 1, entries, configuration)
+        found[index] = ready(test, index + 1, configuration)
         if test.out is not None and (first := folders.setdefault(Path(test.out).absolute(), index)) != index:
             allowed = f"test {first + 1} has this folder; give each one of its own"
             raise InvalidInput(f"test {index + 1}: out", test.out, allowed)
@@ -98,8 +87,8 @@ def own_folder(test: Queued, moment: datetime, tests: Iterable[Queued] = ()) -> 
 
 def add_to_queue(
     path: Path,
-    entry: Entry,
-    experiment: "Experiment",
+    protocol: "Protocol[Any]",
+    parameters: Parameters,
     configuration: "BenchConfiguration",
     options: "Options",
     progress: Progress = silent,
@@ -109,7 +98,7 @@ def add_to_queue(
     Raises InvalidInput also while somebody else owns the queue.
     """
     progress("loading the program")
-    from bench.preflight.compiled import compile_run, load_bench
+    from bench.preflight.compiled import compile_run, prepare
     from bench.queue.file import QueueFile
     from bench.queue.owner import owned
     from bench.queue.queue import Queue
@@ -117,14 +106,12 @@ def add_to_queue(
     with owned(path, "`rockbench run --queue`"):
         store = QueueFile(path)
         queue = Queue(store.read(), store.write)
-        load_bench(configuration, progress)
-        progress("checking the protocol against the bench")
-        experiment.check(configuration)
-        compile_run(experiment, configuration, options.out or Path(), progress).require()
+        prepared = prepare(protocol, parameters, configuration, progress)
+        compile_run(protocol.name, prepared, options.out or Path(), progress).require()
         queue.add(
             queued(
-                entry,
-                experiment.parameters,
+                protocol,
+                parameters,
                 options.out,
                 operator=options.operator,
                 note="\n".join(options.note),

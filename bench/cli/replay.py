@@ -53,27 +53,29 @@ def replay(
     something differs, which is told; 2 when the file cannot be played; 130 after Ctrl-C.
     """
     progress("loading the program")
-    from bench.cli.recorded import entry_of, experiment_of, parameters_of
+    from bench.cli.console import progress_on
+    from bench.cli.recorded import parameters_of, protocol_of
     from bench.preflight.compiled import load_bench
     from bench.record.reader import open_record
     from bench.replaying.session import replay as play
     from bench.replaying.session import stored_configuration
+    from bench.session import result_of
 
     clock = _clock(speed)
     with open_record(file) as record:
-        entry = entry_of(record)
-        configuration = stored_configuration(record)
-        experiment = experiment_of(record, entry, parameters_of(record, entry))
+        protocol = protocol_of(record)
+        configuration, parameters = stored_configuration(record), parameters_of(record, protocol)
         try:
             load_bench(configuration, progress)
             progress("replaying the file")
-            with entry.progress(sys.stderr, False) as display, redirect_stdout(sys.stderr):
-                replayed = play(record, experiment, configuration, clock=clock, subscribers=[display])
+            with progress_on(sys.stderr, False, protocol) as display, redirect_stdout(sys.stderr):
+                prepared = protocol.prepare(parameters, configuration, record.tables)
+                replayed = play(record, prepared.plan(), configuration, clock=clock, subscribers=[display])
         except KeyboardInterrupt:
             answer("the replay was interrupted")
             return 130
-        points = list(replayed.points)
-        print(json.dumps(_content(file, replayed)) if as_json else _text(replayed, experiment.table(points)))
+        result = result_of(replayed.returned, prepared, replayed.points)
+        print(json.dumps(_content(file, replayed)) if as_json else _text(replayed, result.text))
     if not replayed.agrees:
         tell(_different(file, replayed))
         return 1

@@ -4,16 +4,18 @@ import json
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import redirect_stdout
+from contextvars import ContextVar
 from dataclasses import fields
 from datetime import datetime
 from functools import partial
 from inspect import Signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
+from typing import Protocol as Interface
 
 from cyclopts import App, Group
 
-from bench.cli.catalogue import CATALOGUE, Entry
+from bench.catalogue import load_protocol, protocol_names
 from bench.cli.flags import arguments_of
 from bench.cli.options import Options, arguments_of_options
 from bench.cli.progress import HANDED
@@ -23,11 +25,11 @@ from bench.results import SUMMARY
 from sim.errors import InvalidInput, RockbenchError
 
 if TYPE_CHECKING:
-    from bench.config.model import BenchConfiguration
     from bench.engine.operator import Operator
     from bench.engine.requests import Requests
     from bench.events import Subscriber
-    from bench.session import Experiment, SessionResult
+    from bench.protocol import Prepared, Protocol
+    from bench.session import SessionResult
 
 GOOD = ("completed", "stopped")
 """How a session ends whose results are good."""
@@ -39,13 +41,13 @@ _EXIT_CODES = (
 )
 
 
-class Start(Protocol):
+class Start(Interface):
     """What runs a session: `bench.session.run_session`, or its stand-in in a test."""
 
     def __call__(
         self,
-        protocol: "Experiment",
-        configuration: "BenchConfiguration",
+        protocol: "Protocol[Any]",
+        prepared: "Prepared[Any]",
         *,
         out: Path,
         operator: "Operator",
@@ -53,62 +55,113 @@ class Start(Protocol):
         requests: "Requests",
         realtime: bool,
     ) -> "SessionResult":
-        """Run `protocol` and leave its results in the folder `out`."""
+        """Run a prepared protocol and leave its results in the folder `out`."""
         ...
 
 
-def run_app(start: Start | None = None) -> App:
-    """`rockbench run`, with one command for each protocol. Without `start`, sessions are the real ones."""
+STAND_IN: ContextVar[Start | None] = ContextVar("stand-in for sessions", default=None)
+"""Takes the place of `bench.session.run_session` where it is set."""
+
+
+CHECK = "check"
+"""The protocol that is a command of its own, and none of `rockbench run`."""
+
+
+def run_app(*, listed: bool) -> App:
+    """`rockbench run`, with one command for each protocol that is installed, loaded when it is used; where they are
+    `listed`, all of them are, with their summaries.
+    """
     app = App(name="run", help="Run a protocol on the bench.", version_flags=())
-    for entry in CATALOGUE:
-        app.command(command_of(entry, start), name=entry.name)
+    for name in protocol_names():
+        if name == CHECK:
+            continue
+        if listed:
+            app.command(__getattr__(name))
+        else:
+            app.command(f"{__name__}:{name}", name=name)
     return app
 
 
-def command_of(entry: Entry, start: Start | None) -> Callable[..., int]:
+def __getattr__(name: str) -> App:
+    """The command of the protocol `name`: cyclopts asks this module for it when it is used or listed."""
+    if name not in protocol_names():
+        raise AttributeError(name)
+    try:
+        protocol = load_protocol(name)
+    except InvalidInput as refused:
+        # named where it is listed or run; the others are none the worse
+        failure = refused
+    else:
+        command = name if name == CHECK else f"run {name}"
+        app = App(
+            name=name, help_epilogue=f"Example: rockbench {command} {protocol.example}".rstrip(), version_flags=()
+        )
+        app.default(command_of(protocol))
+        return app
+
+    def unavailable(*_tokens: str) -> int:
+        raise failure
+
+    app = App(name=name, help=f"Not available: {failure.allowed}", version_flags=())
+    app.default(unavailable)
+    return app
+
+
+def command_of(protocol: "Protocol[Any]") -> Callable[..., int]:
     """The function behind a protocol's command; its signature is the protocol's flags and the common options."""
 
     def execute(*values: str, **arguments: Any) -> int:
         progress = arguments.pop("progress", silent)
-        if values and entry.positional is not None:
-            arguments[entry.positional] = values
+        if values and protocol.positional is not None:
+            arguments[protocol.positional] = values
         common = {field.name for field in fields(Options)} & arguments.keys()
         options = Options(**{name: arguments.pop(name) for name in common})
-        return _perform(entry, arguments, options, start, progress)
+        return _perform(protocol, arguments, options, progress)
 
-    group = Group(f"Parameters of the {entry.name} protocol", sort_key=1)
-    execute.__doc__ = f"{entry.summary}\n\n{entry.details}\n\n{_EXIT_CODES}"
-    asked = arguments_of(entry.parameters, group, entry.positional)
+    group = Group(f"Parameters of the {protocol.name} protocol", sort_key=1)
+    execute.__doc__ = f"{protocol.summary}\n\n{protocol.details}\n\n{_EXIT_CODES}"
+    asked = arguments_of(protocol.parameters, group, protocol.positional)
     execute.__dict__["__signature__"] = Signature([*asked, *arguments_of_options(), HANDED])
     return execute
 
 
-def _perform(entry: Entry, arguments: dict[str, Any], options: Options, start: Start | None, progress: Progress) -> int:
+def _perform(protocol: "Protocol[Any]", arguments: dict[str, Any], options: Options, progress: Progress) -> int:
     progress("reading protocol and bench")
     from bench.cli.inputs import configuration_from, parameters_from
     from bench.cli.operator import choose
     from bench.cli.output import check_folder, default_folder, make_folder, remove_unused, result_names
 
-    experiment = entry.campaign(parameters_from(entry.parameters, arguments, options.protocol_file))
+    parameters = parameters_from(protocol.parameters, arguments, options.protocol_file)
     configuration = configuration_from(options.config, options.seed, options.specimen)
-    out = options.out or default_folder(entry.name, datetime.now())
-    check_folder(out, result_names(experiment))
+    out = options.out or default_folder(protocol.name, datetime.now())
+    check_folder(out, result_names(protocol))
     if options.queue is not None:
         from bench.cli.queueing import add_to_queue
 
-        return add_to_queue(options.queue, entry, experiment, configuration, options, progress)
+        return add_to_queue(options.queue, protocol, parameters, configuration, options, progress)
     if options.dry_run:
         from bench.cli.dry_run import dry_run
 
-        return dry_run(experiment, configuration, out, progress, as_json=options.json)
+        return dry_run(protocol, parameters, configuration, out, progress, as_json=options.json)
     operator = choose(
         serves_itself=configuration.serves_itself, yes=options.yes, ask=options.ask, terminal=sys.stdin.isatty()
     )
+
+    def prepared_here(progress: Progress) -> "Prepared[Any]":
+        from bench.preflight.compiled import prepare
+
+        return prepare(protocol, parameters, configuration, progress)
+
     if options.out is None:
         out = make_folder(out)
     try:
         ended, interrupted = carry_out(
-            entry, experiment, configuration, out, operator, realtime=options.realtime, about=options.about, start=start
+            protocol,
+            prepared_here,
+            out,
+            operator,
+            realtime=options.realtime,
+            about=options.about,
         )
     finally:
         if options.out is None:
@@ -116,44 +169,46 @@ def _perform(entry: Entry, arguments: dict[str, Any], options: Options, start: S
     if isinstance(ended, Exception):
         fail(ended)
         return interrupted or 1
-    return _report(entry, ended, out, options.json, interrupted)
+    return _report(ended, out, options.json, interrupted)
 
 
 def carry_out(
-    entry: Entry,
-    experiment: "Experiment",
-    configuration: "BenchConfiguration",
+    protocol: "Protocol[Any]",
+    prepare: "Callable[[Progress], Prepared[Any]]",
     out: Path,
     operator: "Operator",
     *,
     realtime: bool,
     about: Mapping[str, str],
-    start: Start | None,
 ) -> "tuple[SessionResult | Exception, int | None]":
-    """Run an experiment and show how it goes. Returns its end, or what it failed with, and the exit code of a signal
-    that asked for its end, or None. Raises InvalidInput when the session refuses it.
+    """Run a protocol and show how it goes. Returns its end, or what it failed with, and the exit code of a signal
+    that asked for its end, or None. Raises InvalidInput when it is refused.
     """
+    from bench.cli.console import progress_on
     from bench.cli.interrupt import interruptible
     from bench.cli.operator import AtTheConsole
     from bench.engine.requests import Requests
 
     person = operator if isinstance(operator, AtTheConsole) else None
+    start = STAND_IN.get()
     requests = Requests()
     with (
         interruptible(requests, asking=lambda: person is not None and person.asking) as interrupts,
-        entry.progress(sys.stderr, person is not None) as progress,
+        progress_on(sys.stderr, person is not None, protocol) as progress,
         # standard output belongs to the result
         redirect_stdout(sys.stderr),
     ):
         try:
-            if start is None:
-                progress.prepare("loading the program")
-                with requests.without_rig():
+            progress.prepare("loading the program")
+            with requests.without_rig():
+                if start is None:
                     from bench.session import run_session
-                start = partial(run_session, about=about, progress=progress.prepare)
+
+                    start = partial(run_session, about=about, progress=progress.prepare)
+                prepared = prepare(progress.prepare)
             ended = start(
-                experiment,
-                configuration,
+                protocol,
+                prepared,
                 out=out,
                 operator=operator,
                 subscribers=[progress],
@@ -174,9 +229,9 @@ def carry_out(
     return ended, interrupts.exit_code
 
 
-def _report(entry: Entry, result: "SessionResult", out: Path, as_json: bool, interrupted: int | None) -> int:
+def _report(result: "SessionResult", out: Path, as_json: bool, interrupted: int | None) -> int:
     """Print the result, and turn the way it ended into an exit code."""
-    error = _error(entry, result)
+    error = _error(result)
     if as_json:
         content = {"status": result.status, "reason": result.reason, **result.summary}
         print(json.dumps(content | ({} if error is None else {"error": error}), allow_nan=False))
@@ -189,10 +244,10 @@ def _report(entry: Entry, result: "SessionResult", out: Path, as_json: bool, int
     return interrupted or (130 if result.interrupted else 1)
 
 
-def _error(entry: Entry, result: "SessionResult") -> dict[str, Any] | None:
+def _error(result: "SessionResult") -> dict[str, Any] | None:
     """The error that the JSON object of a run has beside its results; None for a run that came to a good end."""
     if result.status not in GOOD:
         return error_object(result.reason, "run_failed" if result.status == "failed" else "run_aborted")
-    if not entry.passed(result.summary):
+    if not result.passed:
         return error_object("something that was checked failed: see the points", "check_failed")
     return None

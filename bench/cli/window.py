@@ -9,10 +9,10 @@ from typing import Annotated
 
 from cyclopts import App, Parameter
 
-from bench.cli.catalogue import CATALOGUE
-from bench.cli.check import CHECK
+from bench.catalogue import all_protocols
 from bench.cli.inputs import Seed, SpecimenFile, configuration_from
 from bench.cli.progress import Handed
+from bench.cli.refusal import warn
 from bench.progress import silent
 from sim.errors import InvalidInput, RockbenchError
 from sim.extras import require
@@ -88,7 +88,12 @@ def gui(
 
     from bench.gui.app import open_window
 
-    return open_window(configuration, (*CATALOGUE, CHECK), config, queue)
+    protocols, failed = all_protocols()
+    for line in failed:
+        warn(line)
+    # the paper's campaign is the first choice
+    protocols = sorted(protocols, key=lambda each: each.name != "harmonic")
+    return open_window(configuration, protocols, config, queue)
 
 
 def require_display() -> None:

@@ -56,6 +56,8 @@ class Engine:
         self._sines = Sines(self._turns, rig.sample_rate)
         self._player = Player(self._turns, guard, stream)
         self._specimen: Specimen | None = None
+        self.returned: object = None
+        """What the plan returned; None where it broke off."""
         requests.cut_by(rig.halt)
 
     @property
@@ -96,8 +98,8 @@ class Engine:
                 with self._requests.breakable(self._asked_to_end):
                     step = next(plan) if outcome is None else plan.send(outcome)
                 outcome = self._do(step)
-        except StopIteration:
-            return
+        except StopIteration as end:
+            self.returned = end.value
 
     def _asked_to_end(self) -> Ended:
         return Ended(Ending("aborted", self._requests.reason))

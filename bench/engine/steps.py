@@ -165,4 +165,5 @@ class Heard:
 
 
 Outcome = Done | Fallen | Measured | Played | Heard
-Plan = Generator[Step, Outcome, None]
+Plan = Generator[Step, Outcome, object]
+"""Steps in order; what it returns is kept by the engine."""

@@ -5,21 +5,22 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import FrameType
+from typing import Any
 
 from PySide6.QtCore import QSettings
 from PySide6.QtWidgets import QApplication
 
-from bench.cli.catalogue import Entry
 from bench.config.model import BenchConfiguration
 from bench.gui.controller import Controller
 from bench.gui.own_errors import OwnErrors
 from bench.gui.palette import Theme, desktop_theme, qt_palette, style_sheet
 from bench.gui.stop import StopFilter
 from bench.gui.window import Window
+from bench.protocol import Protocol
 
 
 def open_window(
-    configuration: BenchConfiguration, entries: Sequence[Entry], path: Path | None, queue: Path | None
+    configuration: BenchConfiguration, entries: Sequence[Protocol[Any]], path: Path | None, queue: Path | None
 ) -> int:
     """Show the window until it is closed; returns the exit code of Qt's main loop."""
     application = QApplication(sys.argv[:1])

@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from bench.catalogue import load_protocol
 from bench.cli.check import CHECK
 from bench.cli.output import default_folder, make_folder, remove_unused
 from bench.cli.words import ABSENT
@@ -97,14 +98,14 @@ class CheckPanel(QWidget):
         if self._why_not:
             return
         try:
-            out = make_folder(default_folder(CHECK.name, datetime.now()))
+            out = make_folder(default_folder(CHECK, datetime.now()))
         except RockbenchError as error:
             self._say(str(error), "alarm")
             return
         self._folder = out
         person = self.person.isChecked()
         self.predicted.emit({})
-        self._controller.start(Run(CHECK.campaign, CHECK.parameters(), self._configuration, out, person=person))
+        self._controller.start(Run(CHECK, load_protocol(CHECK).parameters(), self._configuration, out, person=person))
 
     def use_theme(self, theme: Theme) -> None:
         """Take the colours of another theme."""
@@ -119,7 +120,7 @@ class CheckPanel(QWidget):
         return texts.LATCHED if self._controller.latched else self._controller.held
 
     def _began(self, run: Run) -> None:
-        self._ours = run.make is CHECK.campaign
+        self._ours = run.protocol == CHECK
         if self._ours:
             self.lines.clear()
             self.table.setRowCount(0)

@@ -4,11 +4,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
+from typing import Any
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QPushButton, QScrollArea, QSplitter, QVBoxLayout, QWidget
 
-from bench.cli.catalogue import Entry
 from bench.cli.output import check_folder, default_folder, make_folder, remove_unused, result_names
 from bench.cli.queueing import queued
 from bench.config.model import BenchConfiguration
@@ -19,6 +19,7 @@ from bench.gui.form import Form
 from bench.gui.plan_view import PlanView
 from bench.gui.run_options import RunOptions
 from bench.link.messages import Refused, Survey, Surveyed
+from bench.protocol import Protocol
 from bench.queue.queued import Queued
 from sim.errors import RockbenchError
 
@@ -36,7 +37,7 @@ class ProtocolPage(QWidget):
     """The prediction of the run that is about to begin."""
 
     def __init__(
-        self, controller: Controller, configuration: BenchConfiguration, entries: Sequence[Entry], tour: bool
+        self, controller: Controller, configuration: BenchConfiguration, entries: Sequence[Protocol[Any]], tour: bool
     ) -> None:
         super().__init__()
         self._controller, self._configuration, self._entries = controller, configuration, tuple(entries)
@@ -75,7 +76,7 @@ class ProtocolPage(QWidget):
         controller.ended.connect(self._ended)
 
     @property
-    def entry(self) -> Entry:
+    def entry(self) -> Protocol[Any]:
         """The protocol that is chosen."""
         return self._entries[self.choice.currentIndex()]
 
@@ -183,8 +184,8 @@ class ProtocolPage(QWidget):
         """The plan as the form has it. Raises InvalidInput."""
         entry, parameters = self.entry, self.form.parameters()
         out = self.options.out or Path(self.folder.placeholderText())
-        check_folder(out, result_names(entry.campaign(parameters)))
-        return Survey(entry.campaign, parameters, self._configuration, out)
+        check_folder(out, result_names(entry))
+        return Survey(entry.name, parameters, self._configuration, out)
 
     def _choose(self, index: int) -> None:
         entry = self._entries[index]

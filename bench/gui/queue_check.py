@@ -7,7 +7,6 @@ from typing import cast
 
 from PySide6.QtCore import QObject, Signal
 
-from bench.cli.catalogue import Entry
 from bench.cli.queueing import Ready, all_ready, room_refusal
 from bench.config.model import BenchConfiguration
 from bench.gui.background import Reader
@@ -22,7 +21,6 @@ class Checked:
     """A test whose plan was found good on the bench of `plan`."""
 
     test: Queued
-    ready: Ready
     plan: Survey
     found: Surveyed
 
@@ -46,14 +44,14 @@ class QueueCheck(QObject):
     changed = Signal()
     """Another test is being checked."""
 
-    def __init__(self, controller: Controller, entries: Sequence[Entry], parent: QObject) -> None:
+    def __init__(self, controller: Controller, parent: QObject) -> None:
         super().__init__(parent)
-        self._controller, self._entries = controller, tuple(entries)
+        self._controller = controller
         self._checked: list[Checked] = []
         self._tests: tuple[Queued, ...] = ()
         self._configuration = BenchConfiguration()
         self._left: list[tuple[Queued, Ready]] = []
-        self._asked: tuple[Ready, Survey] | None = None
+        self._asked: Survey | None = None
         self.test: Queued | None = None
         """The test that is being checked."""
         self._reader = Reader(self)
@@ -70,8 +68,8 @@ class QueueCheck(QObject):
         """Check what waits of `tests`, the whole queue, and was not checked yet; there is at least one such test."""
         self._tests, self._configuration = tuple(tests), configuration
         self.test = next(test for test in self._waiting if self.known(test, configuration) is None)
-        entries, whole = self._entries, self._tests
-        self._reader.call(lambda: all_ready(whole, entries, configuration))
+        whole = self._tests
+        self._reader.call(lambda: all_ready(whole, configuration))
         self.changed.emit()
 
     def give_up(self) -> None:
@@ -107,8 +105,8 @@ class QueueCheck(QObject):
         if self._left:
             self.test, ready = self._left.pop(0)
             out = Path(self.test.out or "runs")
-            plan = Survey(ready.entry.campaign, ready.parameters, self._configuration, out)
-            self._asked = ready, plan
+            plan = Survey(ready.protocol.name, ready.prepared.parameters, self._configuration, out)
+            self._asked = plan
             self._controller.survey(plan, by=self)
             self.changed.emit()
             return
@@ -127,7 +125,7 @@ class QueueCheck(QObject):
         self._asked = None
         refusal = found.text if isinstance(found, Refused) else found.refusal
         if isinstance(found, Surveyed) and refusal is None:
-            self._checked.append(Checked(test, *asked, found))
+            self._checked.append(Checked(test, asked, found))
             self._next()
         else:
             self.give_up()

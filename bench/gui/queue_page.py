@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
@@ -18,7 +18,6 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from bench.cli.catalogue import Entry
 from bench.cli.flags import in_words
 from bench.cli.words import ABSENT
 from bench.config.declared import Declared, declared
@@ -27,6 +26,7 @@ from bench.gui.buttons import give_key
 from bench.gui.controller import Controller
 from bench.gui.header import set_level
 from bench.gui.queue_runner import QueueRunner
+from bench.protocol import Protocol
 from bench.queue.queue import MOST_COPIES
 from bench.queue.queued import OPEN, Queued, Stage
 
@@ -37,7 +37,7 @@ class QueuePage(QWidget):
     edit_asked = Signal(object, int)
     """A `Queued` that has not begun, and its number."""
 
-    def __init__(self, controller: Controller, runner: QueueRunner, entries: Sequence[Entry]) -> None:
+    def __init__(self, controller: Controller, runner: QueueRunner, entries: Sequence[Protocol[Any]]) -> None:
         super().__init__()
         self._controller, self._runner = controller, runner
         self._entries = {entry.name: entry for entry in entries}

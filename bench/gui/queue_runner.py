@@ -2,12 +2,11 @@
 after a STOP.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from datetime import datetime
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from bench.cli.catalogue import Entry
 from bench.cli.output import remove_unused
 from bench.cli.queueing import own_folder
 from bench.config.model import BenchConfiguration
@@ -42,7 +41,6 @@ class QueueRunner(QObject):
         self,
         controller: Controller,
         configuration: BenchConfiguration,
-        entries: Sequence[Entry],
         store: QueueFile | None = None,
         parent: QObject | None = None,
     ) -> None:
@@ -61,7 +59,7 @@ class QueueRunner(QObject):
             self.close()
             raise
         self._begun: tuple[Run, Checked] | None = None
-        self._check = QueueCheck(controller, entries, self)
+        self._check = QueueCheck(controller, self)
         self._check.good.connect(self._next)
         self._check.refused.connect(self._refused)
         self._check.changed.connect(self.changed)
@@ -170,7 +168,7 @@ class QueueRunner(QObject):
             return
         self.predicted.emit(each.found.prediction)
         run = Run(
-            plan.make,
+            plan.protocol,
             plan.parameters,
             plan.configuration,
             out,
@@ -197,7 +195,7 @@ class QueueRunner(QObject):
         if isinstance(ended, Refused):
             status, good, told = ("failed" if ended.failed else "refused"), False, ended.text
         else:
-            passed = begun[1].ready.entry.passed(ended.summary)
+            passed = ended.passed
             status, good = ended.status, passed and ended.status in GOOD
             told = ended.reason if passed else "not passed"
         why = "" if status == "completed" and good else texts.QUEUE_ENDED.format(number=index + 1, status=status)

@@ -73,7 +73,7 @@ class RunOptions(QWidget):
         """The run of a plan."""
         told = {"operator": self.operator.text().strip(), "notes": self.note.text().strip()}
         return Run(
-            plan.make,
+            plan.protocol,
             plan.parameters,
             plan.configuration,
             plan.out,

@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from PySide6.QtCore import QEvent, QObject, QSettings
 from PySide6.QtGui import QCloseEvent, QKeySequence, QShortcut
 from PySide6.QtWidgets import QMainWindow, QTabWidget, QVBoxLayout, QWidget
 
-from bench.cli.catalogue import Entry
 from bench.config.model import BenchConfiguration
 from bench.gui import texts
 from bench.gui.controller import Controller
@@ -25,6 +25,7 @@ from bench.gui.setup_page import SetupPage
 from bench.gui.tour import Tour
 from bench.gui.trouble import TroublePanel
 from bench.gui.troubles import Trouble
+from bench.protocol import Protocol
 from bench.queue.file import QueueFile
 from bench.queue.queued import Queued
 from sim.errors import RockbenchError
@@ -43,7 +44,7 @@ class Window(QMainWindow):
         self,
         controller: Controller,
         configuration: BenchConfiguration,
-        entries: Sequence[Entry],
+        entries: Sequence[Protocol[Any]],
         theme: Theme,
         *,
         path: Path | None = None,
@@ -55,7 +56,7 @@ class Window(QMainWindow):
         self._controller, self._settings = controller, settings
         self.setMinimumSize(*SMALLEST)
         self.header, self.prompt, self.trouble = Header(controller, theme), Prompt(controller), TroublePanel(controller)
-        self.runner = self._runner(configuration, entries, queue)
+        self.runner = self._runner(configuration, queue)
         self.setup = SetupPage(controller, configuration, path, theme)
         self.protocol = ProtocolPage(controller, configuration, entries, tour)
         # whoever takes the tour sees its end within a minute
@@ -106,14 +107,14 @@ class Window(QMainWindow):
         self.runner.close()
         super().closeEvent(event)
 
-    def _runner(self, configuration: BenchConfiguration, entries: Sequence[Entry], queue: Path | None) -> QueueRunner:
+    def _runner(self, configuration: BenchConfiguration, queue: Path | None) -> QueueRunner:
         """The queue of the file; when that cannot be read it is left alone, and the queue is kept nowhere."""
         try:
             store = None if queue is None else QueueFile(queue)
-            return QueueRunner(self._controller, configuration, entries, store, self)
+            return QueueRunner(self._controller, configuration, store, self)
         except RockbenchError as error:
             self.trouble.show_trouble(Trouble(str(error), texts.QUEUE_UNREAD_DID, texts.QUEUE_UNREAD_NOW))
-            return QueueRunner(self._controller, configuration, entries, parent=self)
+            return QueueRunner(self._controller, configuration, parent=self)
 
     def _connect(self) -> None:
         controller, runner = self._controller, self.runner

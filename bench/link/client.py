@@ -173,5 +173,6 @@ class Link:
             return None
         with suppress(OSError, ValueError, KeyError):
             content = json.loads((self._out / SUMMARY).read_text(encoding="utf-8"))
-            return Ended(content["status"], content["reason"], content, "", self._out)
+            passed = content.get("passed", True) is not False
+            return Ended(content["status"], content["reason"], content, "", self._out, passed)
         return None

@@ -2,10 +2,9 @@
 program, over a connection that only its own child can open.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +13,6 @@ from bench.config.model import BenchConfiguration
 from bench.events import Event, State
 from bench.preflight.margins import Margin
 from bench.record.tables import Table
-from bench.session import Experiment
 from sim.parameters import Parameters
 
 BEAT = 0.25
@@ -27,12 +25,9 @@ PATIENCE = 3.0
 
 @dataclass(frozen=True)
 class Survey:
-    """The whole run computed beforehand; opens nothing.
+    """The whole run computed beforehand; opens nothing. `protocol` is the name of one that is installed."""
 
-    `make` is a function of a module that makes the experiment from `parameters`.
-    """
-
-    make: Callable[[Any], Experiment]
+    protocol: str
     parameters: Parameters
     configuration: BenchConfiguration
     out: Path
@@ -159,13 +154,17 @@ class Beat:
 
 @dataclass(frozen=True)
 class Ended:
-    """The run is over, its files are written; `summary` is ready for JSON, `table` is plain text."""
+    """The run is over, its files are written; `summary` is ready for JSON, `table` is plain text.
+
+    `passed` is the verdict of a protocol that judges the bench, True of any other.
+    """
 
     status: str
     reason: str
     summary: dict[str, object]
     table: str
     out: Path
+    passed: bool = True
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ import traceback
 from multiprocessing.connection import Client, Connection
 from types import FrameType
 
+from bench.catalogue import load_protocol
 from bench.config.model import BenchConfiguration
 from bench.engine.operator import Unattended
 from bench.engine.requests import Requests
@@ -59,9 +60,8 @@ def serve(connection: Connection) -> None:
 
 def _survey(asked: Survey) -> FromSession:
     _give_way()
-    experiment = asked.make(asked.parameters)
-    experiment.check(asked.configuration)
-    found = compile_run(experiment, asked.configuration, asked.out)
+    prepared = load_protocol(asked.protocol).prepare(asked.parameters, asked.configuration, None)
+    found = compile_run(asked.protocol, prepared, asked.out)
     room = found.room
     return Surveyed(
         margins=found.margins,
@@ -71,7 +71,7 @@ def _survey(asked: Survey) -> FromSession:
         needed=None if room is None else room.needed,
         free=None if room is None else room.free,
         plan_hash=found.plan_hash,
-        prediction=experiment.predict(asked.configuration),
+        prediction=prepared.prediction,
     )
 
 
@@ -79,9 +79,10 @@ def _run(asked: Run, host: Host, requests: Requests) -> FromSession:
     configuration = asked.configuration
     _abort_on_terminate(requests)
 
+    protocol = load_protocol(asked.protocol)
     ended = run_session(
-        asked.make(asked.parameters),
-        configuration,
+        protocol,
+        protocol.prepare(asked.parameters, configuration, None),
         out=asked.out,
         operator=AtTheClient(host, requests) if asked.person else Unattended(_policy(configuration)),
         subscribers=[Teller(host)],
@@ -89,7 +90,7 @@ def _run(asked: Run, host: Host, requests: Requests) -> FromSession:
         realtime=asked.realtime,
         about=asked.about,
     )
-    return Ended(ended.status, ended.reason, ended.summary, ended.table, asked.out)
+    return Ended(ended.status, ended.reason, ended.summary, ended.table, asked.out, ended.passed)
 
 
 def _policy(configuration: BenchConfiguration) -> str:

@@ -4,36 +4,23 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Protocol
+from typing import Any
 
 from bench.config.model import BenchConfiguration
 from bench.config.review import Review, notices_of, review, scales_of
 from bench.preflight.bounds import bounds
 from bench.preflight.disk import Room, room
 from bench.preflight.fingerprint import plan_hash
-from bench.preflight.forecast import Forecast, Forecasting
+from bench.preflight.forecast import Forecast
 from bench.preflight.margins import Margin, margins, refusal, warnings
 from bench.preflight.tables import drive_table, margins_table
 from bench.progress import Progress, silent
+from bench.protocol import Prepared, Protocol
 from bench.provenance import software
 from bench.record.tables import Table
 from sim.errors import InvalidInput
 from sim.loading import BENCH, load_model
 from sim.parameters import Parameters
-
-
-class Asked(Protocol):
-    """An experiment, as far as it matters here."""
-
-    @property
-    def name(self) -> str:
-        """The protocol's name."""
-        ...
-
-    @property
-    def parameters(self) -> Parameters:
-        """What was asked for."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -91,25 +78,32 @@ def load_bench(configuration: BenchConfiguration, progress: Progress = silent) -
         load_model(progress, BENCH)
 
 
-def compile_run(
-    experiment: Asked, configuration: BenchConfiguration, folder: Path, progress: Progress = silent
-) -> Preflight:
-    """Compute and check the whole run; its results would go to `folder`. Opens nothing, creates nothing.
+def prepare(
+    protocol: Protocol[Any], parameters: Parameters, configuration: BenchConfiguration, progress: Progress = silent
+) -> Prepared[Any]:
+    """A protocol prepared for a new run on this bench. Raises InvalidInput where the bench cannot do it."""
+    load_bench(configuration, progress)
+    progress("checking the protocol against the bench")
+    return protocol.prepare(parameters, configuration, None)
 
-    Raises InvalidInput only for what cannot be planned at all: a refusal is part of the answer.
+
+def compile_run(protocol: str, prepared: Prepared[Any], folder: Path, progress: Progress = silent) -> Preflight:
+    """Compute and check the whole run of the protocol of this name; its results would go to `folder`.
+
+    Opens nothing, creates nothing. Raises InvalidInput only for what cannot be planned at all: a refusal is part of
+    the answer.
     """
-    forecast = experiment.preflight(configuration, progress) if isinstance(experiment, Forecasting) else Forecast()
+    prepared.progress = progress
+    forecast, configuration = prepared.forecast, prepared.configuration
     found, specimen = review(configuration), configuration.known_specimen
     return Preflight(
         forecast=forecast,
         margins=margins(forecast.demands, bounds(configuration)),
         room=None if forecast.duration is None else room(configuration, forecast.duration, folder),
-        plan_hash=plan_hash(
-            experiment.name, experiment.parameters, configuration, software()["rocking-bench"], forecast
-        ),
+        plan_hash=plan_hash(protocol, prepared.parameters, configuration, software()["rocking-bench"], forecast),
         sensors=_aged(configuration),
-        reviewed=Review(found.refusals, (*found.notices, *notices_of(experiment.parameters, specimen))),
-        scales=scales_of(experiment.parameters, specimen),
+        reviewed=Review(found.refusals, (*found.notices, *notices_of(prepared.parameters, specimen))),
+        scales=scales_of(prepared.parameters, specimen),
     )
 
 

@@ -1,11 +1,8 @@
 """What an experiment says of its run beforehand: its whole drive, and the most it asks of every limited quantity."""
 
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
 
-from bench.config.model import BenchConfiguration
 from bench.control.legs import Leg
-from bench.progress import Progress, silent
 
 
 @dataclass(frozen=True)
@@ -44,15 +41,3 @@ class Forecast:
     duration: float | None = None
     warnings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
-
-
-@runtime_checkable
-class Forecasting(Protocol):
-    """An experiment that predicts what it will ask of the bench. One that does not is run without margins."""
-
-    def preflight(self, configuration: BenchConfiguration, progress: Progress = silent) -> Forecast:
-        """The forecast on this bench, reporting to `progress` what takes long.
-
-        Raises InvalidInput for what cannot be planned at all.
-        """
-        ...

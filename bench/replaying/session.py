@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 from bench.analysis.signals import SignalMap
 from bench.config.model import BenchConfiguration
@@ -26,25 +25,14 @@ UNFINISHED = "running"
 """Status of a file whose writer was killed."""
 
 
-class Planned(Protocol):
-    """An experiment, as far as it matters here."""
-
-    def check(self, configuration: BenchConfiguration) -> None:
-        """Raise InvalidInput when this bench cannot do what is asked."""
-        ...
-
-    def plan(self, configuration: BenchConfiguration) -> Plan:
-        """The steps."""
-        ...
-
-
 @dataclass(frozen=True)
 class Replayed:
     """What a replay came to.
 
     `ended` says where the recording broke off, if the plan wanted more than there is: at an error of the rig or a
     killed program, which no data can show again. `in_place` are violations that are in no sample either, for which an
-    abort was asked for in their place. `played` of `rows` samples were asked for.
+    abort was asked for in their place. `played` of `rows` samples were asked for. `returned` is
+    what the plan returned, None where it broke off.
     """
 
     status: str
@@ -56,6 +44,7 @@ class Replayed:
     rows: int
     found: Found
     changed: tuple[str, ...]
+    returned: object = None
 
     def parted(self, part: str) -> str | None:
         """The first difference in a part that rounding does not explain."""
@@ -79,19 +68,18 @@ def stored_configuration(record: Record) -> BenchConfiguration:
 
 def replay(
     record: Record,
-    experiment: Planned,
+    plan: Plan,
     configuration: BenchConfiguration,
     *,
     clock: Clock,
     subscribers: Sequence[Subscriber],
     signals: SignalMap | None = None,
 ) -> Replayed:
-    """Play an open file as `experiment` on `configuration`, which are those that were recorded, and compare.
+    """Carry out `plan` on the samples of an open file, on the `configuration` that was recorded, and compare.
 
     `clock` begins at 0. With `signals` the caller sees the zero that the engine has taken. Raises InvalidInput when
-    the file cannot be played, or the experiment not be planned.
+    the file cannot be played.
     """
-    experiment.check(configuration)
     recording, course = ReplayedRecord(record), RecordedCourse(record)
     comparison, points = Comparison(record, course), list[Parameters]()
 
@@ -116,7 +104,7 @@ def replay(
         for warning in course.first_warnings:
             stream.publish(Warned(warning))
         with twin_beside(stream, rig, configuration, requests, patient=True):
-            ending = engine.run(experiment.plan(configuration))
+            ending = engine.run(plan)
         over = rig.over
     broke_off = _broke_off(record, over)
     found = comparison.finish(ending.reason.partition("; then ")[0] if broke_off else None)
@@ -138,6 +126,7 @@ def replay(
         rows=rows,
         found=found,
         changed=_changed(record.metadata),
+        returned=engine.returned,
     )
 
 

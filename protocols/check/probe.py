@@ -9,8 +9,7 @@ from bench.analysis.signals import ACCELERATION, SIGNALS
 from bench.control.calibration import DriveCalibration
 from bench.control.legs import Leg
 from bench.engine.steps import Calibrate, Dwell, Follow, Measured, Outcome, Step
-from protocols.harmonic.calibrate import CHANGE_TIME, PROBE, SETTLING
-from protocols.harmonic.evidence import Unmeasurable, need_cycles
+from protocols.common.calibrate import CHANGE_TIME, PROBE, SETTLING, Unmeasurable, need_cycles
 
 _CYCLES = 8
 """Cycles of each probe: their scatter says what is noise."""

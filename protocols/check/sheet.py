@@ -19,7 +19,7 @@ from protocols.check.resting import resting_lines
 from protocols.check.safety import safety_lines
 from protocols.check.scales import scale_lines
 from protocols.check.sines import measured_sines
-from protocols.harmonic.evidence import Unmeasurable
+from protocols.common.calibrate import Unmeasurable
 
 REST = 2.0
 """Time at rest before the table moves, over which the zero of the signals is taken [s]."""

@@ -12,8 +12,7 @@ from bench.engine.steps import Calibrate, Dwell, Fallen, Follow, Measured, Outco
 from bench.events import Progress, StepStarted
 from protocols.check.parameters import CheckParameters
 from protocols.check.probe import probed_drive
-from protocols.harmonic.calibrate import CHANGE_TIME, SETTLING, calibrate_drive
-from protocols.harmonic.evidence import Unmeasurable, need_cycles
+from protocols.common.calibrate import CHANGE_TIME, SETTLING, Unmeasurable, calibrate_drive, need_cycles
 
 _DRIVE = len(SIGNALS)
 _FALLEN = "the first storey is pulled aside although no block stands on the table: check lasers and specimen"

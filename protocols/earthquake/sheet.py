@@ -20,6 +20,7 @@ from bench.control.table_model import TableModel
 from bench.engine.steps import Arm, Fallen, Handle, Outcome, Plan, Play, Played, RampOut, Say, Step
 from bench.events import PointFinished, Progress, StepStarted, Warned
 from drivers.rig import Handwork, RigError
+from protocols.common.replicate import replicate
 from protocols.earthquake.histories import Histories
 from protocols.earthquake.judge import BareTest, measured, not_played, overturned
 from protocols.earthquake.learned import refused, shortfall
@@ -33,7 +34,6 @@ from protocols.earthquake.records import Shaking, shakings
 from protocols.earthquake.shaken import tracking
 from protocols.earthquake.sources import Sources
 from protocols.earthquake.table import identification_time, table_for
-from protocols.replicate import replicate
 from sim.errors import InvalidInput
 from sim.specimen import Specimen
 

@@ -22,12 +22,12 @@ from bench.config.model import BenchConfiguration
 from bench.engine.steps import Arm, Handle, Outcome, Plan, Play, Played, RampOut, Say, Step
 from bench.events import Event, PointFinished, Progress, SpecimenIdentified, StepStarted, Warned
 from drivers.rig import Handwork
+from protocols.common.calibrate import Unmeasurable
 from protocols.free_rocking.identified import identified_of
 from protocols.free_rocking.parameters import FreeRockingParameters
 from protocols.free_rocking.planned import planned_tilts, recording_time, seen_displacement
 from protocols.free_rocking.point import ALL, doubts, point
 from protocols.free_rocking.told import fits_of
-from protocols.harmonic.evidence import Unmeasurable
 from sim.errors import RockbenchError
 from sim.identified import Identified
 

@@ -10,12 +10,12 @@ from bench.config.model import BenchConfiguration
 from bench.engine.steps import Handle, Outcome, Say, Step
 from bench.events import PointFinished, StepStarted, Warned
 from drivers.rig import Handwork
+from protocols.common.calibrate import Unmeasurable
 from protocols.free_vibration.parameters import DecayParameters, FreeVibrationParameters
 from protocols.free_vibration.playing import WAITING, Pace, found_level, played
 from protocols.free_vibration.pulse import QUIET, Planned, Pulse, window_of
 from protocols.free_vibration.results import FrameResult, point_of, result_of
 from protocols.free_vibration.told import fit_finished
-from protocols.harmonic.evidence import Unmeasurable
 from sim.parameters import Parameters
 from sim.specimen import Specimen
 

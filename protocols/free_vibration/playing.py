@@ -10,9 +10,8 @@ from bench.analysis.signals import ACCELERATION, DISPLACEMENT, DRIFT, LASER_1, L
 from bench.config.model import BenchConfiguration
 from bench.engine.steps import Arm, Fallen, Outcome, Play, Played, RampOut, Say, Step
 from bench.events import Event, Progress, StepStarted, Warned
+from protocols.common.calibrate import PROBE, Unmeasurable
 from protocols.free_vibration.pulse import QUIET, SHARE, Pulse
-from protocols.harmonic.calibrate import PROBE
-from protocols.harmonic.evidence import Unmeasurable
 
 Array = NDArray[np.float64]
 

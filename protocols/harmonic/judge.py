@@ -6,7 +6,7 @@ from math import hypot, log
 from bench.analysis.gain import SteadyPeak, gain
 from bench.analysis.sensor_accuracy import SensorDoubt
 from bench.prediction.model_uncertainty import expanded_uncertainty
-from protocols.harmonic.point import HarmonicPoint, PointStatus
+from protocols.harmonic.protocol import HarmonicPoint, PointStatus
 from protocols.harmonic.settle import Settled
 from sim.gain import Layer, predict_gain
 from sim.knowledge import SpecimenKnowledge

@@ -1,11 +1,9 @@
 """Whether a bench can do what a campaign asks, as far as closed forms and steady states tell.
 
-These refusals come at once and name the parameter; `protocols.harmonic.preflight` has the whole run, starts included.
+These refusals come at once and name the parameter; `protocols.harmonic.forecast` has the whole run, starts included.
 """
 
-from functools import lru_cache
 from math import tau
-from typing import Literal
 
 import numpy as np
 
@@ -13,79 +11,82 @@ from bench.analysis.steady import WINDOW
 from bench.config.model import BenchConfiguration
 from bench.control.candidates import OVERSHOOTS
 from bench.preflight.motion import Travel
-from protocols.harmonic.parameters import HarmonicParameters
+from protocols.harmonic.protocol import HarmonicParameters
 from sim.errors import InvalidInput
-from sim.specimen import Specimen
-
-Reference = Literal["ground", "table"]
-"""Where the lasers stand."""
+from sim.linear import steady_response
+from sim.steady import NoOrbit, rocking_orbit
 
 
-def check_table(parameters: HarmonicParameters, configuration: BenchConfiguration) -> None:
-    """Refuse table motions beyond limits or stroke, overshoot of a start included: x = a / Omega^2, v = a / Omega."""
-    limits, stroke = configuration.limits, configuration.half_stroke
-    peak = max(OVERSHOOTS) * parameters.amplitude_factor * configuration.known_specimen.uplift_acceleration
-    if peak > limits.acceleration:
-        allowed = f"a start needs {peak:.3g} m/s2, limits.acceleration = {limits.acceleration:g} m/s2"
-        raise InvalidInput("amplitude_factor", parameters.amplitude_factor, allowed)
-    reach, owner = min((stroke, "the shaker's stroke"), (limits.displacement, "limits.displacement"))
-    for omega in parameters.omega:
-        travel, speed = peak / omega**2, peak / omega
-        if travel > reach:
-            needs = f"a start of {peak:.3g} m/s2 needs {1e3 * travel:.1f} mm there, {owner} allows {1e3 * reach:.1f} mm"
-            raise InvalidInput("omega", omega, needs)
-        if speed > limits.velocity:
-            needs = f"a start of {peak:.3g} m/s2 needs {speed:.3g} m/s there, limits.velocity = {limits.velocity:g} m/s"
-            raise InvalidInput("omega", omega, needs)
-        if parameters.settle_limit < 2 * WINDOW * tau / omega:
-            needs = f"judging a steady state at {omega:g} rad/s takes {2 * WINDOW * tau / omega:.1f} s at least"
-            raise InvalidInput("settle_limit", parameters.settle_limit, needs)
+class Reach:
+    """The steady motions of a campaign, each computed once, against limits and ranges of the bench."""
 
+    def __init__(self, parameters: HarmonicParameters, configuration: BenchConfiguration) -> None:
+        self._parameters, self._configuration = parameters, configuration
+        self._specimen = configuration.known_specimen
+        self._amplitude = parameters.amplitude_factor * self._specimen.uplift_acceleration
+        self._found: dict[tuple[float | None, float], Travel | None] = {}
 
-def check_storeys(parameters: HarmonicParameters, configuration: BenchConfiguration) -> None:
-    """Refuse frequencies at which a storey would leave its laser's range, bare or on the steady rocking motion."""
-    specimen = configuration.known_specimen
-    amplitude = parameters.amplitude_factor * specimen.uplift_acceleration
-    reference = configuration.laser_reference
-    ranges = tuple(0.5 * whole for whole in configuration.laser_ranges)
-    for omega in parameters.omega:
-        for beta in (None, *parameters.beta):
-            if beta is None:
-                seen = bare_travel(specimen, omega, amplitude, reference)
-            else:
-                seen = rocking_travel(specimen.coupled(beta), omega, amplitude, reference)
-            if seen is None:
-                continue
-            for number, (motion, half) in enumerate(zip((seen.storey_1, seen.storey_2), ranges, strict=True), 1):
-                if motion > half:
-                    what = "the bare frame" if beta is None else f"beta = {beta:g}"
-                    moves = f"storey {number} of {what} moves {1e3 * motion:.0f} mm there"
-                    needs = f"{moves}, its laser sees {1e3 * half:.0f} mm"
-                    raise InvalidInput("omega", omega, needs)
+    def check(self) -> None:
+        """Raise InvalidInput for what table, lasers or limits do not allow."""
+        self._check_table()
+        self._check_storeys()
 
+    def steady(self, beta: float | None, omega: float) -> Travel | None:
+        """What the lasers see in the steady state at `omega` [rad/s], and the drift: of the bare frame where `beta` is
+        None, else of the rocking motion; None where that does not exist or was not found.
+        """
+        if (beta, omega) not in self._found:
+            self._found[beta, omega] = self._bare(omega) if beta is None else self._rocking(beta, omega)
+        return self._found[beta, omega]
 
-def bare_travel(specimen: Specimen, omega: float, amplitude: float, reference: Reference) -> Travel:
-    """What the lasers see of the bare frame, and its drift, in the steady state under `amplitude` [m/s2]."""
-    from sim.linear import steady_response
+    def _check_table(self) -> None:
+        """Refuse table motions beyond limits or stroke, a start's overshoot included: x = a / Omega^2 and so on."""
+        parameters, configuration = self._parameters, self._configuration
+        limits, stroke = configuration.limits, configuration.half_stroke
+        peak = max(OVERSHOOTS) * self._amplitude
+        if peak > limits.acceleration:
+            allowed = f"a start needs {peak:.3g} m/s2, limits.acceleration = {limits.acceleration:g} m/s2"
+            raise InvalidInput("amplitude_factor", parameters.amplitude_factor, allowed)
+        start = f"a start of {peak:.3g} m/s2"
+        reach, owner = min((stroke, "the shaker's stroke"), (limits.displacement, "limits.displacement"))
+        for omega in parameters.omega:
+            travel, speed = peak / omega**2, peak / omega
+            if travel > reach:
+                needs = f"{start} needs {1e3 * travel:.1f} mm there, {owner} allows {1e3 * reach:.1f} mm"
+                raise InvalidInput("omega", omega, needs)
+            if speed > limits.velocity:
+                needs = f"{start} needs {speed:.3g} m/s there, limits.velocity = {limits.velocity:g} m/s"
+                raise InvalidInput("omega", omega, needs)
+            if parameters.settle_limit < 2 * WINDOW * tau / omega:
+                needs = f"judging a steady state at {omega:g} rad/s takes {2 * WINDOW * tau / omega:.1f} s at least"
+                raise InvalidInput("settle_limit", parameters.settle_limit, needs)
 
-    u1, u2 = steady_response(specimen, omega, amplitude)
-    table = -amplitude / omega**2 if reference == "ground" else 0.0
-    return Travel(abs(u1 + table), abs(u2 + table), abs(u2 - u1))
+    def _check_storeys(self) -> None:
+        """Refuse frequencies at which a storey would leave its laser's range, bare or on the steady rocking motion."""
+        halves = tuple(0.5 * whole for whole in self._configuration.laser_ranges)
+        for omega in self._parameters.omega:
+            for beta in (None, *self._parameters.beta):
+                seen = self.steady(beta, omega)
+                if seen is None:
+                    continue
+                for number, (motion, half) in enumerate(zip((seen.storey_1, seen.storey_2), halves, strict=True), 1):
+                    if motion > half:
+                        what = "the bare frame" if beta is None else f"beta = {beta:g}"
+                        moves = f"storey {number} of {what} moves {1e3 * motion:.0f} mm there"
+                        needs = f"{moves}, its laser sees {1e3 * half:.0f} mm"
+                        raise InvalidInput("omega", omega, needs)
 
+    def _bare(self, omega: float) -> Travel:
+        u1, u2 = steady_response(self._specimen, omega, self._amplitude)
+        table = -self._amplitude / omega**2 if self._configuration.laser_reference == "ground" else 0.0
+        return Travel(abs(u1 + table), abs(u2 + table), abs(u2 - u1))
 
-def rocking_travel(specimen: Specimen, omega: float, amplitude: float, reference: Reference) -> Travel | None:
-    """The same of the steady rocking motion; None where it does not exist or was not found."""
-    # frozen parameters are hashable, though pydantic does not declare it
-    return _rocking_travel(specimen, omega, amplitude, reference)  # pyright: ignore[reportArgumentType]
-
-
-@lru_cache(maxsize=1024)
-def _rocking_travel(specimen: Specimen, omega: float, amplitude: float, reference: Reference) -> Travel | None:
-    from sim.steady import NoOrbit, rocking_orbit
-
-    try:
-        phase, u1, u2, _ = rocking_orbit(specimen, omega, amplitude).samples(64).T
-    except NoOrbit:
-        return None
-    table = -amplitude / omega**2 * np.sin(phase) if reference == "ground" else np.zeros_like(phase)
-    return Travel(*(float(np.abs(each).max()) for each in (u1 + table, u2 + table, u2 - u1)))
+    def _rocking(self, beta: float, omega: float) -> Travel | None:
+        specimen, amplitude = self._specimen.coupled(beta), self._amplitude
+        try:
+            phase, u1, u2, _ = rocking_orbit(specimen, omega, amplitude).samples(64).T
+        except NoOrbit:
+            return None
+        on_ground = self._configuration.laser_reference == "ground"
+        table = -amplitude / omega**2 * np.sin(phase) if on_ground else np.zeros_like(phase)
+        return Travel(*(float(np.abs(each).max()) for each in (u1 + table, u2 + table, u2 - u1)))

@@ -3,11 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import tau
-from typing import Literal
 
 import numpy as np
 
-from bench.analysis.cycles import HARMONICS, Cycle, CycleAnalyser, mean_amplitude
+from bench.analysis.cycles import Cycle, CycleAnalyser, mean_amplitude
 from bench.analysis.gain import SteadyPeak, modulated_peak, steady_peak
 from bench.analysis.signals import ACCELERATION, SignalMap
 from bench.analysis.steady import Steadiness, SteadyDetector
@@ -19,32 +18,9 @@ from bench.events import Acquired, Estimate, Event, PointFinished
 from bench.prediction.model_uncertainty import expanded_uncertainty
 from drivers.rig import Channel
 from protocols.harmonic.judge import judge
-from protocols.harmonic.parameters import HarmonicParameters
-from protocols.harmonic.point import HarmonicPoint, PointStatus
+from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, HarmonicSettings, PointStatus
 from protocols.harmonic.settle import JUDGED, KIN, LEFT, TURNING, Settled
 from sim.gain import predict_gain
-from sim.parameters import Parameters, quantity
-
-
-class HarmonicSettings(Parameters):
-    """What can be chosen after the measurement; the defaults are what the campaign itself does."""
-
-    measured_cycles: int | None = quantity(
-        None,
-        "1",
-        "cycles at the end of each dwell that are used, back to the last change of its drive; absent: as measured",
-        ge=4,
-        le=10000,
-    )
-    harmonics: int = quantity(HARMONICS, "1", "harmonics that are fitted to each cycle", ge=1, le=60)
-    peak: Literal["judged", "mean", "largest"] = quantity(
-        "judged",
-        "",
-        "peak of the mean cycle, largest peak met, or judged: the first where the motion is steady, else the second",
-    )
-    settle_tolerance: float | None = quantity(
-        None, "1", "relative change still expected when a channel counts as steady; absent: as measured", gt=0, le=0.1
-    )
 
 
 @dataclass

@@ -12,8 +12,8 @@ from bench.analysis.steady import WINDOW, Steadiness, SteadyDetector
 from bench.control.answer import Answer, Sine
 from bench.control.sine import SineControl, Tolerance
 from bench.engine.steps import Dwell, Fallen, Measured, Outcome, Step, Trim
-from protocols.harmonic.evidence import need_cycles
-from protocols.harmonic.parameters import HarmonicParameters
+from protocols.common.calibrate import need_cycles
+from protocols.harmonic.protocol import HarmonicParameters
 
 TURN = 6
 """Cycles between two looks at the table's motion and at steadiness."""

@@ -6,7 +6,8 @@
    next one is tried; a point that no start reaches is reported as what it did.
 """
 
-from collections.abc import Generator
+from collections.abc import Generator, Mapping, Sequence
+from math import tau
 
 from bench.analysis.cycles import Cycle
 from bench.analysis.gain import gain, steady_peak
@@ -15,17 +16,15 @@ from bench.control.answer import Sine
 from bench.control.calibration import DriveCalibration
 from bench.control.legs import Leg
 from bench.control.starts import Start
-from bench.engine.steps import Arm, Calibrate, Fallen, Follow, Handle, Outcome, Plan, RampOut, Say, Step
-from bench.events import Estimate, PointFinished, StepStarted, Warned
+from bench.engine.steps import Arm, Calibrate, Fallen, Follow, Handle, Outcome, RampOut, Say, Step
+from bench.events import Estimate, PointFinished, Progress, StepStarted, Warned
 from bench.prediction.model_uncertainty import expanded_uncertainty
 from drivers.rig import Handwork, RigError
-from protocols.harmonic.calibrate import calibrate_drive, harmonic_frequencies
+from protocols.common.calibrate import calibrate_drive, harmonic_frequencies
 from protocols.harmonic.judge import judge
-from protocols.harmonic.pace import Pace
-from protocols.harmonic.parameters import HarmonicParameters
-from protocols.harmonic.point import HarmonicPoint, PointStatus
+from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, PointStatus
 from protocols.harmonic.settle import Look, Settled, settle_and_measure
-from protocols.harmonic.stages import BARE_CHANGE, planned_starts, spring_calibration
+from protocols.harmonic.stages import BARE_CHANGE, spring_calibration
 from sim.gain import predict_gain
 from sim.specimen import Specimen
 
@@ -36,23 +35,58 @@ NO_BLOCK = "the first storey is pulled aside although the block was taken off: c
 
 FALLEN_REQUEST = "The block has fallen: stand it up again."
 
+OVERHEAD = 30.0
+"""Time of a test besides its cycles: rest, start, ramps [s]."""
+
+CYCLES = 220
+"""Cycles that a test typically takes until it is steady and measured."""
+
+
+class Pace:
+    """Counts tests down by their expected length on the bench."""
+
+    def __init__(self, omegas: tuple[float, ...], tests_per_omega: int) -> None:
+        self._total = tests_per_omega * sum(self._expected(omega) for omega in omegas)
+        self._finished = 0.0
+
+    @staticmethod
+    def _expected(omega: float) -> float:
+        return OVERHEAD + CYCLES * tau / omega
+
+    def finished(self, omega: float) -> None:
+        """A test at `omega` [rad/s] has its result."""
+        self._finished += self._expected(omega)
+
+    def progress(self, activity: str, omega: float | None = None, cycles: int = 0) -> Progress:
+        """Where the campaign stands, `cycles` into a test at `omega`."""
+        within = 0.0 if omega is None else min(cycles / CYCLES, 0.95) * self._expected(omega)
+        gone = min(self._finished + within, self._total)
+        return Progress(gone / self._total, self._total - gone, activity)
+
 
 class HarmonicSheet:
     """One campaign on one bench: what the plan knows and gathers while it runs."""
 
-    def __init__(self, parameters: HarmonicParameters, configuration: BenchConfiguration) -> None:
-        self._parameters = parameters
-        self._configuration = configuration
+    def __init__(
+        self,
+        parameters: HarmonicParameters,
+        configuration: BenchConfiguration,
+        starts: Mapping[tuple[float, float], Sequence[Start]],
+    ) -> None:
+        self._parameters, self._configuration, self._starts = parameters, configuration, starts
         self._specimen = configuration.known_specimen
         self._amplitude = parameters.amplitude_factor * self._specimen.uplift_acceleration
         self._pace = Pace(parameters.omega, 1 + len(parameters.beta))
         self._bare: dict[float, Settled] = {}
+        self._points: list[HarmonicPoint] = []
 
-    def plan(self) -> Plan:
-        """The whole campaign as steps."""
+    def plan(self) -> Generator[Step, Outcome, Sequence[HarmonicPoint]]:
+        """The whole campaign as steps; returns its points."""
         calibration = yield from self._bare_frame()
         for beta in self._parameters.beta:
-            yield from self._spring(self._specimen.coupled(beta), calibration)
+            plans = {omega: self._starts[beta, omega] for omega in self._parameters.omega}
+            yield from self._spring(self._specimen.coupled(beta), plans, calibration)
+        return self._points
 
     def _bare_frame(self) -> Generator[Step, Outcome, DriveCalibration]:
         yield Handle(Handwork.REMOVE_BLOCK, self._specimen.bare(), "Take the spring and the block off the table.")
@@ -79,10 +113,11 @@ class HarmonicSheet:
         yield RampOut()
         return calibration
 
-    def _spring(self, specimen: Specimen, calibration: DriveCalibration) -> Generator[Step, Outcome, None]:
+    def _spring(
+        self, specimen: Specimen, plans: Mapping[float, Sequence[Start]], calibration: DriveCalibration
+    ) -> Generator[Step, Outcome, None]:
         request = f"Stand the block on its base and mount the spring of beta = {specimen.label:g}."
         yield Handle(Handwork.MOUNT_SPRING, specimen, request)
-        plans = {omega: self._starts(specimen, omega) for omega in self._parameters.omega}
         yield Arm(REST)
         yield Say(StepStarted(f"calibrate the drive, beta = {specimen.label:g}"))
         starts = [start for each in plans.values() for start in each]
@@ -96,10 +131,11 @@ class HarmonicSheet:
             point = yield from self._point(specimen, omega, calibration, plans[omega])
             self._pace.finished(omega)
             yield Say(self._pace.progress(f"finished beta = {specimen.label:g} at {omega:g} rad/s"))
+            self._points.append(point)
             yield Say(PointFinished(point))
 
     def _point(
-        self, specimen: Specimen, omega: float, calibration: DriveCalibration, starts: list[Start]
+        self, specimen: Specimen, omega: float, calibration: DriveCalibration, starts: Sequence[Start]
     ) -> Generator[Step, Outcome, HarmonicPoint]:
         """Try the planned starts; the first steady rocking motion is the point, else the first that stood."""
         found: HarmonicPoint | None = None
@@ -159,10 +195,6 @@ class HarmonicSheet:
     ) -> Generator[Step, Outcome, Settled | Fallen]:
         asked = Sine(omega, self._amplitude, calibration)
         return settle_and_measure(asked, self._parameters, self._configuration.analysis, self._look(omega, specimen))
-
-    def _starts(self, specimen: Specimen, omega: float) -> list[Start]:
-        uncertainty = self._configuration.known
-        return list(planned_starts(specimen, omega, self._amplitude, self._parameters.starts, uncertainty))
 
     def _look(self, omega: float, specimen: Specimen | None) -> Look:
         """What the operator is told while a test settles: running alpha_2 beside the predicted one."""

@@ -1,28 +1,20 @@
-"""The whole drive of a harmonic campaign, told before it runs: what the lab sheet will ask of the table, in order.
+"""The whole drive of a harmonic campaign before it runs: every stage that the lab sheet may drive, in order."""
 
-The starts are planned here, once: the lab sheet takes them from the same cache, and nothing is computed while the bench
-is armed.
-"""
-
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from math import tau
 
 import numpy as np
 
 from bench.config.model import BenchConfiguration
 from bench.control.legs import Leg
-from bench.control.starts import Start, plan_starts
+from bench.control.starts import Start
 from bench.preflight.forecast import Stage
 from bench.preflight.response import TableResponse
-from protocols.harmonic.calibrate import CHANGE_TIME, MEASURED, PROBE, SETTLING, harmonic_frequencies
-from protocols.harmonic.parameters import HarmonicParameters
-from sim.gain import predict_gain
-from sim.knowledge import SpecimenKnowledge
+from protocols.common.calibrate import CHANGE_TIME, MEASURED, PROBE, SETTLING, harmonic_frequencies
+from protocols.harmonic.protocol import HarmonicParameters
 from sim.specimen import Specimen
 from sim.steady import resting_level
-from sim.sweep import Done
 
 BARE_CHANGE = 4.0
 """Time in which the bare frame goes from one frequency to the next [s], as the lab sheet has it."""
@@ -38,8 +30,8 @@ PROBES = (PROBE, 10.0 * PROBE)
 class Trial:
     """A stage as it is simulated: `before` it the legs that lead up to it and do not count, after it its last sine.
 
-    That one is simulated for `hold` [s] and may last `longest` [s]. `rocks` says whether the block is to rock.
-    `steady` is the sine [rad/s] whose steady state counts as well.
+    That one is simulated for `hold` [s] and may last `longest` [s]. `beta` is the stiffness ratio with which the block
+    is to rock, None where it is not to. `steady` is the sine [rad/s] whose steady state counts as well.
     """
 
     stage: Stage
@@ -47,7 +39,7 @@ class Trial:
     before: tuple[Leg, ...] = ()
     hold: float = 0.0
     longest: float = 0.0
-    rocks: bool = False
+    beta: float | None = None
     steady: float | None = None
 
     @property
@@ -62,55 +54,31 @@ class Trial:
         return sum(leg.duration for leg in self.before)
 
 
-def planned_starts(
-    specimen: Specimen, omega: float, amplitude: float, count: int, uncertainty: SpecimenKnowledge
-) -> tuple[Start, ...]:
-    """The starts that are tried at `amplitude` [m/s2] and `omega` [rad/s], best first, see
-    `bench.control.starts.plan_starts`; computed once.
-    """
-    # frozen parameters are hashable, though pydantic does not declare it
-    return _planned_starts(specimen, omega, amplitude, count, uncertainty)  # pyright: ignore[reportArgumentType]
-
-
-@lru_cache(maxsize=1024)
-def _planned_starts(
-    specimen: Specimen, omega: float, amplitude: float, count: int, uncertainty: SpecimenKnowledge
-) -> tuple[Start, ...]:
-    layer = predict_gain(specimen, omega, amplitude).rocking
-    return tuple(plan_starts(specimen, omega, amplitude, layer.orbit if layer else None, count, uncertainty))
-
-
 def trials(
     parameters: HarmonicParameters,
     configuration: BenchConfiguration,
     response: TableResponse | None,
-    done: Done = lambda _done, _all: None,
+    starts: Mapping[tuple[float, float], Sequence[Start]],
 ) -> Iterator[Trial]:
-    """Every stage that the lab sheet may come to, each planned start among them. `done` counts the points whose starts
-    are planned.
+    """Every stage that the lab sheet may come to, each of the planned `starts` (by stiffness and frequency) among them.
 
     Without a `response` of the table the calibration of the bare frame is taken to move it as asked.
     """
     specimen = configuration.known_specimen
-    amplitude = parameters.amplitude_factor * specimen.uplift_acceleration
     yield _bare_calibration(parameters, specimen, response)
     yield from _bare_tests(parameters, specimen)
-    longest, planned = _longest_dwell(parameters), 0
+    longest = _longest_dwell(parameters)
     for beta in parameters.beta:
         coupled = specimen.coupled(beta)
-        plans: dict[float, tuple[Start, ...]] = {}
-        for omega in parameters.omega:
-            plans[omega] = planned_starts(coupled, omega, amplitude, parameters.starts, configuration.known)
-            planned += 1
-            done(planned, len(parameters.beta) * len(parameters.omega))
+        plans = {omega: starts[beta, omega] for omega in parameters.omega}
         wanted, level = spring_calibration(parameters, coupled, [start for each in plans.values() for start in each])
         legs = _calibration_legs([(omega, level) for omega in wanted])
         yield Trial(Stage(f"calibration of the drive with beta = {beta:g}", legs), coupled)
-        for omega, starts in plans.items():
-            for number, start in enumerate(starts, 1):
+        for omega, planned in plans.items():
+            for number, start in enumerate(planned, 1):
                 name = f"start {number} of beta = {beta:g} at omega = {omega:g} rad/s"
                 stage = Stage(name, start.legs, start.chance)
-                yield Trial(stage, coupled, hold=HOLD, longest=longest, rocks=True, steady=omega)
+                yield Trial(stage, coupled, hold=HOLD, longest=longest, beta=beta, steady=omega)
 
 
 def spring_calibration(

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from bench.engine.steps import Arm, Fallen, Outcome, Play, Played, RampOut, Step
 from bench.events import Event, Progress
 from bench.guard.limits import Limits
-from protocols.harmonic.evidence import Unmeasurable
+from protocols.common.calibrate import Unmeasurable
 
 Array = NDArray[np.float64]
 

@@ -14,8 +14,7 @@ from bench.control.identification import line_amplitudes
 from bench.control.multisine import waveform
 from bench.engine.steps import Fallen, Outcome, Played, Say, Step
 from bench.events import StepStarted
-from protocols.harmonic.calibrate import PROBE
-from protocols.harmonic.evidence import Unmeasurable
+from protocols.common.calibrate import PROBE, Unmeasurable
 from protocols.identify.playing import Rules, played
 from protocols.identify.signal import Complex, Grid, drive_for, seen_peak
 

@@ -18,7 +18,7 @@ from bench.control.table_model import TableModel
 from bench.engine.steps import Fallen, Handle, Outcome, Plan, Played, Say, Step
 from bench.events import PointFinished, StepStarted, TableIdentified, Warned
 from drivers.rig import Handwork
-from protocols.harmonic.evidence import Unmeasurable
+from protocols.common.calibrate import Unmeasurable
 from protocols.identify.level import Planned, mounted_name, planned, specimen_of
 from protocols.identify.motion import RESTING, largest
 from protocols.identify.parameters import IdentifyParameters

@@ -33,8 +33,7 @@ from bench.engine.steps import (
 from bench.events import FitFinished, FittedParameter, PointFinished, Progress, Series, StepStarted
 from drivers.rig import Handwork
 from protocols.check.probe import probed_drive
-from protocols.harmonic.calibrate import SETTLING, calibrate_drive
-from protocols.harmonic.evidence import Unmeasurable, need_cycles
+from protocols.common.calibrate import SETTLING, Unmeasurable, calibrate_drive, need_cycles
 from protocols.laser_calibration.fit import Fitted, Pass, calibration, fitted, one_pass
 from protocols.laser_calibration.parameters import LaserCalibrationParameters
 from protocols.laser_calibration.point import sensors

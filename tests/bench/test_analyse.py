@@ -17,10 +17,8 @@ from bench.control.starts import Start
 from bench.guard.limits import Limits
 from bench.record.reader import open_record
 from drivers.simulated import SimulatedRig
-from protocols.harmonic import sheet
 from protocols.harmonic.campaign import HarmonicCampaign
-from protocols.harmonic.parameters import HarmonicParameters
-from protocols.harmonic.point import HarmonicPoint
+from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint
 from sim.gain import predict_gain
 from sim.specimen import Frame, Specimen
 from sim.virtual_bench import VirtualBenchParameters
@@ -47,7 +45,7 @@ ASKED = HarmonicParameters(
 )
 
 
-def _planned(specimen: Specimen, omega: float, amplitude: float, *_: object) -> tuple[Start, ...]:  # noqa: ARG001
+def _planned(_specimen: Specimen, omega: float, amplitude: float, *_: object) -> tuple[Start, ...]:
     """A start that topples the block, and a ramp that leaves it at rest: good starts take long to find."""
     shaken = Leg(2.0, 2.9 * amplitude, 12.0)
     violent = Start("violent", (shaken, replace(shaken, duration=3.0), Leg(2.0, amplitude, omega)), 0.1)
@@ -57,7 +55,7 @@ def _planned(specimen: Specimen, omega: float, amplitude: float, *_: object) -> 
 @pytest.fixture(scope="module", autouse=True)
 def _no_planning() -> object:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sheet, "planned_starts", _planned)
+        patch.setattr("protocols.harmonic.campaign.plan_starts", _planned)
         yield
 
 
@@ -67,7 +65,7 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("analyse") / "campaign.h5"
     rig = SimulatedRig(BENCH.simulation.bench, BENCH.specimen, seed=1, lead=BENCH.lead_samples)
     metadata = {"protocol": "harmonic", "parameters": ASKED.model_dump_json()}
-    ending = recorded(path, HarmonicCampaign(ASKED).plan(BENCH), rig, BENCH, HarmonicPoint, metadata)
+    ending = recorded(path, HarmonicCampaign(ASKED, BENCH).plan(), rig, BENCH, HarmonicPoint, metadata)
     assert ending.status == "completed"
     with open_record(path) as record:
         assert any("The block has fallen" in event.text for event in record.events)

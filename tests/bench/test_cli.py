@@ -19,9 +19,10 @@ from bench.config.model import BenchConfiguration
 from bench.engine.operator import Operator, Unattended
 from bench.engine.requests import Requests
 from bench.events import StepStarted, Subscriber
-from bench.session import Experiment, SessionResult
+from bench.protocol import Prepared, Protocol
+from bench.session import SessionResult
 from drivers.rig import RigError
-from protocols.harmonic.parameters import HarmonicParameters
+from protocols.harmonic.protocol import HarmonicParameters
 from sim.errors import InvalidInput, RockbenchError
 
 
@@ -35,8 +36,8 @@ class FakeSession:
 
     def __call__(
         self,
-        protocol: Experiment,
-        configuration: BenchConfiguration,
+        protocol: Protocol[Any],  # noqa: ARG002 - the surface of `run_session`
+        prepared: Prepared[Any],
         *,
         out: Path,
         operator: Operator,
@@ -46,8 +47,8 @@ class FakeSession:
     ) -> SessionResult:
         self.calls.append(
             {
-                "parameters": protocol.parameters,
-                "configuration": configuration,
+                "parameters": prepared.parameters,
+                "configuration": prepared.configuration,
                 "out": out,
                 "operator": operator,
                 "realtime": realtime,

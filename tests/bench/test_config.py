@@ -15,7 +15,7 @@ from bench.config.template import Kind, write_template
 from bench.config.toml import problems_of, read_configuration
 from bench.config.validation import problems, validated
 from drivers.hardware.parameters import Daq, Hardware, Laser1, Laser2, Lasers, TableForce
-from protocols.harmonic.parameters import HarmonicParameters
+from protocols.harmonic.protocol import HarmonicParameters
 from sim.errors import InvalidInput
 from sim.specimen import Frame, Specimen
 

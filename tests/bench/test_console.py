@@ -31,7 +31,7 @@ from bench.events import (
     Warned,
 )
 from drivers.rig import Block
-from protocols.harmonic.point import HarmonicPoint, PointStatus
+from protocols.harmonic.protocol import HarmonicPoint, PointStatus
 from protocols.identify.point import IdentifiedBand
 from tests.bench.twin_bench import estimate
 

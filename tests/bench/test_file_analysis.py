@@ -12,7 +12,7 @@ from bench.config.model import BenchConfiguration
 from bench.events import PointFinished
 from bench.record.reader import open_record
 from bench.replaying.beside import Analysis, write_analysis
-from protocols.harmonic.point import HarmonicPoint
+from protocols.harmonic.protocol import HarmonicPoint
 from tests.bench.test_record import FULL, begin, block
 
 

@@ -3,6 +3,7 @@
 import hashlib
 import json
 from collections import namedtuple
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -21,9 +22,9 @@ from bench.preflight.forecast import Demand, Forecast, Stage
 from bench.preflight.load import load
 from bench.preflight.margins import margins, refusal, warnings
 from bench.preflight.response import IdentifiedTable, SimulatedTable, response_of
-from bench.progress import Progress, silent
+from bench.protocol import Plan, Prepared, Result
 from bench.record import tables
-from protocols.harmonic.parameters import HarmonicParameters
+from protocols.harmonic.protocol import HarmonicParameters
 from sim.errors import InvalidInput
 from sim.parameters import Parameters
 from sim.shaker import Shaker
@@ -33,21 +34,28 @@ CONFIGURATION = BenchConfiguration()
 STAGE = Stage("hold", (Leg(2.0, 1.0, 10.0),), 0.5)
 
 
-class Silent:
-    """An experiment that predicts nothing."""
+class Silent(Prepared[HarmonicParameters]):
+    """A protocol that predicts nothing."""
 
-    name = "silent"
-    parameters: Parameters = HarmonicParameters()
+    def __init__(self) -> None:
+        super().__init__(HarmonicParameters(), CONFIGURATION)
+
+    def plan(self) -> Plan:
+        raise NotImplementedError
+
+    def result(self, points: Sequence[Parameters]) -> Result:
+        raise NotImplementedError
 
 
 class Telling(Silent):
-    """An experiment with the demands it is given."""
+    """A protocol with the demands it is given."""
 
     def __init__(self, *demands: Demand, duration: float = 100.0) -> None:
+        super().__init__()
         self._forecast = Forecast(demands, (STAGE,), duration)
 
-    def preflight(self, configuration: BenchConfiguration, progress: Progress = silent) -> Forecast:  # noqa: ARG002
-        assert configuration is CONFIGURATION
+    @property
+    def forecast(self) -> Forecast:
         return self._forecast
 
 
@@ -65,9 +73,9 @@ def test_the_tightest_margin_comes_first_and_the_unknown_last() -> None:
 @pytest.mark.parametrize("quantity", list(bounds(CONFIGURATION)))
 def test_what_is_beyond_a_limit_is_refused_by_its_name(quantity: str, tmp_path: Path) -> None:
     bound = bounds(CONFIGURATION)[quantity]
-    allowed = compile_run(Telling(_demand(quantity, bound.limit)), CONFIGURATION, tmp_path)
+    allowed = compile_run("silent", Telling(_demand(quantity, bound.limit)), tmp_path)
     assert allowed.refusal is None
-    beyond = compile_run(Telling(_demand(quantity, 1.25 * bound.limit)), CONFIGURATION, tmp_path)
+    beyond = compile_run("silent", Telling(_demand(quantity, 1.25 * bound.limit)), tmp_path)
     with pytest.raises(InvalidInput) as caught:
         beyond.require()
     assert (caught.value.item, caught.value.value) == (bound.owner, bound.limit)
@@ -110,7 +118,7 @@ def test_the_least_of_several_limits_binds() -> None:
 
 
 def test_an_experiment_without_predictions_has_no_margins_but_a_hash(tmp_path: Path) -> None:
-    found = compile_run(Silent(), CONFIGURATION, tmp_path)
+    found = compile_run("silent", Silent(), tmp_path)
     assert (found.margins, found.room, found.refusal, dict(found.tables)) == ((), None, None, {})
     assert len(found.plan_hash) == 64
 
@@ -127,7 +135,7 @@ def test_a_record_that_does_not_fit_is_refused(tmp_path: Path, monkeypatch: pyte
 
     monkeypatch.setattr(disk.shutil, "disk_usage", full)
     folder = tmp_path / "a" / "b"
-    refused = compile_run(Telling(duration=1000.0), CONFIGURATION, folder).refusal
+    refused = compile_run("silent", Telling(duration=1000.0), folder).refusal
     assert refused is not None
     assert seen[0] == tmp_path
     assert (refused.item, refused.value) == ("--out", str(folder))
@@ -206,7 +214,7 @@ def test_the_hash_is_the_same_for_the_same_run_and_for_its_last_bits() -> None:
 
 
 def test_the_tables_can_be_stored(tmp_path: Path) -> None:
-    found = compile_run(Telling(_demand("drift", 0.05), _demand("force", None)), CONFIGURATION, tmp_path)
+    found = compile_run("silent", Telling(_demand("drift", 0.05), _demand("force", None)), tmp_path)
     for name, table in found.tables.items():
         tables.check(name, table)
     assert found.tables["preflight"]["margin"].values == pytest.approx([0.375, np.nan], nan_ok=True)

@@ -24,7 +24,7 @@ from bench.queue.owner import Owner
 from bench.queue.queue import Queue
 from bench.queue.queued import OPEN, Queued, Stage
 from drivers.rig import RigError
-from protocols.harmonic.parameters import HarmonicParameters
+from protocols.harmonic.protocol import HarmonicParameters
 from sim.errors import InvalidInput
 from tests.bench.test_cli import FakeSession
 
@@ -231,7 +231,7 @@ def test_what_waits_goes_on_waiting_after_a_test_that_did_not_end_well(
 @pytest.mark.parametrize(
     ("second", "said"),
     [
-        ({"protocol": "harmonics"}, "test 2: protocol = 'harmonics' is refused: one of harmonic, "),
+        ({"protocol": "harmonics"}, "test 2: protocol = 'harmonics' is refused: one of check, "),
         ({"protocol": "harmonic", "parameters": {"omega": [99.0]}}, "test 2: omega[0] = 99.0"),
         ({"protocol": "check", "parameters": {"velocity": 0.5}}, "test 2: omega = "),
         ({"protocol": "harmonic", "out": "full"}, "test 2: --out = 'full' is refused: it holds campaign.h5 already"),

@@ -26,7 +26,7 @@ from bench.record.reader import open_record
 from bench.record.recorder import Recorder
 from bench.record.tables import Column
 from drivers.rig import Block, Channel
-from protocols.harmonic.point import HarmonicPoint, PointStatus
+from protocols.harmonic.protocol import HarmonicPoint, PointStatus
 from sim.errors import InvalidInput
 from sim.parameters import Parameters, quantity
 

@@ -16,7 +16,7 @@ from bench.record.recorder import Recorder
 from bench.record.recovery import recover
 from bench.record.verification import verify
 from drivers.rig import Block, Channel
-from protocols.harmonic.point import HarmonicPoint
+from protocols.harmonic.protocol import HarmonicPoint
 from tests.bench.test_recorder_crash import BLOCK, NAMES, POINT, check, counts_of
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="forks and kills the POSIX way")

@@ -17,7 +17,7 @@ from bench.record.errors import RecordError
 from bench.record.reader import Record, open_record
 from bench.record.recorder import Recorder
 from drivers.rig import Block, Channel
-from protocols.harmonic.point import HarmonicPoint, PointStatus
+from protocols.harmonic.protocol import HarmonicPoint, PointStatus
 
 ROOT = Path(__file__).parents[2]
 POSIX_ONLY = pytest.mark.skipif(os.name != "posix", reason="kills and limits processes the POSIX way")

@@ -16,7 +16,7 @@ from bench.publication.cycles import PERIODS, SAMPLES, Dwells
 from bench.publication.report import campaign_report
 from bench.record.reader import open_record
 from bench.report.page.document import Document, Picture, Section, Table
-from protocols.harmonic.parameters import HarmonicParameters
+from protocols.harmonic.protocol import HarmonicParameters
 from sim.gain import predict_gain
 
 SHORT = ["--omega", "20", "--beta", "0.25", "--ramp-time", "2", "--measured-cycles", "8"]

@@ -17,7 +17,7 @@ from bench.preflight.compiled import compile_run
 from drivers.hardware.parameters import CoilCurrent, Hardware, TableAcceleration, TableDisplacement, TableForce
 from protocols.check.experiment import LoopCheck
 from protocols.check.parameters import CheckParameters
-from protocols.harmonic.parameters import HarmonicParameters
+from protocols.harmonic.protocol import HarmonicParameters
 from sim.errors import InvalidInput
 from sim.specimen import Frame, Specimen, Spring
 

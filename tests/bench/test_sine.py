@@ -12,7 +12,7 @@ from bench.analysis.signals import ACCELERATION, SIGNALS
 from bench.control.answer import Answer, Sine
 from bench.control.calibration import DriveCalibration
 from bench.control.sine import GAIN, LARGEST_STEP, SineControl, Tolerance
-from protocols.harmonic.parameters import HarmonicParameters
+from protocols.harmonic.protocol import HarmonicParameters
 
 AIMED = Tolerance(amplitude=0.0005, phase=np.radians(0.05), distortion=0.005)
 UPDATES = 6

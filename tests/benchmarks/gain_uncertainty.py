@@ -26,7 +26,7 @@ from bench.analysis.table_motion import at_rest_in_the_end, table_motion
 from protocols.earthquake.observed import observe
 from protocols.earthquake.sensors import drift_errors
 from protocols.harmonic.judge import AMPLITUDE_STEP
-from protocols.harmonic.parameters import HarmonicParameters
+from protocols.harmonic.protocol import HarmonicParameters
 from protocols.harmonic.settle import LEFT
 from sim.excitation import SampledRecord
 from sim.gain import predict_gain

@@ -29,7 +29,7 @@ from PySide6.QtCore import QEvent, QEventLoop, QObject
 from PySide6.QtWidgets import QApplication
 
 from bench.analysis.signals import SignalMap
-from bench.cli.catalogue import CATALOGUE
+from bench.catalogue import all_protocols
 from bench.config.model import BenchConfiguration, Simulation
 from bench.events import Acquired
 from bench.gui.app import dress
@@ -50,8 +50,7 @@ HOUR, TOGETHER = 3600.0, 30
 """Seconds of the soak, and how many of its blocks are drawn at once."""
 
 OURS = """
-from bench.cli.catalogue import CATALOGUE
-from bench.cli.check import CHECK
+from bench.catalogue import all_protocols
 from bench.cli.inputs import configuration_from
 configuration = configuration_from(None, None)
 from PySide6.QtWidgets import QApplication
@@ -62,7 +61,7 @@ from bench.gui.window import Window
 application = QApplication([])
 dress(application, LIGHT)
 controller = Controller()
-window = Window(controller, configuration, (*CATALOGUE, CHECK), LIGHT, tour=True)
+window = Window(controller, configuration, all_protocols()[0], LIGHT, tour=True)
 """
 PEER = """
 import pyqtgraph
@@ -253,7 +252,7 @@ def main(seconds: float, length: float) -> None:
     application = QApplication([])
     dress(application, LIGHT)
     controller = Controller()
-    window = Window(controller, BenchConfiguration(simulation=Simulation(bench=PARAMETERS)), CATALOGUE, LIGHT)
+    window = Window(controller, BenchConfiguration(simulation=Simulation(bench=PARAMETERS)), all_protocols()[0], LIGHT)
     window.pages.setCurrentWidget(window.run)
     window.show()
     application.processEvents()

@@ -7,18 +7,26 @@ import pytest
 from PySide6.QtWidgets import QApplication, QWidget
 from pytestqt.qtbot import QtBot
 
-from bench.cli.catalogue import CATALOGUE, Entry
+from bench.catalogue import GROUP, all_protocols
 from bench.gui.app import dress
 from bench.gui.controller import Controller
 from bench.gui.palette import LIGHT
 from bench.gui.stop import StopFilter
 from bench.gui.window import Window
 from bench.link.messages import FromSession, Survey
-from tests.link.experiment import Shaking, ShakingParameters, bench
+from tests.link.experiment import SHAKING, bench
+from tests.plugins import installed
 
-SHAKING = Entry(
-    name="shaking", summary="One sine.", details="For tests.", parameters=ShakingParameters, campaign=Shaking
-)
+PROTOCOLS = tuple(each for each in all_protocols()[0] if each.name != SHAKING.name)
+"""Those of the project."""
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _shaking_is_installed(tmp_path_factory: pytest.TempPathFactory) -> Generator[None]:
+    """The sessions of these tests are processes of their own, and find their protocol as they find every other."""
+    entry_points = {GROUP: {"shaking": "tests.link.experiment:SHAKING"}}
+    with installed(tmp_path_factory.mktemp("shaking"), "rockbench-shaking", entry_points):
+        yield
 
 
 class SpokenLink:
@@ -79,7 +87,7 @@ def window(qtbot: QtBot, qapp: QApplication, tmp_path: Path) -> Generator[Window
     before = qapp.styleSheet()
     dress(qapp, LIGHT)
     controller = Controller()
-    shown = Window(controller, bench(), (SHAKING, *CATALOGUE), LIGHT)
+    shown = Window(controller, bench(), (SHAKING, *PROTOCOLS), LIGHT)
     key = StopFilter(controller, shown.header.stop)
     qapp.installEventFilter(key)
     shown.protocol.folder.setText(str(tmp_path / "run"))

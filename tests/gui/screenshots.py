@@ -14,7 +14,7 @@ from pathlib import Path
 
 from PySide6.QtWidgets import QApplication
 
-from bench.cli.catalogue import CATALOGUE
+from bench.catalogue import all_protocols, load_protocol
 from bench.cli.queueing import queued
 from bench.config.model import BenchConfiguration, Simulation
 from bench.events import Estimate, Event
@@ -25,7 +25,7 @@ from bench.gui.window import Window
 from bench.link.messages import Question
 from bench.queue.queued import Stage
 from bench.results import FILE
-from protocols.harmonic.parameters import HarmonicParameters
+from protocols.harmonic.protocol import HarmonicParameters
 
 LONG = 120.0
 SIZE = (1280, 800)
@@ -50,7 +50,7 @@ def take(folder: Path) -> None:
         window = Window(
             controller,
             BenchConfiguration(simulation=simulation),
-            CATALOGUE,
+            all_protocols()[0],
             theme,
             queue=Path("runs", "queue.json"),
             tour=True,
@@ -142,7 +142,7 @@ def fill(window: Window) -> None:
         (18.0, Stage.SKIPPED, ""),
     ):
         asked = HarmonicParameters(omega=(omega,), beta=(0.4,), starts=3)
-        test = queued(CATALOGUE[0], asked, Path("runs", f"omega-{omega:g}"), realtime=True)
+        test = queued(load_protocol("harmonic"), asked, Path("runs", f"omega-{omega:g}"), realtime=True)
         window.runner.queue.add(test.model_copy(update={"stage": stage, "told": told}))
     window.runner.changed.emit()
     window.queue.table.setCurrentCell(2, 0)

@@ -15,7 +15,7 @@ from bench.gui.palette import DARK, LIGHT
 from bench.record.tables import Column, Table
 from protocols.earthquake.point import EarthquakePoint
 from protocols.earthquake.point import PointStatus as Ended
-from protocols.harmonic.point import HarmonicPoint, PointStatus
+from protocols.harmonic.protocol import HarmonicPoint, PointStatus
 
 RECORDS: Table = {
     "record": Column(np.array(["Kobe", "Kobe", "Kobe", "El Centro", "El Centro"]), "", ""),

@@ -20,7 +20,6 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
-from bench.cli.catalogue import CATALOGUE
 from bench.gui import texts
 from bench.gui.buttons import key_of
 from bench.gui.controller import Controller
@@ -29,7 +28,7 @@ from bench.gui.stop import StopButton
 from bench.gui.window import Window
 from bench.link.messages import Question
 from bench.queue.queued import Queued
-from tests.gui.conftest import SHAKING, SpokenLink
+from tests.gui.conftest import PROTOCOLS, SHAKING, SpokenLink
 from tests.link.experiment import bench, order
 
 OPERATED = (QAbstractButton, QLineEdit, QComboBox, QAbstractSpinBox, QAbstractItemView, QPlainTextEdit, QTabBar)
@@ -123,7 +122,7 @@ def test_a_layout_is_remembered(qtbot: QtBot, tmp_path_factory: pytest.TempPathF
     settings = QSettings(str(tmp_path_factory.mktemp("kept") / "kept.ini"), QSettings.Format.IniFormat)
 
     def opened() -> Window:
-        window = Window(Controller(), bench(), (SHAKING, *CATALOGUE), LIGHT, settings=settings)
+        window = Window(Controller(), bench(), (SHAKING, *PROTOCOLS), LIGHT, settings=settings)
         qtbot.addWidget(window)
         window.show()
         return window

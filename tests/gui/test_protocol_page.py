@@ -1,22 +1,22 @@
 """The form says what the declaration says; nothing starts before its plan was checked."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLineEdit
 from pytestqt.qtbot import QtBot
 
-from bench.cli.catalogue import CATALOGUE, Entry
-from bench.cli.check import CHECK
 from bench.config.declared import declared
 from bench.gui import texts
 from bench.gui.form import Form
 from bench.gui.window import Window
 from bench.link.messages import Refused, Run, Surveyed
-from protocols.harmonic.parameters import HarmonicParameters
+from bench.protocol import Protocol
+from protocols.harmonic.protocol import HarmonicParameters
 from sim.errors import InvalidInput
-from tests.gui.conftest import SpokenLink
+from tests.gui.conftest import PROTOCOLS, SpokenLink
 
 FINE = Surveyed((), None, (), 60.0, 1e6, 1e9, "hash", {})
 
@@ -26,8 +26,8 @@ def _type(field: object, text: str) -> None:
     field.setText(text)
 
 
-@pytest.mark.parametrize("entry", [*CATALOGUE, CHECK], ids=lambda entry: entry.name)
-def test_an_untouched_form_is_the_defaults(entry: Entry, qtbot: QtBot) -> None:
+@pytest.mark.parametrize("entry", PROTOCOLS, ids=lambda entry: entry.name)
+def test_an_untouched_form_is_the_defaults(entry: Protocol[Any], qtbot: QtBot) -> None:
     form = Form(entry.parameters)
     qtbot.addWidget(form)
     values = [each for each in declared(entry.parameters) if each.group is None]

@@ -9,7 +9,6 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLineEdit
 from pytestqt.qtbot import QtBot
 
-from bench.cli.catalogue import CATALOGUE
 from bench.cli.main import main
 from bench.config.model import BenchConfiguration
 from bench.gui import texts
@@ -21,7 +20,7 @@ from bench.link.messages import Ended, FromSession, Question, Refused, Run, Surv
 from bench.queue.file import LEFT, QueueFile
 from bench.queue.queued import Queued, Stage
 from sim.errors import InvalidInput
-from tests.gui.conftest import SHAKING, SpokenLink
+from tests.gui.conftest import PROTOCOLS, SHAKING, SpokenLink
 from tests.link.experiment import bench, order
 
 pytestmark = pytest.mark.usefixtures("without_plots")
@@ -383,7 +382,7 @@ def test_the_end_of_another_run_is_none_of_a_test(filled: Window, spoken: type[S
 
 
 def _window(qtbot: QtBot, queue: Path) -> Window:
-    window = Window(Controller(), bench(), (SHAKING, *CATALOGUE), LIGHT, queue=queue)
+    window = Window(Controller(), bench(), (SHAKING, *PROTOCOLS), LIGHT, queue=queue)
     qtbot.addWidget(window)
     window.show()
     return window

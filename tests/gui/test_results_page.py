@@ -23,7 +23,7 @@ from bench.link.messages import Ended
 from bench.record.recorder import Recorder
 from bench.record.tables import Column
 from drivers.rig import Block, Channel
-from protocols.harmonic.point import HarmonicPoint, PointStatus
+from protocols.harmonic.protocol import HarmonicPoint, PointStatus
 
 RATE, N = 1000.0, 4000
 LONG = 60_000

@@ -18,7 +18,7 @@ from bench.gui.window import Window
 from bench.link.messages import Beat, Ended, Question, Surveyed, Told, Traces
 from bench.link.reduction import TRACES
 from bench.record.tables import Column
-from protocols.harmonic.point import HarmonicPoint, PointStatus
+from protocols.harmonic.protocol import HarmonicPoint, PointStatus
 from tests.bench.twin_bench import estimate
 from tests.gui.conftest import SpokenLink
 from tests.link.experiment import order

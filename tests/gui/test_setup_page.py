@@ -10,7 +10,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFileDialog, QTreeWidgetItem
 from pytestqt.qtbot import QtBot
 
-from bench.cli.check import CHECK
+from bench.catalogue import load_protocol
 from bench.config.dump import as_toml
 from bench.config.model import BenchConfiguration
 from bench.config.specimen_file import write_specimen
@@ -172,7 +172,7 @@ def _check(window: Window, spoken: type[SpokenLink], qtbot: QtBot, lines: tuple[
     qtbot.mouseClick(window.setup.loop.check, Qt.MouseButton.LeftButton)
     run = spoken.latest.assignment
     assert isinstance(run, Run)
-    assert (run.make, run.parameters, run.person) == (CHECK.campaign, CHECK.parameters(), False)
+    assert (run.protocol, run.parameters, run.person) == ("check", load_protocol("check").parameters(), False)
     spoken.latest.said = [Told(PointFinished(line, time=1.0)) for line in lines]
     window._controller._look()
     spoken.latest.said = [Ended(status, "told", {"points": []}, "", run.out)]

@@ -13,7 +13,7 @@ from bench.gui.steadiness import NEEDED, SensorSteadiness
 from bench.gui.steady_view import MARKS, SteadyView
 from bench.link.messages import Traces
 from bench.link.reduction import TRACES
-from protocols.harmonic.parameters import HarmonicParameters
+from protocols.harmonic.protocol import HarmonicParameters
 from tests.link.experiment import order
 
 STEP, OMEGA, TOLERANCE = 0.002, 16.0, 0.002

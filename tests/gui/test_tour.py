@@ -5,7 +5,6 @@ from pathlib import Path
 import pytest
 from pytestqt.qtbot import QtBot
 
-from bench.cli.catalogue import CATALOGUE
 from bench.config.model import BenchConfiguration
 from bench.events import PointFinished, Warned
 from bench.gui.controller import Controller
@@ -15,7 +14,7 @@ from bench.gui.troubles import Trouble
 from bench.gui.window import Window
 from bench.link.messages import Ended, Question, Refused, Surveyed
 from sim.parameters import Parameters
-from tests.gui.conftest import SHAKING
+from tests.gui.conftest import PROTOCOLS, SHAKING
 from tests.link.experiment import bench, order
 
 FINE = Surveyed((), None, (), 60.0, 1e6, 1e9, "hash", {})
@@ -66,7 +65,7 @@ def test_a_run_without_a_point_is_begun_again(controller: Controller, ended: End
 @pytest.mark.usefixtures("without_plots", "spoken")
 def test_the_tour_gives_way_to_what_matters_and_to_a_real_bench(qtbot: QtBot) -> None:
     controller = Controller()
-    window = Window(controller, bench(), (SHAKING, *CATALOGUE), LIGHT, tour=True)
+    window = Window(controller, bench(), (SHAKING, *PROTOCOLS), LIGHT, tour=True)
     qtbot.addWidget(window)
     window.show()
     assert window.welcome.isVisible()

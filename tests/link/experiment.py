@@ -1,16 +1,18 @@
 """A short experiment on the small bench of the fault tests, made anew in the session's process."""
 
 from collections.abc import Sequence
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
 from bench.config.model import Acquisition, BenchConfiguration, Simulation
 from bench.control.legs import Leg
-from bench.engine.steps import Arm, Calibrate, Dwell, Follow, Handle, Plan, RampOut, Say
+from bench.engine.steps import Arm, Calibrate, Dwell, Follow, Handle, RampOut, Say
 from bench.events import Estimate, PointFinished, StepStarted
 from bench.link.client import Link
 from bench.link.messages import Run
+from bench.protocol import Plan, Prepared, Protocol, Result, Sources
 from bench.record.tables import Column, Table
 from drivers.rig import Handwork
 from sim.errors import InvalidInput
@@ -29,25 +31,22 @@ class ShakingParameters(Parameters):
     amplitude: float = quantity(AMPLITUDE, "m/s2", "amplitude of the table acceleration", gt=0, le=2)
 
 
-class Shaking:
+class Shaking(Prepared[ShakingParameters]):
     """Arms, shakes and ramps out."""
 
-    name = "shaking"
-    figure_name = "none.png"
-    point_type: type[Parameters] = NoPoint
+    def __init__(
+        self, parameters: ShakingParameters, configuration: BenchConfiguration, stored: Sources | None = None
+    ) -> None:
+        super().__init__(parameters, configuration, stored)
+        if configuration.limits.acceleration < parameters.amplitude:
+            raise InvalidInput("amplitude", parameters.amplitude, "the limit is lower")
 
-    def __init__(self, parameters: ShakingParameters) -> None:
-        self.parameters = parameters
+    @cached_property
+    def prediction(self) -> Table:
+        return {"value": Column(np.array([1.0]), "1", f"of the {self.configuration.backend} bench")}
 
-    def check(self, configuration: BenchConfiguration) -> None:
-        if configuration.limits.acceleration < self.parameters.amplitude:
-            raise InvalidInput("amplitude", self.parameters.amplitude, "the limit is lower")
-
-    def predict(self, configuration: BenchConfiguration) -> Table:
-        return {"value": Column(np.array([1.0]), "1", f"of the {configuration.backend} bench")}
-
-    def plan(self, configuration: BenchConfiguration) -> Plan:
-        yield Handle(Handwork.REMOVE_BLOCK, configuration.specimen, "Take the block off the table.")
+    def plan(self) -> Plan:
+        yield Handle(Handwork.REMOVE_BLOCK, self.configuration.specimen, "Take the block off the table.")
         yield Say(StepStarted("shaking", time=0.0))
         yield Arm(0.2, patience=5.0)
         yield Calibrate(CALIBRATION)
@@ -57,13 +56,26 @@ class Shaking:
             for _ in range(self.parameters.gossip):
                 yield Say(Estimate(OMEGA, None, cycle, 0.001, float("nan"), float("nan"), float("nan"), time=0.0))
         yield RampOut()
-        yield Say(PointFinished(NoPoint(value=1.0), time=0.0))
+        point = NoPoint(value=1.0)
+        yield Say(PointFinished(point, time=0.0))
+        return self.result([point])
 
-    def table(self, points: Sequence[Parameters]) -> str:
-        return f"{len(points)} points"
+    def result(self, points: Sequence[Parameters]) -> Result:
+        def draw(path: Path) -> None:
+            path.write_text(f"{len(points)} of {len(self.prediction)}", encoding="utf-8")
 
-    def figure(self, points: Sequence[Parameters], prediction: Table, path: Path) -> None:
-        path.write_text(f"{len(points)} of {len(prediction)}", encoding="utf-8")
+        return Result(tuple(points), f"{len(points)} points", {"none.png": draw})
+
+
+SHAKING = Protocol(
+    name="shaking",
+    summary="One sine.",
+    details="For tests.",
+    parameters=ShakingParameters,
+    point=NoPoint,
+    prepare=Shaking,
+    figures=("none.png",),
+)
 
 
 def bench() -> BenchConfiguration:
@@ -82,7 +94,14 @@ def order(out: Path, *, realtime: bool = True, person: bool = False, keep_going:
     """The order for a run with these parameters."""
     parameters = ShakingParameters.model_validate(asked)
     return Run(
-        Shaking, parameters, bench(), out, realtime=realtime, person=person, keep_going=keep_going, about={"notes": "n"}
+        SHAKING.name,
+        parameters,
+        bench(),
+        out,
+        realtime=realtime,
+        person=person,
+        keep_going=keep_going,
+        about={"notes": "n"},
     )
 
 

@@ -33,7 +33,7 @@ from bench.link.reduction import extremes
 from bench.record.reader import open_record
 from bench.results import FILE
 from bench.session import run_session
-from tests.link.experiment import Shaking, ShakingParameters, begun, bench
+from tests.link.experiment import SHAKING, Shaking, ShakingParameters, begun, bench
 
 LONG = 60.0
 
@@ -77,8 +77,8 @@ def test_a_run_over_the_link_is_the_run_of_the_command_line(tmp_path: Path) -> N
     client = Client(begun(tmp_path / "linked", realtime=False, cycles=6))
     ended = client.until_over()
     direct = run_session(
-        Shaking(ShakingParameters(cycles=6)),
-        bench(),
+        SHAKING,
+        Shaking(ShakingParameters(cycles=6), bench()),
         out=tmp_path / "direct",
         operator=Unattended("the bench itself"),
         subscribers=[],
@@ -117,7 +117,7 @@ def test_traces_enclose_the_recorded_samples(tmp_path: Path) -> None:
 
 
 def test_a_survey_opens_nothing(tmp_path: Path) -> None:
-    client = Client(Link(Survey(Shaking, ShakingParameters(), bench(), tmp_path / "run")))
+    client = Client(Link(Survey("shaking", ShakingParameters(), bench(), tmp_path / "run")))
     found = client.until_over()
     assert isinstance(found, Surveyed)
     assert (found.refusal, list(found.prediction)) == (None, ["value"])
@@ -228,14 +228,14 @@ def test_extremes_are_those_of_each_bin() -> None:
 
 def test_whoever_waits_is_called_when_there_is_something_to_take(tmp_path: Path) -> None:
     called = threading.Event()
-    link = Link(Survey(Shaking, ShakingParameters(), bench(), tmp_path / "run"), called.set)
+    link = Link(Survey("shaking", ShakingParameters(), bench(), tmp_path / "run"), called.set)
     assert called.wait(60.0)
     assert link.take()
 
 
 def test_a_link_that_is_over_leaves_no_thread_and_no_handle(tmp_path: Path) -> None:
     before = set(threading.enumerate())
-    client = Client(Link(Survey(Shaking, ShakingParameters(), bench(), tmp_path / "run")))
+    client = Client(Link(Survey("shaking", ShakingParameters(), bench(), tmp_path / "run")))
     assert isinstance(client.until_over(), Surveyed)
     end = time.monotonic() + 5.0
     while (left := set(threading.enumerate()) - before) and time.monotonic() < end:

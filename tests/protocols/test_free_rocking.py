@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bench.catalogue import load_protocol
 from bench.cli.main import main
 from bench.config.model import BenchConfiguration, Simulation
 from bench.config.specimen_file import read_specimen
@@ -19,7 +20,6 @@ from bench.publication.free_rocking import rocking_section
 from bench.record.reader import open_record
 from bench.results import FILE
 from bench.session import SessionResult, run_session
-from protocols.free_rocking.experiment import FreeRockingTest
 from protocols.free_rocking.parameters import FreeRockingParameters
 from protocols.free_rocking.planned import planned_tilts, seen_displacement
 from protocols.free_rocking.point import ALL, RockingPoint
@@ -30,6 +30,7 @@ from sim.specimen import Block, Specimen
 from sim.virtual_bench import VirtualBenchParameters
 
 FACTOR = 0.985
+PROTOCOL = load_protocol("free-rocking")
 SHORT = FreeRockingParameters(tilts=(0.5,))
 # the rocking block moves by 36 mm: no drift, and not to be taken for one
 LIMITS = Limits(drift=0.02)
@@ -53,8 +54,8 @@ def run(
 ) -> tuple[SessionResult, list[Event]]:
     events: list[Event] = []
     result = run_session(
-        FreeRockingTest(SHORT),
-        configuration,
+        PROTOCOL,
+        PROTOCOL.prepare(SHORT, configuration, None),
         out=out,
         operator=operator or Unattended(),
         subscribers=[events.append],
@@ -174,7 +175,8 @@ def test_a_run_that_is_declined_says_what_is_left_to_undo(tmp_path: Path) -> Non
 
 
 def test_preflight_says_that_nothing_is_driven(tmp_path: Path) -> None:
-    margins = {each.bound.quantity: each for each in compile_run(FreeRockingTest(SHORT), bench(), tmp_path).margins}
+    prepared = PROTOCOL.prepare(SHORT, bench(), None)
+    margins = {each.bound.quantity: each for each in compile_run("free-rocking", prepared, tmp_path).margins}
     assert (margins["drive_voltage"].demand.value, margins["displacement"].demand.value) == (0.0, 0.0)
     assert margins["drift"].margin is None
     alpha = critical_angle(Block())
@@ -205,4 +207,4 @@ def test_what_cannot_be_watched_is_refused(
     asked: dict[str, object], configuration: BenchConfiguration, says: str
 ) -> None:
     with pytest.raises((InvalidInput, ValueError), match=says):
-        FreeRockingTest(FreeRockingParameters(**asked)).check(configuration)  # type: ignore[arg-type]
+        PROTOCOL.prepare(FreeRockingParameters(**asked), configuration, None)  # type: ignore[arg-type]

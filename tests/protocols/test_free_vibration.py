@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from pydantic import ValidationError
 
 from bench.analysis.free_decay.stretch import Unusable
 from bench.analysis.rounding import in_brackets, plus_minus
+from bench.catalogue import load_protocol
 from bench.config.model import BenchConfiguration, Simulation
 from bench.config.specimen_file import read_specimen
 from bench.engine.operator import Unattended
@@ -17,21 +19,21 @@ from bench.engine.steps import Handle, Plan
 from bench.events import Acquired, Event, FitFinished, OperatorAsked, StepStarted, Warned
 from bench.guard.limits import Limits
 from bench.preflight.compiled import compile_run
+from bench.protocol import Prepared, Protocol
 from bench.publication.campaign import Campaign
 from bench.publication.free_vibration import vibration_section
 from bench.record.reader import open_record
 from bench.record.verification import verify
 from bench.report.page.document import Picture, Table
 from bench.results import FILE
-from bench.session import Experiment, SessionResult, run_session
-from protocols.coupling_stiffness.experiment import CouplingStiffness
+from bench.session import SessionResult, run_session
+from protocols.common.calibrate import Unmeasurable
 from protocols.coupling_stiffness.parameters import CouplingStiffnessParameters
-from protocols.free_vibration.experiment import FreeVibration
 from protocols.free_vibration.parameters import FreeVibrationParameters
 from protocols.free_vibration.pulse import SHARE, planned
-from protocols.harmonic.evidence import Unmeasurable
 from sim.errors import InvalidInput
 from sim.identified import Correlation, Finding, Identified
+from sim.parameters import Parameters
 from sim.sensors import Laser
 from sim.specimen import Frame, Specimen
 from sim.virtual_bench import VirtualBenchParameters
@@ -49,11 +51,20 @@ def bench(**changes: object) -> BenchConfiguration:
     return BenchConfiguration(simulation=simulation, **changes)  # type: ignore[arg-type]
 
 
-def run(experiment: Experiment, configuration: BenchConfiguration, out: Path) -> tuple[SessionResult, list[Event]]:
+FRAME, SPRINGS = load_protocol("free-vibration"), load_protocol("coupling-stiffness")
+
+
+def prepared(parameters: Parameters, configuration: BenchConfiguration) -> Prepared[Any]:
+    """By the protocol whose parameters they are."""
+    protocol: Protocol[Any] = FRAME if isinstance(parameters, FreeVibrationParameters) else SPRINGS
+    return protocol.prepare(parameters, configuration, None)
+
+
+def run(parameters: Parameters, configuration: BenchConfiguration, out: Path) -> tuple[SessionResult, list[Event]]:
     events: list[Event] = []
     result = run_session(
-        experiment,
-        configuration,
+        FRAME if isinstance(parameters, FreeVibrationParameters) else SPRINGS,
+        prepared(parameters, configuration),
         out=out,
         operator=Unattended(),
         subscribers=[lambda event: None if isinstance(event, Acquired) else events.append(event)],
@@ -71,7 +82,7 @@ def close(finding: Finding | None, truth: float) -> bool:
 def test_pulses_tell_the_frame_and_everything_is_kept(tmp_path: Path) -> None:
     out = tmp_path / "run"
     parameters = FreeVibrationParameters(repeats=2, window=10.0)
-    result, events = run(FreeVibration(parameters), bench(), out)
+    result, events = run(parameters, bench(), out)
     assert (result.status, result.reason) == ("completed", "the plan was carried out")
     found = read_specimen(out / "specimen.json")
     assert found.names == ("k1", "k2", "xi1", "xi2", "m1", "m2")
@@ -110,7 +121,7 @@ def test_pulses_tell_the_frame_and_everything_is_kept(tmp_path: Path) -> None:
 def test_a_frame_let_go_by_hand_says_the_same(tmp_path: Path) -> None:
     out = tmp_path / "run"
     parameters = FreeVibrationParameters(excitation="hand", repeats=1, window=20.0, pull=0.025)
-    result, events = run(FreeVibration(parameters), bench(), out)
+    result, events = run(parameters, bench(), out)
     assert result.status == "completed"
     found = read_specimen(out / "specimen.json")
     assert all(close(found.finding(name), getattr(TRUE, name)) for name in found.names)
@@ -122,7 +133,7 @@ def test_a_frame_let_go_by_hand_says_the_same(tmp_path: Path) -> None:
 def test_the_spring_is_the_difference_that_it_makes(tmp_path: Path) -> None:
     out = tmp_path / "run"
     parameters = CouplingStiffnessParameters(beta=(0.25, 0.97), repeats=1, window=10.0)
-    result, _ = run(CouplingStiffness(parameters), bench(), out)
+    result, _ = run(parameters, bench(), out)
     assert result.status == "completed"
     found = read_specimen(out / "specimen.json")
     for label in (0.25, 0.97):
@@ -167,7 +178,7 @@ KNOWN_REFERENCE = CouplingStiffnessParameters(beta=(0.64,), repeats=1, window=10
 
 def test_a_spring_against_a_frame_that_was_identified_before(tmp_path: Path) -> None:
     out = tmp_path / "run"
-    run(CouplingStiffness(KNOWN_REFERENCE), bench(identified=KNOWN), out)
+    run(KNOWN_REFERENCE, bench(identified=KNOWN), out)
     found = read_specimen(out / "specimen.json")
     assert found.names == ("k1", "k2", "k_c:0.64")
     assert close(found.finding("k_c:0.64"), SPRING * 0.64 * 213.44)
@@ -186,7 +197,7 @@ def test_the_pulse_keeps_its_distance_from_every_limit(tmp_path: Path) -> None:
     configuration = bench(limits=Limits(drift=0.04))
     found = planned(parameters, configuration, configuration.specimen.bare())
     assert (found.binds, found.drift) == ("drift", pytest.approx(SHARE * 0.04))
-    preflight = compile_run(FreeVibration(parameters), configuration, tmp_path)
+    preflight = compile_run("free-vibration", prepared(parameters, configuration), tmp_path)
     assert preflight.refusal is None
     assert preflight.margins[0].margin == pytest.approx(1.0 - SHARE)
     known = {margin.demand.quantity for margin in preflight.margins if margin.margin is not None}
@@ -194,17 +205,17 @@ def test_the_pulse_keeps_its_distance_from_every_limit(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("experiment", "item", "told"),
+    ("asked", "item", "told"),
     [
-        (FreeVibration(FreeVibrationParameters(drift=0.002)), "drift", "0.003 m"),
-        (FreeVibration(FreeVibrationParameters(pulse=0.005)), "pulse", "0.01 s at least"),
-        (FreeVibration(FreeVibrationParameters(excitation="hand", pull=0.1)), "pull", "lasers' ranges"),
-        (CouplingStiffness(CouplingStiffnessParameters(reference=False)), "reference", "not identified"),
+        (FreeVibrationParameters(drift=0.002), "drift", "0.003 m"),
+        (FreeVibrationParameters(pulse=0.005), "pulse", "0.01 s at least"),
+        (FreeVibrationParameters(excitation="hand", pull=0.1), "pull", "lasers' ranges"),
+        (CouplingStiffnessParameters(reference=False), "reference", "not identified"),
     ],
 )
-def test_what_cannot_be_done_is_refused_beforehand(experiment: Experiment, item: str, told: str) -> None:
+def test_what_cannot_be_done_is_refused_beforehand(asked: Parameters, item: str, told: str) -> None:
     with pytest.raises(InvalidInput, match=told) as refusal:
-        experiment.check(BenchConfiguration())
+        prepared(asked, BenchConfiguration())
     assert refusal.value.item == item
 
 
@@ -224,10 +235,10 @@ def test_what_would_have_no_effect_is_refused(values: dict[str, object], item: s
 def test_a_weighing_that_the_specimen_file_overrules_is_refused_and_other_masses_are_told(tmp_path: Path) -> None:
     weighed = Identified(findings=(before("m1", 1.0624, 0.0004), before("m2", TRUE.m2, 0.0004)))
     with pytest.raises(InvalidInput, match=r"m1 = 1\.0624 kg .*leave it out") as refusal:
-        FreeVibration(FreeVibrationParameters(mass_uncertainty=0.05)).check(bench(identified=weighed))
+        prepared(FreeVibrationParameters(mass_uncertainty=0.05), bench(identified=weighed))
     assert refusal.value.item == "mass_uncertainty"
     parameters = FreeVibrationParameters(excitation="hand", repeats=1, window=5.0)
-    _, events = run(FreeVibration(parameters), bench(identified=weighed), tmp_path / "run")
+    _, events = run(parameters, bench(identified=weighed), tmp_path / "run")
     assert any("m1 = 1.0624 kg" in event.text for event in events if isinstance(event, Warned))
     found = read_specimen(tmp_path / "run" / "specimen.json")
     assert found.finding("m1") == weighed.finding("m1")
@@ -240,7 +251,7 @@ def test_a_run_that_fails_does_not_leave_the_table_clamped(tmp_path: Path, monke
 
     monkeypatch.setattr("protocols.free_vibration.decays.released_decay", useless)
     parameters = FreeVibrationParameters(excitation="hand", repeats=1, window=5.0)
-    result, events = run(FreeVibration(parameters), bench(), tmp_path / "run")
+    result, events = run(parameters, bench(), tmp_path / "run")
     assert "no decay could be used" in result.reason
     asked = [event.request for event in events if isinstance(event, OperatorAsked)]
     assert asked[-1] == "Take the clamp off the table."
@@ -253,12 +264,12 @@ def test_a_spring_that_fails_does_not_leave_its_block_clamped(monkeypatch: pytes
         yield
 
     monkeypatch.setattr("protocols.coupling_stiffness.sheet._decays", useless)
-    springs, asked = CouplingStiffness(KNOWN_REFERENCE), []
+    springs, asked = prepared(KNOWN_REFERENCE, bench(identified=KNOWN)), []
     with pytest.raises(Unmeasurable):
-        asked.extend(springs.plan(bench(identified=KNOWN)))
+        asked.extend(springs.plan())
     requests = [step.request for step in asked if isinstance(step, Handle)]
     assert requests[-1].startswith("Take the clamp, the spring and the block off")
-    assert "STILL CLAMPED" not in springs.table([])
+    assert "STILL CLAMPED" not in springs.result([]).text
 
 
 def test_a_table_or_block_that_stays_clamped_is_told() -> None:
@@ -268,11 +279,12 @@ def test_a_table_or_block_that_stays_clamped_is_told() -> None:
                 break
         plan.close()
 
-    frame, springs = FreeVibration(FreeVibrationParameters(excitation="hand")), CouplingStiffness(KNOWN_REFERENCE)
-    until(frame.plan(bench()), "Clamp")
-    until(springs.plan(bench(identified=KNOWN)), "Stand the block")
-    assert "THE TABLE IS STILL LOCKED" in frame.table([])
-    assert "THE BLOCK IS STILL CLAMPED" in springs.table([])
+    frame = prepared(FreeVibrationParameters(excitation="hand"), bench())
+    springs = prepared(KNOWN_REFERENCE, bench(identified=KNOWN))
+    until(frame.plan(), "Clamp")
+    until(springs.plan(), "Stand the block")
+    assert "THE TABLE IS STILL LOCKED" in frame.result([]).text
+    assert "THE BLOCK IS STILL CLAMPED" in springs.result([]).text
 
 
 def test_numbers_are_written_with_as_many_digits_as_they_deserve() -> None:

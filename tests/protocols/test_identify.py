@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy import signal
 
+from bench.catalogue import load_protocol
 from bench.config.model import BenchConfiguration, Simulation
 from bench.config.review import review
 from bench.control.table_model import TableModel
@@ -22,7 +23,6 @@ from bench.preflight.response import response_of
 from bench.record.reader import open_record
 from bench.results import FILE
 from bench.session import SessionResult, run_session
-from protocols.identify.experiment import Identification
 from protocols.identify.level import BLOCK_SHARE, SHARE, planned
 from protocols.identify.motion import RESTING, largest
 from protocols.identify.parameters import IdentifyParameters
@@ -39,6 +39,7 @@ from sim.virtual_bench import VirtualBenchParameters
 Array = NDArray[np.float64]
 
 DAMPED = Specimen(frame=Frame(xi1=0.2, xi2=0.2))
+PROTOCOL = load_protocol("identify")
 SHORT = IdentifyParameters(period=2.0, band_low=0.5, band_high=60.0, periods=2)
 
 
@@ -52,8 +53,8 @@ def run(
 ) -> tuple[SessionResult, list[Event]]:
     events: list[Event] = []
     result = run_session(
-        Identification(parameters),
-        configuration,
+        PROTOCOL,
+        PROTOCOL.prepare(parameters, configuration, None),
         out=out,
         operator=Unattended(),
         subscribers=[lambda event: None if isinstance(event, Acquired) else events.append(event)],
@@ -189,7 +190,7 @@ def test_the_level_keeps_every_limit_at_a_distance(limits: Limits, binds: str, t
     found = planned(SHORT, configuration)
     assert (found.binds, found.level < SHORT.level) == (binds, True)
     assert found.asked[binds] == pytest.approx(SHARE * getattr(limits, binds))
-    margins = compile_run(Identification(SHORT), configuration, tmp_path).margins
+    margins = compile_run("identify", PROTOCOL.prepare(SHORT, configuration, None), tmp_path).margins
     assert margins[0].bound.quantity == binds
     assert margins[0].margin == pytest.approx(1.0 - SHARE)
 
@@ -233,4 +234,4 @@ def test_the_lines_cover_the_band_that_replication_needs(odd: bool, period: floa
 )
 def test_what_cannot_be_identified_is_refused(changes: dict[str, float], says: str) -> None:
     with pytest.raises(ValueError, match=says):
-        Identification(IdentifyParameters(**changes)).check(bench())  # type: ignore[arg-type]
+        PROTOCOL.prepare(IdentifyParameters(**changes), bench(), None)  # type: ignore[arg-type]

@@ -10,7 +10,7 @@ from bench.analysis.gain import SensorAccuracy, SteadyPeak
 from bench.analysis.sensor_accuracy import SensorDoubt, Sighting
 from bench.analysis.steady import Steadiness
 from protocols.harmonic.judge import judge
-from protocols.harmonic.point import HarmonicPoint, PointStatus
+from protocols.harmonic.protocol import HarmonicPoint, PointStatus
 from protocols.harmonic.settle import Settled
 from sim.gain import predict_gain
 from sim.knowledge import SpecimenKnowledge

@@ -10,6 +10,7 @@ import pytest
 from bench.analysis.laser_calibration import LaserCalibration, LaserCurve
 from bench.analysis.sensor_accuracy import LINEARITY, SCALES, SensorAccuracy, SensorDoubt, Sighting
 from bench.analysis.signals import ACCELERATION, DRIFT, LASER_1, LASER_2, U1, SignalMap
+from bench.catalogue import load_protocol
 from bench.cli.main import main
 from bench.config.calibration_file import read_calibration, write_calibration
 from bench.config.dump import as_toml
@@ -17,11 +18,11 @@ from bench.config.model import BenchConfiguration
 from bench.config.toml import read_configuration
 from bench.record.reader import open_record
 from drivers.rig import Channel
-from protocols.laser_calibration.experiment import LasersCalibrated
 from protocols.laser_calibration.fit import Pass, calibration, fitted
 from protocols.laser_calibration.parameters import LaserCalibrationParameters
 from sim.errors import InvalidInput
 
+PROTOCOL = load_protocol("laser-calibration")
 RANGE = 0.2
 PHASES = np.arange(256) * 2.0 * np.pi / 256
 RESTS = (0.003, -0.002)
@@ -219,13 +220,13 @@ def test_what_cannot_be_calibrated_is_refused(
     bench = tmp_path / "bench.toml"
     bench.write_text(configuration, encoding="utf-8")
     with pytest.raises(InvalidInput) as refused:
-        LasersCalibrated(LaserCalibrationParameters(**parameters)).check(read_configuration(bench))
+        PROTOCOL.prepare(LaserCalibrationParameters(**parameters), read_configuration(bench), None)
     assert refused.value.item == item
 
 
 def test_an_older_calibration_is_not_calibrated_again() -> None:
     with pytest.raises(InvalidInput, match="leave it out"):
-        LasersCalibrated(LaserCalibrationParameters()).check(BenchConfiguration(calibrated=found()))
+        PROTOCOL.prepare(LaserCalibrationParameters(), BenchConfiguration(calibrated=found()), None)
 
 
 def test_a_calibration_on_the_simulated_bench_agrees_with_its_lasers_and_serves_other_runs(

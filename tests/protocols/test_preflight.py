@@ -17,9 +17,9 @@ from bench.preflight.compiled import Preflight, compile_run
 from bench.preflight.forecast import Demand
 from bench.preflight.motion import travel
 from bench.preflight.response import response_of
-from protocols.harmonic import stages
+from protocols.harmonic import campaign
 from protocols.harmonic.campaign import HarmonicCampaign
-from protocols.harmonic.parameters import HarmonicParameters
+from protocols.harmonic.protocol import HarmonicParameters
 from protocols.harmonic.stages import Trial, trials
 from sim.gain import predict_gain
 from sim.linear import steady_response
@@ -31,7 +31,7 @@ SHORT = HarmonicParameters(omega=(OMEGA,), beta=(BETA,))
 
 
 def _compiled(parameters: HarmonicParameters = SHORT, configuration: BenchConfiguration = CONFIGURATION) -> Preflight:
-    return compile_run(HarmonicCampaign(parameters), configuration, Path())
+    return compile_run("harmonic", HarmonicCampaign(parameters, configuration), Path())
 
 
 def _by_quantity(found: Preflight) -> dict[str, Demand]:
@@ -39,7 +39,8 @@ def _by_quantity(found: Preflight) -> dict[str, Demand]:
 
 
 def _trials(parameters: HarmonicParameters) -> list[Trial]:
-    return list(trials(parameters, CONFIGURATION, response_of(CONFIGURATION)))
+    starts = HarmonicCampaign(parameters, CONFIGURATION).starts
+    return list(trials(parameters, CONFIGURATION, response_of(CONFIGURATION), starts))
 
 
 def test_the_bare_frame_moves_as_its_linear_response_says() -> None:
@@ -73,10 +74,10 @@ def test_the_lab_sheet_drives_what_was_predicted() -> None:
     script.run()
     followed = [leg for step in script.steps if isinstance(step, Follow) for leg in step.legs]
     forecast = _trials(PARAMETERS)
-    starts = [trial.stage for trial in forecast if trial.rocks]
+    starts = [trial.stage for trial in forecast if trial.beta is not None]
     assert len(starts) == PARAMETERS.starts
     assert [leg for stage in starts for leg in stage.legs] == followed[-sum(len(stage.legs) for stage in starts) :]
-    (spring,) = [trial.stage for trial in forecast if "beta" in trial.stage.name and not trial.rocks]
+    (spring,) = [trial.stage for trial in forecast if "beta" in trial.stage.name and trial.beta is None]
     first = followed.index(spring.legs[0], 3)
     driven = followed[first : first + len(spring.legs) // 2 + 1]
     # each frequency is gone to, then held: the plan asks for the latter as a dwell
@@ -88,11 +89,12 @@ def test_the_lab_sheet_drives_what_was_predicted() -> None:
 
 def test_starts_are_planned_once(monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[float] = []
-    plan = stages.plan_starts
-    monkeypatch.setattr(stages, "plan_starts", lambda *arguments: calls.append(arguments[1]) or plan(*arguments))
-    stages._planned_starts.cache_clear()
-    HarmonicCampaign(PARAMETERS).preflight(CONFIGURATION)
-    Script(lambda *_: None, predict_gain(Specimen().coupled(BETA), OMEGA, AMPLITUDE).bare.drift).run()
+    plan = campaign.plan_starts
+    monkeypatch.setattr(campaign, "plan_starts", lambda *arguments: calls.append(arguments[1]) or plan(*arguments))
+    prepared = HarmonicCampaign(PARAMETERS, CONFIGURATION)
+    assert sum(stage.chance is not None for stage in prepared.forecast.stages) == PARAMETERS.starts
+    bare = predict_gain(Specimen().coupled(BETA), OMEGA, AMPLITUDE).bare.drift
+    Script(lambda *_: None, bare, prepared).run()
     assert calls == [OMEGA]
 
 

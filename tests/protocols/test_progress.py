@@ -4,37 +4,35 @@ from pathlib import Path
 
 import pytest
 
+from bench.catalogue import load_protocol
 from bench.config.model import BenchConfiguration, Simulation
 from bench.engine.operator import Unattended
 from bench.engine.requests import Requests
 from bench.events import Event, Progress
-from bench.session import Experiment, run_session
-from protocols.check.experiment import LoopCheck
+from bench.session import run_session
 from protocols.check.parameters import CheckParameters
-from protocols.coupling_stiffness.experiment import CouplingStiffness
 from protocols.coupling_stiffness.parameters import CouplingStiffnessParameters
-from protocols.free_rocking.experiment import FreeRockingTest
 from protocols.free_rocking.parameters import FreeRockingParameters
-from protocols.free_vibration.experiment import FreeVibration
 from protocols.free_vibration.parameters import FreeVibrationParameters
-from protocols.identify.experiment import Identification
 from protocols.identify.parameters import IdentifyParameters
-from protocols.laser_calibration.experiment import LasersCalibrated
 from protocols.laser_calibration.parameters import LaserCalibrationParameters
+from sim.parameters import Parameters
 from sim.virtual_bench import VirtualBenchParameters
 
-RUNS: tuple[Experiment, ...] = (
-    LoopCheck(CheckParameters()),
-    LasersCalibrated(LaserCalibrationParameters(passes=6)),
-    Identification(IdentifyParameters(period=2.0, band_low=0.5, band_high=60.0, periods=2)),
-    FreeVibration(FreeVibrationParameters(repeats=2, window=10.0)),
-    CouplingStiffness(CouplingStiffnessParameters(beta=(0.64,), repeats=2, window=10.0)),
-    FreeRockingTest(FreeRockingParameters(tilts=(0.5,))),
-)
+RUNS: dict[str, Parameters] = {
+    "check": CheckParameters(),
+    "laser-calibration": LaserCalibrationParameters(passes=6),
+    "identify": IdentifyParameters(period=2.0, band_low=0.5, band_high=60.0, periods=2),
+    "free-vibration": FreeVibrationParameters(repeats=2, window=10.0),
+    "coupling-stiffness": CouplingStiffnessParameters(beta=(0.64,), repeats=2, window=10.0),
+    "free-rocking": FreeRockingParameters(tilts=(0.5,)),
+}
 
 
-@pytest.mark.parametrize("experiment", RUNS, ids=lambda each: each.name)
-def test_the_progress_of_a_completed_run_ends_at_100_percent(experiment: Experiment, tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", RUNS)
+def test_the_progress_of_a_completed_run_ends_at_100_percent(name: str, tmp_path: Path) -> None:
+    protocol = load_protocol(name)
+    configuration = BenchConfiguration(simulation=Simulation(bench=VirtualBenchParameters(sample_rate=1000.0)))
     told: list[Progress] = []
 
     def keep(event: Event) -> None:
@@ -42,8 +40,8 @@ def test_the_progress_of_a_completed_run_ends_at_100_percent(experiment: Experim
             told.append(event)
 
     result = run_session(
-        experiment,
-        BenchConfiguration(simulation=Simulation(bench=VirtualBenchParameters(sample_rate=1000.0))),
+        protocol,
+        protocol.prepare(RUNS[name], configuration, None),
         out=tmp_path / "run",
         operator=Unattended(),
         subscribers=[keep],

@@ -24,12 +24,11 @@ from bench.engine.steps import (
     Step,
 )
 from bench.events import Estimate, PointFinished, Progress
+from bench.protocol import Result
 from drivers.rig import Handwork
-from protocols.harmonic.calibrate import PROBE
+from protocols.common.calibrate import PROBE, Unmeasurable
 from protocols.harmonic.campaign import HarmonicCampaign
-from protocols.harmonic.evidence import Unmeasurable
-from protocols.harmonic.parameters import HarmonicParameters
-from protocols.harmonic.point import HarmonicPoint, PointStatus
+from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, PointStatus
 from sim.gain import predict_gain
 from sim.specimen import Specimen
 from tests.made_cycles import pure_cycle
@@ -50,7 +49,13 @@ def _cycle(index: int, drift: float, u1: float = 0.001, turn: float = 0.0) -> Cy
 class Script:
     """Answers the steps of a plan and keeps them."""
 
-    def __init__(self, coupled: Callable[[int, int], Cycle | None], bare: float) -> None:
+    def __init__(
+        self,
+        coupled: Callable[[int, int], Cycle | None],
+        bare: float,
+        prepared: HarmonicCampaign | None = None,
+    ) -> None:
+        self._prepared = prepared or HarmonicCampaign(PARAMETERS, BenchConfiguration())
         self._coupled, self._bare = coupled, bare
         self.steps: list[Step] = []
         self.start = 0
@@ -59,7 +64,7 @@ class Script:
         self.mounted = False
 
     def run(self) -> list[HarmonicPoint]:
-        plan = HarmonicCampaign(PARAMETERS).plan(BenchConfiguration())
+        plan = self._prepared.plan()
         points: list[HarmonicPoint] = []
         step = next(plan)
         try:
@@ -69,8 +74,11 @@ class Script:
                     assert isinstance(step.event.point, HarmonicPoint)
                     points.append(step.event.point)
                 step = plan.send(self._answer(step))
-        except StopIteration:
-            return points
+        except StopIteration as end:
+            result = end.value
+        assert isinstance(result, Result)
+        assert list(result.points) == points
+        return points
 
     def _answer(self, step: Step) -> Outcome:
         match step:

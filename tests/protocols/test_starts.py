@@ -8,7 +8,7 @@ from bench.control.legs import Leg, program
 from bench.control.starts import CATCH_ANGLE, RATING, Start, plan_starts
 from bench.engine.steps import Say
 from bench.events import StepStarted
-from protocols.harmonic.point import PointStatus
+from protocols.harmonic.protocol import PointStatus
 from sim.excitation import SineProgram, Sweep
 from sim.gain import predict_gain
 from sim.knowledge import SpecimenKnowledge

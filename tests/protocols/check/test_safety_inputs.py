@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from bench.catalogue import load_protocol
 from bench.config.model import Acquisition, BenchConfiguration
 from bench.engine.operator import Unattended
 from bench.engine.requests import Requests
@@ -17,7 +18,6 @@ from drivers.daqmx.parameters import Daq
 from drivers.emulation.laboratory import Laboratory
 from drivers.hardware.parameters import Hardware
 from drivers.laboratory_client import ask
-from protocols.check.experiment import LoopCheck
 from protocols.check.line import Verdict
 from protocols.check.parameters import CheckParameters
 from protocols.check.safety import safety_lines
@@ -45,10 +45,12 @@ def check(laboratory: Laboratory, tmp_path: Path) -> Check:
         backend="hardware", hardware=laboratory.hardware, acquisition=Acquisition(block_duration=0.05, lead=0.4)
     )
 
+    protocol = load_protocol("check")
+
     def run() -> SessionResult:
         return run_session(
-            LoopCheck(CheckParameters(rest=20.0)),
-            configuration,
+            protocol,
+            protocol.prepare(CheckParameters(rest=20.0), configuration, None),
             out=tmp_path,
             operator=Unattended(),
             subscribers=(),

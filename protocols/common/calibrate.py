@@ -1,16 +1,16 @@
-"""What acceleration the drive makes: measured at each frequency, at a level that leaves the block at rest."""
+"""Calibration of the drive by sines that leave the block at rest, and the evidence that measured cycles must show."""
 
 from collections.abc import Generator, Sequence
 from math import ceil, log2
 
 import numpy as np
 
-from bench.analysis.cycles import Cycle
+from bench.analysis.cycles import Cycle, mean_amplitude
 from bench.analysis.signals import ACCELERATION, SIGNALS
 from bench.control.calibration import DriveCalibration
 from bench.control.legs import Leg
 from bench.engine.steps import Calibrate, Dwell, Fallen, Follow, Measured, Outcome, Step
-from protocols.harmonic.evidence import need_answer, need_cycles
+from sim.errors import RockbenchError
 
 PROBE = 0.02
 """First, careful amplitude [V] when nothing is known of the drive yet."""
@@ -20,6 +20,12 @@ CHANGE_TIME = 1.0
 
 SETTLING, MEASURED = 2, 4
 """Cycles that are left out and used at each point."""
+
+ENOUGH = 0.75
+"""Share of the asked cycles that must have come with nearly all their samples."""
+
+AUDIBLE = 5.0
+"""How many standard deviations of its fit the table's acceleration must reach to count as an answer to the drive."""
 
 _DRIVE = len(SIGNALS)
 """Column of the drive in a cycle's arrays."""
@@ -88,3 +94,28 @@ def drive_response(cycles: Sequence[Cycle]) -> complex:
     """Fundamental of the table's acceleration over that of the drive, over cycles [m/s2 per V]."""
     moved, driven = (np.array([cycle.harmonics(column)[0] for cycle in cycles]) for column in (ACCELERATION, _DRIVE))
     return complex(np.vdot(driven, moved) / np.vdot(driven, driven))
+
+
+class Unmeasurable(RockbenchError):
+    """The signals do not show what the protocol needs to go on."""
+
+    error_code = "not_measurable"
+
+
+def need_cycles(cycles: Sequence[Cycle], asked: int) -> None:
+    """Raise Unmeasurable when too many cycles lack samples."""
+    if len(cycles) < ENOUGH * asked:
+        raise Unmeasurable(
+            f"{asked - len(cycles)} of {asked} cycles lack samples: a sensor leaves its range; move it or ask for less"
+        )
+
+
+def need_answer(cycles: Sequence[Cycle]) -> None:
+    """Raise Unmeasurable when the table does not follow the drive."""
+    moved = mean_amplitude(cycles, ACCELERATION)
+    doubt = float(np.mean([cycle.noise[ACCELERATION] * np.sqrt(2.0 / cycle.samples) for cycle in cycles]))
+    if not moved > AUDIBLE * doubt:
+        raise Unmeasurable(
+            f"the table does not answer the drive: {moved:.2g} m/s2 measured, noise {doubt:.2g} m/s2;"
+            " check the amplifier, the enable line and the accelerometer"
+        )

@@ -1,13 +1,13 @@
-"""What a harmonic campaign will ask of the bench: predicted for every stage, over what is not known of the specimen."""
+"""Demands of a harmonic campaign: predicted for every stage, over the uncertainty of the specimen."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bench.config.model import BenchConfiguration
 from bench.control.legs import program
-from bench.control.starts import CATCH_ANGLE, DRIVE, SEED
+from bench.control.starts import CATCH_ANGLE, DRIVE, SEED, Start
 from bench.preflight.asked import UNKNOWN_SHAKER, Asked, demand
 from bench.preflight.bounds import bounds
 from bench.preflight.forecast import Forecast
@@ -15,11 +15,10 @@ from bench.preflight.load import load
 from bench.preflight.motion import Travel, travel
 from bench.preflight.response import TableResponse, response_of
 from bench.progress import Progress, counting, silent
-from protocols.harmonic.pace import Pace
-from protocols.harmonic.parameters import HarmonicParameters
-from protocols.harmonic.reach import bare_travel, rocking_travel
+from protocols.harmonic.protocol import HarmonicParameters
+from protocols.harmonic.reach import Reach
+from protocols.harmonic.sheet import Pace
 from protocols.harmonic.stages import Trial, payload_of, trials
-from sim.loading import load_model
 from sim.specimen import Specimen
 from sim.sweep import Done, in_threads
 
@@ -49,21 +48,24 @@ _UNKNOWN = {
 
 
 def forecast(
-    parameters: HarmonicParameters, configuration: BenchConfiguration, progress: Progress = silent
+    parameters: HarmonicParameters,
+    configuration: BenchConfiguration,
+    starts: Mapping[tuple[float, float], Sequence[Start]],
+    reach: Reach,
+    progress: Progress = silent,
 ) -> Forecast:
-    """The campaign's stages with the demands of them all. Plans the starts, which are kept for the run.
+    """The campaign's stages with the demands of them all.
 
     A drawn specimen is the same one throughout the campaign, and so is how far its drive is off.
     Raises InvalidInput when a table model is named that cannot be read or does not reach far enough.
     """
     response = response_of(configuration)
-    load_model(progress)
-    found = list(trials(parameters, configuration, response, counting(progress, "planning the starts")))
+    found = list(trials(parameters, configuration, response, starts))
     factors = np.concatenate(([1.0], 1.0 + DRIVE * np.random.default_rng(SEED).uniform(-1.0, 1.0, DRAWS)))
     simulating = counting(progress, f"simulating every stage with {1 + DRAWS} specimens")
     moved = _travels(found, factors, configuration, simulating)
     asked = [
-        _asked(trial, travels, factors, parameters, configuration, response)
+        _asked(trial, travels, factors, reach, configuration, response)
         for trial, travels in zip(found, moved, strict=True)
     ]
     return Forecast(
@@ -98,7 +100,7 @@ def _asked(
     trial: Trial,
     travels: Sequence[Travel],
     factors: Array,
-    parameters: HarmonicParameters,
+    reach: Reach,
     configuration: BenchConfiguration,
     response: TableResponse | None,
 ) -> Asked:
@@ -111,12 +113,14 @@ def _asked(
         response=response,
         heating_time=configuration.limits.heating_time,
     )
-    raised = _RAISED if trial.rocks else ()
+    raised = _RAISED if trial.beta is not None else ()
     values = {
         quantity: factors * value * (1.0 + (IMPACTS if quantity in raised else RIPPLE))
         for quantity, value in loads.items()
     }
-    steady = _steady(trial, parameters, configuration)
+    # a simulation of limited length may not have reached the steady state
+    steady = None if trial.steady is None else reach.steady(trial.beta, trial.steady)
+    steady = steady or Travel(0.0, 0.0, 0.0)
     halves = [0.5 * whole for whole in configuration.laser_ranges]
     values |= {
         "laser_1": np.array([max(each.storey_1, steady.storey_1) for each in travels]) / halves[0] + OFF_MIDDLE,
@@ -124,12 +128,3 @@ def _asked(
         "drift": np.array([max(each.drift, steady.drift) for each in travels]),
     }
     return Asked(trial.stage.name, values)
-
-
-def _steady(trial: Trial, parameters: HarmonicParameters, configuration: BenchConfiguration) -> Travel:
-    """The steady state of the assumed specimen, which a simulation of limited length may not have reached."""
-    if trial.steady is None:
-        return Travel(0.0, 0.0, 0.0)
-    amplitude = parameters.amplitude_factor * configuration.known_specimen.uplift_acceleration
-    motion = rocking_travel if trial.rocks else bare_travel
-    return motion(trial.specimen, trial.steady, amplitude, configuration.laser_reference) or Travel(0.0, 0.0, 0.0)
