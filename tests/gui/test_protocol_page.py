@@ -105,6 +105,36 @@ def test_start_follows_the_check(window: Window, spoken: type[SpokenLink], qtbot
     assert page.why_not == texts.START_BUSY
 
 
+@pytest.mark.parametrize("left", [(), ("campaign.h5",)])
+def test_a_folder_that_another_program_made_meanwhile_is_left_to_it(
+    left: tuple[str, ...],
+    window: Window,
+    spoken: type[SpokenLink],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    page = window.protocol
+    page.folder.clear()
+    shown = Path(page.folder.placeholderText())
+    page.survey()
+    spoken.latest.said.append(FINE)
+    window._controller._look()
+    shown.mkdir(parents=True)
+    page.begin()
+    run = spoken.latest.assignment
+    assert isinstance(run, Run)
+    assert run.out == shown.with_name(f"{shown.name}-2")
+    assert run.out.is_dir()
+    for name in left:
+        (run.out / name).touch()
+    spoken.latest.said.append(Refused("not now"))
+    window._controller._look()
+    # what holds nothing is removed again, the other program's folder stays
+    assert run.out.exists() == bool(left)
+    assert shown.is_dir()
+
+
 @pytest.mark.parametrize(
     "found",
     [
