@@ -12,6 +12,7 @@ the test for non-finite numbers. Nobody calls them as C functions: without that 
 import os
 import threading
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar, cast
 
 # the loops here are short recurrences: vectorising them and the last level of optimisation cost a fifth of the
@@ -56,7 +57,10 @@ def compiled(signature: str) -> Callable[[F], F]:
                 # numba reads this once for each function; it is set for ours only, and other code keeps its caches
                 before, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(folder)
                 try:
-                    return _njit(signature, function, cache=True)
+                    made = _njit(signature, function, cache=True)
+                    if _is_within(made, folder):
+                        return made
+                    _cache.give_up(f"numba cannot or may not use {folder}")
                 except numba.core.errors.NumbaError:
                     raise
                 except Exception as error:
@@ -73,6 +77,13 @@ def is_compiled(module: str) -> bool:
     """Whether the cache holds compiled code of `module` of the kernel, such as "rocking"."""
     folder = _cache.folder()
     return folder is not None and any(folder.rglob(f"{module}.*.nbi"))
+
+
+def _is_within(made: Callable[..., Any], folder: Path) -> bool:
+    # where numba finds the folder unusable, as on a disk that is full, it goes on to others without a word; without
+    # compilation (NUMBA_DISABLE_JIT) there is no cache
+    stats = getattr(made, "stats", None)
+    return stats is None or Path(stats.cache_path).is_relative_to(folder)
 
 
 def _njit(signature: str, function: F, *, cache: bool) -> F:

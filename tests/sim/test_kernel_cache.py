@@ -185,6 +185,14 @@ def test_threads_that_load_parts_of_the_kernel_together(installation: Installati
     assert installation.run(code + ASK) == ("31.0", "")
 
 
+def test_a_place_that_numba_takes_instead_is_not_used(installation: Installation) -> None:
+    # as it does by itself where the folder's disk is full
+    installation.environment["NUMBA_CACHE_LOCATOR_CLASSES"] = "InTreeCacheLocator"
+    assert installation.run()[0] == "3.0"
+    installation.edit(30.0)
+    assert installation.run()[0] == "31.0"
+
+
 def test_numba_functions_of_others_keep_their_own_caches(installation: Installation) -> None:
     theirs = installation.site / "theirs.py"
     theirs.write_text("import numba\n@numba.njit('int64(int64)', cache=True)\ndef f(x): return x\n")
