@@ -16,7 +16,7 @@ EXTRAS = {
 
 
 class MissingExtra(InvalidInput):
-    """Something was asked for whose extra is not installed; nothing was started.
+    """An extra that the request needs is not installed; nothing was started.
 
     `item` is what needs it, `value` the name of the extra, `allowed` the commands that install it.
     """

@@ -53,7 +53,7 @@ def commands(
 
 
 def add_examples(app: App) -> None:
-    """End the help of every command with an example; one that has none of its own is its own example.
+    """End the help of every command with an example: the one listed for it, or else its own name.
 
     Those of the protocols have theirs from them, when they are loaded.
     """

@@ -13,7 +13,7 @@ Code = Literal[
 """Codes of errors that are no RockbenchError, whose types bring their own as `error_code`."""
 
 _objects: TextIO | None = None
-"""Where a command that was given --json prints its error; None for every other."""
+"""Stream for the error of a command with --json; None for every other command."""
 
 
 def reply_in_json(stream: TextIO | None) -> None:
@@ -23,7 +23,7 @@ def reply_in_json(stream: TextIO | None) -> None:
 
 
 def warn(message: object) -> None:
-    """One line on standard error about what was done although something is wrong."""
+    """One line on standard error: a defect in spite of which the command went on."""
     print(f"rockbench: warning: {one_line(str(message))}", file=sys.stderr)
 
 
@@ -46,7 +46,7 @@ def fail(error: BaseException | str, code: Code | None = None) -> None:
 def error_object(error: BaseException | str, code: Code | None = None) -> dict[str, Any]:
     """An error for a program, ready for JSON: `code`, `message`, and `item`, `value`, `remedy` where they are known.
 
-    The code is that of the error's type; `code` is for what is no RockbenchError.
+    The code is that of the error's type; `code` applies where the error is no RockbenchError.
     """
     known = isinstance(error, InvalidInput)
     return {
