@@ -14,6 +14,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import zip_longest
 from math import isclose, pi, sqrt
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -196,7 +197,8 @@ def _in_configuration(meant: random.Random) -> Iterator[Slip]:
             typo = name + "x"
         wrong = (*path[:-1], typo)
         said = ("nearest", name) if len(name) > 2 else ("there is no such key",)
-        yield Slip(f"config {'.'.join(map(str, wrong))}", "1.0", "typo of a key", partial(_checked, wrong, "1.0"), said)
+        place = f"config {'.'.join(map(str, path))}"
+        yield Slip(place, typo, "typo of a key", partial(_checked, wrong, "1.0"), said)
 
 
 def _numeric(model: type[Parameters], path: tuple[str | int, ...]) -> Iterator[tuple[tuple[str | int, ...], Declared]]:
@@ -367,11 +369,15 @@ def _states(said: str, value: float) -> bool:
 
 
 def chosen(count: int, seed: int) -> list[Slip]:
-    """`count` slips, every place at least once if there are as many, the rest at random."""
+    """`count` slips: every place at least once if there are as many, the rest of every kind alike, at random."""
     everything = list(slips(seed))
     random.Random(seed).shuffle(everything)
     first = {slip.place: slip for slip in reversed(everything)}
-    rest = [slip for slip in everything if first[slip.place] is not slip]
+    kinds: dict[str, list[Slip]] = {}
+    for slip in everything:
+        if first[slip.place] is not slip:
+            kinds.setdefault(slip.kind, []).append(slip)
+    rest = (slip for turn in zip_longest(*kinds.values()) for slip in turn if slip is not None)
     return [*first.values(), *rest][:count]
 
 

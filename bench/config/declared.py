@@ -6,6 +6,7 @@ File, command line and error messages all describe a parameter through this modu
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
+from functools import cache
 from inspect import getdoc
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
@@ -101,8 +102,7 @@ class Declared:
 
 def declared(model: type[Parameters]) -> Iterator[Declared]:
     """The fields of a group of parameters, in their order."""
-    for name, field in model.model_fields.items():
-        yield _declared(name, field)
+    yield from _fields(model).values()
 
 
 def at(model: type[Parameters], path: Sequence[str | int]) -> Declared | None:
@@ -114,7 +114,7 @@ def at(model: type[Parameters], path: Sequence[str | int]) -> Declared | None:
             continue
         if group is None or key not in group.model_fields:
             return None
-        found = _declared(key, group.model_fields[key])
+        found = _fields(group)[key]
         group = found.element
     return replace(found, many=False) if found is not None and isinstance(path[-1], int) else found
 
@@ -135,6 +135,11 @@ def summary(model: type[Parameters]) -> str:
 
 def _exactly(limit: float) -> str:
     return str(limit) if isinstance(limit, int) else f"{limit:g}"
+
+
+@cache
+def _fields(model: type[Parameters]) -> dict[str, Declared]:
+    return {name: _declared(name, field) for name, field in model.model_fields.items()}
 
 
 def _declared(name: str, field: FieldInfo) -> Declared:

@@ -66,15 +66,16 @@ def review(configuration: BenchConfiguration) -> Review:
             remedy = f'{why}; lower it, or name it in limits.confirmed = ["{reach.limit}"]'
             refusals.append(InvalidInput(f"limits.{reach.limit}", value, remedy))
     refusals += _contradictions(configuration)
-    notices += _unusual(configuration)
+    known = tuple(f"limits.{name} = " for name in confirmed)
+    notices += (notice for notice in _unusual(configuration) if not notice.startswith(known))
     return Review(tuple(refusals), tuple(notices))
 
 
 def notices_of(parameters: Parameters, specimen: Specimen) -> tuple[str, ...]:
     """Notices of what a protocol or a prediction is asked for, with this specimen on the table."""
     found = (*unusual(parameters), *off_resonance(parameters, specimen.frame.natural_frequencies))
-    # one notice for each value: the one that names the modes says more
-    return tuple({notice.partition(" lies ")[0]: notice for notice in found}.values())
+    # one notice for each key: the one that names the modes says more
+    return tuple({notice.partition(" = ")[0].partition("[")[0]: notice for notice in found}.values())
 
 
 def scales_of(parameters: Parameters, specimen: Specimen) -> tuple[str, ...]:

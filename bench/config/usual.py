@@ -1,6 +1,6 @@
 """Notices of values that are valid but unusual: outside the usual range that their declaration states."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
 from math import tau
 from typing import Any, NamedTuple
@@ -22,20 +22,22 @@ class _Watched(NamedTuple):
 
 
 def unusual(parameters: Parameters, prefix: str = "") -> Iterator[str]:
-    """A notice for each value outside its usual range, naming key and value; keys begin with `prefix`.
+    """A notice for each key with a value outside its usual range, naming both; keys begin with `prefix`.
 
-    Zero is no slip where it is allowed. A value that lists hold is named by its place.
+    Zero is no slip where it is allowed. Of a list the first such value is named.
     """
     values, groups = _watched(type(parameters))
     for watched in values:
         if watched.usual is None:
             continue
-        for item, value in _numbers(f"{prefix}{watched.name}", getattr(parameters, watched.name)):
-            low, high = watched.usual
-            if value != 0.0 and not low <= abs(value) <= high:
-                unit = "" if watched.unit == "1" else f" {watched.unit}"
-                said = f"{item} = {value:g}{unit}{_in_hertz(value, watched.unit)}"
-                yield f"{said} lies {'below' if abs(value) < low else 'above'} the usual {low:.3g} to {high:.3g}{unit}"
+        low, high = watched.usual
+        numbers = _numbers(f"{prefix}{watched.name}", getattr(parameters, watched.name))
+        outside = [(item, value) for item, value in numbers if value != 0.0 and not low <= abs(value) <= high]
+        if outside:
+            item, value = outside[0]
+            unit = "" if watched.unit == "1" else f" {watched.unit}"
+            said = f"{item} = {value:g}{unit}{_in_hertz(value, watched.unit)}{_others(outside)}"
+            yield f"{said} lies {'below' if abs(value) < low else 'above'} the usual {low:.3g} to {high:.3g}{unit}"
     for name in groups:
         group = getattr(parameters, name)
         if isinstance(group, Parameters):
@@ -45,19 +47,21 @@ def unusual(parameters: Parameters, prefix: str = "") -> Iterator[str]:
                 yield from unusual(each, f"{prefix}{name}[{place}].")
 
 
-def off_resonance(parameters: Parameters, modes: tuple[float, float], prefix: str = "") -> Iterator[str]:
-    """A notice for each circular frequency far from the `modes` of the bare frame [rad/s]: Hz typed for rad/s shows."""
+def off_resonance(parameters: Parameters, modes: tuple[float, float]) -> Iterator[str]:
+    """A notice for each key with a circular frequency far from the `modes` of the bare frame [rad/s]."""
     for watched in _watched(type(parameters))[0]:
         if watched.unit != ANGULAR:
             continue
-        for item, value in _numbers(f"{prefix}{watched.name}", getattr(parameters, watched.name)):
-            if value == 0.0 or _SLOW * modes[0] <= value <= _FAST * modes[1]:
-                continue
+        numbers = _numbers(watched.name, getattr(parameters, watched.name))
+        outside = [(item, value) for item, value in numbers if not _SLOW * modes[0] <= value <= _FAST * modes[1]]
+        if outside:
+            item, value = outside[0]
+            said = f"{item} = {value:g} rad/s{_in_hertz(value, ANGULAR)}{_others(outside)}"
             where = "below" if value < modes[0] else "above"
             natural = " and ".join(f"{mode:.3g}" for mode in modes)
             yield (
-                f"{item} = {value:g} rad/s{_in_hertz(value, ANGULAR)} lies far {where} the modes of the bare frame, "
-                f"{natural} rad/s: was Hz meant? write it with its unit"
+                f"{said} lies far {where} the modes of the bare frame, {natural} rad/s: "
+                "was Hz meant? write it with its unit"
             )
 
 
@@ -68,6 +72,10 @@ def in_hertz(parameters: Parameters) -> Iterator[str]:
         if watched.unit == ANGULAR and values:
             angular, cycles = (" ".join(f"{value * k:.4g}" for value in values) for k in (1.0, 1.0 / tau))
             yield f"{watched.name} = {angular} rad/s = {cycles} Hz"
+
+
+def _others(outside: Sequence[object]) -> str:
+    return f" (and {len(outside) - 1} more)" if len(outside) > 1 else ""
 
 
 def _in_hertz(value: float, unit: str) -> str:
