@@ -117,7 +117,7 @@ def _reaches(configuration: BenchConfiguration) -> Iterator[_Reach]:
     stroke = configuration.half_stroke, "m", f"the stroke ({shaker}.half_stroke)"
     travel = min(stroke, position)
     yield _Reach("displacement", *travel)
-    # Landau's inequality: |v|^2 <= 2 |x| |a| for a motion within them (E. Landau, Proc. London Math. Soc. 13, 1913)
+    # |v|^2 <= 2 |x| |a| for a motion from rest to rest within them (J. Hadamard, C. R. Soc. Math. France 41, 1914)
     owner = f"a motion within {travel[2]} and {acceleration[2]}"
     yield _Reach("velocity", sqrt(2.0 * travel[0] * acceleration[0]), "m/s", owner)
     yield _Reach("acceleration", *acceleration)

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from difflib import get_close_matches
 from json import dumps
+from math import inf
 from typing import Any, TypeVar, cast
 
 from pydantic import ValidationError
@@ -153,8 +154,20 @@ def _refusal(model: type[Parameters], detail: Any, named: Callable[[Path], str])
         listed = entry.many or isinstance(path[-1], int)
         if remedy := _remedy(entry, value, listed):
             return InvalidInput(named(path), value, remedy)
-    allowed = f"it must be {entry.allowed_in_unit}" if entry is not None else str(detail["msg"])
+    allowed = (
+        f"it must be {entry.allowed_in_unit}{_as_meant(entry, value)}" if entry is not None else str(detail["msg"])
+    )
     return InvalidInput(named(path), value, allowed)
+
+
+def _as_meant(entry: Declared, value: Any) -> str:
+    """How to write what was probably meant by a number beyond its limits: a percentage, or degrees."""
+    if not isinstance(value, float | int) or entry.kind is not float or not 1.0 < value <= 360.0:
+        return ""
+    if entry.unit == "rad":
+        return f'; {value:g} degrees are "{value:g} deg"'
+    highest = min((getattr(limit, "lt", getattr(limit, "le", inf)) for limit in entry.constraints), default=inf)
+    return f"; {value:g} % is {value / 100.0:g}" if entry.unit == "1" and highest <= 1.0 and value <= 100.0 else ""
 
 
 def _suggestion(model: type[Parameters], path: Path) -> str:

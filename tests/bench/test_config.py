@@ -134,6 +134,13 @@ def test_a_byte_order_mark_is_no_error(tmp_path: Path):
         ("[specimen.frame]\nk1 = true", "specimen.frame.k1 = True is refused: it must be a number"),
         ("[specimen.frame]\nk1 = 2024-05-01", "specimen.frame.k1 = '2024-05-01' is refused: it must be a number"),
         ("[specimen.frame]\nxi1 = 1.0", "xi1 = 1.0 is refused: it must be a number at least 0 and below 1$"),
+        ("[specimen.frame]\nxi2 = 3.5", "xi2 = 3.5 is refused: it must be .* below 1; 3.5 % is 0.035"),
+        (
+            "[simulation.bench]\ncatch_angle = 20",
+            'catch_angle = 20 is refused: it must be .* below 1 rad; 20 degrees are "20 deg"',
+        ),
+        ("[simulation]\nseed = 1_000", "bench.toml: seed = '1_000' is refused: write a decimal number"),
+        ("[specimen.frame]\nk1 = 213,44", "it is not TOML.*k1 = 213,44; a decimal comma. write k1 = 213.44"),
         ("[simulation]\nseed = 1.5", "simulation.seed = 1.5 is refused: it must be a whole number"),
         ("[specimen.frame]\nk3 = 1.0", "specimen.frame.k3 = 1.0 is refused: .* nearest is specimen.frame.k[12]"),
         ("[frame]\nk1 = 1.0", "frame = 'a table' is refused: there is no such key"),

@@ -137,9 +137,10 @@ def settings(path: Path) -> dict[str, str]:
     """What a re-analysis can change of a file, and its unit."""
     done = command("analyse", path, "--list")
     assert done.code == 0, done.err
-    heading, *lines = done.out.splitlines()
-    unit, text = heading.index("UNIT"), heading.index("MEANING")
-    return {line.split()[0]: line[unit:text].strip() for line in lines}
+    heading, _, *lines = done.out.splitlines()
+    unit, text = heading.index("unit"), heading.index("meaning")
+    # a line that begins with a space goes on with the meaning above
+    return {line.split()[0]: line[unit:text].strip() for line in lines if not line.startswith(" ")}
 
 
 def shared(found: dict[str, dict[str, Any]]) -> dict[str, Any]:
