@@ -262,12 +262,9 @@ def _in_protocols(meant: random.Random) -> Iterator[Slip]:
 
 
 def _asked(entry: Any, name: str, typed: str | list[str]) -> Outcome:
-    """What `rockbench run` says of a flag before it plans, and where that is nothing, its check of the whole."""
+    """What `rockbench run` says of a flag before it plans."""
     parameters: Parameters = parameters_from(entry.parameters, {name: typed}, None)
-    if notices := notices_of(parameters, Specimen()):
-        return Outcome(None, notices)
-    entry.campaign(parameters).check(BenchConfiguration())
-    return Outcome(None)
+    return Outcome(None, notices_of(parameters, Specimen()))
 
 
 def _in_predictions(meant: random.Random) -> Iterator[Slip]:

@@ -51,11 +51,12 @@ class Reach:
         reach, owner = min((stroke, "the shaker's stroke"), (limits.displacement, "limits.displacement"))
         for omega in parameters.omega:
             travel, speed = peak / omega**2, peak / omega
+            at = f"{start} at {omega / tau:.2f} Hz"
             if travel > reach:
-                needs = f"{start} needs {1e3 * travel:.1f} mm there, {owner} allows {1e3 * reach:.1f} mm"
+                needs = f"{at} needs {1e3 * travel:.1f} mm, {owner} allows {1e3 * reach:.1f} mm"
                 raise InvalidInput("omega", omega, needs)
             if speed > limits.velocity:
-                needs = f"{start} needs {speed:.3g} m/s there, limits.velocity = {limits.velocity:g} m/s"
+                needs = f"{at} needs {speed:.3g} m/s, limits.velocity = {limits.velocity:g} m/s"
                 raise InvalidInput("omega", omega, needs)
             if parameters.settle_limit < 2 * WINDOW * tau / omega:
                 needs = f"judging a steady state at {omega:g} rad/s takes {2 * WINDOW * tau / omega:.1f} s at least"
