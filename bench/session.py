@@ -86,6 +86,8 @@ def run_session(
     """
     started = time.monotonic()
     with requests.without_rig():
+        if requests.strongest is not None:
+            raise KeyboardInterrupt
         require_drivers(prepared.configuration)
         preflight = compile_run(protocol.name, prepared, out, progress)
         preflight.require()

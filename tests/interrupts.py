@@ -18,7 +18,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf
 from pathlib import Path
 
@@ -26,6 +26,8 @@ ANSWERED = 0.5
 """Longest time to the answer [s]."""
 RAMP = 3.0
 """Longest time to the end where a rig is open [s]: a fast ramp in virtual time, the recorder's last pages, the file."""
+DRIVEN = 2.0
+"""Latest moment after the rig was opened [s]."""
 STARTED = 0.25
 """Earliest moment [s]: Python itself starts before, and answers in its own way."""
 
@@ -88,6 +90,18 @@ COMMANDS = (
 )
 
 
+@dataclass(frozen=True)
+class Moment:
+    """When `command` is interrupted: `after` [s] from its start or, `opened`, from when the rig is open; and `again`
+    [s] later, if not None.
+    """
+
+    command: Command
+    after: float
+    again: float | None
+    opened: bool
+
+
 @dataclass
 class Reaction:
     """What came of a signal `moment` [s] after the start. `late` [s]: how late this machine woke a sleeping thread."""
@@ -139,8 +153,9 @@ class Bed:
         self.queue.write_text(json.dumps(whole), encoding="utf-8")
         subprocess.run([sys.executable, "-m", "bench", "config", "init"], check=True, cwd=folder, capture_output=True)
 
-    def react(self, command: Command, moment: float, second: float | None) -> Reaction | None:
-        """Start `command` and interrupt it at `moment` [s], and again `second` [s] later; None if it ended before."""
+    def react(self, drawn: Moment) -> Reaction | None:
+        """Start the command and interrupt it at its moment; None if it ended before."""
+        command, moment, second = drawn.command, drawn.after, drawn.again
         with tempfile.TemporaryDirectory(dir=self.folder) as made:
             work, temporary = Path(made, "work"), Path(made, "temporary")
             work.mkdir()
@@ -164,6 +179,8 @@ class Bed:
             reader = threading.Thread(target=_read, args=(process, lines))
             reader.start()
             try:
+                while drawn.opened and process.poll() is None and not any(work.rglob("campaign.h5")):
+                    time.sleep(0.02)
                 time.sleep(moment)
                 if process.poll() is not None:
                     return None
@@ -226,7 +243,14 @@ def _judge(found: Reaction, lines: list[tuple[float, str]], group: int, work: Pa
         faults.append(f"ended after {found.end:.2f} s")
     left = [str(path) for path in temporary.rglob("*")]
     if not (done or found.driving):
-        left += [str(path) for path in work.rglob("*") if path.name not in ("queue.json", "queue.json.lock")]
+        # the lock of a queue stays, and is let go of; the window keeps its queue in a folder of its own
+        kept = {
+            "queue.json",
+            "queue.json.lock",
+            "queue.json.owner",
+            *(("runs",) if found.command.name == "gui" else ()),
+        }
+        left += [str(path) for path in work.rglob("*") if path.name not in kept]
     else:
         left += [str(path) for pattern in (".*", "*.part", "*.new") for path in work.rglob(pattern)]
     if left:
@@ -238,19 +262,18 @@ def _judge(found: Reaction, lines: list[tuple[float, str]], group: int, work: Pa
     faults.append("a child is left")
 
 
-def moments(
-    count: int, seed: int, only: Sequence[str] = (), latest: float = inf
-) -> list[tuple[Command, float, float | None]]:
-    """`count` of them, spread over the commands: when the signal comes, and when a second one if one does [s]."""
+def moments(count: int, seed: int, only: Sequence[str] = (), latest: float = inf) -> list[Moment]:
+    """`count` of them, spread over the commands."""
     chance = random.Random(seed)
     chosen = [each for each in COMMANDS if not only or each.name in only]
-    drawn = list[tuple[Command, float, float | None]]()
+    drawn = list[Moment]()
     for number in range(count):
         # in long strides, so that few moments are of different kinds too
         command = chosen[number * 7 % len(chosen)]
-        moment = chance.uniform(STARTED, min(command.span, latest))
-        second = chance.uniform(0.0, 0.3) if chance.random() < 0.3 else None
-        drawn.append((command, moment, second))
+        opened = command.drives and chance.random() < 0.5
+        after = chance.uniform(0.0, DRIVEN) if opened else chance.uniform(STARTED, min(command.span, latest))
+        again = chance.uniform(0.0, 0.3) if chance.random() < 0.3 else None
+        drawn.append(Moment(command, after, again, opened))
     return drawn
 
 
@@ -264,13 +287,13 @@ def main() -> int:
     found = list[Reaction]()
     with tempfile.TemporaryDirectory() as folder:
         bed = Bed(Path(folder))
-        for command, moment, second in moments(asked.moments, asked.seed, asked.only):
-            reaction = bed.react(command, moment, second)
-            tries = 0
+        for drawn in moments(asked.moments, asked.seed, asked.only):
+            command, reaction, tries = drawn.command, bed.react(drawn), 0
             while reaction is None and tries < 6:
+                # this machine is faster than the span says
                 tries += 1
-                moment = STARTED + (moment - STARTED) / 1.5
-                reaction = bed.react(command, moment, second)
+                drawn = replace(drawn, after=drawn.after / 1.5 if drawn.opened else max(STARTED, drawn.after / 1.5))
+                reaction = bed.react(drawn)
             if reaction is None:
                 print(f"{command.name:24} ends before every moment", flush=True)
                 continue

@@ -13,7 +13,7 @@ import threading
 from collections.abc import Callable, Generator
 from contextlib import contextmanager, suppress
 from types import FrameType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 from bench.cli.refusal import fail, tell
 from bench.unfinished import remove_unfinished
@@ -51,6 +51,15 @@ class Interrupts:
         if self.first is None:
             self.first = number
             raise KeyboardInterrupt
+
+
+class Leaving(Interrupts):
+    """The handler where an exception would do harm: Qt prints it in a callback, and aborts what is half built."""
+
+    def __call__(self, number: int, frame: FrameType | None) -> None:  # noqa: ARG002 - the signature is Python's
+        """End the process at once."""
+        answer("interrupted")
+        leave(128 + number)
 
 
 class RunInterrupts(Interrupts):
@@ -97,6 +106,20 @@ def interruptible(requests: "Requests", asking: Callable[[], bool]) -> Generator
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+@contextmanager
+def leaving() -> Generator[None, None, None]:
+    """Within, SIGINT ends the process at once where `heed_signals` heeds it, and somewhere else nothing is changed."""
+    before = signal.getsignal(signal.SIGINT)
+    if not isinstance(before, Interrupts):
+        yield
+        return
+    signal.signal(signal.SIGINT, Leaving())
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 class Watch:
@@ -191,7 +214,7 @@ def answer(text: str, *, in_result: bool = False) -> None:
             fail(text, "interrupted")
 
 
-def leave(code: int) -> None:
+def leave(code: int) -> NoReturn:
     """End the process now, without running anything that still waits in it; what was in the making is removed."""
     remove_unfinished()
     with suppress(OSError, ValueError):

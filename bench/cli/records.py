@@ -7,8 +7,10 @@ from typing import Annotated, Any
 from cyclopts import App, Parameter
 
 from bench.cli.predict_options import ResultOptions
+from bench.cli.progress import Handed
 from bench.cli.records_fit import register_fit
 from bench.cli.refusal import fail
+from bench.progress import silent
 from sim.errors import InvalidInput, RockbenchError
 
 MOST_DRAWN = 8
@@ -56,6 +58,7 @@ def info(
     as_json: Annotated[
         bool, Parameter(name="--json", negative=(), show_default=False, help="Print one JSON object.")
     ] = False,
+    progress: Handed = silent,
 ) -> int:
     """Say what earthquake records are and measure them: peaks, Arias intensity, significant duration, hash.
 
@@ -64,6 +67,7 @@ def info(
     every record was read, 1 when a figure could not be written, 2 when something was refused. Files that exist are
     never overwritten.
     """
+    progress("reading the records")
     from bench.accelerograms.reference import GRAMMAR, RecordReference, read_records, seconds_of
     from bench.cli.records_output import content_of, figure_of, text_of
 

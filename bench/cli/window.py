@@ -11,6 +11,7 @@ from cyclopts import App, Parameter
 
 from bench.catalogue import all_protocols
 from bench.cli.inputs import Seed, SpecimenFile, configuration_from
+from bench.cli.interrupt import leaving
 from bench.cli.progress import Handed
 from bench.cli.refusal import warn
 from bench.progress import silent
@@ -93,7 +94,9 @@ def gui(
         warn(line)
     # the paper's campaign is the first choice
     protocols = sorted(protocols, key=lambda each: each.name != "harmonic")
-    return open_window(configuration, protocols, config, queue)
+    # until the window has a handler of its own, which closes it
+    with leaving():
+        return open_window(configuration, protocols, config, queue)
 
 
 def require_display() -> None:

@@ -96,6 +96,8 @@ class Engine:
             while True:
                 # what the plan computes between its steps may take long, and looks at no request
                 with self._requests.breakable(self._asked_to_end):
+                    if self._requests.interrupted:
+                        raise self._asked_to_end()
                     step = next(plan) if outcome is None else plan.send(outcome)
                 outcome = self._do(step)
         except StopIteration as end:

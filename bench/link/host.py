@@ -1,6 +1,8 @@
 """The session's side of the link: sends what the engine says, hears the client, and notices when it is gone."""
 
+import signal
 import threading
+from _thread import interrupt_main
 from collections.abc import Callable
 from contextlib import suppress
 from multiprocessing.connection import Connection
@@ -98,12 +100,11 @@ class Host:
 
     def _heed(self, message: object) -> None:
         match message:
-            case Ask("halt"):
-                self._requests.halt()
-            case Ask("abort"):
-                self._requests.abort()
-            case Ask("stop"):
-                self._requests.stop()
+            case Ask("halt" | "abort" | "stop" as end):
+                {"halt": self._requests.halt, "abort": self._requests.abort, "stop": self._requests.stop}[end]()
+                if self._requests.rig_closed:
+                    # the planning of a run looks at no request: the handler of this signal breaks it off
+                    interrupt_main(signal.SIGTERM)
             case Answer():
                 self.answers.put(message)
             case Leave():

@@ -106,7 +106,11 @@ def _give_way() -> None:
 
 def _abort_on_terminate(requests: Requests) -> None:
     def handle(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - the signature is Python's
-        requests.abort("the session's process was told to terminate")
+        # the hearing thread raises this signal too, for what a client has asked for
+        if requests.strongest is None:
+            requests.abort("the session's process was told to terminate")
+        if requests.breaking is not None:
+            raise requests.breaking()
 
     signal.signal(signal.SIGTERM, handle)
 

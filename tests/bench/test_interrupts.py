@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from tests.interrupts import Bed, Command, moments
+from tests.interrupts import Bed, Moment, moments
 
 if sys.platform == "win32":
     pytest.skip("sends SIGINT to a group of processes", allow_module_level=True)
@@ -20,13 +20,9 @@ def bed(tmp_path_factory: pytest.TempPathFactory) -> Bed:
     return Bed(tmp_path_factory.mktemp("interrupts"))
 
 
-@pytest.mark.parametrize(
-    ("command", "moment", "second"),
-    moments(COUNT, seed=20, latest=6.0),
-    ids=lambda each: each.name if isinstance(each, Command) else None,
-)
-def test_ctrl_c_is_answered_and_leaves_nothing(bed: Bed, command: Command, moment: float, second: float | None) -> None:
-    reaction = bed.react(command, moment, second)
+@pytest.mark.parametrize("moment", moments(COUNT, seed=20, latest=6.0), ids=lambda each: each.command.name)
+def test_ctrl_c_is_answered_and_leaves_nothing(bed: Bed, moment: Moment) -> None:
+    reaction = bed.react(moment)
     if reaction is None:
         pytest.skip("the command ended before the moment")
     assert reaction.faults == [], reaction

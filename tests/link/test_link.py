@@ -1,14 +1,17 @@
 """What passes over the link, both ways, in the order in which a person would meet it."""
 
+import sys
 import threading
 import time
 from collections.abc import Callable
 from multiprocessing import Pipe
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
 
+from bench.config.model import BenchConfiguration
 from bench.engine.operator import Unattended
 from bench.engine.requests import Requests
 from bench.events import PointFinished, State, StateChanged, StepStarted
@@ -22,6 +25,7 @@ from bench.link.messages import (
     Opened,
     Question,
     Refused,
+    Run,
     SafetyInputs,
     Survey,
     Surveyed,
@@ -33,6 +37,7 @@ from bench.link.reduction import extremes
 from bench.record.reader import open_record
 from bench.results import FILE
 from bench.session import run_session
+from protocols.harmonic.parameters import HarmonicParameters
 from tests.link.experiment import SHAKING, Shaking, ShakingParameters, begun, bench
 
 LONG = 60.0
@@ -122,6 +127,25 @@ def test_a_survey_opens_nothing(tmp_path: Path) -> None:
     assert isinstance(found, Surveyed)
     assert (found.refusal, list(found.prediction)) == (None, ["value"])
     assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no signal ends a wait there")
+@pytest.mark.parametrize("end", ["stop", "abort", "halt"])
+def test_an_end_that_is_asked_for_breaks_the_planning_off(
+    tmp_path: Path, end: Literal["stop", "abort", "halt"]
+) -> None:
+    """The paper's whole campaign, whose plan takes many seconds."""
+    client = Client(Link(Run(HarmonicCampaign, HarmonicParameters(), BenchConfiguration(), tmp_path / "run")))
+    client.until(lambda: any(isinstance(message, Beat) for message in client.heard))
+    time.sleep(3.0)
+    client.link.ask(end)
+    took = client.until(lambda: client.link.process.poll() is not None)
+    refused = client.until_over()
+    assert isinstance(refused, Refused)
+    assert f"{end} was asked for" in refused.text
+    assert not (tmp_path / "run").exists()
+    # but for what a machine under full load may be late
+    assert took < 4.0
 
 
 def test_what_is_refused_names_its_item(tmp_path: Path) -> None:
