@@ -137,7 +137,8 @@ def test_an_end_that_is_asked_for_breaks_the_planning_off(
     """The paper's whole campaign, whose plan takes many seconds."""
     client = Client(Link(Run(HarmonicCampaign, HarmonicParameters(), BenchConfiguration(), tmp_path / "run")))
     client.until(lambda: any(isinstance(message, Beat) for message in client.heard))
-    time.sleep(3.0)
+    linked = time.monotonic()
+    client.until(lambda: time.monotonic() - linked > 3.0)
     client.link.ask(end)
     took = client.until(lambda: client.link.process.poll() is not None)
     refused = client.until_over()
