@@ -65,8 +65,6 @@ class Prepared(ABC, Generic[P]):
         self.parameters, self.configuration, self.stored = parameters, configuration, stored
         self.progress: Progress = silent
         """What a long computation reports to."""
-        self.progress: Progress = silent
-        """What a long computation reports to, and what may interrupt it."""
 
     @cached_property
     def forecast(self) -> "Forecast":

@@ -80,9 +80,13 @@ def _run(asked: Run, host: Host, requests: Requests) -> FromSession:
     _abort_on_terminate(requests)
 
     protocol = load_protocol(asked.protocol)
+    with requests.without_rig():
+        if requests.strongest is not None:
+            raise KeyboardInterrupt
+        prepared = protocol.prepare(asked.parameters, configuration, None)
     ended = run_session(
         protocol,
-        protocol.prepare(asked.parameters, configuration, None),
+        prepared,
         out=asked.out,
         operator=AtTheClient(host, requests) if asked.person else Unattended(_policy(configuration)),
         subscribers=[Teller(host)],

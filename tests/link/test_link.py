@@ -37,7 +37,7 @@ from bench.link.reduction import extremes
 from bench.record.reader import open_record
 from bench.results import FILE
 from bench.session import run_session
-from protocols.harmonic.parameters import HarmonicParameters
+from protocols.harmonic.protocol import HarmonicParameters
 from tests.link.experiment import SHAKING, Shaking, ShakingParameters, begun, bench
 
 LONG = 60.0
@@ -135,7 +135,7 @@ def test_an_end_that_is_asked_for_breaks_the_planning_off(
     tmp_path: Path, end: Literal["stop", "abort", "halt"]
 ) -> None:
     """The paper's whole campaign, whose plan takes many seconds."""
-    client = Client(Link(Run(HarmonicCampaign, HarmonicParameters(), BenchConfiguration(), tmp_path / "run")))
+    client = Client(Link(Run("harmonic", HarmonicParameters(), BenchConfiguration(), tmp_path / "run")))
     client.until(lambda: any(isinstance(message, Beat) for message in client.heard))
     linked = time.monotonic()
     client.until(lambda: time.monotonic() - linked > 3.0)
