@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from bench.catalogue import load_protocol
 from bench.cli.main import main
 from bench.config.model import BenchConfiguration
 from bench.config.review import notices_of, review, scales_of
@@ -15,7 +16,6 @@ from bench.guard.limits import Debounce, Limits
 from bench.prediction.requests import SineRequest
 from bench.preflight.compiled import compile_run
 from drivers.hardware.parameters import CoilCurrent, Hardware, TableAcceleration, TableDisplacement, TableForce
-from protocols.check.experiment import LoopCheck
 from protocols.check.parameters import CheckParameters
 from protocols.harmonic.protocol import HarmonicParameters
 from sim.errors import InvalidInput
@@ -72,14 +72,16 @@ def test_a_limit_that_could_never_trip_is_refused_unless_it_is_confirmed(
     assert problems_of(FILE) == []
     assert main(["config", "check", str(FILE)]) == 0
     assert re.search(rf"warning: limits.{limit} = .* limits.confirmed names it", capsys.readouterr().err)
-    preflight = compile_run(LoopCheck(CheckParameters()), read_configuration(FILE), Path("run"))
+    preflight = compile_run(
+        "check", load_protocol("check").prepare(CheckParameters(), read_configuration(FILE), None), Path("run")
+    )
     assert any(f"limits.{limit}" in warning for warning in preflight.warnings)
     assert preflight.refusal is None
 
 
 def test_a_configuration_that_no_file_holds_is_refused_alike() -> None:
     wide = BenchConfiguration(limits=Limits(drift=80.0))
-    refusal = compile_run(LoopCheck(CheckParameters()), wide, Path("run")).refusal
+    refusal = compile_run("check", load_protocol("check").prepare(CheckParameters(), wide, None), Path("run")).refusal
     assert refusal is not None
     assert refusal.item == "limits.drift"
 
