@@ -6,6 +6,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -32,13 +33,15 @@ ROOT = Path(__file__).parents[2]
 FITS = Room(Path(), 10, 1_000)
 
 Operation = tuple[str, int, int]
+_NUMBERS = count()
+"""Of the folders: whoever adds a test names one that no other has; `checked` refuses what does not."""
 
 
 def _try(queue: Queue, operation: Operation) -> None:
     """Do it where it is allowed."""
     name, place, amount = operation
     if name == "add":
-        queue.add(Queued(protocol="p", out=f"folder{len(queue.tests)}-{amount}-{place}"))
+        queue.add(Queued(protocol="p", out=f"folder-{next(_NUMBERS)}"))
         return
     if not queue.tests:
         return
