@@ -27,6 +27,7 @@ from bench.rigs import open_rig, require_drivers
 from bench.twin.beside import twin_beside
 from drivers.clock import VirtualClock
 from drivers.rig import Rig
+from sim.errors import UNKNOWN, Cause
 from sim.parameters import Parameters
 
 
@@ -52,6 +53,7 @@ class SessionResult:
     table: str
     interrupted: bool
     passed: bool = True
+    cause: Cause = UNKNOWN
 
 
 class _Points:
@@ -172,6 +174,7 @@ def run_session(
     return SessionResult(
         status=ending.status,
         reason=ending.reason,
+        cause=ending.cause,
         summary=summary.as_dict(),
         table=result.text,
         interrupted=requests.strongest is not None,

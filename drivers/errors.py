@@ -1,6 +1,8 @@
 """What goes wrong with instruments. Whatever is raised here, the output is at zero or on its way there."""
 
-from sim.errors import RockbenchError
+from collections.abc import Sequence
+
+from sim.errors import Cause, CauseCode, RockbenchError
 
 
 class RigError(RockbenchError):
@@ -44,3 +46,18 @@ class DeviceNotFound(RigError):
     """A device, its driver or its port is not there, or somebody else holds it."""
 
     error_code = "device_not_found"
+
+
+class SafetyInputOpen(RigError):
+    """Safety inputs, named by `inputs`, are not good: nothing is armed, and what was armed is cut."""
+
+    error_code = CauseCode.SAFETY_INPUT
+
+    def __init__(self, text: str, inputs: Sequence[str]) -> None:
+        super().__init__(text)
+        self.inputs = tuple(inputs)
+
+    @property
+    def cause(self) -> Cause:
+        """The code, and the names of the inputs."""
+        return Cause(self.error_code, ", ".join(self.inputs))

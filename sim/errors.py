@@ -1,6 +1,39 @@
 """The family of errors that this software raises on purpose."""
 
+import errno
+from dataclasses import dataclass
+from enum import StrEnum
 from typing import ClassVar
+
+
+class CauseCode(StrEnum):
+    """Causes of the end of a run that are no error of a type of its own."""
+
+    UNKNOWN = "unknown"
+    REQUEST = "request"
+    """Somebody asked for the end."""
+    CLIENT_LOST = "client_lost"
+    DECLINED = "declined"
+    """The operator did not do what was asked for."""
+    LIMIT = "limit"
+    RESIDUAL = "residual"
+    """The live twin's residual exceeded its limit."""
+    SAFETY_INPUT = "safety_input"
+    DISK = "disk"
+
+
+@dataclass(frozen=True)
+class Cause:
+    """Why a run ended or was refused: the `error_code` of an error, or a `CauseCode`; advice depends on it alone.
+
+    `subject` is what it concerns: the quantity of a limit, the names of safety inputs, the item of a value.
+    """
+
+    code: str = CauseCode.UNKNOWN
+    subject: str = ""
+
+
+UNKNOWN = Cause()
 
 
 class RockbenchError(Exception):
@@ -10,6 +43,11 @@ class RockbenchError(Exception):
     """
 
     error_code: ClassVar[str] = "error"
+
+    @property
+    def cause(self) -> Cause:
+        """The code, and what it concerns."""
+        return Cause(self.error_code)
 
 
 class InvalidInput(RockbenchError, ValueError):
@@ -25,3 +63,18 @@ class InvalidInput(RockbenchError, ValueError):
         self.item = item
         self.value = value
         self.allowed = allowed
+
+    @property
+    def cause(self) -> Cause:
+        """The code, and the item."""
+        return Cause(self.error_code, self.item)
+
+
+_OF_DISK = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.EFBIG})
+
+
+def cause_of(error: BaseException) -> Cause:
+    """The cause that any error is: that of ours, and of what the system reports of a disk."""
+    if isinstance(error, RockbenchError):
+        return error.cause
+    return Cause(CauseCode.DISK if isinstance(error, OSError) and error.errno in _OF_DISK else CauseCode.UNKNOWN)

@@ -1,6 +1,8 @@
-"""How a run ends, and how an ending is told when more than one thing went wrong."""
+"""How a run ends, and how an ending is reported when more than one thing went wrong."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+from sim.errors import UNKNOWN, Cause, RockbenchError
 
 SEVERITY = ("completed", "stopped", "aborted", "halted", "failed")
 """Every status, the worst last."""
@@ -8,16 +10,26 @@ SEVERITY = ("completed", "stopped", "aborted", "halted", "failed")
 
 @dataclass(frozen=True)
 class Ending:
-    """How a session ended: `status` is completed, stopped, aborted, halted or failed, with the reason."""
+    """How a session ended: `status` is completed, stopped, aborted, halted or failed, with the reason and its cause."""
 
     status: str
     reason: str
+    cause: Cause = field(default=UNKNOWN, compare=False)
+
+    @classmethod
+    def failed(cls, error: RockbenchError) -> "Ending":
+        """The ending that an error makes."""
+        return cls("failed", str(error), error.cause)
 
     def then(self, later: "Ending | None") -> "Ending":
-        """This ending with what came on top while the bench was brought to rest: the worse status, both reasons."""
+        """This ending with what came on top while the bench was brought to rest: the worse status, both reasons.
+
+        The cause stays that of the first.
+        """
         if later is None:
             return self
-        return Ending(max(self.status, later.status, key=SEVERITY.index), f"{self.reason}; then {later.reason}")
+        status = max(self.status, later.status, key=SEVERITY.index)
+        return Ending(status, f"{self.reason}; then {later.reason}", self.cause)
 
 
 class Ended(Exception):

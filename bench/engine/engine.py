@@ -29,6 +29,7 @@ from bench.engine.turns import Turns
 from bench.events import OperatorAnswered, OperatorAsked, SpecimenMounted, State
 from bench.guard.guard import Guard
 from drivers.rig import Handwork, Rig
+from sim.errors import Cause, CauseCode
 from sim.specimen import Specimen
 
 
@@ -104,7 +105,7 @@ class Engine:
             self.returned = end.value
 
     def _asked_to_end(self) -> Ended:
-        return Ended(Ending("aborted", self._requests.reason))
+        return Ended(Ending("aborted", self._requests.reason, self._requests.cause))
 
     def _do(self, step: Step) -> Outcome:
         match step:
@@ -141,7 +142,7 @@ class Engine:
         machine.go(State.IDLE, "the operator answered")
         self._turns.heed_requests()
         if not agreed:
-            raise Ended(Ending("aborted", f"the operator declined: {step.request}"))
+            raise Ended(Ending("aborted", f"the operator declined: {step.request}", Cause(CauseCode.DECLINED)))
         self._rig.handwork(step.work, (step.specimen.nominal_k_c or None) if step.amount is None else step.amount)
         self._specimen = step.specimen
         if step.work in (Handwork.WATCH_BLOCK, Handwork.WATCH_STOREYS):

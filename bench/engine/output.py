@@ -14,7 +14,7 @@ from bench.engine.stream import Stream
 from bench.events import Acquired, State, StateChanged
 from bench.guard.guard import Exchange, Guard
 from drivers.rig import Rig, RigError
-from sim.errors import RockbenchError
+from sim.errors import Cause, CauseCode, RockbenchError
 
 _DRIVEN = (State.ARMED, State.RUNNING, State.STOPPING, State.ABORTING)
 """States in which the rig is armed."""
@@ -66,7 +66,8 @@ class Output:
         self.drive = exchange.drive
         self._stream.publish(Acquired(self._run, exchange.block, exchange.drive, exchange.signals))
         if exchange.opened:
-            raise Ended(self.cut(Ending("halted", f"{', '.join(exchange.opened)} opened")))
+            opened = ", ".join(exchange.opened)
+            raise Ended(self.cut(Ending("halted", f"{opened} opened", Cause(CauseCode.SAFETY_INPUT, opened))))
         return exchange
 
     def rest(self) -> None:
@@ -80,13 +81,13 @@ class Output:
         try:
             self._guard.halt()
         except RigError as error:
-            ending = ending.then(Ending("failed", str(error)))
+            ending = ending.then(Ending.failed(error))
         if self.state not in (State.HALTED, State.CLOSED):
             try:
                 self.machine.go(State.HALTED, ending.reason)
             except RockbenchError as error:
-                ending = ending.then(Ending("failed", str(error)))
-        # what ended the run is what must be told of it
+                ending = ending.then(Ending.failed(error))
+        # report the original cause, not a follow-up error
         with suppress(RockbenchError):
             self._placements.tell()
         return ending
@@ -100,10 +101,10 @@ class Output:
         except RigError as error:
             if self._requests.strongest == "halt" and self.driven:
                 # the rig was cut under the loop by the thread that asked
-                return self.cut(Ending("halted", self._requests.reason))
-            return self.cut(Ending("failed", str(error)))
+                return self.cut(Ending("halted", self._requests.reason, self._requests.cause))
+            return self.cut(Ending.failed(error))
         except RockbenchError as error:
-            return Ending("failed", str(error))
+            return Ending.failed(error)
         return None
 
     def rescue(self, error: BaseException, lasts: Sequence[Callable[[], object]]) -> None:

@@ -4,6 +4,9 @@ from collections.abc import Callable, Generator
 from contextlib import contextmanager, suppress
 
 from drivers.errors import RigError
+from sim.errors import UNKNOWN, Cause, CauseCode
+
+_Made = tuple[str, Cause]
 
 
 class Requests:
@@ -13,7 +16,9 @@ class Requests:
     """
 
     def __init__(self) -> None:
-        self._stop = self._abort = self._halt = ""
+        self._stop: _Made | None = None
+        self._abort: _Made | None = None
+        self._halt: _Made | None = None
         self._cut: Callable[[], None] | None = None
         self.interrupted = False
         """Whether a signal made one of them: then nothing is waited for once the rig is at rest."""
@@ -44,17 +49,17 @@ class Requests:
         """From now on `halt` also calls `cut`, in the thread that asks."""
         self._cut = cut
 
-    def stop(self, why: str = "stop was asked for") -> None:
+    def stop(self, why: str = "stop was asked for", code: CauseCode = CauseCode.REQUEST) -> None:
         """Ramp the output out; what was measured is good. `why` is told as the reason, of the first that asked."""
-        self._stop = self._stop or why
+        self._stop = self._stop or (why, Cause(code))
 
-    def abort(self, why: str = "abort was asked for") -> None:
+    def abort(self, why: str = "abort was asked for", code: CauseCode = CauseCode.REQUEST) -> None:
         """Ramp the output out fast; the run is bad."""
-        self._abort = self._abort or why
+        self._abort = self._abort or (why, Cause(code))
 
-    def halt(self, why: str = "halt was asked for") -> None:
+    def halt(self, why: str = "halt was asked for", code: CauseCode = CauseCode.REQUEST) -> None:
         """Cut the enable line now, in this thread; the loop finds the rig halted and ends by itself."""
-        self._halt = self._halt or why
+        self._halt = self._halt or (why, Cause(code))
         if self._cut is not None:
             # the loop cuts once more, and that is where a failure is told
             with suppress(RigError):
@@ -72,4 +77,11 @@ class Requests:
     @property
     def reason(self) -> str:
         """Why the strongest request was made; empty without any."""
-        return self._halt or self._abort or self._stop
+        made = self._halt or self._abort or self._stop
+        return made[0] if made else ""
+
+    @property
+    def cause(self) -> Cause:
+        """Why it was made, for programs."""
+        made = self._halt or self._abort or self._stop
+        return made[1] if made else UNKNOWN

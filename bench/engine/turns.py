@@ -14,6 +14,7 @@ from bench.engine.stream import Stream
 from bench.events import LimitExceeded, State, Warned
 from bench.guard.guard import Exchange, Guard
 from bench.guard.violation import Violation
+from sim.errors import Cause, CauseCode
 
 
 class Turns:
@@ -54,19 +55,20 @@ class Turns:
 
     def heed_requests(self) -> None:
         """End as somebody has asked, if somebody has."""
-        asked, why, state = self._requests.strongest, self._requests.reason, self.output.state
+        asked, why, cause = self._requests.strongest, self._requests.reason, self._requests.cause
+        state = self.output.state
         if asked == "halt":
-            raise Ended(self.output.cut(Ending("halted", why)))
+            raise Ended(self.output.cut(Ending("halted", why, cause)))
         if asked == "abort" and state is not State.ABORTING:
-            self._end(State.ABORTING, Ending("aborted", why))
+            self._end(State.ABORTING, Ending("aborted", why, cause))
         if asked == "stop" and state not in (State.ABORTING, State.STOPPING):
-            self._end(State.STOPPING, Ending("stopped", why))
+            self._end(State.STOPPING, Ending("stopped", why, cause))
 
     def end_test(self, *, fast: bool) -> bool:
         """Ramp out at the end of a test; whether the block fell on the way. A limit exceeded by then ends the run."""
         fell = self.ramp_out(State.ABORTING if fast else State.STOPPING, "the test is over")
         if self._over is not None:
-            raise Ended(Ending("aborted", str(self._over)))
+            raise Ended(Ending("aborted", str(self._over), _cause(self._over)))
         return fell
 
     def ramp_out(self, way: State, reason: str) -> bool:
@@ -80,7 +82,7 @@ class Turns:
             fell |= self.signals()[1]
         if self._runaway is not None:
             reason = f"{self._runaway} although the drive has been ramped to zero"
-            raise Ended(self.output.cut(Ending("halted", reason)))
+            raise Ended(self.output.cut(Ending("halted", reason, _cause(self._runaway))))
         self.output.rest()
         return fell
 
@@ -89,9 +91,13 @@ class Turns:
         self._over = over
         self._stream.publish(LimitExceeded(over.quantity, over.value, over.limit, over.unit))
         if self.output.state is not State.ABORTING:
-            self._end(State.ABORTING, Ending("aborted", str(over)))
+            self._end(State.ABORTING, Ending("aborted", str(over), _cause(over)))
 
     def _end(self, way: State, ending: Ending) -> Never:
         if self.output.state is not State.IDLE:
             ending = ending.then(self.output.ending_of(lambda: self.ramp_out(way, ending.reason)))
         raise Ended(ending)
+
+
+def _cause(over: Violation) -> Cause:
+    return Cause(CauseCode.LIMIT, over.quantity)

@@ -17,6 +17,7 @@ from bench.guard.quantities import Mover
 from bench.guard.timing import TimeWatch
 from bench.guard.violation import Violation
 from bench.guard.watch import MotionWatch
+from drivers.errors import SafetyInputOpen
 from drivers.rig import Block, Rig, RigError
 
 
@@ -83,7 +84,7 @@ class Guard:
     def arm(self) -> None:
         """Arm the rig with zeros waiting ahead of the first sample. Raises RigError while a safety input is open."""
         if opened := self._opened():
-            raise RigError(f"arming is refused: {', '.join(opened)} open; close it, then begin again")
+            raise SafetyInputOpen(f"arming is refused: {', '.join(opened)} open; close it, then begin again", opened)
         self._ramp_samples, self._ramp_done, self._ramp_from = None, 0, 1.0
         self._command, self._sent, self._held, self._expected = 0.0, 0.0, None, 0
         self._first_block = True
@@ -125,7 +126,7 @@ class Guard:
             self.abort()
         opened = self._opened()
         if opened:
-            self._cut_because(f"{', '.join(opened)} opened")
+            self._cut_because(opened)
         runaway = next((violation for violation in exceeded if violation.of_table), None)
         return Exchange(block, values, signals, played, refused or seen, tuple(near), opened, runaway)
 
@@ -180,11 +181,11 @@ class Guard:
         """Stop the rig; its output is at zero afterwards."""
         self._rig.stop()
 
-    def _cut_because(self, reason: str) -> None:
+    def _cut_because(self, opened: tuple[str, ...]) -> None:
         try:
             self.halt()
         except RigError as error:
-            raise RigError(f"{reason}, and {error}") from error
+            raise SafetyInputOpen(f"{', '.join(opened)} opened, and {error}", opened) from error
 
     def _opened(self) -> tuple[str, ...]:
         return tuple(name for name, good in self._rig.interlocks().items() if not good)

@@ -252,32 +252,31 @@ NOW_LOOK = (
     "the next test."
 )
 NOW_LIMIT = (
-    "Look at specimen and sensors before the next test: {quantity} was beyond its limit. If they are well, compare the "
+    "Look at specimen and sensors before the next test: {subject} was beyond its limit. If they are well, compare the "
     "margins of the plan, and ask for less motion."
 )
-NOW = (
-    (
-        r"^(stop|abort|halt) was asked for\b",
-        "Clear STOP on the Protocol page when the bench is safe. A new run begins from its start.",
-    ),
-    (r"^the operator declined\b", "Do what was asked for, or take it out of the plan, then start anew."),
-    (
-        r"^(?!.*\bbe opened)[\w -]+(, [\w -]+)* opened\b|\bopen; close it\b|\bafter the enable line was closed\b",
-        "See at the bench why it opened and reset it there; the header shows it good again in the next run.",
-    ),
-    (
-        r"\bno space left\b|\b(on|its) (that |another )?disk\b|\bdisk is full\b|\bis not recorded further\b"
-        r"|\bquota\b|\bread-only file system\b",
-        "Free space on the disk, or name a folder on another one under Results in. `rockbench file check` says what "
-        "the file holds.",
-    ),
-    (
-        r"\bcables?\b|\bpower\b|\bdevices?\b|\bserver\b|\bserial port\b|\b(has|did|does) not answer(ed)?\b"
-        r"|\bis gone\b|\bis not there\b",
-        "See to power and cables of what is named, then look for devices on the Setup page, and run the loop check.",
-    ),
+_NOW_DEVICE = (
+    "See to power and cables of what is named, then look for devices on the Setup page, and run the loop check."
 )
-"""What follows from the words of a reason, as drivers, guard and recorder put them; the first that fits."""
+_NOW_DISK = (
+    "Free space on the disk, or name a folder on another one under Results in. `rockbench file check` says what the "
+    "file holds."
+)
+NOW = {
+    "request": "Clear STOP on the Protocol page when the bench is safe. A new run begins from its start.",
+    "declined": "Do what was asked for, or take it out of the plan, then start anew.",
+    "safety_input": (
+        "See at the bench why it opened and reset it there; the header shows it good again in the next run."
+    ),
+    "limit": NOW_LIMIT,
+    "disk": _NOW_DISK,
+    "data_file": _NOW_DISK,
+    "device_timeout": _NOW_DEVICE,
+    "connection_lost": _NOW_DEVICE,
+    "device_not_found": _NOW_DEVICE,
+    "command_refused": _NOW_DEVICE,
+}
+"""What is to be done about a cause, by its code; NOW_LOOK about every other."""
 OWN_TROUBLE = "An error of the window, not of the bench: {error}."
 OWN_DID = "The run goes on in its own process; what this window shows may be incomplete."
 OWN_NOW = "Close and open the window when no run is under way, and hand on the details."

@@ -3,7 +3,6 @@
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFrame, QGridLayout, QHBoxLayout, QLabel, QPlainTextEdit, QPushButton, QVBoxLayout
 
-from bench.events import Event, LimitExceeded
 from bench.gui import texts
 from bench.gui.buttons import give_key
 from bench.gui.controller import Controller
@@ -19,7 +18,6 @@ class TroublePanel(QFrame):
         super().__init__()
         self.setObjectName("trouble")
         self._controller = controller
-        self._limit: LimitExceeded | None = None
         self.title = QLabel(f"▲ {texts.TROUBLE}")
         set_level(self.title, "alarm")
         self.answers = tuple(QLabel(wordWrap=True) for _ in texts.TROUBLE_PARTS)
@@ -32,7 +30,6 @@ class TroublePanel(QFrame):
         self.hide()
         self.more.toggled.connect(self.details.setVisible)
         self.close_it.clicked.connect(self.hide)
-        controller.told.connect(self._tell)
         controller.began.connect(self._begin)
         controller.ended.connect(self._end)
 
@@ -48,15 +45,10 @@ class TroublePanel(QFrame):
         self.show()
 
     def _begin(self) -> None:
-        self._limit = None
         self.hide()
 
-    def _tell(self, event: Event) -> None:
-        if isinstance(event, LimitExceeded):
-            self._limit = event
-
     def _end(self, ended: Ended | Refused) -> None:
-        trouble = trouble_of(ended, driven=self._controller.driven, limit=self._limit)
+        trouble = trouble_of(ended, driven=self._controller.driven)
         if trouble is not None:
             self.show_trouble(trouble)
 

@@ -1,11 +1,10 @@
 """What went wrong, in three answers: what happened, what the bench did, what to do now. Knows nothing of Qt."""
 
-import re
 from dataclasses import dataclass
 
-from bench.events import LimitExceeded
 from bench.gui import texts
 from bench.link.messages import Ended, Refused
+from sim.errors import Cause
 
 QUIET = ("completed", "stopped")
 """Ends that are no trouble: nobody has to do anything."""
@@ -21,15 +20,15 @@ class Trouble:
     details: str = ""
 
 
-def trouble_of(ended: Ended | Refused, *, driven: bool, limit: LimitExceeded | None) -> Trouble | None:
+def trouble_of(ended: Ended | Refused, *, driven: bool) -> Trouble | None:
     """Why the end of a run needs a person, or None. `driven` says whether the rig was armed in it."""
     if isinstance(ended, Refused):
         return _of_refusal(ended, driven=driven)
     if ended.status in QUIET:
         return None
     did = texts.DID[ended.status] if driven else texts.DID_NOTHING
-    now = texts.NOW_LIMIT.format(quantity=limit.quantity) if limit is not None else advice(ended.reason)
-    return Trouble(texts.RUN_ENDED.format(**vars(ended)), f"{did} {texts.KEPT.format(out=ended.out)}", now)
+    what = texts.RUN_ENDED.format(**vars(ended))
+    return Trouble(what, f"{did} {texts.KEPT.format(out=ended.out)}", advice(ended.cause))
 
 
 def _of_refusal(refused: Refused, *, driven: bool) -> Trouble:
@@ -37,12 +36,9 @@ def _of_refusal(refused: Refused, *, driven: bool) -> Trouble:
         return Trouble(refused.text, texts.DID_REFUSE, texts.NOW_REFUSED, refused.details)
     if driven:
         return Trouble(refused.text, texts.DID_LOSE, texts.NOW_LOOK, refused.details)
-    return Trouble(refused.text, texts.DID_NOT_START, advice(refused.text), refused.details)
+    return Trouble(refused.text, texts.DID_NOT_START, advice(refused.cause), refused.details)
 
 
-def advice(reason: str) -> str:
-    """What to do about `reason`: what it says itself comes first, this is what follows from its kind."""
-    for pattern, answer in texts.NOW:
-        if re.search(pattern, reason, re.IGNORECASE):
-            return answer
-    return texts.NOW_LOOK
+def advice(cause: Cause) -> str:
+    """What to do about a cause: what the message says itself comes first, this is what follows from its kind."""
+    return texts.NOW.get(cause.code, texts.NOW_LOOK).format(subject=cause.subject)

@@ -13,6 +13,7 @@ from bench.config.model import BenchConfiguration
 from bench.events import Event, State
 from bench.preflight.margins import Margin
 from bench.record.tables import Table
+from sim.errors import UNKNOWN, Cause
 from sim.parameters import Parameters
 
 BEAT = 0.25
@@ -157,6 +158,7 @@ class Ended:
     """The run is over, its files are written; `summary` is ready for JSON, `table` is plain text.
 
     `passed` is the verdict of a protocol that judges the bench, True of any other.
+    The cause of a run that is known by its files alone is unknown.
     """
 
     status: str
@@ -165,17 +167,18 @@ class Ended:
     table: str
     out: Path
     passed: bool = True
+    cause: Cause = UNKNOWN
 
 
 @dataclass(frozen=True)
 class Refused:
-    """Nothing was started, or something failed (`failed`): `text` says what, of which `item` where it is known.
+    """Nothing was started, or something failed (`failed`): `text` says what, `cause` why, where it is known.
 
     `details` are for whoever looks after the program, and may be long.
     """
 
     text: str
-    item: str = ""
+    cause: Cause = UNKNOWN
     failed: bool = False
     details: str = ""
 

@@ -19,7 +19,7 @@ from bench.link.host import AtTheClient, Host, Teller
 from bench.link.messages import Ended, FromSession, Refused, Run, Survey, Surveyed
 from bench.preflight.compiled import compile_run
 from bench.session import run_session
-from sim.errors import InvalidInput, RockbenchError
+from sim.errors import CauseCode, InvalidInput, RockbenchError, cause_of
 
 FAREWELL = 2.0
 """Longest wait at the end for a client that does not read [s]."""
@@ -40,17 +40,17 @@ def serve(connection: Connection) -> None:
 
     def lost(why: str) -> None:
         if not keep_going:
-            requests.stop(f"{why}, and the run was not told to go on without it")
+            requests.stop(f"{why}, and the run was not told to go on without it", CauseCode.CLIENT_LOST)
 
     host = Host(connection, requests, lost)
     try:
         last = _run(assignment, host, requests) if isinstance(assignment, Run) else _survey(assignment)
     except KeyboardInterrupt:
-        last = Refused(f"ended before anything moved: {requests.reason}")
+        last = Refused(f"ended before anything moved: {requests.reason}", requests.cause)
     except InvalidInput as error:
-        last = Refused(str(error), error.item)
+        last = Refused(str(error), error.cause)
     except (RockbenchError, OSError) as error:
-        last = Refused(str(error), failed=True, details=traceback.format_exc())
+        last = Refused(str(error), cause_of(error), failed=True, details=traceback.format_exc())
     except Exception as error:
         text = f"{type(error).__name__}: {error}"
         host.close(Refused(text, failed=True, details=traceback.format_exc()), FAREWELL)
@@ -94,7 +94,9 @@ def _run(asked: Run, host: Host, requests: Requests) -> FromSession:
         realtime=asked.realtime,
         about=asked.about,
     )
-    return Ended(ended.status, ended.reason, ended.summary, ended.table, asked.out, ended.passed)
+    return Ended(
+        ended.status, ended.reason, ended.summary, ended.table, asked.out, ended.passed, ended.cause
+    )
 
 
 def _policy(configuration: BenchConfiguration) -> str:

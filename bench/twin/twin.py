@@ -33,6 +33,7 @@ from bench.twin.gains import Measured
 from bench.twin.lag import laser_lag
 from bench.twin.residual import Limit
 from bench.twin.standing import Standing
+from sim.errors import CauseCode
 from sim.specimen import Specimen
 
 Array = NDArray[np.float64]
@@ -171,7 +172,7 @@ class Twin:
             self._warned_of = self._standing.specimen
             self._publish(Warned(f"{what}, limit {run.warn.limit:g}: is it the specimen that is configured?", time=now))
         if run.stop.exceeded(excess, seconds):
-            self._requests.stop(f"{what}, limit {run.stop.limit:g}")
+            self._requests.stop(f"{what}, limit {run.stop.limit:g}", CauseCode.RESIDUAL)
 
 
 def _take(

@@ -12,7 +12,7 @@ from drivers.daqmx.output import Output
 from drivers.daqmx.parameters import AnalogInput, Daq
 from drivers.daqmx.safety_inputs import SafetyInputs
 from drivers.daqmx.watchdog import Watchdog
-from drivers.errors import RigError
+from drivers.errors import RigError, SafetyInputOpen
 from sim.errors import InvalidInput
 
 _LOOK = 0.05
@@ -146,8 +146,9 @@ class Tasks:
         while not (good := safety.read())["amplifier ready"]:
             _require_not_cut(is_cut)
             if clock.now() > deadline:
-                opened = ", ".join(name for name, is_good in good.items() if not is_good)
-                raise RigError(f"prepare is refused: {opened} not good {delay:g} s after the enable line was closed")
+                opened = [name for name, is_good in good.items() if not is_good]
+                text = f"{', '.join(opened)} not good {delay:g} s after the enable line was closed"
+                raise SafetyInputOpen(f"prepare is refused: {text}", opened)
             clock.wait_until(clock.now() + _LOOK)
             if self.watchdog is not None:
                 self.watchdog.tell()

@@ -34,8 +34,9 @@ from bench.engine.stream import Stream
 from bench.events import Acquired, Event, LimitExceeded, OperatorAsked, State, StateChanged, StepStarted, Warned
 from bench.guard.guard import Guard
 from bench.guard.limits import Limits, Ramps
+from drivers.errors import ConnectionLost, DriveUnderflow
 from drivers.rig import Block, Handwork, RigError
-from sim.errors import RockbenchError
+from sim.errors import Cause, RockbenchError
 from sim.specimen import Specimen
 from tests.loopback import LoopbackRig
 
@@ -455,3 +456,32 @@ def test_the_zero_is_taken_when_the_storeys_are_still_or_with_a_warning_when_the
     bench.run(_plan(MOUNT, Arm(0.5, patience=2.0), RampOut()))
     (warning,) = [event for event in bench.events if isinstance(event, Warned)]
     assert "not still after 2 s" in warning.text
+
+
+@pytest.mark.parametrize(
+    ("error", "code"),
+    [(ConnectionLost("cDAQ1 is gone"), "connection_lost"), (DriveUnderflow("too late"), "drive_underflow")],
+)
+def test_the_cause_of_an_ending_is_that_of_the_drivers_error(error: RigError, code: str) -> None:
+    def fail(event: Event) -> None:
+        if isinstance(event, Acquired) and event.time > 1.5:
+            raise error
+
+    bench = Bench(listener=fail)
+    ending = bench.run(_plan(*RUN))
+    assert (ending.status, ending.cause) == ("failed", Cause(code))
+
+
+@pytest.mark.parametrize(("ask", "code"), [("stop", "request"), ("abort", "request"), ("halt", "request")])
+def test_the_cause_of_an_ending_that_was_asked_for_is_the_request(ask: str, code: str) -> None:
+    bench = Bench()
+    getattr(bench.requests, ask)("words that nobody looks at")
+    assert bench.run(_plan(*RUN)).cause == Cause(code)
+
+
+def test_the_cause_of_a_limit_is_its_quantity_and_of_a_safety_input_its_name() -> None:
+    over = Bench(limits=Limits(displacement=0.001))
+    assert over.run(_plan(*RUN)).cause == Cause("limit", "table displacement")
+    opened = Bench()
+    opened.rig.safety = {"emergency stop": False}
+    assert opened.run(_plan(*RUN)).cause == Cause("safety_input", "emergency stop")

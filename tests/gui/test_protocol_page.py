@@ -15,7 +15,7 @@ from bench.gui.window import Window
 from bench.link.messages import Refused, Run, Surveyed
 from bench.protocol import Protocol
 from protocols.harmonic.protocol import HarmonicParameters
-from sim.errors import InvalidInput
+from sim.errors import Cause, InvalidInput
 from tests.gui.conftest import PROTOCOLS, SpokenLink
 
 FINE = Surveyed((), None, (), 60.0, 1e6, 1e9, "hash", {})
@@ -139,7 +139,7 @@ def test_a_folder_that_another_program_made_meanwhile_is_left_to_it(
     "found",
     [
         Surveyed((), "limits.drift = 0.08 is refused: too near", (), None, None, None, "", {}),
-        Refused("limits.drift = 0.08 is refused: too near", "limits.drift"),
+        Refused("limits.drift = 0.08 is refused: too near", Cause("invalid_input", "limits.drift")),
     ],
 )
 def test_a_refused_plan_says_why_and_does_not_start(

@@ -19,7 +19,7 @@ from bench.gui.window import Window
 from bench.link.messages import Ended, FromSession, Question, Refused, Run, Surveyed
 from bench.queue.file import LEFT, QueueFile
 from bench.queue.queued import Queued, Stage
-from sim.errors import InvalidInput
+from sim.errors import Cause, InvalidInput
 from tests.gui.conftest import PROTOCOLS, SHAKING, SpokenLink
 from tests.link.experiment import bench, order
 
@@ -146,7 +146,9 @@ def test_a_test_that_does_not_end_well_pauses_the_queue(
     assert _stages(filled)[1] is Stage.RUNNING
 
 
-@pytest.mark.parametrize("answer", [REFUSED, Refused("omega = 2 is refused: too slow", "omega")])
+@pytest.mark.parametrize(
+    "answer", [REFUSED, Refused("omega = 2 is refused: too slow", Cause("invalid_input", "omega"))]
+)
 def test_a_refused_plan_pauses_the_queue_and_nothing_is_driven(
     filled: Window, spoken: type[SpokenLink], qtbot: QtBot, answer: FromSession
 ) -> None:

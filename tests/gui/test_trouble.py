@@ -1,5 +1,6 @@
 """Whatever goes wrong is told in one panel: what happened, what the bench did, what to do now."""
 
+import errno
 from pathlib import Path
 
 import pytest
@@ -14,9 +15,18 @@ from bench.gui.header import STALE
 from bench.gui.troubles import advice, trouble_of
 from bench.gui.window import Window
 from bench.link.messages import Ended, Refused, SafetyInputs, Told
-from bench.preflight.disk import Room
+from bench.record.errors import RecordError
 from drivers.clock import now
-from sim.errors import InvalidInput
+from drivers.errors import (
+    ConnectionLost,
+    DeviceNotFound,
+    DeviceTimeout,
+    DriveUnderflow,
+    RigError,
+    SafetyInputOpen,
+)
+from drivers.optoncdt.dialogue import CommandRefused
+from sim.errors import Cause, CauseCode, RockbenchError, cause_of
 from tests.gui.conftest import SpokenLink
 from tests.link.experiment import order
 
@@ -26,39 +36,35 @@ OUT = Path("runs", "one")
 
 
 @pytest.mark.parametrize(
-    ("reason", "fits"),
+    ("cause", "fits"),
     [
-        ("abort was asked for", "Clear STOP"),
-        ("the operator declined: Mount the spring.", "Do what was asked"),
-        ("emergency stop, over-travel opened", "See at the bench why it opened"),
-        ("runs/one/campaign.h5: No space left on device", "Free space"),
-        (
-            "x.h5 is not recorded further, its disk is 4096 events behind: what was written before is readable",
-            "Free space",
-        ),
-        (str(Room(Path("runs"), 10, 1).refusal()), "Free space"),
-        ("cDAQ1Mod1 is gone: check power and cables, then open a new session (code -88709)", "look for devices"),
-        ("laser_1 on COM3 has not answered for 1 s", "look for devices"),
-        ("something that nobody thought of", "Look at the bench"),
-        # as the drivers, the guard and the recorder put it
-        ("emergency stop opened; then reading the safety inputs failed", "See at the bench why it opened"),
-        ("arming is refused: over-travel 1 open; close it, then begin again", "See at the bench why it opened"),
-        (
-            "prepare is refused: amplifier ready not good 2 s after the enable line was closed",
-            "See at the bench why it opened",
-        ),
-        (str(InvalidInput("record", "one.h5", "it cannot be opened (Permission denied)")), "Look at the bench"),
-        ("the device file could not be opened", "look for devices"),
-        ("laser_1 on COM3 did not answer GETINFO within 1 s; check its power and cable, and open it anew", "devices"),
-        ("no gRPC device server answers at crio.local:31763: start ni_grpc_device_server there", "look for devices"),
-        ("the workspace of the solver is too small", "Look at the bench"),
-        ("the spectrum has no answer in this spacing of the lines, nor a powerful one", "Look at the bench"),
-        ("the drive was written too late: give it more lead (code -200290)", "Look at the bench"),
-        ("report.pdf: what was asked for cannot be made", "Look at the bench"),
+        (Cause(CauseCode.REQUEST), "Clear STOP"),
+        (Cause(CauseCode.DECLINED), "Do what was asked"),
+        (Cause(CauseCode.LIMIT, "drift"), "drift was beyond its limit"),
+        (SafetyInputOpen("arming is refused", ("over-travel 1",)).cause, "See at the bench why it opened"),
+        (RecordError("its disk is 4096 events behind").cause, "Free space"),
+        (cause_of(OSError(errno.ENOSPC, "whatever the system calls it")), "Free space"),
+        (cause_of(PermissionError(errno.EACCES, "Permission denied")), "Look at the bench"),
+        (ConnectionLost("cDAQ1Mod1 is gone").cause, "look for devices"),
+        (DeviceTimeout("laser_1 on COM3 has not answered for 1 s").cause, "look for devices"),
+        (DeviceNotFound("no gRPC device server answers").cause, "look for devices"),
+        (CommandRefused("laser_1", "OUTPUT RS422", "E210 refused").cause, "look for devices"),
+        (DriveUnderflow("the drive was written too late").cause, "Look at the bench"),
+        (RigError("something that nobody thought of").cause, "Look at the bench"),
+        (cause_of(ZeroDivisionError()), "Look at the bench"),
     ],
 )
-def test_advice_follows_the_kind_of_what_happened(reason: str, fits: str) -> None:
-    assert fits in advice(reason)
+def test_advice_follows_the_cause_whatever_the_words(cause: Cause, fits: str) -> None:
+    assert fits in advice(cause)
+
+
+def test_every_cause_that_has_advice_exists() -> None:
+    """A code that is renamed must not silently lose its advice."""
+
+    def codes(kind: type[RockbenchError]) -> set[str]:
+        return {kind.error_code}.union(*(codes(each) for each in kind.__subclasses__()))
+
+    assert texts.NOW.keys() <= codes(RockbenchError) | set(CauseCode)
 
 
 @settings(max_examples=30, deadline=None)
@@ -68,7 +74,7 @@ def test_advice_follows_the_kind_of_what_happened(reason: str, fits: str) -> Non
     driven=st.booleans(),
 )
 def test_every_bad_end_has_all_three_answers_and_no_good_one_has_any(status: str, reason: str, driven: bool) -> None:
-    trouble = trouble_of(Ended(status, reason, {}, "", OUT), driven=driven, limit=None)
+    trouble = trouble_of(Ended(status, reason, {}, "", OUT), driven=driven)
     assert (trouble is None) == (status in ("completed", "stopped"))
     if trouble is not None:
         assert reason in trouble.what
@@ -91,7 +97,7 @@ def test_a_limit_says_what_the_bench_did_and_where_the_data_are(window: Window, 
     link.said = [
         Told(StateChanged(State.ARMED, State.RUNNING, "driving", time=1.0)),
         Told(LimitExceeded("drift", 0.081, 0.08, "m", time=2.0)),
-        Ended("aborted", "drift 0.081 m exceeds 0.08 m", {}, "", OUT),
+        Ended("aborted", "drift 0.081 m exceeds 0.08 m", {}, "", OUT, cause=Cause(CauseCode.LIMIT, "drift")),
     ]
     window._controller._look()
     assert window.trouble.isVisible()
@@ -104,7 +110,9 @@ def test_a_limit_says_what_the_bench_did_and_where_the_data_are(window: Window, 
 
 
 def test_a_failed_start_has_its_details_on_request(window: Window, link: SpokenLink, qtbot: QtBot) -> None:
-    link.said = [Refused("cDAQ1 is not there: `rockbench devices` lists what is there", failed=True, details="Trace")]
+    link.said = [
+        Refused("cDAQ1 is not there", DeviceNotFound("cDAQ1 is not there").cause, failed=True, details="Trace")
+    ]
     window._controller._look()
     panel = window.trouble
     assert _said(window)[1] == texts.DID_NOT_START
@@ -118,7 +126,7 @@ def test_a_failed_start_has_its_details_on_request(window: Window, link: SpokenL
 
 
 def test_a_refused_start_says_that_nothing_happened(window: Window, link: SpokenLink) -> None:
-    link.said = [Refused("limits.drift = 0.08 is refused: too near", "limits.drift")]
+    link.said = [Refused("limits.drift = 0.08 is refused: too near", Cause("invalid_input", "limits.drift"))]
     window._controller._look()
     assert _said(window) == ["limits.drift = 0.08 is refused: too near", texts.DID_REFUSE, texts.NOW_REFUSED]
 

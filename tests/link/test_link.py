@@ -153,7 +153,7 @@ def test_what_is_refused_names_its_item(tmp_path: Path) -> None:
     client = Client(begun(tmp_path / "run", amplitude=1.95))
     refused = client.until_over()
     assert isinstance(refused, Refused)
-    assert (refused.item, refused.failed) == ("amplitude", False)
+    assert (refused.cause.subject, refused.failed) == ("amplitude", False)
     assert not (tmp_path / "run").exists()
 
 
