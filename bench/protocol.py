@@ -16,7 +16,6 @@ from sim.parameters import Parameters
 
 if TYPE_CHECKING:
     # a list of protocols and their flags need none of it
-    from bench.analysis.signals import SignalMap
     from bench.config.model import BenchConfiguration
     from bench.engine.steps import Outcome, Step
     from bench.events import Event
@@ -121,12 +120,11 @@ class Follower(Interface):
 class Reanalysis(Generic[P]):
     """How recorded results are computed again with other `settings`.
 
-    `follower` is given the settings, the recorded parameters, the configuration to analyse with, the open file, and
-    the signals whose zero the engine takes.
+    `follower` is given the settings, the recorded parameters, the configuration to analyse with, and the open file.
     """
 
     settings: type[Parameters]
-    follower: "Callable[[Any, P, BenchConfiguration, Record, SignalMap], Follower]"
+    follower: "Callable[[Any, P, BenchConfiguration, Record], Follower]"
 
 
 @dataclass(frozen=True)

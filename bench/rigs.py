@@ -19,7 +19,7 @@ def open_rig(configuration: BenchConfiguration, *, realtime: bool) -> Rig:
     if configuration.backend == "hardware":
         from drivers.hardware.rig import HardwareRig
 
-        return HardwareRig(configuration.hardware, lead=configuration.lead_samples)
+        return HardwareRig(configuration.hardware, lead=configuration.lead_samples, further=configuration.channels)
     from drivers.simulated import SimulatedRig
 
     simulation = configuration.simulation
@@ -30,4 +30,5 @@ def open_rig(configuration: BenchConfiguration, *, realtime: bool) -> Rig:
         spring_factor=simulation.spring_factor,
         clock=WallClock() if realtime else VirtualClock(),
         lead=configuration.lead_samples,
+        further=configuration.channels,
     )

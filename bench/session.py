@@ -125,7 +125,9 @@ def run_session(
             signals = SignalMap(rig.channels, configuration.laser_reference, configuration.calibrated)
             engine = Engine(
                 rig,
-                Guard(rig, configuration.limits, configuration.ramps, configuration.mover, signals),
+                Guard(
+                    rig, configuration.limits, configuration.ramps, configuration.mover, signals, configuration.channels
+                ),
                 stream,
                 requests,
                 operator,

@@ -1,7 +1,7 @@
 """The simulated rig: the virtual bench behind the interface of the hardware."""
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from enum import Enum
 from typing import Self
 
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from drivers.clock import Clock, VirtualClock
 from drivers.drive import Drive, ending_by, require_block
 from drivers.errors import RigError
+from drivers.further import FurtherChannel
 from drivers.handyman import Handyman
 from drivers.rig import Alignment, Block, Channel, Handwork
 from sim.specimen import Specimen
@@ -51,10 +52,11 @@ class SimulatedRig:
         clock: Clock | None = None,
         lead: int | None = None,
         spring_factor: float = 1.0,
+        further: Sequence[FurtherChannel] = (),
     ) -> None:
         lead = round(0.05 * parameters.sample_rate) if lead is None else lead
         self._drive = Drive(parameters.shaker.drive_range, lead)
-        self.bench = VirtualBench(parameters, specimen, seed)
+        self.bench = VirtualBench(parameters, specimen, seed, [each.simulated for each in further])
         self._clock = clock if clock is not None else VirtualClock()
         self._seed = seed
         self._handyman = Handyman(specimen, spring_factor)

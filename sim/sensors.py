@@ -146,6 +146,30 @@ class DisplacementSensor(LinearSensor):
     noise_density: float = quantity(5e-7, "m/Hz^0.5", "spectral density of the white noise", ge=0)
 
 
+Place = Literal["table", "storey 1", "storey 2", "elsewhere"]
+SIMULATED = ("acceleration", "velocity", "displacement")
+"""Quantities that a sensor of the simulated bench can measure."""
+
+
+class PlacedSensor(LinearSensor):
+    """A further sensor with a proportional voltage output: the motion of `place` against the ground."""
+
+    name: str = quantity(..., "", "name of its channel")
+    measures: str = quantity(..., "", "one of SIMULATED")
+    unit: str = quantity(..., "", "SI unit of the values")
+    place: Place = quantity(..., "", "what it is mounted on")
+    sensitivity: float = quantity(..., "V/unit", "volts per unit as calibrated")
+    zero: float = quantity(0.0, "V", "voltage at zero")
+    noise_density: float = quantity(0.0, "unit/Hz^0.5", "spectral density of the white noise", ge=0)
+
+    @property
+    def nominal(self) -> tuple[float, float]:
+        return 1.0 / self.sensitivity, -self.zero / self.sensitivity
+
+    def volts(self, value: Array, sample_rate: float, random: Generator) -> Array:
+        return super().volts(value, sample_rate, random) + self.zero
+
+
 @lru_cache
 def _sections(order: int, share: float) -> tuple[Array, Array]:
     """Second-order sections of the low-pass with cutoff `share` of the sample rate, and their settled state."""

@@ -1,5 +1,6 @@
 """The bench without the laboratory: shaker, specimen and instruments, from drive volts to counts."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil
 
@@ -12,7 +13,7 @@ from sim.arrangement import Arrangement
 from sim.channel import Channel
 from sim.errors import InvalidInput
 from sim.parameters import Parameters, quantity
-from sim.sensors import Accelerometer, Converter, DisplacementSensor, FilterUnit, Laser
+from sim.sensors import Accelerometer, Converter, DisplacementSensor, FilterUnit, Laser, PlacedSensor
 from sim.shaker import Shaker
 from sim.sight import sights
 from sim.specimen import Specimen
@@ -23,6 +24,7 @@ _LONGEST_STEP = 5.0e-4
 """Longest integration step [s]; its error in two seconds of violent rocking is below 1e-8 m."""
 _STEPS_PER_TIME_CONSTANT = 5
 """Steps within the shortest time constant of the shaker, should that ask for more."""
+_PLACES = ("table", "storey 1", "storey 2")
 _LET_GO = 3.0, 5.0
 """A hand that holds the block or the frame lets go so long after the rig is armed [s], earliest and latest."""
 
@@ -74,17 +76,21 @@ class Truth:
 class VirtualBench:
     """A bench that turns drive volts into counts, tick by tick, without end.
 
-    Everything random comes from `seed`; the same seed and drive give the same counts, however the drive is cut
-    into blocks. Tick i of a block is sampled just before its drive sample takes effect. What is held by hand is let go
-    between two ticks, without a push, a few seconds after `arm`.
+    `further` sensors come after table and lasers. Everything random comes from `seed`; the same seed and drive give the
+    same counts, however the drive is cut into blocks. Tick i of a block is sampled just before its drive sample takes
+    effect. What is held by hand is let go between two ticks, without a push, a few seconds after `arm`.
     """
 
-    def __init__(self, parameters: VirtualBenchParameters, specimen: Specimen, seed: int) -> None:
+    def __init__(
+        self, parameters: VirtualBenchParameters, specimen: Specimen, seed: int, further: Sequence[PlacedSensor] = ()
+    ) -> None:
         from sim.kernel import table
 
         self._kernel = table
         self.parameters = parameters
-        sources = SeedSequence(seed).spawn(7)
+        self._further = tuple(further)
+        # the first ones are the same however many there are
+        sources = SeedSequence(seed).spawn(7 + len(self._further))
         rate = parameters.sample_rate
         self._force_random, self._displacement_random, self._accelerometer_random = (
             np.random.default_rng(source) for source in sources[:3]
@@ -93,6 +99,8 @@ class VirtualBench:
         self._laser_2 = parameters.laser_2.stream(rate, sources[4])
         self._converter_random = np.random.default_rng(sources[5])
         self._hand_random = np.random.default_rng(sources[6])
+        self._further_randoms = [np.random.default_rng(source) for source in sources[7:]]
+        self._velocities = np.zeros(3)
         self._held_for: int | None = None
         self._filter = parameters.filter_unit.stream(rate)
         step = min(_LONGEST_STEP, parameters.shaker.shortest_time / _STEPS_PER_TIME_CONSTANT)
@@ -136,6 +144,11 @@ class VirtualBench:
             low, high = (round(volts / lsb) for volts in laser.valid_volts)
             valid = max(low, lowest), min(high, highest)
             channels.append(Channel(name, "displacement", "m", lsb * slope, offset, valid, "simulated optoNCDT 1420"))
+        for sensor in self._further:
+            slope, offset = sensor.nominal
+            device = f"simulated, on {sensor.place}"
+            kind, unit = sensor.measures, sensor.unit
+            channels.append(Channel(sensor.name, kind, unit, lsb * slope, offset, (lowest, highest), device))
         return tuple(channels)
 
     @property
@@ -152,9 +165,9 @@ class VirtualBench:
         return sights(np.ascontiguousarray(self._samples.T), self._arrangement, on_ground)
 
     def run(self, volts: Array) -> NDArray[np.int16]:
-        """Play `volts`, shape (n,) [V], and return the counts sampled meanwhile, shape (n, 4)."""
+        """Play `volts`, shape (n,) [V], and return the counts sampled meanwhile, shape (n, n_channels)."""
         if volts.size == 0:
-            return np.empty((0, 4), dtype=np.int16)
+            return np.empty((0, 4 + len(self._further)), dtype=np.int16)
         self._move(volts)
         filtered = self._filter.read(self._sense())
         return self.parameters.converter.counts(filtered.T, self._converter_random)
@@ -175,6 +188,7 @@ class VirtualBench:
         self._arrange(arrangement)
         self._held_for = None
         self._state[1:] = 0.0
+        self._velocities[:] = 0.0
         self._state[2:4] = arrangement.storeys()
         self._state[6] = arrangement.tilt
         if arrangement.table_locked:
@@ -238,12 +252,30 @@ class VirtualBench:
         )
 
     def _sense(self) -> Array:
-        """Voltages at the filter cards, shape (4, n)."""
+        """Voltages at the filter cards, shape (n_channels, n)."""
         p, s = self.parameters, np.ascontiguousarray(self._samples.T)
-        volts = np.empty((4, s.shape[1]))
+        volts = np.empty((4 + len(self._further), s.shape[1]))
         volts[0] = p.displacement_sensor.volts(s[0], p.sample_rate, self._displacement_random)
         volts[1] = p.accelerometer.volts(s[8], p.sample_rate, self._accelerometer_random)
         seen = self.sights
         volts[2] = self._laser_1.read(seen[0], seen[1])
         volts[3] = self._laser_2.read(seen[2], seen[3])
+        if self._further:
+            motion = self._motion(s)
+            for k, (sensor, random) in enumerate(zip(self._further, self._further_randoms, strict=True), 4):
+                value = motion[sensor.measures][_PLACES.index(sensor.place)]
+                volts[k] = sensor.volts(value, p.sample_rate, random)
         return volts
+
+    def _motion(self, s: Array) -> dict[str, Array]:
+        """Displacement, velocity and acceleration of table and storeys against the ground, each of shape (3, n).
+
+        The acceleration of a storey is the mean since the tick before: the kernel integrates it and keeps its velocity.
+        """
+        x, v, u1, u2, v1, v2, _, _, a = s
+        velocity = np.stack((v, v + v1, v + v2))
+        before = np.column_stack((self._velocities, velocity[:, :-1]))
+        self._velocities = velocity[:, -1].copy()
+        acceleration = (velocity - before) * self.parameters.sample_rate
+        acceleration[0] = a
+        return {"displacement": np.stack((x, x + u1, x + u2)), "velocity": velocity, "acceleration": acceleration}

@@ -44,7 +44,7 @@ def recorded(
     signals = SignalMap(rig.channels, configuration.laser_reference)
     engine = Engine(
         rig,
-        Guard(rig, configuration.limits, configuration.ramps, configuration.mover, signals),
+        Guard(rig, configuration.limits, configuration.ramps, configuration.mover, signals, configuration.channels),
         stream,
         requests,
         operator or Unattended(),

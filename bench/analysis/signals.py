@@ -1,5 +1,6 @@
 """The signals of the experiment, and their map from the channels of a rig."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -29,6 +30,11 @@ class Further:
     quantity: str
 
 
+def further_of(channels: Sequence[Channel]) -> tuple[Further, ...]:
+    """The further signals of a rig with these channels, in their order."""
+    return tuple(Further(each.name, each.unit, each.quantity) for each in channels if each.name not in MEASURED_BY)
+
+
 class SignalMap:
     """Turns channel values into signals, counted from the zero taken at rest; one for a run, with the guard.
 
@@ -48,12 +54,11 @@ class SignalMap:
             if name not in names:
                 raise InvalidInput("channels", ", ".join(names), f"the harmonic analysis needs a channel {name}")
         self._columns = [names.index(name) for name in MEASURED_BY]
-        others = [column for column, name in enumerate(names) if name not in MEASURED_BY]
-        self._others = others
-        self.further = tuple(Further(names[at], channels[at].unit, channels[at].quantity) for at in others)
+        self.further = further_of(channels)
+        self._others = [names.index(each.name) for each in self.further]
         self._ground = reference == "ground"
         self._calibration = calibration
-        self._zero = np.zeros(len(SIGNALS) + len(others))
+        self._zero = np.zeros(len(SIGNALS) + len(self.further))
         self.taken = np.zeros(self._zero.size, dtype=np.bool_)
         """Which signals had a value when the zero was taken, shape (n_signals,)."""
 

@@ -13,7 +13,6 @@ from sim.errors import InvalidInput
 from sim.parameters import Parameters
 
 if TYPE_CHECKING:
-    from bench.analysis.signals import SignalMap
     from bench.config.declared import Declared
     from bench.config.model import BenchConfiguration
     from bench.protocol import Follower, Protocol
@@ -40,7 +39,7 @@ class Choice:
     asked: Parameters
     settings: Parameters
     given: Mapping[str, Any]
-    follower: "Callable[[SignalMap], Follower] | None" = None
+    follower: "Callable[[], Follower] | None" = None
 
 
 def choice_of(record: "Record", changes: Sequence[str], config: Path | None, specimen: Path | None = None) -> Choice:
@@ -94,8 +93,8 @@ def choice_of(record: "Record", changes: Sequence[str], config: Path | None, spe
         return Choice(protocol, recorded, changed, asked, parameters_of(record, protocol, own), given)
     settings = validated(reanalysis.settings, own, named)
 
-    def follower(signals: "SignalMap") -> "Follower":
-        return reanalysis.follower(settings, asked, changed, record, signals)
+    def follower() -> "Follower":
+        return reanalysis.follower(settings, asked, changed, record)
 
     return Choice(protocol, recorded, changed, asked, settings, given, follower)
 

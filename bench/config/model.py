@@ -9,6 +9,7 @@ from bench.analysis.sensor_accuracy import SensorAccuracy, SensorDoubt
 from bench.config.twin import Twin
 from bench.guard.limits import Limits, Ramps
 from bench.guard.quantities import Mover
+from drivers.further import FurtherChannel
 from drivers.hardware.parameters import Hardware
 from sim.errors import InvalidInput
 from sim.identified import Identified
@@ -90,6 +91,7 @@ class BenchConfiguration(Parameters):
     twin: Twin = Twin()
     simulation: Simulation = Simulation()
     hardware: Hardware = Hardware()
+    channels: tuple[FurtherChannel, ...] = quantity((), "", "further analogue sensors, one table each")
 
     @property
     def known_specimen(self) -> Specimen:
@@ -207,6 +209,25 @@ class BenchConfiguration(Parameters):
             _ = self.known_specimen
         except InvalidInput as refusal:
             raise InvalidInput(f"identified.{refusal.item}", refusal.value, refusal.allowed) from None
+        return self
+
+    @model_validator(mode="after")
+    def _channels_of_their_own(self) -> "BenchConfiguration":
+        hardware = self.hardware
+        terminals = {each.terminal.lower(): name for name, each in (*hardware.transducers, *hardware.analogue_lasers)}
+        names = set[str]()
+        for number, channel in enumerate(self.channels):
+            item = f"channels[{number}]"
+            if channel.name in names:
+                raise InvalidInput(f"{item}.name", channel.name, "another channel has this name; give it its own")
+            names.add(channel.name)
+            if self.backend == "simulated":
+                try:
+                    _ = channel.simulated
+                except InvalidInput as refusal:
+                    raise InvalidInput(f"{item}.{refusal.item}", refusal.value, refusal.allowed) from None
+            elif (other := terminals.setdefault(channel.terminal.lower(), channel.name)) != channel.name:
+                raise InvalidInput(f"{item}.terminal", channel.terminal, f"{other} has this terminal already")
         return self
 
     @model_validator(mode="after")

@@ -5,20 +5,23 @@ acquisition loop itself, and knows the three ways to end: *stop* (smooth ramp), 
 line cut now). Once a ramp has begun nothing can raise the output again until the guard is armed anew.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.analysis.signals import DRIFT, SignalMap
+from bench.analysis.signals import DRIFT, SIGNALS, SignalMap
 from bench.guard.health import SensorWatch
 from bench.guard.limits import Limits, Ramps, ramp_refusal
 from bench.guard.quantities import Mover
 from bench.guard.timing import TimeWatch
 from bench.guard.violation import Violation
-from bench.guard.watch import MotionWatch
+from bench.guard.watch import ChannelLimit, MotionWatch
 from drivers.errors import SafetyInputOpen
+from drivers.further import FurtherChannel
 from drivers.rig import Block, Rig, RigError
+from sim.errors import InvalidInput
 
 
 @dataclass(frozen=True)
@@ -46,17 +49,24 @@ class Guard:
     """Stands between the engine and the rig.
 
     With a `mover`, a force and a current that no channel measures are estimated from the motion. With `signals`, every
-    block is turned into signals, once, and the drift among them is watched.
+    block is turned into signals, once, and the drift among them is watched, and `further` channels that have a limit.
     """
 
     def __init__(
-        self, rig: Rig, limits: Limits, ramps: Ramps, mover: Mover | None = None, signals: SignalMap | None = None
+        self,
+        rig: Rig,
+        limits: Limits,
+        ramps: Ramps,
+        mover: Mover | None = None,
+        signals: SignalMap | None = None,
+        further: Sequence[FurtherChannel] = (),
     ) -> None:
         self._rig = rig
         self._limits = limits
         self._ramps = ramps
         self._mover = mover
         self._signals = signals
+        self._further = () if signals is None else _limits_of(signals, further)
         self._first_block = True
         self._channels = rig.channels
         self._waiting = np.zeros(0)
@@ -192,7 +202,7 @@ class Guard:
 
     def _make_watches(self) -> None:
         rate = self._rig.sample_rate
-        self._motion = MotionWatch(self._channels, rate, self._limits, self._mover)
+        self._motion = MotionWatch(self._channels, rate, self._limits, self._mover, self._further)
         self._sensors = SensorWatch(self._channels, rate, self._limits)
         self._time = TimeWatch(rate, self._limits)
 
@@ -239,3 +249,16 @@ class Guard:
         for column, channel in enumerate(self._channels):
             values[:, column] = channel.to_unit(block.counts[:, column])
         return values
+
+
+def _limits_of(signals: SignalMap, further: Sequence[FurtherChannel]) -> tuple[ChannelLimit, ...]:
+    """The limits of the channels that have one and are there; raises InvalidInput where one is not."""
+    columns = {each.name: len(SIGNALS) + k for k, each in enumerate(signals.further)}
+    found: list[ChannelLimit] = []
+    for each in further:
+        if each.limit is None:
+            continue
+        if each.name not in columns:
+            raise InvalidInput("channels", each.name, "the rig has no such channel, and its limit could not be watched")
+        found.append(ChannelLimit(each.name, each.unit, columns[each.name], each.limit, each.warning, each.debounce))
+    return tuple(found)

@@ -20,6 +20,7 @@ from bench.link.messages import (
     Beat,
     Ended,
     FromSession,
+    Opened,
     Question,
     Refused,
     Run,
@@ -43,6 +44,8 @@ class Controller(QObject):
 
     changed = Signal()
     """The state, a time or the link changed."""
+    opened = Signal(object)
+    """`Opened`: the rig of the run is open."""
     traced = Signal(object)
     """A list of `Traces`."""
     noticed = Signal(object)
@@ -216,6 +219,10 @@ class Controller(QObject):
         if self._link is None:
             return
         messages = self._link.take()
+        # how many columns traces have is known before they are drawn
+        for message in messages:
+            if isinstance(message, Opened):
+                self.opened.emit(message)
         if traces := [message for message in messages if isinstance(message, Traces)]:
             self.traced.emit(traces)
         for message in messages:

@@ -26,7 +26,7 @@ from bench.gui.palette import Theme
 from bench.gui.physical import BlockAngle, PhysicalPicture
 from bench.gui.steady_view import SteadyView
 from bench.gui.traces import TracePlot
-from bench.link.messages import Run, Traces
+from bench.link.messages import Opened, Run, Traces
 from bench.record.tables import Table
 
 LOG_LINES = 2000
@@ -59,6 +59,7 @@ class RunPage(QWidget):
         self.ramp_out.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.ramp_out.clicked.connect(controller.ramp_out)
         self._arrange()
+        controller.opened.connect(self._open)
         controller.traced.connect(self._trace)
         controller.told.connect(self._tell)
         controller.noticed.connect(self._note)
@@ -108,6 +109,9 @@ class RunPage(QWidget):
         self.picture.use(run.configuration.known_specimen)
         self.steady.begin(run)
         self.block = BlockAngle()
+
+    def _open(self, opened: Opened) -> None:
+        self.traces.use_further(opened.further)
 
     def _trace(self, traces: list[Traces]) -> None:
         self.traces.add(traces)

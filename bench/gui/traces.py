@@ -2,6 +2,7 @@
 # pyright: reportMissingTypeStubs=false
 """Live traces. pyqtgraph ships no types, hence the first lines."""
 
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
+from bench.analysis.signals import Further
 from bench.gui import texts
 from bench.gui.axes import colour_axes, round_down
 from bench.gui.palette import Theme
@@ -28,7 +30,7 @@ HEADROOM, WIDE, LEAST = 1.15, 2.0, 1e-3
 
 
 class TracePlot(QWidget):
-    """Five curves one above the other over the same seconds.
+    """Five curves one above the other over the same seconds, and one for each further signal of the rig.
 
     Samples come in blocks; between two blocks the axis runs on with the clock, so that the curves scroll evenly and
     every sample is shown as soon as it is known.
@@ -36,6 +38,8 @@ class TracePlot(QWidget):
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
+        self._theme = theme
+        self._further: tuple[Further, ...] = ()
         self.ring = Ring(len(NAMES))
         self._columns = [NAMES.index(name) for name in SHOWN]
         self._fresh = False
@@ -45,20 +49,39 @@ class TracePlot(QWidget):
         self._reach = np.full(len(SHOWN), LEAST)
         self.view: Any = pg.GraphicsLayoutWidget()
         self.view.setAccessibleName(texts.NAMES["traces"])
-        self.plots: list[Any] = [self.view.addPlot(row=row, col=0) for row in range(len(SHOWN))]
-        self.curves: list[Any] = [plot.plot(antialias=False) for plot in self.plots]
-        for plot in self.plots:
-            _arrange(plot, last=plot is self.plots[-1])
-        self.use_theme(theme)
+        self.plots: list[Any] = []
+        self.curves: list[Any] = []
+        self.use_further(())
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(self.view)
 
+    def use_further(self, further: tuple[Further, ...]) -> None:
+        """Show these signals after those of every bench: what was there before is forgotten."""
+        if self.plots and further == self._further:
+            return
+        self._further = further
+        self.view.clear()
+        self.ring = Ring(len(NAMES) + len(further))
+        self._columns = [*(NAMES.index(name) for name in SHOWN), *range(len(NAMES), len(NAMES) + len(further))]
+        self._reach = np.full(len(self._columns), LEAST)
+        self.plots = [self.view.addPlot(row=row, col=0) for row in range(len(self._columns))]
+        self.curves = [plot.plot(antialias=False) for plot in self.plots]
+        for plot in self.plots:
+            _arrange(plot, last=plot is self.plots[-1])
+        self.use_theme(self._theme)
+
+    @property
+    def labels(self) -> tuple[tuple[str, str, float], ...]:
+        """Label, unit on the screen, and screen units per SI unit, of each trace."""
+        return (*texts.TRACES, *((each.name.replace("_", " "), each.unit, 1.0) for each in self._further))
+
     def use_theme(self, theme: Theme) -> None:
         """Take these colours."""
+        self._theme = theme
         self.view.setBackground(theme.raised)
         for plot, curve, (label, unit, _), colour in zip(
-            self.plots, self.curves, texts.TRACES, theme.lines, strict=True
+            self.plots, self.curves, self.labels, cycle(theme.lines), strict=False
         ):
             plot.setTitle(f"{label} [{unit}]", color=theme.text, size="10pt", justify="left")
             colour_axes(plot, theme)
@@ -100,7 +123,7 @@ class TracePlot(QWidget):
         self._fresh = False
         seconds, values = self.ring.window(WINDOW, BUCKETS)
         whole = bool(np.isfinite(values).all())
-        for k, (plot, curve, (_, _, factor)) in enumerate(zip(self.plots, self.curves, texts.TRACES, strict=True)):
+        for k, (plot, curve, (_, _, factor)) in enumerate(zip(self.plots, self.curves, self.labels, strict=True)):
             line = (values[:, self._columns[k]] * factor).astype(np.float64)
             curve.setData(seconds, line, connect="all" if whole else "finite", skipFiniteCheck=whole)
             self._fit(k, plot, line)

@@ -8,6 +8,7 @@ from contextlib import suppress
 from multiprocessing.connection import Connection
 from queue import Empty, SimpleQueue
 
+from bench.analysis.signals import further_of
 from bench.engine.requests import Requests
 from bench.events import Acquired, Event, State, StateChanged, Warned
 from bench.link.inputs import SafetyWatch
@@ -147,7 +148,7 @@ class Teller:
         """Traces are made from now on."""
         self._reduction = Reduction(rig.sample_rate)
         names = tuple(channel.name for channel in rig.channels)
-        self._host.outbox.put(Opened(names, rig.sample_rate, rig.description), always=True)
+        self._host.outbox.put(Opened(names, rig.sample_rate, rig.description, further_of(rig.channels)), always=True)
         self._host.inputs.watch(rig)
 
     def __call__(self, event: Event) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.analysis.signals import Further
 from bench.config.model import BenchConfiguration
 from bench.events import Event, State
 from bench.preflight.margins import Margin
@@ -90,11 +91,15 @@ class Surveyed:
 
 @dataclass(frozen=True)
 class Opened:
-    """The rig is open: the names of its channels, samples per second, and what is known of its devices."""
+    """The rig is open: the names of its channels, samples per second, and what is known of its devices.
+
+    `further` are the signals that come after those of `bench.link.reduction.TRACES` in every block of traces.
+    """
 
     channels: tuple[str, ...]
     sample_rate: float
     devices: Mapping[str, str]
+    further: tuple[Further, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -94,9 +94,7 @@ def _run(asked: Run, host: Host, requests: Requests) -> FromSession:
         realtime=asked.realtime,
         about=asked.about,
     )
-    return Ended(
-        ended.status, ended.reason, ended.summary, ended.table, asked.out, ended.passed, ended.cause
-    )
+    return Ended(ended.status, ended.reason, ended.summary, ended.table, asked.out, ended.passed, ended.cause)
 
 
 def _policy(configuration: BenchConfiguration) -> str:

@@ -47,9 +47,10 @@ def room(configuration: BenchConfiguration, duration: float, folder: Path) -> Ro
 def bytes_per_second(configuration: BenchConfiguration) -> float:
     """Counts of every channel and the drive, 16 bit simulated, up to 32 bit on hardware; and what the twin says."""
     if configuration.backend == "simulated":
-        channels, width = 4, 2
+        inputs, width = 4, 2
     else:
-        channels, width = len(configuration.hardware.transducers) + 2, 4
+        inputs, width = len(configuration.hardware.transducers) + 2, 4
+    channels = inputs + len(configuration.channels)
     beside = configuration.at_pace(realtime=False).twin.enabled
     said = 8 * len(EVENT_TABLES[TwinEstimate].fields) / configuration.acquisition.block_duration if beside else 0.0
     return configuration.sample_rate * (channels * width + DRIVE_BYTES) + said

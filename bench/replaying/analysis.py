@@ -3,7 +3,6 @@
 from collections.abc import Callable, Generator, Sequence
 from typing import Any
 
-from bench.analysis.signals import SignalMap
 from bench.config.model import BenchConfiguration
 from bench.engine.steps import Outcome, Plan, Step
 from bench.events import Subscriber
@@ -25,7 +24,7 @@ class NotComparable(RockbenchError):
 def follow(
     record: Record,
     prepared: Prepared[Any],
-    make: Callable[[SignalMap], Follower],
+    make: Callable[[], Follower],
     subscribers: Sequence[Subscriber] = (),
 ) -> tuple[Replayed, tuple[Parameters, ...]]:
     """Carry out the recorded plan again, watched by a follower: the replay and the follower's points.
@@ -34,12 +33,11 @@ def follow(
     other settings would show would be mixed with what the software changed.
     """
     configuration = prepared.configuration
-    signals = SignalMap(record.channels, configuration.laser_reference, configuration.calibrated)
-    follower = make(signals)
+    follower = make()
     # the follower comes first: it may look at a block before the plan has gone on
     heard = [follower, *subscribers]
     plan = _watched(prepared.plan(), follower)
-    replayed = replay(record, plan, configuration, clock=VirtualClock(), subscribers=heard, signals=signals)
+    replayed = replay(record, plan, configuration, clock=VirtualClock(), subscribers=heard)
     if (why := replayed.parted(POINTS)) is not None:
         raise NotComparable(f"this software does not come to what was recorded with the same settings: {why}")
     return replayed, tuple(follower.points)

@@ -73,11 +73,10 @@ def replay(
     *,
     clock: Clock,
     subscribers: Sequence[Subscriber],
-    signals: SignalMap | None = None,
 ) -> Replayed:
     """Carry out `plan` on the samples of an open file, on the `configuration` that was recorded, and compare.
 
-    `clock` begins at 0. With `signals` the caller sees the zero that the engine has taken. Raises InvalidInput when
+    `clock` begins at 0. Raises InvalidInput when
     the file cannot be played.
     """
     recording, course = ReplayedRecord(record), RecordedCourse(record)
@@ -92,10 +91,10 @@ def replay(
         # who asks comes last: what was said before is with everybody by then
         heard = [comparison, keep, *subscribers, AskingAgain(course, requests)]
         stream = Stream(clock, heard)
-        signals = signals or SignalMap(rig.channels, configuration.laser_reference, configuration.calibrated)
+        signals = SignalMap(rig.channels, configuration.laser_reference, configuration.calibrated)
         engine = Engine(
             rig,
-            Guard(rig, configuration.limits, configuration.ramps, configuration.mover, signals),
+            Guard(rig, configuration.limits, configuration.ramps, configuration.mover, signals, configuration.channels),
             stream,
             requests,
             RecordedOperator(course),

@@ -4,7 +4,8 @@ from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 from drivers.daqmx.parameters import AnalogInput
-from drivers.hardware.parameters import Hardware
+from drivers.further import FurtherChannel
+from drivers.hardware.parameters import CalibratedInput, Hardware
 from drivers.optoncdt.analogue import laser_scaling
 from drivers.optoncdt.codec import MID_RANGE, count_size
 from sim.channel import Channel
@@ -38,24 +39,32 @@ class Scaling(Protocol):
 
 
 def analogue_channels(
-    hardware: Hardware, scalings: Sequence[Scaling], devices: Mapping[str, str]
+    hardware: Hardware, scalings: Sequence[Scaling], devices: Mapping[str, str], further: Sequence[FurtherChannel] = ()
 ) -> tuple[Channel, ...]:
-    """The channels of the DAQ's inputs, in their order: transducers first, then lasers on their analogue outputs.
+    """The channels of the DAQ's inputs, in their order: transducers, lasers on their analogue outputs, further ones.
 
     `devices` is the description of the DAQ, with the identity of each device.
     """
     channels: list[Channel] = []
     transducers = hardware.transducers
     for (name, given), scaling in zip(transducers, scalings, strict=False):
-        quantity, unit = _MEASURED[name]
-        device = f"{_device(devices, given)}, {given.terminal}"
-        channels.append(_analogue(name, quantity, unit, device, scaling, 1.0 / given.sensitivity, given.zero))
-    for (name, given), scaling in zip(hardware.analogue_lasers, scalings[len(transducers) :], strict=True):
+        channels.append(_calibrated(name, *_MEASURED[name], given, scaling, devices))
+    lasers = hardware.analogue_lasers
+    for (name, given), scaling in zip(lasers, scalings[len(transducers) :], strict=False):
         output = laser_scaling(given.measuring_range, hardware.lasers.load)
         device = f"optoNCDT 1420 on its analogue output, {_device(devices, given)}, {given.terminal}"
         slope = given.polarity * output.slope
         channels.append(_analogue(name, "displacement", "m", device, scaling, slope, output.middle, output.valid))
+    for given, scaling in zip(further, scalings[len(transducers) + len(lasers) :], strict=True):
+        channels.append(_calibrated(given.name, given.measures, given.unit, given, scaling, devices))
     return tuple(channels)
+
+
+def _calibrated(
+    name: str, quantity: str, unit: str, given: CalibratedInput, scaling: Scaling, devices: Mapping[str, str]
+) -> Channel:
+    device = f"{_device(devices, given)}, {given.terminal}"
+    return _analogue(name, quantity, unit, device, scaling, 1.0 / given.sensitivity, given.zero)
 
 
 def _device(devices: Mapping[str, str], given: AnalogInput) -> str:

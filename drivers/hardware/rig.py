@@ -1,6 +1,6 @@
 """The bench in the laboratory behind the interface of every rig: the DAQ is master, lasers are placed on its clock."""
 
-from collections.abc import Generator, Mapping
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from enum import Enum
 from typing import Self
@@ -12,6 +12,7 @@ from drivers.clock import Clock, WallClock, now
 from drivers.daqmx.session import DaqSession
 from drivers.drive import Drive, require_block
 from drivers.errors import RigError
+from drivers.further import FurtherChannel
 from drivers.hands import Person, RemoteHands
 from drivers.hardware.channels import analogue_channels
 from drivers.hardware.parameters import Hardware
@@ -38,14 +39,14 @@ class _State(Enum):
 class HardwareRig:
     """DAQ and lasers as one rig. The sample clock starts with the first block that is read.
 
-    `lead` is the number of drive samples that must be waiting. Raises InvalidInput or RigError when the bench is not
-    as configured; nothing is left open then.
+    `lead` is the number of drive samples that must be waiting, `further` are sensors besides those of every bench.
+    Raises InvalidInput or RigError when the bench is not as configured; nothing is left open then.
     """
 
-    def __init__(self, hardware: Hardware, *, lead: int) -> None:
+    def __init__(self, hardware: Hardware, *, lead: int, further: Sequence[FurtherChannel] = ()) -> None:
         self._clock = WallClock()
         serial = hardware.lasers.connection == "serial"
-        inputs = [given for _, given in (*hardware.transducers, *hardware.analogue_lasers)]
+        inputs = [*(one for _, one in (*hardware.transducers, *hardware.analogue_lasers)), *further]
         with ExitStack() as opened:
             # the DAQ before all that can fail: opening it makes the bench safe, whatever an earlier program left
             self._daq = DaqSession(hardware.daq, inputs, hardware.sample_rate, lead)
@@ -57,7 +58,7 @@ class HardwareRig:
             self._lasers = SerialLasers(hardware) if serial else None
             if self._lasers is not None:
                 opened.callback(self._lasers.close)
-            analogue = analogue_channels(hardware, self._daq.scalings, self._daq.description)
+            analogue = analogue_channels(hardware, self._daq.scalings, self._daq.description, further)
             self._channels = analogue if self._lasers is None else (*analogue, *self._lasers.channels)
             self._opened = opened.pop_all()
         self._state = _State.STOPPED

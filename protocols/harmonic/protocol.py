@@ -9,7 +9,6 @@ from bench.protocol import Prepared, Protocol, Reanalysis, Sources
 from sim.parameters import COUPLING, Parameters, each_once, quantity
 
 if TYPE_CHECKING:
-    from bench.analysis.signals import SignalMap
     from bench.config.model import BenchConfiguration
     from bench.protocol import Follower
     from bench.record.reader import Record
@@ -145,11 +144,10 @@ def _follower(
     parameters: HarmonicParameters,
     configuration: "BenchConfiguration",
     record: "Record",
-    signals: "SignalMap",
 ) -> "Follower":
     from protocols.harmonic.reanalysis import HarmonicFollower
 
-    return HarmonicFollower(settings, parameters, configuration, signals, record.channels, record.sample_rate)
+    return HarmonicFollower(settings, parameters, configuration, record.sample_rate)
 
 
 PROTOCOL = Protocol(

@@ -8,7 +8,7 @@ import numpy as np
 
 from bench.analysis.cycles import Cycle, CycleAnalyser, mean_amplitude
 from bench.analysis.gain import SteadyPeak, modulated_peak, steady_peak
-from bench.analysis.signals import ACCELERATION, SignalMap
+from bench.analysis.signals import ACCELERATION, SIGNALS
 from bench.analysis.steady import Steadiness, SteadyDetector
 from bench.config.model import BenchConfiguration
 from bench.control.answer import Answer, Sine
@@ -16,7 +16,6 @@ from bench.control.calibration import DriveCalibration
 from bench.engine.steps import Arm, Calibrate, Dwell, Follow, Measured, Outcome, Say, Step, Trim
 from bench.events import Acquired, Estimate, Event, PointFinished
 from bench.prediction.model_uncertainty import expanded_uncertainty
-from drivers.rig import Channel
 from protocols.harmonic.judge import judge
 from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, HarmonicSettings, PointStatus
 from protocols.harmonic.settle import JUDGED, KIN, LEFT, TURNING, Settled
@@ -47,12 +46,10 @@ class HarmonicFollower:
         settings: HarmonicSettings,
         parameters: HarmonicParameters,
         configuration: BenchConfiguration,
-        signals: SignalMap,
-        channels: tuple[Channel, ...],
         sample_rate: float,
     ) -> None:
         self._settings, self._parameters, self._configuration = settings, parameters, configuration
-        self._signals, self._channels, self._rate = signals, channels, sample_rate
+        self._rate = sample_rate
         self._cycles = settings.measured_cycles or parameters.measured_cycles
         self._tolerance = settings.settle_tolerance or parameters.settle_tolerance
         self._calibration = DriveCalibration.flat(1.0)
@@ -115,9 +112,7 @@ class HarmonicFollower:
         self._read = event.block.first + len(event.block)
         if not self._dwelling or (series := self._series) is None:
             return
-        counts = event.block.counts
-        values = np.column_stack([channel.to_unit(counts[:, k]) for k, channel in enumerate(self._channels)])
-        cycles = series.analyser.push(np.column_stack((self._signals.of(values), event.drive)))
+        cycles = series.analyser.push(np.column_stack((event.signals[:, : len(SIGNALS)], event.drive)))
         if series.turn is None and cycles:
             series.turn = series.sine.turn(cycles[0])
         series.recent += cycles

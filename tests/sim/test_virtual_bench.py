@@ -7,7 +7,7 @@ from pydantic import ValidationError
 from scipy.optimize import minimize
 
 from sim.arrangement import Arrangement
-from sim.sensors import Accelerometer, FilterUnit, Laser
+from sim.sensors import Accelerometer, FilterUnit, Laser, PlacedSensor
 from sim.shaker import Shaker
 from sim.specimen import Specimen
 from sim.virtual_bench import VirtualBench, VirtualBenchParameters
@@ -149,3 +149,43 @@ def test_mounting_another_specimen_stands_it_still() -> None:
 def test_a_filter_that_the_sample_rate_cannot_carry_is_refused() -> None:
     with pytest.raises(ValidationError, match=r"filter_unit\.cutoff"):
         VirtualBenchParameters(sample_rate=150.0)
+
+
+def _further(measures: str, place: str) -> PlacedSensor:
+    unit = {"acceleration": "m/s2", "velocity": "m/s", "displacement": "m"}[measures]
+    return PlacedSensor.model_validate(
+        {"name": "one", "measures": measures, "unit": unit, "place": place, "sensitivity": 0.1, "noise_density": 1e-3}
+    )
+
+
+FURTHER = [_further("acceleration", place) for place in ("table", "storey 1", "storey 2")]
+
+
+def test_further_sensors_change_no_other_count_and_do_not_depend_on_how_the_drive_is_cut() -> None:
+    """But for the converter's noise, which is drawn for all inputs of a tick together."""
+    parameters, volts = VirtualBenchParameters.model_validate({"converter": {"noise": 0.0}}), kick(3000)
+    alone = VirtualBench(parameters, Specimen(), 1).run(volts)
+    whole, cut = (VirtualBench(parameters, Specimen(), 1, FURTHER) for _ in range(2))
+    expected = whole.run(volts)
+    np.testing.assert_array_equal(expected[:, :4], alone)
+    assert expected.shape == (3000, 7)
+    parts = [cut.run(part) for part in np.split(volts, [1, 8, 8, 500, 1499])]
+    np.testing.assert_array_equal(np.concatenate(parts), expected)
+
+
+@pytest.mark.parametrize("place", ["table", "storey 1", "storey 2"])
+def test_a_further_sensor_measures_the_motion_of_its_place(place: str) -> None:
+    """The acceleration integrates to the velocity, and that to the displacement, of the true motion."""
+    quiet = {"converter": {"noise": 0.0, "bits": 16}, "filter_unit": {"order": 1, "cutoff": 900.0}}
+    sensors = [_further(each, place) for each in ("acceleration", "velocity", "displacement")]
+    sensors = [each.model_copy(update={"noise_density": 0.0}) for each in sensors]
+    bench = VirtualBench(VirtualBenchParameters.model_validate(quiet), Specimen(), 1, sensors)
+    counts, truth, rate = bench.run(kick(4000)), bench.truth, bench.parameters.sample_rate
+    relative = {"table": np.zeros(4000), "storey 1": truth.u1, "storey 2": truth.u2}[place]
+    speed = {"table": np.zeros(4000), "storey 1": truth.v1, "storey 2": truth.v2}[place]
+    acceleration, velocity, displacement = (
+        channel.to_unit(counts[:, k]) for k, channel in enumerate(bench.channels[4:], 4)
+    )
+    assert np.abs(velocity - truth.v - speed).max() < 0.02 * np.abs(velocity).max()
+    assert np.abs(displacement - truth.x - relative).max() < 0.02 * np.abs(displacement).max()
+    assert np.abs(np.cumsum(acceleration) / rate - velocity).max() < 0.02 * np.abs(velocity).max()

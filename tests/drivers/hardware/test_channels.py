@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from bench.config.model import BenchConfiguration
+from drivers.further import FurtherChannel
 from drivers.hardware.channels import Scaling, analogue_channels, serial_laser
 from drivers.hardware.parameters import (
     CoilCurrent,
@@ -138,3 +140,31 @@ def test_the_device_of_a_terminal_is_found_in_any_case(terminal: str) -> None:
 def test_a_device_that_nobody_described_is_said_to_be_unknown() -> None:
     (one, *_) = channels(*[SIXTEEN] * 4, table_displacement=TableDisplacement(terminal="Dev2/ai0"))
     assert one.device == "unknown device, Dev2/ai0"
+
+
+def test_a_further_channel_is_a_row_after_those_of_every_bench() -> None:
+    given = FurtherChannel(
+        name="strain_of_spring",
+        measures="strain",
+        unit="1",
+        place="elsewhere",
+        terminal="Dev1/ai7",
+        sensitivity=-250.0,
+        zero=0.5,
+    )
+    hardware = Hardware.model_validate({"lasers": Lasers(connection="analogue")})
+    made = analogue_channels(hardware, [SIXTEEN] * 5, {"device Dev1": "NI USB-6211"}, [given])
+    assert [channel.name for channel in made[:2]] == ["table_displacement", "table_acceleration"]
+    last = made[-1]
+    assert (last.name, last.quantity, last.unit, last.device) == (
+        *("strain_of_spring", "strain", "1"),
+        "NI USB-6211, Dev1/ai7",
+    )
+    # 5 V at 16384 counts
+    assert value(last, 16384) == pytest.approx((5.0 - 0.5) / -250.0, rel=1e-12)
+
+
+def test_two_channels_on_one_terminal_are_refused() -> None:
+    row = {"name": "a", "measures": "force", "unit": "N", "place": "elsewhere", "sensitivity": 1.0}
+    with pytest.raises(ValueError, match=r"channels\[0\].terminal = 'Dev1/ai1' .* table_acceleration"):
+        BenchConfiguration.model_validate({"backend": "hardware", "channels": [row | {"terminal": "Dev1/ai1"}]})
