@@ -152,9 +152,9 @@ def test_a_filter_that_the_sample_rate_cannot_carry_is_refused() -> None:
 
 
 def _further(measures: str, place: str) -> PlacedSensor:
-    unit = {"acceleration": "m/s2", "velocity": "m/s", "displacement": "m"}[measures]
+    unit, volts = {"acceleration": ("m/s2", 0.1), "velocity": ("m/s", 2.0), "displacement": ("m", 50.0)}[measures]
     return PlacedSensor.model_validate(
-        {"name": "one", "measures": measures, "unit": unit, "place": place, "sensitivity": 0.1, "noise_density": 1e-3}
+        {"name": "one", "measures": measures, "unit": unit, "place": place, "sensitivity": volts, "noise_density": 1e-3}
     )
 
 
