@@ -4,10 +4,10 @@ import numpy as np
 
 from bench.benchmark.section import Cell, Column, Section, Target
 from bench.benchmark.timing import once
+from bench.comparators.catalogue import solve
 from sim.excitation import SineProgram, Sweep
 from sim.maps import GainMap, gain_map
 from sim.rocking import Motion, State, simulate_many
-from sim.solvers.catalogue import solve
 from sim.specimen import Specimen
 
 OMEGAS, BETAS = (12.0, 21.0), (0.1, 1.2)

@@ -8,12 +8,12 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.benchmark.case import DURATION, SPECIMEN, START, drive
+from bench.comparators.case import DURATION, SPECIMEN, START, drive
+from bench.comparators.catalogue import solve
+from bench.comparators.problem import Problem
+from bench.comparators.scipy_events import METHODS, integrate, python_rates
+from bench.comparators.scipy_events import Method as ScipyMethod
 from sim.rocking import Motion, Peaks
-from sim.solvers.catalogue import solve
-from sim.solvers.problem import Problem
-from sim.solvers.scipy_events import METHODS, integrate, python_rates
-from sim.solvers.scipy_events import Method as ScipyMethod
 
 NOT_INSTALLED = "not installed"
 
@@ -103,7 +103,7 @@ def _scipy(name: ScipyMethod, tolerance: float, weight: float, *, python: bool =
 
 def _heyoka(tolerance: float, peaks: bool) -> Method:
     def prepare() -> Run:
-        from bench.benchmark.heyoka_peer import HeyokaPeer
+        from bench.comparators.heyoka import HeyokaPeer
 
         peer = HeyokaPeer(tolerance, peaks=peaks)
 
@@ -119,7 +119,7 @@ def _heyoka(tolerance: float, peaks: bool) -> Method:
 
 def _cvode(tolerance: float) -> Method:
     def prepare() -> Run:
-        from bench.benchmark.cvode_peer import CvodePeer
+        from bench.comparators.cvode import CvodePeer
 
         peer = CvodePeer(tolerance)
 

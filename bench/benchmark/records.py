@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from bench.benchmark.section import Cell, Column, Section, Target
 from bench.benchmark.timing import Timing, once, timed
+from bench.comparators.catalogue import solve
 from sim.excitation import SampledRecord
 from sim.linear import frame_matrices
 from sim.rocking import Motion, State, simulate, simulate_many
-from sim.solvers.catalogue import solve
 from sim.specimen import Block, Specimen
 
 DT, DURATION = 0.005, 40.0

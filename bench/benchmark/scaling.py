@@ -5,9 +5,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from bench.benchmark.case import AMPLITUDE, OMEGA, PHASE, SPECIMEN, START
 from bench.benchmark.section import Cell, Column, Section
 from bench.benchmark.timing import in_turn
+from bench.comparators.case import AMPLITUDE, OMEGA, PHASE, SPECIMEN, START
 from sim.excitation import SineProgram, Sweep
 from sim.maps import gain_map
 from sim.rocking import simulate, simulate_many

@@ -1,9 +1,8 @@
 """Gain coefficients by 120 s runs, against the periodic orbit: what a solver's error does to what it is used for."""
 
 from bench.benchmark.section import Cell, Column, Section
+from bench.comparators.catalogue import LAST_PERIODS, SOLVERS, steady_gain_by_time
 from sim.gain import predict_gain
-from sim.solvers.catalogue import SOLVERS
-from sim.solvers.steady import LAST_PERIODS, steady_gain_by_time
 from sim.specimen import Specimen
 
 POINTS = ((17.5, 0.40), (16.0, 0.97))

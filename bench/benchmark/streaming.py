@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from bench.benchmark.records import ROCKING, ROCKING_OMEGA, ROCKING_PHASE, ROCKING_START
 from bench.benchmark.section import Cell, Column, Section, Target
 from bench.benchmark.timing import timed
+from bench.comparators.catalogue import solve
 from sim.excitation import SampledRecord
-from sim.solvers.catalogue import solve
 from sim.streaming import Stream
 
 RATE = 20_000

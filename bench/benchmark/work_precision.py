@@ -1,9 +1,9 @@
 """Run time against error of every method on the standard case."""
 
-from bench.benchmark.case import IMPACTS, error_of, peak_error_of
 from bench.benchmark.methods import NOT_INSTALLED, Method, Outcome, Run, methods
 from bench.benchmark.section import Cell, Column, Section, Target
 from bench.benchmark.timing import in_turn, once
+from bench.comparators.case import IMPACTS, error_of, peak_error_of
 
 YARDSTICK = "taylor", "tolerance 1e-10"
 """The row that the others are compared with: the engine as it is used."""

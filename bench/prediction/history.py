@@ -7,6 +7,7 @@ from math import tau
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.comparators.catalogue import solve
 from bench.prediction.requests import HistoryRequest
 from bench.prediction.steady import amplitude_of
 from bench.progress import Progress, silent
@@ -15,7 +16,6 @@ from sim.errors import InvalidInput
 from sim.excitation import SineProgram, Sweep
 from sim.gain import predict_gain
 from sim.linear import steady_response
-from sim.solvers.catalogue import solve
 from sim.specimen import Specimen
 from sim.steady import Orbit
 

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from functools import partial
 from math import nan, tau
 
+from bench.comparators.catalogue import steady_gain_by_time
 from bench.prediction.requests import SineRequest
 from sim.gain import GainPrediction
 from sim.rocking import Status
-from sim.solvers.steady import steady_gain_by_time
 from sim.specimen import Specimen
 from sim.sweep import Done, sweep
 

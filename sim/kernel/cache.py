@@ -31,24 +31,30 @@ TOLD = "ROCKBENCH_KERNEL_IN_MEMORY"
 """Environment variable by which child processes do not repeat the notice."""
 
 
+KERNEL = Path(__file__).parent
+
+
 class KernelCache:
     """Finds the folder for the compiled kernel once, and gives it up for good when it turns out to be unusable.
 
     given : folder that the user named for numba's caches, or empty: then it is the installation, or the user's folder
-    for caches.  versions : whatever else decides about the compiled code.
+    for caches.  versions : whatever else decides about the compiled code.  sources : folder of the compiled functions,
+    the kernel's own or another one.
     """
 
-    def __init__(self, given: str, versions: Sequence[object]) -> None:
-        self._sources = Path(__file__).parent
+    def __init__(self, given: str, versions: Sequence[object], sources: Path = KERNEL) -> None:
+        self._sources = sources
         self._stamp = _stamp(self._sources)
         self._folder: Path | None = None
         self._handle: int | None = None
+        self.name = ""
+        """Name of the folder, with the hash; empty without sources."""
         if not self._stamp:
             # in an archive: numba's locator needs files, and without sources nothing says when the code has changed
             self.give_up(f"{self._sources} is no folder of source files")
             return
-        sources = [(name, (self._sources / name).read_bytes()) for name, *_ in self._stamp]
-        name = PREFIX + hashlib.sha256(repr([sources, *versions, self._sources]).encode()).hexdigest()[:12]
+        content = [(name, (self._sources / name).read_bytes()) for name, *_ in self._stamp]
+        self.name = name = PREFIX + hashlib.sha256(repr([content, *versions, self._sources]).encode()).hexdigest()[:12]
         reasons: list[str] = []
         for base in [Path(given).absolute()] if given else _places(self._sources):
             try:

@@ -24,7 +24,7 @@ import llvmlite  # noqa: E402
 import numba  # noqa: E402
 import numpy as np  # noqa: E402
 
-from sim.kernel.cache import KernelCache  # noqa: E402
+from sim.kernel.cache import KERNEL, KernelCache  # noqa: E402
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -32,10 +32,10 @@ OPTIONS = ("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "BOUNDSCHECK", "DEBUGINFO_D
 """numba's settings that change the compiled code and are not in the key of its own index, as the processor is."""
 
 _SETTINGS = [(option, str(getattr(numba.config, option, None))) for option in OPTIONS]
-_cache = KernelCache(
-    cast(str, numba.config.CACHE_DIR),
-    [numba.__version__, llvmlite.__version__, np.__version__, *_SETTINGS, __debug__],
-)
+_VERSIONS = [numba.__version__, llvmlite.__version__, np.__version__, *_SETTINGS, __debug__]
+_GIVEN = cast(str, numba.config.CACHE_DIR)
+_cache = KernelCache(_GIVEN, _VERSIONS)
+_caches = {KERNEL: _cache}
 _one_at_a_time = threading.RLock()
 
 
@@ -52,7 +52,8 @@ def compiled(signature: str) -> Callable[[F], F]:
 
     def decorate(function: F) -> F:
         with _one_at_a_time:
-            folder = _cache.folder()
+            cache = _cache_of(function)
+            folder = cache.folder()
             if folder is not None:
                 # numba reads this once for each function; it is set for ours only, and other code keeps its caches
                 before, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(folder)
@@ -60,12 +61,12 @@ def compiled(signature: str) -> Callable[[F], F]:
                     made = _njit(signature, function, cache=True)
                     if _is_within(made, folder):
                         return made
-                    _cache.give_up(f"numba cannot or may not use {folder}")
+                    cache.give_up(f"numba cannot or may not use {folder}")
                 except numba.core.errors.NumbaError:
                     raise
                 except Exception as error:
                     # a file that a power cut left empty, a full disk: reading and writing pickles raises what it likes
-                    _cache.give_up(f"{folder} cannot be used ({type(error).__name__}: {error}), remove it")
+                    cache.give_up(f"{folder} cannot be used ({type(error).__name__}: {error}), remove it")
                 finally:
                     numba.config.CACHE_DIR = before
             return _njit(signature, function, cache=False)
@@ -84,6 +85,14 @@ def _is_within(made: Callable[..., Any], folder: Path) -> bool:
     # compilation (NUMBA_DISABLE_JIT) there is no cache
     stats = getattr(made, "stats", None)
     return stats is None or Path(stats.cache_path).is_relative_to(folder)
+
+
+def _cache_of(function: Callable[..., Any]) -> KernelCache:
+    """The cache for the folder of a function; one outside the kernel calls it, and has its hash in the name."""
+    folder = Path(function.__code__.co_filename).parent
+    if folder not in _caches:
+        _caches[folder] = KernelCache(_GIVEN, [*_VERSIONS, _cache.name], folder)
+    return _caches[folder]
 
 
 def _njit(signature: str, function: F, *, cache: bool) -> F:

@@ -3,7 +3,8 @@ from pathlib import Path
 
 import pytest
 
-from bench.benchmark import case, suite, timing
+from bench.benchmark import suite, timing
+from bench.comparators import case
 from bench.benchmark import work_precision as table
 from bench.benchmark.methods import NOT_INSTALLED, Method, methods
 from bench.benchmark.section import Column, Section, Target, targets_section
@@ -70,7 +71,7 @@ def test_an_unknown_part_is_refused(tmp_path: Path) -> None:
 
 def test_heyoka_finds_every_impact_of_the_standard_case() -> None:
     pytest.importorskip("heyoka")
-    from bench.benchmark.heyoka_peer import HeyokaPeer
+    from bench.comparators.heyoka import HeyokaPeer
 
     found = HeyokaPeer(1e-15, peaks=True).run()
     assert found.impacts == case.IMPACTS
@@ -81,7 +82,7 @@ def test_heyoka_finds_every_impact_of_the_standard_case() -> None:
 
 def test_cvode_finds_every_impact_of_the_standard_case() -> None:
     pytest.importorskip("sksundae")
-    from bench.benchmark.cvode_peer import CvodePeer
+    from bench.comparators.cvode import CvodePeer
 
     end, impacts = CvodePeer(1e-6).run()
     assert impacts == case.IMPACTS

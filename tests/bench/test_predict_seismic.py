@@ -14,12 +14,12 @@ from scipy.signal import butter, lsim, lti, sosfiltfilt
 
 from bench.accelerograms.synthetic import NAMES
 from bench.cli.main import main
+from bench.comparators.catalogue import solve
 from bench.control.preparation import prepare
 from bench.prediction.requests import SeismicRequest
 from bench.report.seismic_figure import GainCurve, seismic_figure
 from sim.excitation import SampledRecord
 from sim.rocking import simulate
-from sim.solvers.catalogue import solve
 from sim.specimen import Specimen
 from tests.bench.accelerograms.real import CAMPAIGN, needed
 from tests.sim.oracle import reference_motion

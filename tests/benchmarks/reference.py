@@ -3,9 +3,9 @@
     python tests/benchmarks/reference.py [SECONDS]
 
 Needs heyoka and mpmath (`uv sync --group benchmark`) and a processor with 80-bit arithmetic. Prints the end state and
-the peaks that `bench.benchmark.case` holds, how far the stored ones are off, and the greatest difference between heyoka
-and mpmath after SECONDS (default 1.0, some five impacts). mpmath is given the equations as the paper prints them: at 30
-digits their cancellation does not matter.
+the peaks that `bench.comparators.case` holds, how far the stored ones are off, and the greatest difference between
+heyoka and mpmath after SECONDS (default 1.0, some five impacts). mpmath is given the equations as the paper prints
+them: at 30 digits their cancellation does not matter.
 """
 
 import sys
@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from bench.benchmark.case import AMPLITUDE, END, IMPACTS, OMEGA, PEAKS, PHASE, SPECIMEN, START
-from bench.benchmark.heyoka_peer import HeyokaPeer
+from bench.comparators.case import AMPLITUDE, END, IMPACTS, OMEGA, PEAKS, PHASE, SPECIMEN, START
+from bench.comparators.heyoka import HeyokaPeer
 
 DIGITS = 30
 

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.analysis.signals import SignalMap
+from bench.comparators.catalogue import solve
 from bench.config.model import BenchConfiguration, Simulation
 from bench.engine.requests import Requests
 from bench.engine.stream import Stream
@@ -28,7 +29,6 @@ from drivers.clock import WallClock
 from drivers.rig import Alignment, Block, Channel, Counts, Handwork
 from drivers.simulated import SimulatedRig
 from sim.excitation import SampledRecord
-from sim.solvers.catalogue import solve
 from sim.specimen import Specimen
 from sim.virtual_bench import VirtualBenchParameters
 

@@ -40,6 +40,12 @@ from sim.kernel.compiled import compiled
 def caller(x):
     return callee(x) + 1.0
 """
+NEAR = """from sim.kernel.callee import callee as kernels
+from sim.kernel.compiled import compiled
+@compiled("float64(float64)")
+def callee(x):
+    return kernels(x) + {term}
+"""
 ASK = "from sim.kernel.caller import caller; print(caller(1.0))"
 NOTICE = "compiled in memory"
 
@@ -103,6 +109,28 @@ def where_the_user_says(installation: Installation) -> Path:
     place = installation.home / "mine"
     installation.environment["NUMBA_CACHE_DIR"] = str(place)
     return place
+
+
+def test_a_package_that_calls_the_kernel_is_compiled_again_after_an_edit_there_and_in_itself(
+    installation: Installation,
+) -> None:
+    """As the comparators are: numba itself looks only at the file of the function."""
+    peers = installation.site / "peers"
+    peers.mkdir()
+    (peers / "__init__.py").touch()
+    (peers / "far.py").write_text(CALLER.replace("sim.kernel.callee", "peers.near"))
+
+    def edit(term: float) -> None:
+        (peers / "near.py").write_text(NEAR.format(term=term))
+
+    ask = "from peers.far import caller; print(caller(1.0))"
+    edit(10.0)
+    assert installation.run(ask) == ("13.0", "")
+    edit(20.0)
+    assert installation.run(ask) == ("23.0", "")
+    installation.edit(30.0)
+    assert installation.run(ask) == ("51.0", "")
+    assert list((peers / "__pycache__").rglob("far.*.nbc"))
 
 
 @pytest.mark.parametrize("choose", [beside, at_home, where_the_user_says])

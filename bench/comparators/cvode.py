@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.benchmark.case import DURATION, SPECIMEN, START, drive
+from bench.comparators.case import DURATION, SPECIMEN, START, drive
 
 Vector = NDArray[np.float64]
 
@@ -19,7 +19,7 @@ class CvodePeer:
     """The standard case at one relative tolerance; the absolute one is a hundredth of it."""
 
     def __init__(self, tolerance: float) -> None:
-        from sim.kernel.fixed_step import driven_rates
+        from bench.comparators.kernel.fixed_step import driven_rates
 
         self._p, self._row = SPECIMEN.packed(), drive().packed()[0]
         self._sg, self._start = 1.0, 0.0

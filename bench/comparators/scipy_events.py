@@ -12,8 +12,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.comparators.problem import Problem
 from sim.rocking import MOST_IMPACTS, REST_ANGLE, Motion, motion_of
-from sim.solvers.problem import Problem
 
 Vector = NDArray[np.float64]
 Function = Callable[[float, Vector], float]
@@ -42,9 +42,9 @@ def integrate(method: Method, problem: Problem, tolerance: float, equations: Dri
     """
     from scipy.integrate import solve_ivp
 
+    from bench.comparators.kernel.fixed_step import base, driven_rates
     from sim.kernel import rocking as kernel
     from sim.kernel.equations import COUPLED, GRAVITY, H1, H_B, INERTIA, K_C, MASS, RESTITUTION, B
-    from sim.kernel.fixed_step import base, driven_rates
 
     driven: DrivenRates = equations or driven_rates
     p, x = problem.parameters, problem.start.copy()
@@ -117,8 +117,8 @@ def integrate(method: Method, problem: Problem, tolerance: float, equations: Dri
 
 
 def python_rates(p: Vector, sg: float, row: Vector, t: float, x: Vector, out: Vector) -> None:
-    """The equations of `sim.kernel.fixed_step.driven_rates` as Python runs them: what scipy is mostly given."""
-    from sim.kernel import fixed_step
+    """`bench.comparators.kernel.fixed_step.driven_rates` as Python runs it: the equations that scipy is mostly given."""
+    from bench.comparators.kernel import fixed_step
 
     plain_base, plain_rates = _python(fixed_step.base), _python(fixed_step.rates)
     plain_rates(p.tolist(), sg, x.tolist(), plain_base(row.tolist(), t)[0], out)

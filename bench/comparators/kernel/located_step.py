@@ -9,9 +9,9 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.comparators.kernel.fixed_step import STAGES, base, between, cubic_peak, rk4
 from sim.kernel.compiled import compiled
 from sim.kernel.equations import COUPLED, GRAVITY, H1, H_B, INERTIA, K_C, MASS, RESTITUTION, B, rates
-from sim.kernel.fixed_step import STAGES, base, between, cubic_peak, rk4
 from sim.kernel.rocking import (
     COMPLETED,
     END,

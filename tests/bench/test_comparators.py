@@ -5,13 +5,12 @@ from math import pi
 import numpy as np
 import pytest
 
-from bench.benchmark import case
+from bench.comparators import case
+from bench.comparators.catalogue import SOLVERS, solve, steady_gain_by_time
 from sim.errors import InvalidInput
 from sim.excitation import SampledRecord, SineProgram, Sweep
 from sim.linear import steady_response
 from sim.rocking import State, Status
-from sim.solvers.catalogue import SOLVERS, solve
-from sim.solvers.steady import steady_gain_by_time
 from sim.specimen import Specimen
 from tests.sim.oracle import reference_motion
 from tests.sim.runs import A_S

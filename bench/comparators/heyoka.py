@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.benchmark.case import AMPLITUDE, DURATION, OMEGA, PHASE, SPECIMEN, START
+from bench.comparators.case import AMPLITUDE, DURATION, OMEGA, PHASE, SPECIMEN, START
 
 
 @dataclass(frozen=True)

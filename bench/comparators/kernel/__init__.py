@@ -1,0 +1,1 @@
+"""Compiled functions of the comparators, on the equations of `sim.kernel`."""

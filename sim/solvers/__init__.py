@@ -1,1 +1,0 @@
-"""Named ways to integrate the same equations, for comparison: `sim.solvers.catalogue` has them all."""
