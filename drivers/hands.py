@@ -1,17 +1,7 @@
 """Who does the handwork at the bench: a person, or an emulated laboratory that is told of it."""
 
-from typing import Protocol
-
 from drivers.laboratory_client import ask, place_of
 from drivers.rig import Handwork
-
-
-class Hands(Protocol):
-    """Does what is done by hand between two tests."""
-
-    def do(self, work: Handwork, amount: float | None) -> None:
-        """Do `work`, by `amount` where it has one. Raises RigError when it cannot be done."""
-        ...
 
 
 class Person:

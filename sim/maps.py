@@ -52,11 +52,6 @@ class LayerMap:
         """Gain coefficient of the drift u2 - u1, shape (n, m). Source: Eq. (10)."""
         return self.peaks[:, :, 1] / self.bare[:, 1]
 
-    @property
-    def theta_max(self) -> Floats:
-        """Greatest |theta| [rad], shape (n, m)."""
-        return self.peaks[:, :, 2]
-
     @cached_property
     def multiplier(self) -> Floats:
         """Greatest |Floquet multiplier|, shape (n, m)."""

@@ -73,17 +73,6 @@ class Shaker(Parameters):
         impedance = (self.moving_mass + payload) * s * s + (self.c_s + self.electric_damping) * s + self.k_s
         return np.asarray(self.force_per_volt * s * s / (impedance * (1.0 + self.amplifier_lag * s)), np.complex128)
 
-    def maximum_acceleration(self, omega: float, payload: float = 0.0) -> float:
-        """Largest sine acceleration [m/s2] at `omega` [rad/s] that stroke, velocity and force allow.
-
-        The least of omega^2 X, omega V and F/m with the no-load velocity V = voltage_limit / Bl and the peak force
-        F = Bl current_limit; friction and suspension are not counted.
-        """
-        by_stroke = omega**2 * self.half_stroke
-        by_velocity = omega * self.voltage_limit / self.bl
-        by_force = self.bl * self.current_limit / (self.moving_mass + payload)
-        return min(by_stroke, by_velocity, by_force)
-
     def drive_for(self, acceleration: float, omega: float, payload: float = 0.0) -> float:
         """Drive amplitude [V] of a sine of `acceleration` [m/s2] at `omega` [rad/s] by the linear response."""
         return acceleration / float(np.abs(self.frequency_response(omega, payload)))

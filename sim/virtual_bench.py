@@ -197,10 +197,6 @@ class VirtualBench:
         # a block in somebody's hand moves no more than one in the catch
         self._mode = self._kernel.REST if arrangement.tilt == 0.0 else self._kernel.FALLEN
 
-    def stand_up(self) -> None:
-        """Stand the block up again and steady everything."""
-        self.mount(self._arrangement)
-
     def arm(self) -> None:
         """Told that the rig is armed: a hand that holds something lets go 3 to 5 s later."""
         if self._arrangement.held:

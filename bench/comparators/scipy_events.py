@@ -117,7 +117,7 @@ def integrate(method: Method, problem: Problem, tolerance: float, equations: Dri
 
 
 def python_rates(p: Vector, sg: float, row: Vector, t: float, x: Vector, out: Vector) -> None:
-    """`bench.comparators.kernel.fixed_step.driven_rates` as Python runs it: the equations that scipy is mostly given."""
+    """`bench.comparators.kernel.fixed_step.driven_rates` as Python runs it: what scipy is mostly given."""
     from bench.comparators.kernel import fixed_step
 
     plain_base, plain_rates = _python(fixed_step.base), _python(fixed_step.rates)

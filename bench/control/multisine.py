@@ -50,11 +50,6 @@ class Multisine:
         """One period of the drive [V], shape (samples,)."""
         return waveform(self.lines, self.spectrum, self.samples)
 
-    @property
-    def crest_factor(self) -> float:
-        """Peak over root mean square of the drive."""
-        return _crest(self.volts)
-
     def scaled_to(self, peak: float, response: Complex | Array) -> "Multisine":
         """The same multisine with a peak of `peak` units in what a linear `response` [unit/V] at its lines makes."""
         made = float(np.abs(waveform(self.lines, self.spectrum * response, self.samples)).max())

@@ -17,8 +17,6 @@ from math import ceil, hypot, isfinite, sqrt
 
 import numpy as np
 
-from bench.analysis.table_motion import TableMotion
-from bench.control.stroke.reach import Reach
 from sim.errors import InvalidInput
 from sim.excitation import SampledRecord
 from sim.specimen import Specimen
@@ -70,17 +68,6 @@ def scaled(record: SampledRecord, length_ratio: float) -> SampledRecord:
     if not (isfinite(length_ratio) and length_ratio > 0.0):
         raise InvalidInput("length_ratio", length_ratio, "model over prototype length must be a positive number")
     return SampledRecord(record.acceleration, record.dt * sqrt(length_ratio))
-
-
-def largest_length_ratio(motion: TableMotion, reach: Reach) -> float:
-    """The largest lambda_L at which a record whose table motion is `motion` stays within `reach`.
-
-    Displacement goes with lambda_L, velocity with its root. Raises InvalidInput for a motion that does not move.
-    """
-    if not (motion.peak_displacement > 0.0 and motion.peak_velocity > 0.0):
-        raise InvalidInput("motion", motion.peak_displacement, "a record that does not move the table has no scale")
-    by_stroke = reach.displacement / motion.peak_displacement
-    return min(by_stroke, (reach.velocity / motion.peak_velocity) ** 2)
 
 
 def resampled(record: SampledRecord, dt: float) -> SampledRecord:

@@ -63,27 +63,6 @@ class Target:
         return replace(self, acceleration=factor * self.acceleration)
 
 
-def band_limited(record: Array, dt: float, sample_rate: float, band: tuple[float, float]) -> Target:
-    """The part of a record that a table can make: `record` [m/s2], shape (n,), its samples joined by straight lines.
-
-    The filter has zero phase and no response at zero frequency: velocity and displacement end at zero like the
-    acceleration. Raises InvalidInput.
-    """
-    from scipy.fft import next_fast_len
-
-    check_band(band, sample_rate)
-    if record.ndim != 1 or record.size < 2 or not np.isfinite(record).all() or not dt > 0.0:
-        raise InvalidInput("record", (record.shape, dt), "it must be two finite samples in one row or more, dt > 0")
-    times = np.arange(int((record.size - 1) * dt * sample_rate) + 1) / sample_rate
-    resampled = np.interp(times, dt * np.arange(record.size), record)
-    rest = round(REST / band[0] * sample_rate)
-    padded = np.zeros(next_fast_len(times.size + 2 * rest, real=True))
-    padded[rest : rest + times.size] = resampled
-    frequency = np.fft.rfftfreq(padded.size, 1.0 / sample_rate).astype(np.float64)
-    filtered = np.fft.irfft(band_gain(frequency, band) * np.fft.rfft(padded), padded.size)
-    return Target(filtered, sample_rate, band, rest)
-
-
 def windowed(acceleration: Array, dt: float, band: tuple[float, float]) -> Array:
     """`acceleration`, shape (n,), through the window of `band` [Hz] and without phase; zeros are put after it."""
     from scipy.fft import next_fast_len

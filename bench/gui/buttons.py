@@ -10,9 +10,3 @@ def give_key(button: QAbstractButton, key: str) -> None:
     """
     shortcut = QShortcut(QKeySequence(key), button, autoRepeat=False)
     shortcut.activated.connect(button.click)
-
-
-def key_of(button: QAbstractButton) -> str:
-    """The key that was given to the button; empty when none was."""
-    given = button.findChild(QShortcut)
-    return given.key().toString() if isinstance(given, QShortcut) else ""

@@ -95,11 +95,6 @@ class Controller(QObject):
         return self._running
 
     @property
-    def busy(self) -> bool:
-        """Whether a run or a survey is under way."""
-        return self._link is not None or bool(self._surveys)
-
-    @property
     def inputs_age(self) -> float | None:
         """Seconds since the safety inputs of the run that is under way were heard of; None when they never were."""
         if not self._running or self._inputs_heard is None:

@@ -41,13 +41,3 @@ def check_whole(entry: hdf5.Group, counted: Mapping[str, int], size: int) -> Non
             whole = is_within(stored, size)
         if not whole:
             raise RecordError(f"{stored.name} reaches beyond the end of the file: it is truncated")
-
-
-def whole_rows(entry: hdf5.Group, counted: Mapping[str, int], size: int) -> dict[str, int]:
-    """The rows of every part that all of its datasets have, of those that were `counted`."""
-    whole = dict(counted)
-    for stored in hdf5.datasets(entry):
-        if hdf5.grows(stored):
-            part = part_of(stored.name)
-            whole[part] = min(whole[part], intact_rows(stored, size))
-    return whole

@@ -30,24 +30,6 @@ class CommonMotion:
     scatter: float
 
 
-def complex_amplitudes(
-    signal: NDArray[np.float64], sample_rate: float, omega: NDArray[np.float64]
-) -> NDArray[np.complex128]:
-    """Amplitudes, shape (m,), of the lines `omega` [rad/s] in a signal, shape (n,), by least squares with its mean.
-
-    An amplitude a is the line Re(a exp(i omega t)), t from the first sample. The lines need not fit the length.
-    Raises InvalidInput for a signal too short for them, or with samples that are not finite.
-    """
-    if signal.size <= 2 * omega.size + 1:
-        raise InvalidInput("samples", signal.size, f"more than {2 * omega.size + 1} for {omega.size} lines")
-    if not np.isfinite(signal).all():
-        raise InvalidInput("signal", "not finite", "measure again without lost samples")
-    phase = np.outer(np.arange(signal.size) / sample_rate, omega)
-    lines = np.hstack((np.cos(phase), -np.sin(phase), np.ones((signal.size, 1))))
-    found = np.linalg.lstsq(lines, signal)[0].astype(np.float64)
-    return found[: omega.size] + 1j * found[omega.size : 2 * omega.size]
-
-
 def common_motion(
     omega: NDArray[np.float64], first: NDArray[np.complex128], second: NDArray[np.complex128]
 ) -> CommonMotion:

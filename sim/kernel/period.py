@@ -6,9 +6,6 @@ from numpy.typing import NDArray
 from sim.kernel.compiled import compiled
 from sim.kernel.rocking import END, IMPACT_LIMIT, PEAKS, REPORT, STATUS, run
 
-PARAMETERS = 18
-"""Numbers in a parameter vector: the packed specimen (16), omega [rad/s] and amplitude [m/s2] of the base's sine."""
-
 
 @compiled("void(float64[:,::1], float64[:,::1], int64, float64, boolean, float64[:,::1], float64[:,::1])")
 def images(
@@ -22,7 +19,8 @@ def images(
 ) -> None:
     """Where each start is just after its second impact, with 2 pi taken off the phase.
 
-    q : parameter vectors, shape (n, 18).  x : starts [phase, u1, u2, v1, v2, omega], shape (n * m, 6), the m starts of
+    q : parameter vectors, shape (n, 18): packed specimen (16), omega [rad/s], amplitude [m/s2] of the base's sine.
+    x : starts [phase, u1, u2, v1, v2, omega], shape (n * m, 6), the m starts of
     a parameter vector together.  order, tolerance : of the Taylor steps.
     out : shape (n * m, 6), NaN where the block does not come back into theta > 0 within three periods.
     peaks : shape (n * m, 3), greatest |u1|, |u2 - u1|, |theta| on the way; 0 unless `watch_peaks`.

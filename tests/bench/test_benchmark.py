@@ -4,11 +4,11 @@ from pathlib import Path
 import pytest
 
 from bench.benchmark import suite, timing
-from bench.comparators import case
 from bench.benchmark import work_precision as table
 from bench.benchmark.methods import NOT_INSTALLED, Method, methods
 from bench.benchmark.section import Column, Section, Target, targets_section
 from bench.cli.main import main
+from bench.comparators import case
 from sim.errors import InvalidInput
 
 TINY = suite.Scale("tiny", False, 0.02, 4, 2, 1, 4, 0.5, 1, 1)

@@ -14,19 +14,19 @@ from bench.control.inverse import TableInverse
 from bench.control.passes import SpectrumCheck
 from bench.control.replication import Replication, ReplicationParameters
 from bench.control.table_model import TableModel
-from bench.control.target import Target, band_limited
+from bench.control.target import Target
 from bench.guard.limits import Limits
 from sim.errors import InvalidInput
 from sim.specimen import Specimen
-from tests.bench.virtual_table import IDENTIFIED, RATE, bench_with, earthquake, identify, play
+from tests.bench.virtual_table import IDENTIFIED, RATE, bench_with, earthquake, identify, play, target_of
 
 Array = NDArray[np.float64]
 
 CARD = signal.butter(4, 100.0, fs=RATE, output="sos")
 
 
-def target_of(seed: int, peak: float, band: tuple[float, float] = (1.0, 12.0)) -> Target:
-    target = band_limited(*earthquake(seed), RATE, band)
+def target_with(seed: int, peak: float, band: tuple[float, float] = (1.0, 12.0)) -> Target:
+    target = target_of(*earthquake(seed), band)
     return target.scaled(peak / target.peaks["acceleration"])
 
 
@@ -66,7 +66,7 @@ def bare() -> TableModel:
     ],
 )
 def test_half_a_percent_within_five_passes(specimen: Specimen, peak: float, band: tuple[float, float]) -> None:
-    target = target_of(2, peak, band)
+    target = target_with(2, peak, band)
     replication = Replication(target, identify(bench_with(specimen)), Limits())
     errors = true_errors(replication, specimen, target)
     assert errors[0] > 0.02
@@ -88,14 +88,14 @@ def test_half_a_percent_within_five_passes(specimen: Specimen, peak: float, band
 def test_a_wrong_model_is_put_right(bare: TableModel, gain: float, stretch: float, turn: float) -> None:
     elsewhere = np.clip(stretch * np.array(bare.frequency), *bare.band)
     model = changed(bare, gain * bare.response(elsewhere) * np.exp(1j * np.radians(turn)))
-    target = target_of(2, 1.47)
+    target = target_with(2, 1.47)
     errors = true_errors(Replication(target, model, Limits()), Specimen(), target)
     assert errors[0] > 0.15
     assert errors[-1] < 0.005
 
 
 def test_a_block_that_rocks_differently_every_time_is_not_learned() -> None:
-    specimen, target = Specimen(beta=0.25), target_of(2, 1.3, (1.0, 25.0))
+    specimen, target = Specimen(beta=0.25), target_with(2, 1.3, (1.0, 25.0))
     model = identify(bench_with(specimen))
     replication = Replication(target, model, Limits(), ReplicationParameters(passes=6))
     bench = bench_with(specimen, seed=7)
@@ -151,7 +151,7 @@ GENEROUS = Limits(displacement=0.5, velocity=5.0, acceleration=50.0)
 
 
 def test_a_known_plant_is_inverted_at_once() -> None:
-    plant, target = Plant(), target_of(2, 1.0)
+    plant, target = Plant(), target_with(2, 1.0)
     replication = Replication(target, plant.model, GENEROUS)
     report = replication.learn(plant.measured(replication.drive))
     assert report.error < 0.003
@@ -160,7 +160,7 @@ def test_a_known_plant_is_inverted_at_once() -> None:
 
 
 def test_noise_is_not_learned() -> None:
-    plant, target = Plant(noise=0.3), target_of(2, 1.0)
+    plant, target = Plant(noise=0.3), target_with(2, 1.0)
     parameters = ReplicationParameters(passes=8, tolerance=1e-9, gains=(1.0,))
     replication = Replication(target, plant.model, GENEROUS, parameters)
     worst = 0.0
@@ -173,7 +173,7 @@ def test_noise_is_not_learned() -> None:
 
 
 def test_a_pass_that_comes_out_worse_is_rolled_back_and_replayed() -> None:
-    plant, target = Plant(), target_of(2, 1.0)
+    plant, target = Plant(), target_with(2, 1.0)
     replication = Replication(target, changed(plant.model, 1.04 * response_of(plant.model)), GENEROUS)
     first = replication.drive
     assert replication.learn(plant.measured(first)).accepted
@@ -199,7 +199,7 @@ def response_of(model: TableModel) -> NDArray[np.complex128]:
 
 
 def test_the_first_drive_can_be_played_twice() -> None:
-    plant, target = Plant(noise=0.01), target_of(2, 1.0)
+    plant, target = Plant(noise=0.01), target_with(2, 1.0)
     model = changed(plant.model, 1.04 * response_of(plant.model))
     replication = Replication(target, model, GENEROUS, ReplicationParameters(replay_first=True))
     first = replication.drive
@@ -211,7 +211,7 @@ def test_the_first_drive_can_be_played_twice() -> None:
 
 def test_the_passes_go_on_until_the_response_spectrum_is_met_too() -> None:
     """The table's motion is 3 % too large: good enough as root mean square, not as a spectrum."""
-    plant, target = Plant(), target_of(2, 1.0)
+    plant, target = Plant(), target_with(2, 1.0)
     for tolerance, status in ((0.01, "running"), (0.04, "converged")):
         parameters = ReplicationParameters(tolerance=0.05, spectrum_tolerance=tolerance, spectrum_periods=(1.3,))
         replication = Replication(target, plant.model, GENEROUS, parameters)
@@ -244,7 +244,7 @@ def test_only_what_noise_does_not_explain_of_a_spectrum_counts() -> None:
 
 
 def test_a_line_counts_by_its_coherence() -> None:
-    plant, target = Plant(), target_of(2, 1.0)
+    plant, target = Plant(), target_with(2, 1.0)
     f = np.array(plant.model.frequency)
     coherence = np.interp(f, (2.0, 10.0), (1.0, 0.3))
     doubted = plant.model.model_copy(update={"coherence": tuple(coherence)})
@@ -259,14 +259,14 @@ def test_a_line_counts_by_its_coherence() -> None:
 
 
 def test_a_smaller_first_gain_is_a_smaller_first_drive() -> None:
-    model, target = Plant().model, target_of(2, 1.0)
+    model, target = Plant().model, target_with(2, 1.0)
     full = Replication(target, model, GENEROUS).drive
     low = Replication(target, model, GENEROUS, ReplicationParameters(gains=(0.3, 1.0))).drive
     assert low == pytest.approx(0.3 * full)
 
 
 def test_the_drive_begins_and_ends_at_zero(bare: TableModel) -> None:
-    drive = Replication(target_of(2, 1.47), bare, Limits()).drive
+    drive = Replication(target_with(2, 1.47), bare, Limits()).drive
     assert drive[0] == drive[-1] == 0.0
     assert np.abs(np.diff(drive)).max() * RATE < Limits().drive_slew
     assert np.abs(drive[:20]).max() < 1e-3
@@ -283,7 +283,7 @@ def test_the_drive_begins_and_ends_at_zero(bare: TableModel) -> None:
     ],
 )
 def test_a_drive_beyond_a_limit_is_refused_or_scaled(bare: TableModel, limits: Limits, binds: str) -> None:
-    target = target_of(2, 1.47)
+    target = target_with(2, 1.47)
     with pytest.raises(InvalidInput, match=binds):
         Replication(target, bare, limits)
     replication = Replication(target, bare, limits, ReplicationParameters(beyond="scale"))
@@ -320,9 +320,9 @@ def test_the_largest_share_that_fits() -> None:
 
 
 def test_what_cannot_be_replicated_is_refused(bare: TableModel) -> None:
-    target = target_of(2, 1.0)
+    target = target_with(2, 1.0)
     with pytest.raises(InvalidInput, match="wider band"):
-        Replication(target_of(2, 1.0, (0.6, 12.0)), bare, Limits())
+        Replication(target_with(2, 1.0, (0.6, 12.0)), bare, Limits())
     with pytest.raises(InvalidInput, match="sample_rate"):
         Replication(target, bare.model_copy(update={"sample_rate": 1000.0}), Limits())
     with pytest.raises(InvalidInput, match="nothing to replicate"):

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from bench.analysis.table_motion import table_motion
-from bench.control.similitude import RockingNumbers, largest_length_ratio, resampled, scaled
-from bench.control.stroke.reach import Reach
+from bench.control.similitude import RockingNumbers, resampled, scaled
 from sim.errors import InvalidInput
 from sim.excitation import SampledRecord
 from sim.rocking import simulate
@@ -84,19 +83,6 @@ def test_p_of_a_rectangular_block_is_housners() -> None:
     assert stiffer == pytest.approx(0.5 * 213.44 / (2450.0 * 0.05 * 0.4 * 0.1 * 3.0 * 9.81 / (4.0 * radius)))
 
 
-@pytest.mark.parametrize(("reach", "binds"), [(Reach(0.01, 10.0), "stroke"), (Reach(10.0, 0.02), "velocity")])
-def test_the_largest_length_ratio_uses_the_reach_up(reach: Reach, binds: str) -> None:
-    record = pulse()
-    small = scaled(record, largest_length_ratio(table_motion(record.acceleration, record.dt), reach))
-    motion = table_motion(small.acceleration, small.dt)
-    if binds == "stroke":
-        assert motion.peak_displacement == pytest.approx(reach.displacement)
-        assert motion.peak_velocity < reach.velocity
-    else:
-        assert motion.peak_velocity == pytest.approx(reach.velocity)
-        assert motion.peak_displacement < reach.displacement
-
-
 @pytest.mark.parametrize("parts", [1, 4, 7])
 def test_a_step_that_divides_the_records_leaves_the_motion_as_it_is(parts: int) -> None:
     record = pulse()
@@ -120,6 +106,3 @@ def test_what_would_lose_or_turn_around_is_refused() -> None:
         resampled(record, 1.5 * record.dt)
     with pytest.raises(InvalidInput, match="positive"):
         scaled(record, 0.0)
-    still = table_motion(np.zeros(10), 0.01)
-    with pytest.raises(InvalidInput, match="has no scale"):
-        largest_length_ratio(still, Reach(0.05, 0.5))

@@ -8,7 +8,10 @@ from numpy.typing import NDArray
 
 from bench.control.identification import identify_table, steady_periods
 from bench.control.multisine import band_lines, drive_amplitudes, multisine
+from bench.control.preparation import prepare
 from bench.control.table_model import TableModel
+from bench.control.target import Target
+from sim.excitation import SampledRecord
 from sim.shaker import Shaker
 from sim.specimen import Specimen
 from sim.virtual_bench import VirtualBench, VirtualBenchParameters
@@ -30,7 +33,7 @@ class Played:
 
 def play(bench: VirtualBench, volts: Array) -> Played:
     """Play a drive on a bench at rest."""
-    bench.stand_up()
+    bench.mount(bench.arrangement)
     bench.run(np.zeros(400))
     counts = bench.run(volts)
     displacement, acceleration = (bench.channels[i].to_unit(counts[:, i]) for i in (0, 1))
@@ -60,6 +63,11 @@ def identify(
     return identify_table(
         np.array(drives), np.array(accelerations), lines, RATE, date=IDENTIFIED, specimen="as mounted"
     )
+
+
+def target_of(record: Array, dt: float, band: tuple[float, float]) -> Target:
+    """The part of a record that a table can make, at RATE, neither trimmed nor scaled."""
+    return prepare(SampledRecord(record, dt), band=band, peak=None, trim=None).target(RATE)
 
 
 def earthquake(seed: int, duration: float = 20.0, dt: float = 0.01) -> tuple[Array, float]:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QByteArray, QSettings, Qt
+from PySide6.QtGui import QShortcut
 from PySide6.QtWidgets import (
     QAbstractButton,
     QAbstractItemView,
@@ -21,7 +22,6 @@ from PySide6.QtWidgets import (
 from pytestqt.qtbot import QtBot
 
 from bench.gui import texts
-from bench.gui.buttons import key_of
 from bench.gui.controller import Controller
 from bench.gui.palette import DARK, LIGHT
 from bench.gui.stop import StopButton
@@ -82,7 +82,7 @@ def test_tab_reaches_whatever_has_no_key_of_its_own(page: int, ready: Window, qt
         for each in _operated(ready)
         if each not in reached
         and not isinstance(each, StopButton)
-        and not (isinstance(each, QAbstractButton) and key_of(each))
+        and not (isinstance(each, QAbstractButton) and _key_of(each))
         and not any(inner in reached for inner in each.findChildren(QWidget))
     ]
     assert missed == []
@@ -95,7 +95,7 @@ def test_no_key_is_claimed_twice_and_every_button_says_what_it_does(page: int, r
     for part in (ready.prompt, ready.trouble, ready.protocol.leave, ready.protocol.clear):
         part.show()
     buttons = [each for each in ready.findChildren(QAbstractButton) if each.isVisible() and _outside_lists(each)]
-    keys = Counter(key for each in buttons if (key := key_of(each)))
+    keys = Counter(key for each in buttons if (key := _key_of(each)))
     keys.update(f"Ctrl+{number + 1}" for number in range(len(texts.PAGES)))
     keys.update(["F12"])
     assert [key for key, times in keys.items() if times > 1] == []
@@ -151,3 +151,9 @@ def test_the_window_takes_another_theme_while_it_is_open(window: Window) -> None
     centre = before.width() // 2
     assert before.pixelColor(centre, 8).name() == LIGHT.calm
     assert after.pixelColor(centre, 8).name() == DARK.calm
+
+
+def _key_of(button: QAbstractButton) -> str:
+    """The key that was given to the button; empty when none was."""
+    given = button.findChild(QShortcut)
+    return given.key().toString() if isinstance(given, QShortcut) else ""

@@ -163,7 +163,7 @@ def test_results_are_never_overwritten(window: Window) -> None:
     (folder / "campaign.h5").touch()
     page.survey()
     assert "never overwritten" in page.plan.verdict.text()
-    assert not window._controller.busy
+    assert not window._controller.running
 
 
 def test_what_the_plan_says_is_not_cut_off(window: Window, spoken: type[SpokenLink], qtbot: QtBot) -> None:

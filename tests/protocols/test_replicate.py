@@ -11,7 +11,7 @@ from bench.analysis.signals import ACCELERATION, SignalMap
 from bench.config.model import BenchConfiguration
 from bench.control.replication import ReplicationParameters
 from bench.control.table_model import TableModel
-from bench.control.target import Target, band_limited
+from bench.control.target import Target
 from bench.engine.ending import Ending
 from bench.engine.engine import Engine
 from bench.engine.operator import Unattended
@@ -30,13 +30,13 @@ from protocols.identify.motion import RESTING, largest
 from protocols.identify.point import IdentifiedBand
 from sim.specimen import Frame, Specimen
 from sim.virtual_bench import VirtualBenchParameters
-from tests.bench.virtual_table import RATE, bench_with, earthquake, identify
+from tests.bench.virtual_table import RATE, bench_with, earthquake, identify, target_of
 
 Array = NDArray[np.float64]
 
 
-def target_of(peak: float = 1.2) -> Target:
-    target = band_limited(*earthquake(2, duration=10.0), RATE, (1.0, 12.0))
+def target_with(peak: float = 1.2) -> Target:
+    target = target_of(*earthquake(2, duration=10.0), (1.0, 12.0))
     return target.scaled(peak / target.peaks["acceleration"])
 
 
@@ -89,7 +89,7 @@ def test_half_a_percent_within_five_passes_and_never_worse(
 ) -> None:
     response = wrong * model.response(np.array(model.frequency))
     changed = model.model_copy(update={"real": tuple(response.real), "imaginary": tuple(response.imag)})
-    rig, target = simulated(specimen), target_of(peak)
+    rig, target = simulated(specimen), target_with(peak)
     recorder = Recorder(
         tmp_path / "passes.h5",
         channels=rig.channels,
@@ -135,7 +135,7 @@ def test_half_a_percent_within_five_passes_and_never_worse(
 
 def test_each_pass_is_announced_and_the_bench_is_left_at_rest(model: TableModel) -> None:
     bench = Bench(simulated(Specimen()))
-    bench.replicate(target_of(), model, passes=1)
+    bench.replicate(target_with(), model, passes=1)
     assert [event.text for event in bench.events if isinstance(event, StepStarted)] == ["a record: pass 1 of 1 at most"]
     assert bench.found[0].status == "out of passes"
     assert len([event for event in bench.events if isinstance(event, StateChanged) and event.after == "idle"]) == 1
@@ -148,7 +148,7 @@ def played(acceleration: Array) -> Played:
 
 
 def test_the_best_drive_is_given_back_and_not_the_last(model: TableModel) -> None:
-    target = target_of()
+    target = target_with()
     stage = replicate(target, model, Limits(), ReplicationParameters(passes=2), "a record")
     shares, ended = iter((0.9, 0.5)), list[Replicated]()
 
@@ -177,7 +177,7 @@ def test_the_best_drive_is_given_back_and_not_the_last(model: TableModel) -> Non
 
 @pytest.mark.parametrize("when", ["while it is played", "in the ramp"])
 def test_a_fall_is_told_to_the_caller_who_stands_the_block_up(model: TableModel, when: str) -> None:
-    target = target_of()
+    target = target_with()
     stage = replicate(target, model, Limits(), ReplicationParameters(), "a record")
     in_ramp = when == "in the ramp"
     first = played(0.9 * target.acceleration)

@@ -24,7 +24,7 @@ def full() -> GainMap:
 
 def test_the_rocking_orbit_exists_everywhere(full: GainMap) -> None:
     assert full.rocking.exists.all()
-    assert ((full.rocking.theta_max > 0.02) & (full.rocking.theta_max < 0.07)).all()
+    assert ((full.rocking.peaks[:, :, 2] > 0.02) & (full.rocking.peaks[:, :, 2] < 0.07)).all()
 
 
 def test_multipliers_keep_their_product(full: GainMap) -> None:

@@ -101,13 +101,6 @@ def test_friction_distorts_a_sine_by_less_than_a_percent_but_visibly() -> None:
     assert 0.001 < amplitudes[2] / amplitudes[0] < 0.01
 
 
-def test_limits_of_stroke_velocity_and_force_bound_the_acceleration_in_turn() -> None:
-    shaker = Shaker()
-    assert shaker.maximum_acceleration(1.0) == pytest.approx(0.075)
-    assert shaker.maximum_acceleration(12.0) == pytest.approx(12.0 * 30.0 / 50.0)
-    assert shaker.maximum_acceleration(100.0, payload=10.0) == pytest.approx(50.0 * 18.0 / 60.0)
-
-
 def test_the_amplifier_saturates_at_its_current_and_voltage() -> None:
     current = Shaker(friction=0, force_noise=0, k_s=0, c_s=0, amplifier="current", gain=4.0, current_limit=18.0)
     start = motion(current, np.full(20, 10.0), 2000.0)

@@ -130,7 +130,7 @@ def test_a_toppled_block_is_caught_and_pulls_the_frame_where_the_springs_balance
     expected = minimize(energy, np.zeros(2), method="Nelder-Mead", options={"xatol": 1e-8, "fatol": 1e-14}).x[0]
     assert abs(expected) > 0.01
     assert seen == pytest.approx(expected, abs=5e-4)
-    bench.stand_up()
+    bench.mount(bench.arrangement)
     bench.run(np.zeros(400))
     assert not bench.fallen
     assert np.abs(bench.truth.u1).max() < 1e-4

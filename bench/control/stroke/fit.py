@@ -68,11 +68,6 @@ class StrokeFit:
         """Relative change of the response spectrum at `periods`, shape (n,)."""
         return self.spectrum / self.spectrum_before - 1.0
 
-    @property
-    def rms_change(self) -> float:
-        """Root mean square of `change`."""
-        return float(np.sqrt(np.mean(self.change**2)))
-
 
 def periods_of(frame: Frame) -> Array:
     """`PERIODS` and the periods of the frame's modes [s], ascending."""

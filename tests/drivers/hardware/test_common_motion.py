@@ -10,10 +10,11 @@ from drivers.emulation.laboratory import Connection, Laboratory
 from drivers.hardware.parameters import Hardware
 from drivers.hardware.rig import HardwareRig
 from drivers.rig import Handwork
-from drivers.timebase.common_motion import CommonMotion, common_motion, complex_amplitudes
+from drivers.timebase.common_motion import CommonMotion, common_motion
 from sim.specimen import Specimen
 from sim.virtual_bench import VirtualBenchParameters
 from tests.drivers.conformance import play, started
+from tests.drivers.lines import complex_amplitudes
 
 LEAD = 600
 BLOCK = 200

@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 
-from drivers.timebase.common_motion import common_motion, complex_amplitudes
+from drivers.timebase.common_motion import common_motion
 from sim.errors import InvalidInput
+from tests.drivers.lines import complex_amplitudes
 
 OMEGA = 2.0 * np.pi * np.array([1.0, 2.3, 4.1, 6.7, 9.2])
 AMPLITUDES = np.array([3.0, 2.0 + 1.0j, -1.5j, 1.0 - 0.5j, 0.7])
@@ -59,7 +60,3 @@ def test_too_little_is_refused() -> None:
         common_motion(OMEGA[:2], AMPLITUDES[:2], AMPLITUDES[:2])
     with pytest.raises(InvalidInput, match="amplitude"):
         common_motion(OMEGA, np.zeros(5, complex), AMPLITUDES)
-    with pytest.raises(InvalidInput, match="samples"):
-        complex_amplitudes(np.zeros(11), 1000.0, OMEGA)
-    with pytest.raises(InvalidInput, match="signal"):
-        complex_amplitudes(np.full(100, np.nan), 1000.0, OMEGA)
