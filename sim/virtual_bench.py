@@ -9,13 +9,12 @@ from numpy.random import SeedSequence
 from numpy.typing import NDArray
 from pydantic import model_validator
 
-from sim.arrangement import Arrangement
+from sim.arrangement import Arrangement, sights
 from sim.channel import Channel
 from sim.errors import InvalidInput
 from sim.parameters import Parameters, quantity
 from sim.sensors import Accelerometer, Converter, DisplacementSensor, FilterUnit, Laser, PlacedSensor
 from sim.shaker import Shaker
-from sim.sight import sights
 from sim.specimen import Specimen
 
 Array = NDArray[np.float64]
@@ -159,7 +158,7 @@ class VirtualBench:
 
     @property
     def sights(self) -> Array:
-        """What the lasers saw at the ticks of the last `run` or `coast`, shape (4, n): see `sim.sight.sights`."""
+        """What the lasers saw at the ticks of the last `run` or `coast`, shape (4, n): see `sim.arrangement.sights`."""
         # lasers stand together, see the parameters
         on_ground = self.parameters.laser_1.reference == "ground"
         return sights(np.ascontiguousarray(self._samples.T), self._arrangement, on_ground)

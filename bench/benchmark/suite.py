@@ -1,18 +1,112 @@
-"""Runs the parts of the benchmark and writes what they found: tables, JSON and a figure."""
+# pyright: reportUnknownMemberType=false
+"""Runs the parts of the benchmark and writes their results: tables, JSON with the machine, work-precision figure."""
 
 import json
+import os
+import platform
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from bench.benchmark.machine import machine, versions
 from bench.benchmark.section import Section, targets_section
 from bench.progress import Progress, silent
+from bench.provenance import software
 from bench.report.files import write_new
+from bench.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION, new_figure, set_grid
 from sim.errors import InvalidInput
 from sim.loading import load_model
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+STYLES: dict[str, tuple[str, str, Any]] = {
+    "taylor": (BLUE, "o", "-"),
+    "taylor, no peaks": (BLUE, "P", "-"),
+    "heyoka": (VERMILLION, "s", "-"),
+    "heyoka, with peaks": (VERMILLION, "D", "-"),
+    "paper": (BLACK, "X", "-"),
+    "rk4-located": (GREY, "v", (0, (4, 1.5))),
+    "CVODE Adams": (PURPLE, "^", (0, (1, 1))),
+    "scipy DOP853": (GREEN, "o", (0, (6, 1.5))),
+    "scipy DOP853, Python": (GREEN, "P", "none"),
+    "scipy RK45": (GREEN, "s", (0, (2, 2))),
+    "scipy LSODA": (ORANGE, "^", (0, (1, 1))),
+    "scipy Radau": (SKY, "v", (0, (4, 1.5))),
+}
+"""Colour, marker and dashes of a method; one more has grey points."""
+
+
+def work_precision_figure(section: Section) -> "Figure":
+    """Shortest run time over the error of the end state, one line per method; methods that went wrong are left out."""
+    figure = new_figure(7.6, 5.2)
+    panel = figure.add_subplot(1, 1, 1)
+    good = [row for row in section.rows if row["status"] == "ok"]
+    for name in dict.fromkeys(str(row["method"]) for row in good):
+        places = sorted(
+            (float(row["error"] or 0.0), float(row["min_ms"] or 0.0)) for row in good if row["method"] == name
+        )
+        colour, marker, dashes = STYLES.get(name, (GREY, ".", "none"))
+        panel.plot(
+            [error for error, _ in places],
+            [elapsed for _, elapsed in places],
+            color=colour,
+            marker=marker,
+            linestyle=dashes,
+            linewidth=1.6 if name == "taylor" else 1.1,
+            markersize=6.5,
+            markeredgecolor="white",
+            markeredgewidth=0.6,
+            zorder=4 if name == "taylor" else 3,
+            label=name,
+        )
+    panel.set_xscale("log")
+    panel.set_yscale("log")
+    panel.set_xlabel("error of the end state, largest component  [SI units]")
+    panel.set_ylabel("shortest run time  [ms]")
+    panel.set_title(r"120 s of steady rocking, 649 impacts ($\Omega$ = 17 rad/s, $\beta$ = 0.64)", fontsize=10)
+    set_grid(panel)
+    figure.legend(loc="outside right upper", fontsize=8, frameon=False, title="method", title_fontsize=8)
+    return figure
+
+
+PEERS = ("heyoka", "scikit-sundae", "mpmath")
+"""Libraries that only the benchmark uses."""
+
+
+def machine() -> dict[str, str]:
+    """Processor, number of cores and operating system."""
+    return {
+        "processor": _processor(),
+        "cores": str(os.cpu_count()),
+        "system": platform.platform(),
+    }
+
+
+def versions() -> dict[str, str]:
+    """Versions of the software, with those of the peers that are installed."""
+    return software() | {name: _version(name) for name in ("llvmlite", *PEERS)}
+
+
+def _processor() -> str:
+    try:
+        # Linux has the full name only here
+        with open("/proc/cpuinfo", encoding="utf-8") as lines:
+            names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
+    except OSError:
+        names = []
+    return names[0] if names else platform.processor() or platform.machine()
+
+
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "not installed"
+
 
 MARKDOWN, JSON, FIGURE = "benchmark.md", "benchmark.json", "work_precision.png"
 RESULTS = (MARKDOWN, JSON, FIGURE)
@@ -69,7 +163,7 @@ def _streaming(scale: Scale) -> Section:
 
 
 def _steady_by_time(_: Scale) -> Section:
-    from bench.benchmark.steady_by_time import steady_by_time
+    from bench.benchmark.work_precision import steady_by_time
 
     return steady_by_time()
 
@@ -141,7 +235,6 @@ def run_benchmark(
 
 
 def _write(out: Path, context: Mapping[str, str | float | dict[str, str]], sections: list[Section]) -> None:
-    from bench.benchmark.figure import work_precision_figure
     from bench.report.style import write_figure
 
     data: dict[str, object] = {**context, **{section.key: section.as_dict() for section in sections}}

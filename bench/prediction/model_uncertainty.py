@@ -1,11 +1,10 @@
 """How far a predicted gain may be off because the specimen is not known better."""
 
 from bench.analysis.gain import COVERAGE
-from sim.budget import budget
 from sim.errors import InvalidInput
 from sim.gain import Layer
 from sim.knowledge import SPRING, SpecimenKnowledge
-from sim.sensitivity import Sensitivity, sensitivities
+from sim.sensitivity import Sensitivity, budget, sensitivities
 from sim.steady import NoOrbit
 
 

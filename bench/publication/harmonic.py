@@ -1,22 +1,63 @@
-"""Steady tests under a sine: measured against predicted, spectra as in Fig. 6, cycles as in Fig. 5 of the paper."""
+"""Steady tests under a sine: measured against predicted, uncertainty budgets, spectra (Fig. 6), cycles (Fig. 5)."""
 
+import json
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, cast
 
 from bench.analysis.signals import SignalMap
 from bench.prediction.model_uncertainty import expanded_uncertainty
-from bench.publication.budgets import budget_parts
 from bench.publication.campaign import Campaign
 from bench.publication.cycles import Dwells
 from bench.publication.numbers import ABSENT, percent, plain, with_uncertainty, yes_or_no
 from bench.publication.typography import counted, typeset
 from bench.record.tables import arrays
+from bench.report.budget_figure import budget_figure
 from bench.report.figure import gain_spectra
 from bench.report.map_figure import MapPoint
 from bench.report.measured_figure import MeasuredMotion, measured_figure
 from bench.report.page.document import Column, Listing, Notice, Part, Picture, Section, Table
 from sim.errors import InvalidInput
 from sim.gain import Layer, predict_gain
+
+MOST = 30
+"""Bars of a figure."""
+
+
+def budget_parts(points: Sequence[Mapping[str, Any]]) -> list[Part]:
+    """A table and a figure of the harmonic points with a budget; nothing for files from before there were any."""
+    known = [(row, found) for row in points if row["alpha_2"] and (found := _budget(row))]
+    if not known:
+        return []
+    totals = {
+        name: sum((found.get(name, 0.0) / row["alpha_2"]) ** 2 for row, found in known)
+        for _, found in known
+        for name in found
+    }
+    names = sorted(totals, key=lambda name: -totals[name])
+    labels = [f"β = {row['beta']:g}, Ω = {row['omega_rad_s']:g} rad/s" for row, _ in known]
+    expanded = [100.0 * row["alpha_2_uncertainty"] / row["alpha_2"] for row, _ in known]
+    columns = [Column("point", words=True), Column("U (k = 2)", "%"), *(Column(name, "%") for name in names)]
+    rows = [
+        [label, f"{size:.2f}", *(_share(found, name, row["alpha_2"]) for name in names)]
+        for label, size, (row, found) in zip(labels, expanded, known, strict=True)
+    ]
+    caption = "Uncertainty budget of α₂: expanded, and standard by part, the largest first; what is common cancels"
+    picture = Picture(
+        budget_figure(labels[:MOST], [found for _, found in known[:MOST]], expanded[:MOST]),
+        "What makes the uncertainty of α₂: bars as long as it is (k = 2), cut in the shares of the variance.",
+        "Horizontal bars of the expanded uncertainty at every point, divided by contribution.",
+    )
+    return [Table(caption, columns, rows), picture]
+
+
+def _budget(row: Mapping[str, Any]) -> dict[str, float]:
+    text = row.get("uncertainty_parts")
+    return cast(dict[str, float], json.loads(text)) if text else {}
+
+
+def _share(found: Mapping[str, float], name: str, alpha: float) -> str:
+    return f"{100.0 * found[name] / alpha:.3f}" if name in found else ABSENT
+
 
 ROWS = 4
 """Points in a figure of cycles."""

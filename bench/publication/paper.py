@@ -11,6 +11,7 @@ from bench.prediction.seismic import SeismicCurve, seismic_curves
 from bench.prediction.seismic_statement import seismic_statement
 from bench.prediction.statements import POINTS, POINTS_BETA, SECTIONS, harmonic_statements
 from bench.prediction.steady import predict_spectra, steady_table
+from bench.prediction.verdicts import Statement
 from bench.progress import Progress, silent
 from bench.provenance import revision, software
 from bench.publication.facts import facts_table
@@ -18,12 +19,35 @@ from bench.publication.predicted import histories_picture, map_section
 from bench.publication.provenance import NAME, libraries, program, provenance_line
 from bench.publication.records import drift_picture, gains_picture, motions_table, record_pictures
 from bench.publication.specimen import modes_section, specimen_section
-from bench.publication.verdicts import Named, statement_table, verdicts_table
 from bench.record.tables import arrays
 from bench.report.figure import gain_spectra
 from bench.report.page.document import Column, Document, Notice, Part, Picture, Section, Table
 from sim.loading import load_model
 from sim.specimen import Specimen
+
+Named = tuple[str, Statement]
+"""A statement and how it is numbered."""
+
+
+def verdicts_table(named: Sequence[Named]) -> Table:
+    """One row per statement."""
+    columns = [Column("statement", words=True), Column("of what", words=True), Column("verdict", words=True)]
+    rows = [[number, each.title, str(each.verdict)] for number, each in named]
+    caption = "Verdicts. As expected: it is known and documented that the model does not do what the paper says"
+    return Table(caption, columns, rows)
+
+
+def statement_table(named: Sequence[Named]) -> Table:
+    """Every claim with what was found."""
+    columns = [
+        Column("statement", words=True),
+        Column("claim", words=True),
+        Column("found", words=True),
+        Column("verdict", words=True),
+    ]
+    rows = [[number, check.claim, check.found, str(check.verdict)] for number, each in named for check in each.checks]
+    return Table("The claims behind the verdicts, and what the model gives", columns, rows)
+
 
 PARTS = ("statements", "modes", "map", "histories", "spectra", "records", "seismic")
 """What can be asked for."""

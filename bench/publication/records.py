@@ -13,8 +13,7 @@ from bench.publication.numbers import plain
 from bench.publication.typography import listed
 from bench.report.page.document import Column, Picture, Table
 from bench.report.record_figure import RecordPicture, record_figure
-from bench.report.seismic_drift_figure import ModelDrift, model_drift_figure
-from bench.report.seismic_figure import GainCurve, seismic_figure
+from bench.report.seismic_figure import GainCurve, ModelDrift, model_drift_figure, seismic_figure
 from sim.rocking import simulate
 from sim.specimen import Specimen
 

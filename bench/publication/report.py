@@ -6,14 +6,12 @@ from typing import Any
 from bench.progress import Progress, silent
 from bench.publication.campaign import Campaign
 from bench.publication.conditions import damage_notice, limits_section
-from bench.publication.fits import fits_section
 from bench.publication.free_rocking import rocking_section
 from bench.publication.free_vibration import vibration_section
 from bench.publication.harmonic import histories_section, map_points, results_section, spectra_section
-from bench.publication.identified import identified_section
-from bench.publication.points import points_section
 from bench.publication.predicted import map_section
 from bench.publication.provenance import provenance_line, provenance_section
+from bench.publication.results import fits_section, identified_section, points_section
 from bench.publication.seismic import seismic_section
 from bench.publication.specimen import modes_section, specimen_section
 from bench.publication.typography import listed, moment

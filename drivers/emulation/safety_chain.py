@@ -11,8 +11,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.emulation.bench import EmulatedBench
-from drivers.emulation.pulse_relay import PulseRelay
 from drivers.errors import RigError
+
+
+class PulseRelay:
+    """Closed for `timeout` seconds [s] after each rising edge; a level that stands still, high or low, opens it."""
+
+    def __init__(self, timeout: float) -> None:
+        self._timeout = timeout
+        self._high = False
+        self._until = 0.0
+
+    @property
+    def closed(self) -> bool:
+        """Whether the last rising edge is young enough."""
+        return time.monotonic() < self._until
+
+    def level(self, high: bool) -> None:
+        """The line has this level now."""
+        if high and not self._high:
+            self._until = time.monotonic() + self._timeout
+        self._high = high
+
 
 INPUTS = ("emergency_stop", "over_travel", "over_travel_2", "amplifier_ready")
 """The contacts that are wired to inputs."""

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from bench.analysis.signals import DRIFT
 from bench.analysis.transient_base import BaseMotion
-from bench.analysis.transient_running import RunningPeak, running_peak
+from bench.analysis.transient_peak import RunningPeak, running_peak
 from bench.control.starts import CATCH_ANGLE
 from bench.events import RunningGain
 from protocols.earthquake.uncertainty import TOLERANCE

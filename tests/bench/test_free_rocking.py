@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from bench.analysis.free_rocking.combine import combined
-from bench.analysis.free_rocking.findings import findings
+from bench.analysis.free_rocking.findings import combined, findings
 from bench.analysis.free_rocking.fit import ALPHA as ALPHA_ROW
 from bench.analysis.free_rocking.fit import BEND_2, START, P, R
 from bench.analysis.free_rocking.laser_errors import LaserErrors

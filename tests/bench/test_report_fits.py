@@ -6,8 +6,7 @@ import numpy as np
 
 from bench.events import FitFinished, FittedParameter, PointFinished, Series
 from bench.publication.campaign import Campaign
-from bench.publication.fits import fits_section
-from bench.publication.points import points_section
+from bench.publication.results import fits_section, points_section
 from bench.record.reader import open_record
 from bench.record.recorder import Recorder
 from bench.report.fit_figure import fit_figure

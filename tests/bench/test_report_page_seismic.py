@@ -15,9 +15,9 @@ from bench.engine.steps import Arm, Handle, Plan, Play, RampOut
 from bench.events import PointFinished, RunningGain, Warned
 from bench.publication.campaign import Campaign
 from bench.publication.conditions import damage_notice, limits_section
-from bench.publication.played import played_records, signals_of
 from bench.publication.report import campaign_report
 from bench.publication.seismic import seismic_section
+from bench.publication.seismic_histories import played_records, signals_of
 from bench.record.reader import open_record
 from bench.record.recorder import Recorder
 from bench.record.tables import Column

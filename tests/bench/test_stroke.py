@@ -13,9 +13,8 @@ from bench.config.model import BenchConfiguration
 from bench.control.stroke import least_change
 from bench.control.stroke.fit import Method, StrokeFit, fit_stroke, periods_of
 from bench.control.stroke.highpass import high_passed
+from bench.control.stroke.least_change import SineModes, oscillator_peak
 from bench.control.stroke.least_distance import Infeasible, shortest
-from bench.control.stroke.modes import SineModes
-from bench.control.stroke.oscillators import oscillator_peak
 from bench.control.stroke.reach import Reach
 from sim.errors import InvalidInput
 from sim.excitation import SampledRecord

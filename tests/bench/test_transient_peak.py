@@ -5,8 +5,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy import signal
 
-from bench.analysis.transient_peak import transient_peak
-from bench.analysis.transient_running import RunningPeak, running_peak
+from bench.analysis.transient_peak import RunningPeak, running_peak, transient_peak
 from sim.errors import InvalidInput
 
 Array = NDArray[np.float64]

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.analysis.free_decay.decay import Decay, pulsed_decay, released_decay
-from bench.analysis.free_decay.disturbances import CLOCKS, WAVES
+from bench.analysis.free_decay.doubt import CLOCKS, WAVES
 from bench.analysis.free_decay.modal import NAMES, quantities
 from bench.analysis.free_decay.response import Constants
 from bench.analysis.sensor_accuracy import SensorAccuracy

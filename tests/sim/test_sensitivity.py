@@ -5,11 +5,10 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from sim.budget import budget
 from sim.errors import InvalidInput
 from sim.gain import predict_gain
 from sim.linear import steady_peaks
-from sim.sensitivity import Sensitivity, parameter_values, sensitivities
+from sim.sensitivity import Sensitivity, budget, parameter_values, sensitivities
 from sim.specimen import Block, Frame, Specimen
 from sim.steady import NoOrbit, rocking_orbit
 from tests.sim.runs import A_S

@@ -6,16 +6,99 @@ least squares under linear inequalities: |d| and |v| at the samples are linear i
 where a limit is about to be broken enter the problem; those that turn up while it is solved are added.
 """
 
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bench.analysis.table_motion import Array, TableMotion, at_rest_in_the_end, table_motion
 from bench.control.stroke.least_distance import Infeasible, shortest
-from bench.control.stroke.modes import SineModes
-from bench.control.stroke.oscillators import Peak, oscillator_peak
 from bench.control.stroke.reach import Reach
 from sim.errors import InvalidInput
+
+
+class SineModes:
+    """sin(k pi j / (n - 1)) at the samples j = 0 to n - 1, for every k whose frequency is `lowest` to `highest` [Hz].
+
+    There are two at least. They vanish at both ends of the record.
+    """
+
+    def __init__(self, n: int, dt: float, highest: float, lowest: float = 0.0) -> None:
+        self._n, self._dt = n, dt
+        length = (n - 1) * dt
+        first = min(max(int(np.ceil(2.0 * length * lowest)), 1), n - 3)
+        last = min(max(int(np.ceil(2.0 * length * highest)), first + 1), n - 2)
+        self._below = first - 1
+        orders = np.arange(first, last + 1)
+        self.frequencies: Array = orders / (2.0 * length)
+        self._steps: Array = np.pi * orders / (n - 1)
+
+    def sum(self, sizes: Array) -> Array:
+        """The sum of the modes with `sizes`, shape (k,), at the samples, shape (n,)."""
+        whole = np.zeros(self._n)
+        whole[1:-1] = 0.5 * _transformed(np.pad(sizes, (self._below, self._n - 2 - self._below - sizes.size)))
+        return whole
+
+    def products(self, weights: Array) -> Array:
+        """What `weights` at the samples, shape (n,), make of each mode: weights . mode, shape (k,)."""
+        return 0.5 * _transformed(weights[1:-1])[self._below : self._below + self._steps.size]
+
+    def motions(self, samples: NDArray[np.intp]) -> tuple[Array, Array]:
+        """Velocity and displacement after each of `samples`, shape (m,), under each mode of size 1, shape (m, k).
+
+        The first-order hold's sums over sines and cosines of equal steps theta, in closed form:
+        sum of sin(i theta), i < j, is (cos(theta/2) - cos((j - 1/2) theta)) / (2 sin(theta/2)), and so on.
+        """
+        dt, theta, j = self._dt, self._steps, samples[:, None]
+        half = np.sin(0.5 * theta)
+        sines = (np.cos(0.5 * theta) - np.cos((j - 0.5) * theta)) / (2.0 * half)
+        cosines = 0.5 + np.sin((j - 0.5) * theta) / (2.0 * half)
+        trapezium = 0.5 * dt / np.tan(0.5 * theta)
+        velocity = trapezium * (1.0 - np.cos(j * theta))
+        displacement = dt * trapezium * (j - cosines) + (dt * dt / 6.0) * (3.0 * sines + np.sin(j * theta))
+        return velocity, displacement
+
+
+def _transformed(values: Array) -> Array:
+    """Twice the discrete sine transform of type I, shape (n,)."""
+    from scipy.fft import dst
+
+    return np.asarray(dst(values, type=1), dtype=np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class Peak:
+    """The greatest pseudo-acceleration of an oscillator [m/s2], with its sign, and each sample's weight in it."""
+
+    value: float
+    weights: Array
+
+
+def oscillator_peak(acceleration: Array, dt: float, period: float, damping: float) -> Peak:
+    """`Peak` of the oscillator of `period` [s] under `acceleration` [m/s2], shape (n,); at the nearest sample.
+
+    The recursion of `bench.analysis.response_spectrum`: z' = lambda z + a, exact between samples joined by lines.
+    """
+    from scipy import signal
+
+    omega = 2.0 * np.pi / period
+    damped = omega * (1.0 - damping**2) ** 0.5
+    x = complex(-damping * omega, damped) * dt
+    first = np.expm1(x) / x
+    second = (np.expm1(x) - x) / x**2
+    taps = dt * second, dt * (first - second)
+    # `Any`: scipy's stubs leave the type of a filtered array open
+    z: Any = signal.lfilter(taps, [1.0, -np.exp(x)], acceleration)
+    response = np.asarray(-(omega**2 / damped) * z.imag, dtype=np.float64)
+    at = int(np.abs(response).argmax())
+    age = np.arange(at, -1, -1)
+    answers = taps[0] * np.exp(x * age)
+    answers[:-1] += taps[1] * np.exp(x * (age[:-1] - 1))
+    weights = np.zeros_like(acceleration)
+    weights[: at + 1] = -(omega**2 / damped) * answers.imag
+    return Peak(float(response[at]), weights)
+
 
 HIGHEST = 2.0
 """Highest frequency of a change [Hz], or `ABOVE` times its lowest where that is more."""

@@ -1,22 +1,51 @@
 """The server: devices on a plant, behind an address."""
 
+# ruff: noqa: ARG002 - gRPC gives every call a context, needed or not
+
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Self, cast
 
 import grpc
+import session_pb2 as sessions
 from nidaqmx._stubs.nidaqmx_pb2_grpc import add_NiDAQmxServicer_to_server
-from session_pb2_grpc import add_SessionUtilitiesServicer_to_server
+from session_pb2_grpc import SessionUtilitiesServicer, add_SessionUtilitiesServicer_to_server
 
 from drivers.emulation.daqmx.device import DeviceModel
 from drivers.emulation.daqmx.driver import Driver
 from drivers.emulation.daqmx.faults import Boundary, Faults
 from drivers.emulation.daqmx.lines import Wires
 from drivers.emulation.daqmx.service.daqmx import NiDaqmx
-from drivers.emulation.daqmx.service.utilities import SessionUtilities
 from drivers.emulation.plant import Plant
 from sim.errors import InvalidInput
 from sim.sensors import Converter
+
+
+class SessionUtilities(SessionUtilitiesServicer):
+    """EnumerateDevices, ResetServer."""
+
+    def __init__(self, driver: Driver) -> None:
+        self._driver = driver
+
+    def EnumerateDevices(
+        self, request: sessions.EnumerateDevicesRequest, context: object
+    ) -> sessions.EnumerateDevicesResponse:
+        return sessions.EnumerateDevicesResponse(
+            devices=[
+                sessions.DeviceProperties(
+                    name=device.name,
+                    model=device.product,
+                    vendor="National Instruments",
+                    serial_number=f"{device.serial:08X}",
+                )
+                for device in self._driver.catalogue.devices
+            ]
+        )
+
+    def ResetServer(self, request: sessions.ResetServerRequest, context: object) -> sessions.ResetServerResponse:
+        self._driver.reset()
+        return sessions.ResetServerResponse(is_server_reset=True)
+
 
 _WORKERS = 32
 """Calls at the same time; a read that waits holds one."""

@@ -9,7 +9,7 @@ import pytest
 
 from drivers.daqmx.session import DaqSession
 from drivers.emulation.daqmx.server import DaqServer
-from drivers.emulation.pulse_relay import PulseRelay
+from drivers.emulation.safety_chain import PulseRelay
 from drivers.errors import RigError
 from tests.drivers.daqmx.conftest import RATE, OpenSession, eventually
 from tests.drivers.daqmx.loopback import Loopback

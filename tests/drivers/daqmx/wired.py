@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from drivers.emulation.daqmx.lines import Wires
 from drivers.emulation.daqmx.models import x_series
 from drivers.emulation.daqmx.server import DaqServer
-from drivers.emulation.pulse_relay import PulseRelay
+from drivers.emulation.safety_chain import PulseRelay
 from sim.sensors import Converter
 from tests.drivers.daqmx.loopback import BITS, RANGE, Loopback
 

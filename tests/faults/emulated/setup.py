@@ -6,7 +6,7 @@ from typing import Any
 from bench.control.calibration import DriveCalibration
 from bench.guard.limits import Ramps
 from drivers.emulation.laboratory import Laboratory
-from drivers.emulation.pulse_relay import PulseRelay
+from drivers.emulation.safety_chain import PulseRelay
 from drivers.hardware.parameters import Hardware
 from tests.faults.places import PLACES as SIMULATED
 from tests.faults.places import Place

@@ -19,9 +19,21 @@ from drivers.emulation.daqmx.errors import DaqmxFailure
 from drivers.emulation.daqmx.input_channel import InputChannel, require_wiring
 from drivers.emulation.daqmx.job import Job
 from drivers.emulation.daqmx.line_task import Line, LineChannel
-from drivers.emulation.daqmx.ranges import covering_range
 from drivers.emulation.daqmx.service.base import Service
 from drivers.emulation.daqmx.task import Task
+
+
+def covering_range(ranges: Sequence[float], minimum: float, maximum: float, what: str) -> float:
+    """The narrowest of the device's ranges [V] that holds the limits. Raises DaqmxFailure when none does."""
+    wanted = max(abs(minimum), abs(maximum))
+    if minimum >= maximum or wanted > max(ranges):
+        raise DaqmxFailure(
+            DAQmxErrors.INVALID_ATTRIBUTE_VALUE,
+            "Requested value is not a supported value for this property.\n\n"
+            f"Property: {what}\nRequested Limits: {minimum} to {maximum}",
+        )
+    return min(range for range in ranges if range >= wanted)
+
 
 J = TypeVar("J", bound=Job)
 
