@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from drivers.emulation import pulse_relay, safety_chain
+from drivers.emulation import safety_chain
 from drivers.emulation.safety_chain import INPUTS, SafetyChain
 from drivers.errors import RigError
 
@@ -71,8 +71,7 @@ class Chain:
 @pytest.fixture
 def chain(monkeypatch: pytest.MonkeyPatch) -> Chain:
     chain = Chain()
-    for module in (pulse_relay, safety_chain):
-        monkeypatch.setattr(module, "time", chain.clock)
+    monkeypatch.setattr(safety_chain, "time", chain.clock)
     return chain
 
 
@@ -202,8 +201,7 @@ ACTS: tuple[Callable[[Chain], object], ...] = (
 def test_the_drive_moves_the_table_only_while_every_contact_is_closed(acts: list[Callable[[Chain], object]]) -> None:
     with pytest.MonkeyPatch.context() as patch:
         chain = Chain()
-        for module in (pulse_relay, safety_chain):
-            patch.setattr(module, "time", chain.clock)
+        patch.setattr(safety_chain, "time", chain.clock)
         for act in acts:
             act(chain)
             chain.passes(0.02)
