@@ -50,7 +50,7 @@ def take(folder: Path) -> None:
         window = Window(
             controller,
             BenchConfiguration(simulation=simulation),
-            all_protocols()[0],
+            sorted(all_protocols()[0], key=lambda each: each.name != "harmonic"),
             theme,
             queue=Path("runs", "queue.json"),
             tour=True,
@@ -81,11 +81,6 @@ def take(folder: Path) -> None:
             if isinstance(event, Estimate) and event.beta is not None and isfinite(event.alpha_2):
                 seen.append(event)
                 if len(seen) == 20:
-                    # the model of the block computes beside the window
-                    end = time.monotonic() + LONG
-                    while window.run.block.at(window.run.traces.ring.newest - 0.01) is None:
-                        assert time.monotonic() < end
-                        time.sleep(0.01)
                     window.run._draw()
                     window.header.refresh()
                     window.grab().save(str(folder / f"window-run{suffix}.png"))
