@@ -1,12 +1,11 @@
-"""Plain tables for the terminal."""
+"""Tables of numbers for the terminal whose units are given in brackets."""
 
 from collections.abc import Iterable, Sequence
+
+from bench.report.text_table import TextColumn, text_table
 
 
 def right_aligned(titles: Sequence[str], units: Sequence[str], cells: Iterable[Sequence[str]]) -> list[str]:
     """The lines of a table: titles, units, a rule, then one line for each row of cells."""
-    rows = [titles, units, *cells]
-    widths = [max(len(row[column]) for row in rows) for column in range(len(titles))]
-    lines = ["  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in rows]
-    lines.insert(2, "-" * len(lines[0]))
-    return lines
+    columns = [TextColumn(title, unit.strip("[]")) for title, unit in zip(titles, units, strict=True)]
+    return text_table(columns, cells).splitlines()

@@ -3,22 +3,30 @@
 import textwrap
 from collections.abc import Sequence
 
+from bench.report.text_table import TextColumn, text_table
 from protocols.check.line import CheckLine, Verdict
 
 WIDTH = 118
 
 _MARK = {Verdict.PASSED: "passed", Verdict.FAILED: "FAILED", Verdict.STATED: "stated", Verdict.UNTESTED: "untested"}
-_TITLES = ("verdict", "of", "what", "measured", "U (k=2)", "expected", "allowed", "unit")
-_LEFT = (True, True, True, False, False, False, False, True)
+_COLUMNS = (
+    TextColumn("verdict", words=True),
+    TextColumn("of", words=True),
+    TextColumn("what", words=True),
+    TextColumn("measured"),
+    TextColumn("U (k=2)"),
+    TextColumn("expected"),
+    TextColumn("allowed"),
+    TextColumn("unit", words=True),
+)
 
 
 def lines_table(lines: Sequence[CheckLine]) -> str:
     """One row for each line with its remedy below it, and how many passed; "-" stands where a value is absent."""
-    rows = [_TITLES, *(_cells(line) for line in lines)]
-    widths = [max(len(row[column]) for row in rows) for column in range(len(_TITLES))]
-    text = [_aligned(_TITLES, widths), "-" * (sum(widths) + 2 * (len(widths) - 1))]
-    for line, cells in zip(lines, rows[1:], strict=True):
-        text.append(_aligned(cells, widths))
+    title, rule, *rows = text_table(_COLUMNS, map(_cells, lines)).splitlines()
+    text = [title, rule]
+    for line, row in zip(lines, rows, strict=True):
+        text.append(row)
         if line.remedy:
             text += textwrap.wrap(line.remedy, WIDTH, initial_indent="    -> ", subsequent_indent="       ")
     counted = [sum(line.verdict is verdict for line in lines) for verdict in Verdict]
@@ -61,10 +69,3 @@ def _range(line: CheckLine) -> str:
 
 def _number(value: float | None, digits: int = 4) -> str:
     return "-" if value is None else f"{value:.{digits}g}"
-
-
-def _aligned(cells: Sequence[str], widths: Sequence[int]) -> str:
-    placed = [
-        cell.ljust(width) if left else cell.rjust(width) for cell, width, left in zip(cells, widths, _LEFT, strict=True)
-    ]
-    return "  ".join(placed).rstrip()

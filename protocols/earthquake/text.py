@@ -5,33 +5,30 @@ from collections.abc import Sequence
 from typing import Any
 
 from bench.report.rows import PointLike, plain
+from bench.report.text_table import TextColumn, text_table
 
 WIDTH = 120
 ABSENT = "-"
 
-_HEADS = (
-    "record",
-    "beta",
-    "status",
-    "alpha_2",
-    "U (k=2)",
-    "predicted",
-    "95 % interval",
-    "target",
-    "topples",
-    "agrees",
-    "dominated by",
+_COLUMNS = (
+    TextColumn("record", words=True),
+    TextColumn("beta"),
+    TextColumn("status", words=True),
+    TextColumn("alpha_2"),
+    TextColumn("U (k=2)"),
+    TextColumn("predicted"),
+    TextColumn("95 % interval"),
+    TextColumn("target"),
+    TextColumn("topples"),
+    TextColumn("agrees", words=True),
+    TextColumn("dominated by", words=True),
 )
 
 
 def earthquake_table(points: Sequence[PointLike]) -> str:
     """A row per point, and below them how many agree and what needs a look. "-" stands where a value is absent."""
     rows = plain(points)
-    cells = [list(_HEADS), *(_cells(row) for row in rows)]
-    widths = [max(len(line[k]) for line in cells) for k in range(len(_HEADS))]
-    lines = ["  ".join(text.ljust(width) for text, width in zip(line, widths, strict=True)).rstrip() for line in cells]
-    lines.insert(1, "-" * max(map(len, lines)))
-    return "\n".join([*lines, *_remarks(rows)])
+    return "\n".join([text_table(_COLUMNS, map(_cells, rows)), *_remarks(rows)])
 
 
 def _cells(row: dict[str, Any]) -> list[str]:

@@ -77,7 +77,7 @@ class HarmonicCampaign(Prepared[HarmonicParameters]):
     def result(self, points: Sequence[Parameters]) -> Result:
         from bench.report.figure import gain_spectra as drawn
         from bench.report.figure import write_figure
-        from bench.report.table import points_table
+        from protocols.harmonic.table import points_table
 
         return Result(
             points=tuple(points),

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from bench.report.figure import BLUE, GREEN, Prediction, gain_spectra, write_figure
 from bench.report.summary import Summary, write_summary
-from bench.report.table import WIDTH, points_table
 from protocols.harmonic.protocol import HarmonicPoint, PointStatus
+from protocols.harmonic.table import WIDTH, points_table
 from sim.errors import InvalidInput, RockbenchError
 
 OMEGA = np.linspace(12.0, 21.0, 91)
