@@ -89,6 +89,23 @@ class Prepared(ABC, Generic[P]):
     def plan(self) -> Plan:
         """The steps from the beginning."""
 
+    def collected(self, steps: 'Generator["Step", "Outcome", object]') -> Plan:
+        """Carry out `steps`; returns the result of the points that they publish."""
+        from bench.engine.steps import Say
+        from bench.events import PointFinished
+
+        points: list[Parameters] = []
+        try:
+            step = next(steps)
+            while True:
+                if isinstance(step, Say) and isinstance(step.event, PointFinished):
+                    points.append(step.event.point)
+                step = steps.send((yield step))
+        except StopIteration:
+            return self.result(points)
+        finally:
+            steps.close()
+
     @abstractmethod
     def result(self, points: Sequence[Parameters]) -> Result:
         """The result of a run that broke off, from the points that it has published."""

@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from bench.analysis.check_line import CheckLine, Verdict
 from bench.catalogue import load_protocol
 from bench.cli.check import CHECK
 from bench.cli.output import default_folder, make_folder, remove_unused
@@ -30,7 +31,6 @@ from bench.gui.controller import Controller
 from bench.gui.header import set_level
 from bench.gui.palette import Theme
 from bench.link.messages import Ended, Refused, Run
-from protocols.check.line import CheckLine, Verdict
 from sim.errors import RockbenchError
 
 MARKS = {

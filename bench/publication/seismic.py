@@ -11,7 +11,7 @@ from bench.publication.typography import counted, typeset
 from bench.record.tables import arrays
 from bench.report.earthquake_gains import gain_figure
 from bench.report.page.document import Column, Listing, Part, Picture, Section, Table
-from protocols.earthquake.parameters import EarthquakeParameters
+from protocols.earthquake.protocol import EarthquakeParameters
 from protocols.earthquake.records import band_used
 from protocols.earthquake.statement import check_statement
 

@@ -16,9 +16,9 @@ from bench.report.earthquake_histories import DriftPicture, MotionPicture, drift
 from bench.report.page.document import Notice, Part, Picture
 from protocols.earthquake.live import STEP, History
 from protocols.earthquake.observed import observe
-from protocols.earthquake.parameters import EarthquakeParameters
+from protocols.earthquake.protocol import EarthquakeParameters
 from protocols.earthquake.records import Shaking, shakings
-from protocols.earthquake.sources import Sources
+from protocols.earthquake.sources import FileSources
 from sim.errors import InvalidInput
 
 Floats = NDArray[np.float64]
@@ -132,7 +132,7 @@ def _shakings(campaign: Campaign) -> tuple[Shaking, ...]:
     """
     assert campaign.configuration is not None
     parameters = validated(EarthquakeParameters, campaign.parameters)
-    return shakings(parameters, campaign.configuration, Sources.stored(campaign.record.tables))
+    return shakings(parameters, campaign.configuration, FileSources.stored(campaign.record.tables))
 
 
 def _bare_and_softest(plays: Sequence[Played]) -> list[Played]:

@@ -4,11 +4,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from bench.analysis.check_line import CheckLine, judged, stated
 from bench.analysis.gain import COVERAGE
 from bench.config.model import BenchConfiguration
 from drivers.timebase.common_motion import common_motion
-from protocols.check.line import CheckLine, judged, stated
-from protocols.check.parameters import CheckParameters
+from protocols.check.protocol import CheckParameters
 from protocols.check.sines import Sines
 from sim.linear import steady_response
 from sim.specimen import Specimen

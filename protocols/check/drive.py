@@ -5,9 +5,9 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.analysis.check_line import CheckLine, judged, stated
 from bench.config.model import BenchConfiguration
-from protocols.check.line import CheckLine, judged, stated
-from protocols.check.parameters import CheckParameters
+from protocols.check.protocol import CheckParameters
 from protocols.check.sines import Sines
 
 _FINEST = 1e-5

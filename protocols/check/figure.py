@@ -7,8 +7,8 @@ matplotlib's keyword arguments have no types, hence the first line.
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from bench.analysis.check_line import CheckLine, Verdict
 from bench.report.style import BLUE, GREY, VERMILLION, new_figure, set_grid
-from protocols.check.line import CheckLine, Verdict
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -4,12 +4,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from bench.analysis.check_line import CheckLine, judged, stated
 from bench.analysis.cycles import COMPLETE
 from bench.analysis.gain import SensorAccuracy
 from bench.engine.steps import Heard
 from drivers.rig import Channel, Counts
-from protocols.check.line import CheckLine, judged, stated
-from protocols.check.parameters import CheckParameters
+from protocols.check.protocol import CheckParameters
 
 _STUCK = 0.01
 """Scatter [counts] below which a channel does not live: one sample in ten thousand that differs gives as much."""

@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator
 
+from bench.analysis.check_line import CheckLine, passed, untested
 from bench.config.model import BenchConfiguration
-from protocols.check.line import CheckLine, passed, untested
 
 _MISSING = "the program does not read it: see that it opens the enable chain by itself"
 _ALONE = "nothing opens the enable relay when the program dies: wire a heartbeat relay, or set a watchdog"

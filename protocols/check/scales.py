@@ -5,8 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from protocols.check.line import CheckLine, judged
-from protocols.check.parameters import CheckParameters
+from bench.analysis.check_line import CheckLine, judged
+from protocols.check.protocol import CheckParameters
 from protocols.check.sines import Sines
 
 Amplitudes = NDArray[np.complex128]

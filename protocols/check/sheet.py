@@ -7,14 +7,14 @@
 
 from collections.abc import Generator, Iterator
 
+from bench.analysis.check_line import CheckLine, Verdict, failed, untested
 from bench.config.model import BenchConfiguration
-from bench.engine.steps import Arm, Handle, Heard, Listen, Outcome, Plan, RampOut, Say, Step
+from bench.engine.steps import Arm, Handle, Heard, Listen, Outcome, RampOut, Say, Step
 from bench.events import PointFinished, StepStarted
 from drivers.rig import Handwork
 from protocols.check.delays import delay_lines
 from protocols.check.drive import drive_lines
-from protocols.check.line import CheckLine, Verdict, failed, untested
-from protocols.check.parameters import CheckParameters
+from protocols.check.protocol import CheckParameters
 from protocols.check.resting import resting_lines
 from protocols.check.safety import safety_lines
 from protocols.check.scales import scale_lines
@@ -28,7 +28,7 @@ _CLAMP = "Take spring and block off the table and clamp both storeys to it; keep
 _UNCLAMP = "Take the clamps off the storeys."
 
 
-def check_plan(parameters: CheckParameters, configuration: BenchConfiguration) -> Plan:
+def check_plan(parameters: CheckParameters, configuration: BenchConfiguration) -> Generator[Step, Outcome, None]:
     """The whole check as steps; every line is published as a point as soon as it is known."""
     bare = configuration.known_specimen.bare()
     yield Handle(Handwork.LOCK_FRAME, bare, _CLAMP)

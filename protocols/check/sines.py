@@ -10,9 +10,9 @@ from bench.analysis.signals import ACCELERATION, DISPLACEMENT, LASER_1, LASER_2,
 from bench.control.legs import Leg
 from bench.engine.steps import Calibrate, Dwell, Fallen, Follow, Measured, Outcome, Say, Step
 from bench.events import Progress, StepStarted
-from protocols.check.parameters import CheckParameters
-from protocols.check.probe import probed_drive
+from protocols.check.protocol import CheckParameters
 from protocols.common.calibrate import CHANGE_TIME, SETTLING, Unmeasurable, calibrate_drive, need_cycles
+from protocols.common.probe import probed_drive
 
 _DRIVE = len(SIGNALS)
 _FALLEN = "the first storey is pulled aside although no block stands on the table: check lasers and specimen"

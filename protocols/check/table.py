@@ -3,8 +3,8 @@
 import textwrap
 from collections.abc import Sequence
 
+from bench.analysis.check_line import CheckLine, Verdict
 from bench.report.text_table import TextColumn, text_table
-from protocols.check.line import CheckLine, Verdict
 
 WIDTH = 118
 

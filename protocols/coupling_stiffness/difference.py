@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.analysis.free_decay.modal import K1, K2
-from protocols.free_vibration.results import SIGNIFICANT, FrameResult
-from protocols.free_vibration.told import FOUND
+from protocols.common.decays.findings import FOUND
+from protocols.common.decays.results import SIGNIFICANT, FrameResult
 from sim.identified import Identified
 
 Array = NDArray[np.float64]

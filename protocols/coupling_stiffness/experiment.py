@@ -1,103 +1,195 @@
-"""The test of the springs as a session takes it."""
+"""The stiffness of mounted springs on a bench, as a file that other runs load.
 
-from collections.abc import Sequence
+1. The bare frame: decays after pulses, unless it was identified before and is not to be measured again.
+2. For each spring: it is mounted with its block clamped to the table, and the same is done.
+3. The difference of the first storeys' stiffnesses is the spring's.
+"""
+
+from collections.abc import Callable, Generator, Sequence
+from functools import cached_property
 from pathlib import Path
 
+import numpy as np
+
+from bench.analysis.free_decay.decay import Setting
 from bench.config.model import BenchConfiguration
-from bench.engine.steps import Plan
+from bench.config.specimen_file import write_specimen
+from bench.engine.steps import Handle, Outcome, Say, Step
+from bench.events import PointFinished, SpecimenIdentified, Warned
 from bench.preflight.forecast import Forecast
-from bench.progress import Progress, silent
+from bench.protocol import Plan, Prepared, Result, Sources
 from bench.record.tables import Column, Table
-from protocols.coupling_stiffness.parameters import CouplingStiffnessParameters
-from protocols.coupling_stiffness.point import SpringPoint
-from protocols.coupling_stiffness.sheet import Bench
-from sim.errors import InvalidInput
+from bench.report.style import write_figure
+from drivers.rig import Handwork
+from protocols.common.decays.checks import check_pulse
+from protocols.common.decays.decays import pulsed_decays, pulsed_duration, setting_of
+from protocols.common.decays.forecast import pulse_forecast
+from protocols.common.decays.masses import masses_told
+from protocols.common.decays.playing import Pace
+from protocols.common.decays.pulse import Planned, frequencies, planned
+from protocols.common.decays.results import SIGNIFICANT, FrameResult, nonlinear_text, result_of
+from protocols.coupling_stiffness.difference import (
+    Reference,
+    SpringResult,
+    changed,
+    known_reference,
+    reference_of,
+    spring_of,
+)
+from protocols.coupling_stiffness.figure import springs_figure
+from protocols.coupling_stiffness.findings import bare_point, spring_findings, spring_point
+from protocols.coupling_stiffness.protocol import CouplingStiffnessParameters, SpringPoint
+from protocols.coupling_stiffness.table import springs_table
+from sim.errors import InvalidInput, RockbenchError
 from sim.identified import Identified
 from sim.parameters import Parameters
+from sim.specimen import Specimen
+
+BARE, SPRING = "bare frame", "spring of beta = {:g}"
+"""Names of what stands on the table."""
+
+BY_HAND = 120.0
+"""Time to mount a spring [s]."""
 
 STILL_CLAMPED = "THE BLOCK IS STILL CLAMPED to the table: take clamp, spring and block off before it is driven."
 
 
-class CouplingStiffness:
-    """The stiffness of mounted springs, as a file that other runs load."""
+class CouplingStiffness(Prepared[CouplingStiffnessParameters]):
+    """Refuses a run with nothing to compare with, and a pulse that this bench cannot make."""
 
-    name = "coupling-stiffness"
-    figure_name = "coupling_stiffness.png"
-    kept_name = "specimen.json"
-    point_type: type[Parameters] = SpringPoint
-
-    def __init__(self, parameters: CouplingStiffnessParameters) -> None:
-        self.parameters = parameters
-        self._known: Identified | None = None
-        self._bench = Bench()
-
-    def check(self, configuration: BenchConfiguration) -> None:
-        """Raise InvalidInput where there is nothing to compare with, or for a pulse that this bench cannot make."""
-        from protocols.coupling_stiffness.sheet import specimens_of
-        from protocols.free_vibration.checks import check_pulse
-
-        known = configuration.identified
-        if not self.parameters.reference and not (known is not None and {"k1", "k2"} <= set(known.names)):
+    def __init__(
+        self, parameters: CouplingStiffnessParameters, configuration: BenchConfiguration, stored: Sources | None = None
+    ) -> None:
+        super().__init__(parameters, configuration, stored)
+        identified, known = configuration.identified, configuration.known_specimen
+        if not parameters.reference and not (identified is not None and {"k1", "k2"} <= set(identified.names)):
             allowed = "k1 and k2 are not identified: measure the bare frame along, or name a specimen file with them"
             raise InvalidInput("reference", False, allowed)
-        for specimen in specimens_of(self.parameters, configuration).values():
-            check_pulse(self.parameters, configuration, specimen)
+        self._specimens: dict[str, Specimen] = {BARE: known.bare()} if parameters.reference else {}
+        self._specimens |= {SPRING.format(beta): known.coupled(beta) for beta in parameters.beta}
+        for specimen in self._specimens.values():
+            check_pulse(parameters, configuration, specimen)
+        self._bare: FrameResult | None = None
+        self._springs: list[SpringResult] = []
+        self._clamped = False
+        """Whether a block is clamped to the table."""
 
-    def preflight(self, configuration: BenchConfiguration, progress: Progress = silent) -> Forecast:
-        """The most that is asked of every limited quantity."""
-        from protocols.coupling_stiffness.sheet import expected_duration, specimens_of
-        from protocols.free_vibration.preflight import pulse_forecast
-        from protocols.free_vibration.pulse import planned
+    @cached_property
+    def _pulses(self) -> dict[str, Planned]:
+        """The pulse for each specimen."""
+        return {name: planned(self.parameters, self.configuration, each) for name, each in self._specimens.items()}
 
-        progress("predicting what the run asks of the bench")
-        plans = {
-            name: planned(self.parameters, configuration, specimen)
-            for name, specimen in specimens_of(self.parameters, configuration).items()
-        }
-        return pulse_forecast(configuration, plans, expected_duration(self.parameters, configuration))
+    @property
+    def duration(self) -> float:
+        """Expected length of a run [s]."""
+        return sum(pulsed_duration(self.parameters, plan.pulse) + BY_HAND for plan in self._pulses.values())
 
-    def predict(self, configuration: BenchConfiguration) -> Table:
+    @cached_property
+    def forecast(self) -> Forecast:
+        self.progress("predicting what the run asks of the bench")
+        return pulse_forecast(self.configuration, self._pulses, self.duration)
+
+    @cached_property
+    def prediction(self) -> Table:
         """The modes with every spring, as its label has it."""
-        import numpy as np
-
-        from protocols.free_vibration.pulse import frequencies
-
-        known = configuration.known_specimen
-        omega = np.array([np.sort(frequencies(known.coupled(beta))) for beta in self.parameters.beta])
-        stiffness = np.array([known.coupled(beta).nominal_k_c for beta in self.parameters.beta])
+        known, beta = self.configuration.known_specimen, self.parameters.beta
+        omega = np.array([np.sort(frequencies(known.coupled(each))) for each in beta])
+        stiffness = np.array([known.coupled(each).nominal_k_c for each in beta])
         return {
-            "beta": Column(np.array(self.parameters.beta), "1", "stiffness ratio on the label"),
+            "beta": Column(np.array(beta), "1", "stiffness ratio on the label"),
             "k_c": Column(stiffness, "N/m", "stiffness that the label promises"),
             "omega1": Column(omega[:, 0], "rad/s", "first undamped circular frequency with the block held"),
             "omega2": Column(omega[:, 1], "rad/s", "second undamped circular frequency with the block held"),
         }
 
-    def plan(self, configuration: BenchConfiguration) -> Plan:
-        """The lab sheet."""
-        from protocols.coupling_stiffness.sheet import coupling_stiffness_plan
+    def plan(self) -> Plan:
+        self._bare, self._springs, self._clamped = None, [], False
+        return self.collected(self._steps())
 
-        self._known, self._bench = configuration.identified, Bench()
-        return coupling_stiffness_plan(self.parameters, configuration, self._bench)
+    def result(self, points: Sequence[Parameters]) -> Result:
+        known, bare, springs = self.configuration.identified or Identified(), self._bare, tuple(self._springs)
 
-    def keep(self, path: Path) -> None:
-        """Write what is known of the specimen for other runs, if anything was found."""
-        from bench.config.specimen_file import write_specimen
-        from protocols.coupling_stiffness.told import spring_findings
-
-        known, bench = self._known or Identified(), self._bench
-        if bench.bare is not None or bench.springs:
-            write_specimen(path, known.extended(*spring_findings(bench.bare, bench.springs, known)))
-
-    def table(self, points: Sequence[Parameters]) -> str:
-        """The bare frame and every spring; and that a block was left clamped, where it was."""
-        from protocols.coupling_stiffness.table import springs_table
+        def write(path: Path) -> None:
+            write_specimen(path, known.extended(*spring_findings(bare, springs, known)))
 
         told = springs_table([point for point in points if isinstance(point, SpringPoint)])
-        return f"{told}\n{STILL_CLAMPED}" if self._bench.clamped else told
+        return Result(
+            points=tuple(points),
+            text=f"{told}\n{STILL_CLAMPED}" if self._clamped else told,
+            figures={"coupling_stiffness.png": lambda path: write_figure(path, springs_figure(springs))},
+            files={"specimen.json": write} if bare is not None or springs else {},
+        )
 
-    def figure(self, points: Sequence[Parameters], prediction: Table, path: Path) -> None:  # noqa: ARG002
-        """Every spring beside its label, the decays, and the budget."""
-        from bench.report.style import write_figure
-        from protocols.coupling_stiffness.figure import springs_figure
+    def _steps(self) -> Generator[Step, Outcome, None]:
+        p, configuration = self.parameters, self.configuration
+        setting, pace = setting_of(p, configuration), Pace(self.duration)
+        bare = configuration.known_specimen.bare()
+        reference = known_reference(configuration.identified)
+        yield from masses_told(configuration)
+        if p.reference:
+            yield Handle(Handwork.REMOVE_BLOCK, bare, "Take the spring and the block off the table.")
+            found = self._bare = yield from self._decays(BARE, setting, pace)
+            reference = reference_of(found)
+            if (off := changed(found, configuration.identified)) is not None:
+                yield Say(Warned(f"the bare frame is not what it was when it was identified: {off}"))
+            yield Say(PointFinished(bare_point(found, 0)))
+        if reference is None:
+            raise AssertionError("a run without a reference is refused beforehand")
+        failed: RockbenchError | None = None
+        try:
+            for beta in p.beta:
+                self._clamped = True
+                spring = yield from self._spring(beta, reference, setting, pace)
+                self._springs.append(spring)
+                identified = configuration.identified or Identified()
+                yield Say(
+                    SpecimenIdentified(identified.extended(*spring_findings(self._bare, self._springs, identified)))
+                )
+        except RockbenchError as error:
+            failed = error
+        yield Handle(Handwork.REMOVE_BLOCK, bare, "Take the clamp, the spring and the block off the table.")
+        self._clamped = False
+        if failed is not None:
+            raise failed
 
-        write_figure(path, springs_figure(self._bench.springs))
+    def _spring(
+        self, beta: float, reference: Reference, setting: Setting, pace: Pace
+    ) -> Generator[Step, Outcome, SpringResult]:
+        name = SPRING.format(beta)
+        specimen = self._specimens[name]
+        request = (
+            f"Stand the block on its base, mount the spring of beta = {beta:g}, and clamp the block to the table: it"
+            " must not lift, slide or turn."
+        )
+        yield Handle(Handwork.HOLD_BLOCK, specimen, request)
+
+        def told(result: FrameResult, number: int) -> SpringPoint:
+            return spring_point(spring_of(beta, result, reference), specimen.nominal_k_c, number)
+
+        held = yield from self._decays(name, setting, pace, told)
+        spring = spring_of(beta, held, reference)
+        if abs(spring.k2_apart) > SIGNIFICANT:
+            yield Say(
+                Warned(
+                    f"{name}: k2 is {spring.k2_apart:+.1f} standard uncertainties off that of the bare frame: see"
+                    " whether the block, its clamp or the spring touch the second storey, or give under the spring",
+                )
+            )
+        yield Say(PointFinished(told(held, 0)))
+        return spring
+
+    def _decays(
+        self,
+        name: str,
+        setting: Setting,
+        pace: Pace,
+        told: Callable[[FrameResult, int], SpringPoint] | None = None,
+    ) -> Generator[Step, Outcome, FrameResult]:
+        """The decays of one frame, which has just been mounted, with a point for each."""
+        pace.gone += BY_HAND
+        pulse, told = self._pulses[name], told or bare_point
+        decays = yield from pulsed_decays(self.parameters, self.configuration, pulse, setting, pace, name, told=told)
+        result = result_of(decays, setting.masses, setting.weighed)
+        if result.nonlinear.any():
+            yield Say(Warned(f"{name}: {nonlinear_text(result)}"))
+        return result

@@ -5,7 +5,7 @@ from math import tau
 
 from bench.analysis.rounding import plus_minus
 from bench.report.columns import right_aligned
-from protocols.coupling_stiffness.point import SpringPoint
+from protocols.coupling_stiffness.protocol import SpringPoint
 
 _TITLES = ("spring", "decays", "k1 + kC", "kC", "nominal kC", "beta", "k2", "f1", "f2")
 _UNITS = ("", "", "[N/m]", "[N/m]", "[N/m]", "[1]", "[N/m]", "[Hz]", "[Hz]")

@@ -11,7 +11,7 @@ from bench.config.model import BenchConfiguration
 from bench.control.passes import Pass
 from protocols.earthquake.observed import Observed
 from protocols.earthquake.overturn import overturning_time
-from protocols.earthquake.point import EarthquakePoint, PointStatus
+from protocols.earthquake.protocol import EarthquakePoint, PointStatus
 from protocols.earthquake.records import Shaking
 from protocols.earthquake.shaken import Tracking, difference, tracking
 from protocols.earthquake.uncertainty import Compared, compare, predict_draws

@@ -1,7 +1,7 @@
 """Whether a drive that was learned is good enough to be played, and what is to be said of it."""
 
 from protocols.common.replicate import Replicated
-from protocols.earthquake.parameters import EarthquakeParameters
+from protocols.earthquake.protocol import EarthquakeParameters
 
 
 def refused(learned: Replicated, parameters: EarthquakeParameters) -> str | None:

@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from bench.events import Progress
-from protocols.earthquake.parameters import EarthquakeParameters
+from protocols.earthquake.protocol import EarthquakeParameters
 from protocols.earthquake.records import Shaking
 
 BETWEEN = 45.0

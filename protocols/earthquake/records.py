@@ -1,7 +1,6 @@
 """The records of a campaign, each with the motion that the table is to make of it."""
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +14,8 @@ from bench.control.stroke.fit import periods_of
 from bench.control.stroke.reach import Reach
 from bench.control.target import Target
 from bench.prediction.seismic import band_of
-from protocols.earthquake.parameters import EarthquakeParameters
-from protocols.earthquake.sources import Sources
+from protocols.earthquake.protocol import EarthquakeParameters
+from protocols.earthquake.sources import FileSources
 from sim.errors import InvalidInput
 from sim.excitation import SampledRecord
 
@@ -78,20 +77,9 @@ def band_used(parameters: EarthquakeParameters, configuration: BenchConfiguratio
 
 
 def shakings(
-    parameters: EarthquakeParameters, configuration: BenchConfiguration, sources: Sources | None = None
+    parameters: EarthquakeParameters, configuration: BenchConfiguration, sources: FileSources | None = None
 ) -> tuple[Shaking, ...]:
-    """Every record, read and prepared once, in the order asked; `sources` are those of a data file.
-
-    Raises InvalidInput.
-    """
-    # frozen parameters are hashable, though pydantic does not declare it
-    return _shakings(parameters, configuration, sources)  # pyright: ignore[reportArgumentType]
-
-
-@lru_cache(maxsize=4)
-def _shakings(
-    parameters: EarthquakeParameters, configuration: BenchConfiguration, sources: Sources | None
-) -> tuple[Shaking, ...]:
+    """Every record, read and prepared, in the order asked; `sources` are those of a data file. Raises InvalidInput."""
     named = parameters.records or tuple(f"synthetic:{name}" for name in NAMES)
     records = sources.records if sources else read_records([RecordReference.parse(text) for text in named])
     return tuple(_shaking(record, parameters, configuration) for record in records)

@@ -8,7 +8,7 @@
 The springs are the outer loop: changing one is hand work.
 """
 
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from math import tau
 
 import numpy as np
@@ -17,7 +17,7 @@ from bench.analysis.signals import DRIFT
 from bench.config.model import BenchConfiguration
 from bench.control.replication import ReplicationParameters
 from bench.control.table_model import TableModel
-from bench.engine.steps import Arm, Fallen, Handle, Outcome, Plan, Play, Played, RampOut, Say, Step
+from bench.engine.steps import Arm, Fallen, Handle, Outcome, Play, Played, RampOut, Say, Step
 from bench.events import PointFinished, Progress, StepStarted, Warned
 from drivers.rig import Handwork, RigError
 from protocols.common.replicate import replicate
@@ -27,13 +27,11 @@ from protocols.earthquake.learned import refused, shortfall
 from protocols.earthquake.live import History, Watch
 from protocols.earthquake.observed import observe
 from protocols.earthquake.pace import Pace
-from protocols.earthquake.parameters import EarthquakeParameters
-from protocols.earthquake.point import EarthquakePoint
-from protocols.earthquake.prediction import target_gains
-from protocols.earthquake.records import Shaking, shakings
+from protocols.earthquake.prediction import Curves, target_gains
+from protocols.earthquake.protocol import EarthquakeParameters, EarthquakePoint
+from protocols.earthquake.records import Shaking
 from protocols.earthquake.shaken import tracking
-from protocols.earthquake.sources import Sources
-from protocols.earthquake.table import identification_time, table_for
+from protocols.earthquake.table import TableSource, table_for
 from sim.errors import InvalidInput
 from sim.specimen import Specimen
 
@@ -52,22 +50,23 @@ class EarthquakeSheet:
         self,
         parameters: EarthquakeParameters,
         configuration: BenchConfiguration,
+        shakings: Sequence[Shaking],
+        table: TableSource,
+        curves: Curves,
         histories: Histories,
-        sources: Sources | None = None,
     ) -> None:
         self._parameters, self._configuration, self._histories = parameters, configuration, histories
         self._specimen = configuration.known_specimen
-        self._sources = sources
-        self._shakings = shakings(parameters, configuration, sources)
-        self._targets = target_gains(parameters, configuration, sources)
-        self._pace = Pace(parameters, self._shakings, identification_time(parameters, configuration, sources))
+        self._shakings, self._table = shakings, table
+        self._targets = target_gains(curves, parameters.beta)
+        self._pace = Pace(parameters, shakings, table.duration)
         self._bare: dict[str, BareTest | str] = {}
         self._shortfalls: dict[str, str] = {}
         self._points = 0
 
-    def plan(self) -> Plan:
+    def plan(self) -> Generator[Step, Outcome, None]:
         """The whole campaign as steps."""
-        model = yield from table_for(self._parameters, self._configuration, self._pace, self._sources)
+        model = yield from table_for(self._table, self._configuration, self._pace)
         for shaking in self._shakings:
             self._bare[shaking.name] = yield from self._bare_frame(shaking, model)
             self._pace.learned(shaking.name)

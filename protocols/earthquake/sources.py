@@ -30,7 +30,7 @@ _TEXTS = {
 
 
 @dataclass(frozen=True, eq=False)
-class Sources:
+class FileSources:
     """The `records` in the order asked, and the `table` where the configuration named one."""
 
     records: tuple[Accelerogram, ...]
@@ -43,11 +43,11 @@ class Sources:
         return found if self.table is None else found | _model(self.table)
 
     @staticmethod
-    def stored(tables: Mapping[str, Table]) -> "Sources | None":
+    def stored(tables: Mapping[str, Table]) -> "FileSources | None":
         """Those of a data file; None for a file of before they were kept."""
         if RECORDS not in tables or SAMPLES not in tables:
             return None
-        return Sources(_stored_records(tables), _stored_model(tables))
+        return FileSources(_stored_records(tables), _stored_model(tables))
 
 
 def _records(records: Sequence[Accelerogram]) -> Table:

@@ -1,7 +1,7 @@
 """The table's response that the drives are learned with: the stored one, or one identified at the campaign's begin."""
 
 from collections.abc import Generator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from math import ceil, tau
 from pathlib import Path
@@ -13,16 +13,16 @@ from bench.config.model import BenchConfiguration
 from bench.control.table_model import TableModel
 from bench.control.target import FLAT, REACH
 from bench.engine.steps import Done, Handle, Outcome, Play, Say, Step, Watch
-from bench.events import Event, PointFinished, Progress
+from bench.events import Event, Progress
 from drivers.rig import Handwork
+from protocols.common.identification.level import Planned, mounted_name, planned
+from protocols.common.identification.parameters import IdentifyParameters
+from protocols.common.identification.plan import expected_duration, identified
 from protocols.earthquake.pace import Pace
-from protocols.earthquake.parameters import EarthquakeParameters
+from protocols.earthquake.protocol import EarthquakeParameters
 from protocols.earthquake.records import band_used
-from protocols.earthquake.sources import Sources
-from protocols.identify.level import mounted_name, planned
-from protocols.identify.parameters import IdentifyParameters
-from protocols.identify.sheet import expected_duration, identify_plan
-from sim.errors import InvalidInput, RockbenchError
+from protocols.earthquake.sources import FileSources
+from sim.errors import InvalidInput
 
 PERIOD, LONGEST = 8.0, 120.0
 """Period of the identification unless its lowest octave needs a longer one, and the longest that is tried [s]."""
@@ -32,7 +32,7 @@ OCTAVE_LINES = 4
 
 
 def stored_table(
-    parameters: EarthquakeParameters, configuration: BenchConfiguration, sources: Sources | None = None
+    parameters: EarthquakeParameters, configuration: BenchConfiguration, sources: FileSources | None = None
 ) -> TableModel | None:
     """The configured table model; None when none is named. That of a data file was fresh when its run began.
 
@@ -55,12 +55,41 @@ def stored_table(
     return model
 
 
-def table_warnings(parameters: EarthquakeParameters, configuration: BenchConfiguration) -> tuple[str, ...]:
+@dataclass(frozen=True, eq=False)
+class TableSource:
+    """Where the table's response is from: a stored `model`, else an identification as `wanted`, planned as `found`."""
+
+    model: TableModel | None
+    wanted: IdentifyParameters
+    found: Planned | None
+
+    @staticmethod
+    def of(
+        parameters: EarthquakeParameters, configuration: BenchConfiguration, sources: FileSources | None
+    ) -> "TableSource":
+        """That of a campaign. Raises InvalidInput for a model that cannot be used, or a table that cannot be
+        identified.
+        """
+        model = stored_table(parameters, configuration, sources)
+        if model is not None:
+            return TableSource(model, IdentifyParameters(), None)
+        wanted = identification(parameters, configuration)
+        return TableSource(None, wanted, planned(wanted, configuration))
+
+    @property
+    def duration(self) -> float:
+        """Expected length of the identification [s]; zero with a stored model."""
+        return 0.0 if self.found is None else expected_duration(self.wanted, self.found)
+
+
+def table_warnings(
+    parameters: EarthquakeParameters, configuration: BenchConfiguration, model: TableModel | None
+) -> tuple[str, ...]:
     """What the operator should know: a stored model of something else than what the drives are learned with, a mode of
     the frame at which nothing tells how well the table follows.
     """
     said: list[str] = []
-    model, bare = stored_table(parameters, configuration), mounted_name(configuration.known_specimen.bare())
+    bare = mounted_name(configuration.known_specimen.bare())
     if model is not None and model.specimen != bare:
         said.append(
             f"table_model was identified with {model.specimen!r} on the table, the drives are learned with the {bare}:"
@@ -95,42 +124,28 @@ def identification(parameters: EarthquakeParameters, configuration: BenchConfigu
     return IdentifyParameters(band_low=first, band_high=high * REACH, period=period)
 
 
-def identification_time(
-    parameters: EarthquakeParameters, configuration: BenchConfiguration, sources: Sources | None = None
-) -> float:
-    """Expected length of the identification [s]; zero with a stored model. Raises InvalidInput as both do."""
-    if stored_table(parameters, configuration, sources) is not None:
-        return 0.0
-    wanted = identification(parameters, configuration)
-    return expected_duration(wanted, planned(wanted, configuration))
-
-
 def table_for(
-    parameters: EarthquakeParameters, configuration: BenchConfiguration, pace: Pace, sources: Sources | None = None
+    source: TableSource, configuration: BenchConfiguration, pace: Pace
 ) -> Generator[Step, Outcome, TableModel]:
     """The stored table, or it is identified now; afterwards the bare frame stands on it."""
-    model = stored_table(parameters, configuration, sources)
-    if model is not None:
+    if source.model is not None or source.found is None:
+        assert source.model is not None
         bare = configuration.known_specimen.bare()
         yield Handle(Handwork.REMOVE_BLOCK, bare, "Take the spring and the block off the table.")
-        return model
-    found: list[TableModel] = []
-    plan = identify_plan(identification(parameters, configuration), configuration, found.append)
-    step = next(plan)
-    while True:
-        # its thirds of an octave are no points of this campaign, and its progress is a part of the campaign's
-        if isinstance(step, Say) and isinstance(step.event, PointFinished | Progress):
-            outcome = Done()
-        else:
-            outcome = yield replace(step, watch=_counted(step.watch, pace)) if isinstance(step, Play) else step
-        try:
+        return source.model
+    plan = identified(source.wanted, configuration, source.found)
+    try:
+        step = next(plan)
+        while True:
+            # its progress is a part of the campaign's
+            if isinstance(step, Say) and isinstance(step.event, Progress):
+                outcome = Done()
+            else:
+                outcome = yield replace(step, watch=_counted(step.watch, pace)) if isinstance(step, Play) else step
             step = plan.send(outcome)
-        except StopIteration:
-            break
-    if not found:
-        raise RockbenchError("the identification of the table ended without a result")
-    pace.identified()
-    return found[0]
+    except StopIteration as end:
+        pace.identified()
+        return end.value
 
 
 def _counted(watch: Watch | None, pace: Pace) -> Watch | None:

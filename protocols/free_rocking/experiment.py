@@ -1,52 +1,46 @@
-"""Free rocking as a session takes it."""
+"""Free rocking on a bench: the block's restitution, as a specimen file that other runs load."""
 
 from collections.abc import Sequence
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
 from bench.config.model import BenchConfiguration
-from bench.engine.steps import Plan
+from bench.config.specimen_file import write_specimen
 from bench.preflight.forecast import Forecast
-from bench.progress import Progress, silent
+from bench.protocol import Plan, Prepared, Result, Sources
 from bench.record.tables import Column, Table
-from protocols.free_rocking.parameters import FreeRockingParameters
-from protocols.free_rocking.point import RockingPoint
+from bench.report.style import write_figure
+from protocols.free_rocking.figure import rocking_figure
+from protocols.free_rocking.forecast import check, forecast
+from protocols.free_rocking.planned import planned_tilts
+from protocols.free_rocking.protocol import FreeRockingParameters, RockingPoint
 from protocols.free_rocking.sheet import Bench, free_rocking_plan
+from protocols.free_rocking.table import rocking_table
+from sim.free_rocking import FreeRocking, critical_angle, frequency_parameter
 from sim.parameters import Parameters
 
 
-class FreeRockingTest:
-    """The block's restitution, as a specimen file that other runs load."""
+class FreeRockingTest(Prepared[FreeRockingParameters]):
+    """Refuses tilts that the laser cannot follow."""
 
-    name = "free-rocking"
-    figure_name = "free_rocking.png"
-    kept_name = "specimen.json"
-    point_type: type[Parameters] = RockingPoint
-
-    def __init__(self, parameters: FreeRockingParameters) -> None:
-        self.parameters = parameters
+    def __init__(
+        self, parameters: FreeRockingParameters, configuration: BenchConfiguration, stored: Sources | None = None
+    ) -> None:
+        super().__init__(parameters, configuration, stored)
+        check(parameters, configuration)
         self._bench = Bench()
 
-    def check(self, configuration: BenchConfiguration) -> None:
-        """Raise InvalidInput where the laser cannot follow the block."""
-        from protocols.free_rocking.preflight import check
+    @cached_property
+    def forecast(self) -> Forecast:
+        self.progress("predicting what the run asks of the bench")
+        return forecast(self.parameters, self.configuration)
 
-        check(self.parameters, configuration)
-
-    def preflight(self, configuration: BenchConfiguration, progress: Progress = silent) -> Forecast:
-        """No drive; the laser's share of its range; how long it takes."""
-        from protocols.free_rocking.preflight import forecast
-
-        progress("predicting what the run asks of the bench")
-        return forecast(self.parameters, configuration)
-
-    def predict(self, configuration: BenchConfiguration) -> Table:
-        """The half swings of each tilt for the specimen as known."""
-        from protocols.free_rocking.planned import planned_tilts
-        from sim.free_rocking import FreeRocking, critical_angle, frequency_parameter
-
-        specimen = configuration.known_specimen
+    @cached_property
+    def prediction(self) -> Table:
+        """The impacts of every tilt, with the specimen as known."""
+        specimen = self.configuration.known_specimen
         alpha, p = critical_angle(specimen.block), frequency_parameter(specimen.block, specimen.g)
         tilts = planned_tilts(self.parameters, specimen)
         motions = [FreeRocking(alpha, p, specimen.block.restitution, tilt) for tilt in tilts]
@@ -63,39 +57,31 @@ class FreeRockingTest:
             ),
         }
 
-    def plan(self, configuration: BenchConfiguration) -> Plan:
-        """The lab sheet."""
+    def plan(self) -> Plan:
         self._bench = Bench()
-        return free_rocking_plan(self.parameters, configuration, self._bench)
+        return self.collected(free_rocking_plan(self.parameters, self.configuration, self._bench))
 
-    def keep(self, path: Path) -> None:
-        """Write what is known of the specimen with the restitution that was found, if it was."""
-        from bench.config.specimen_file import write_specimen
-
-        if self._bench.identified is not None:
-            write_specimen(path, self._bench.identified)
-
-    def table(self, points: Sequence[Parameters]) -> str:
-        """The tilts and what they come to; and what may be left to be undone at the bench."""
-        from protocols.free_rocking.table import rocking_table
-
+    def result(self, points: Sequence[Parameters]) -> Result:
+        bench, rows = self._bench, [point for point in points if isinstance(point, RockingPoint)]
         left = [
             text
             for there, text in (
-                (self._bench.watching, "Laser 2 still looks at the block: turn it back to storey 2."),
-                (self._bench.locked, "THE TABLE IS STILL LOCKED: take the clamps off before anything is driven."),
+                (bench.watching, "Laser 2 still looks at the block: turn it back to storey 2."),
+                (bench.locked, "THE TABLE IS STILL LOCKED: take the clamps off before anything is driven."),
             )
             if there
         ]
-        return "\n".join([rocking_table(_rows(points)), *left])
 
-    def figure(self, points: Sequence[Parameters], prediction: Table, path: Path) -> None:  # noqa: ARG002
-        """Motion with fit, single impacts, parts of the uncertainty."""
-        from bench.report.style import write_figure
-        from protocols.free_rocking.figure import rocking_figure
+        def write(path: Path) -> None:
+            if bench.identified is not None:
+                write_specimen(path, bench.identified)
 
-        write_figure(path, rocking_figure(_rows(points), self._bench.tilts, self._bench.found))
+        def draw(path: Path) -> None:
+            write_figure(path, rocking_figure(rows, bench.tilts, bench.found))
 
-
-def _rows(points: Sequence[Parameters]) -> list[RockingPoint]:
-    return [point for point in points if isinstance(point, RockingPoint)]
+        return Result(
+            points=tuple(points),
+            text="\n".join([rocking_table(rows), *left]),
+            figures={"free_rocking.png": draw},
+            files={} if bench.identified is None else {"specimen.json": write},
+        )

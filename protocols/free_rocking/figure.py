@@ -15,7 +15,7 @@ from bench.analysis.free_rocking.tilt import Tilt
 from bench.analysis.gain import COVERAGE
 from bench.report.rocking_figure import Impacts, draw_impacts
 from bench.report.style import BLACK, BLUE, VERMILLION, new_figure, set_grid
-from protocols.free_rocking.point import ALL, RockingPoint
+from protocols.free_rocking.protocol import ALL, RockingPoint
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -1,7 +1,7 @@
 """The tilts of a run, how long each takes, and what the laser sees of them."""
 
 from bench.analysis.free_rocking.swings import REST
-from protocols.free_rocking.parameters import FreeRockingParameters
+from protocols.free_rocking.protocol import FreeRockingParameters
 from sim import block_face
 from sim.free_rocking import FreeRocking, critical_angle, frequency_parameter, theoretical_restitution
 from sim.specimen import Specimen

@@ -1,4 +1,4 @@
-"""What free rocking comes to: one row for each tilt, and one for all of them."""
+"""The rows of free rocking from its findings: one for each tilt and one for all of them."""
 
 from collections.abc import Callable
 from json import dumps
@@ -6,53 +6,9 @@ from math import hypot
 
 from bench.analysis.free_rocking.findings import SCATTERED, Findings
 from bench.analysis.gain import COVERAGE
-from protocols.free_rocking.parameters import FreeRockingParameters
+from protocols.free_rocking.protocol import FreeRockingParameters, RockingPoint
 from sim.free_rocking import critical_angle, frequency_parameter, theoretical_restitution
-from sim.parameters import Parameters, quantity
 from sim.specimen import Block, Specimen
-
-ALL = "all tilts"
-"""Name of the row that combines the others."""
-
-_EXPANDED = "expanded uncertainty (k = 2)"
-
-
-class RockingPoint(Parameters):
-    """Restitution of the block's impacts, what its motion says of its shape, and what its sides say of both."""
-
-    part: str = quantity(..., "", "which tilt, or all of them")
-    tilt_rad: float | None = quantity(None, "rad", "tilt in the hand, above zero towards the frame")
-    impacts: int = quantity(..., "1", "impacts that were used")
-    r_exp: float = quantity(..., "1", "restitution, by the better of the two estimators")
-    r_exp_uncertainty: float = quantity(..., "1", f"{_EXPANDED} of r_exp")
-    estimator: str = quantity(
-        "", "", "where r_exp is from: the exact motion, or the amplitudes where impacts differ too much for it"
-    )
-    r_th: float = quantity(..., "1", "theoretical restitution of the block as measured, 1 - 2 M b^2 / J")
-    r_th_uncertainty: float = quantity(..., "1", f"{_EXPANDED} of r_th, by the block's sides")
-    ratio: float = quantity(..., "1", "r_exp / r_th, the restitution factor of the block as configured")
-    ratio_uncertainty: float = quantity(..., "1", f"{_EXPANDED} of the ratio, that of r_th apart")
-    r_motion: float | None = quantity(None, "1", "restitution, from the fit of the exact nonlinear motion")
-    r_motion_uncertainty: float | None = quantity(None, "1", f"{_EXPANDED} of r_motion")
-    r_amplitudes: float = quantity(..., "1", "restitution, from the sizes of the swings alone")
-    r_amplitudes_uncertainty: float = quantity(..., "1", f"{_EXPANDED} of r_amplitudes")
-    trend: float = quantity(..., "1", "change of r from impacts of no speed to that of a fall from the critical angle")
-    trend_uncertainty: float = quantity(..., "1", f"{_EXPANDED} of the trend")
-    alpha_rad: float = quantity(..., "rad", "critical angle that the motion shows")
-    alpha_uncertainty_rad: float = quantity(..., "rad", f"{_EXPANDED} of alpha_rad, by the laser's scale above all")
-    alpha_sides_rad: float = quantity(..., "rad", "critical angle by the block's sides, atan(b / h_b)")
-    alpha_sides_uncertainty_rad: float = quantity(..., "rad", f"{_EXPANDED} of alpha_sides_rad")
-    p_rad_s: float = quantity(..., "rad/s", "frequency parameter that the motion shows")
-    p_uncertainty_rad_s: float = quantity(..., "rad/s", f"{_EXPANDED} of p_rad_s")
-    p_sides_rad_s: float = quantity(..., "rad/s", "frequency parameter of a uniform block with these sides")
-    p_sides_uncertainty_rad_s: float = quantity(..., "rad/s", f"{_EXPANDED} of p_sides_rad_s")
-    residual_m: float = quantity(..., "m", "root mean square of what the fit leaves of the displacement")
-    push: float | None = quantity(
-        None, "1", "by how much the block was pushed: tilt of a release from rest over the hand's"
-    )
-    birge: float | None = quantity(None, "1", "scatter of the tilts' r_motion over what their uncertainties let expect")
-    uncertainty_parts: str = quantity("", "", "standard uncertainty of r_exp by contribution, JSON object")
-    remarks: str = quantity("", "", "what was noticed")
 
 
 def point(

@@ -8,6 +8,7 @@
 
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from math import degrees
 
 import numpy as np
@@ -19,17 +20,18 @@ from bench.analysis.free_rocking.swings import NotRocking, Seen
 from bench.analysis.free_rocking.tilt import PUSH, Tilt, analysed
 from bench.analysis.signals import LASER_2
 from bench.config.model import BenchConfiguration
-from bench.engine.steps import Arm, Handle, Outcome, Plan, Play, Played, RampOut, Say, Step
+from bench.engine.steps import Arm, Handle, Outcome, Play, Played, RampOut, Say, Step
 from bench.events import Event, PointFinished, Progress, SpecimenIdentified, StepStarted, Warned
 from drivers.rig import Handwork
 from protocols.common.calibrate import Unmeasurable
-from protocols.free_rocking.identified import identified_of
-from protocols.free_rocking.parameters import FreeRockingParameters
+from protocols.free_rocking.fits import fits_of
 from protocols.free_rocking.planned import planned_tilts, recording_time, seen_displacement
-from protocols.free_rocking.point import ALL, doubts, point
-from protocols.free_rocking.told import fits_of
+from protocols.free_rocking.point import doubts, point
+from protocols.free_rocking.protocol import ALL, FreeRockingParameters
 from sim.errors import RockbenchError
-from sim.identified import Identified
+from sim.free_rocking import theoretical_restitution
+from sim.identified import Finding, Identified
+from sim.specimen import Block
 
 Array = NDArray[np.float64]
 
@@ -58,7 +60,9 @@ class Bench:
     identified: Identified | None = None
 
 
-def free_rocking_plan(parameters: FreeRockingParameters, configuration: BenchConfiguration, bench: Bench) -> Plan:
+def free_rocking_plan(
+    parameters: FreeRockingParameters, configuration: BenchConfiguration, bench: Bench
+) -> Generator[Step, Outcome, None]:
     """The whole run as steps; `bench` is kept up to date."""
     specimen = configuration.specimen
     bench.locked = True
@@ -210,7 +214,7 @@ def _combined(
         yield Say(Warned(doubt))
     yield Say(PointFinished(row.model_copy(update={"remarks": "; ".join(found)})))
     block, known = configuration.specimen.block, configuration.identified
-    bench.identified = identified_of(bench.found, len(bench.tilts), block, known)
+    bench.identified = _identified_of(bench.found, len(bench.tilts), block, known)
     yield Say(SpecimenIdentified(bench.identified))
 
 
@@ -221,3 +225,21 @@ def _findings(tilts: Sequence[Tilt], parameters: FreeRockingParameters, configur
 def _laser(configuration: BenchConfiguration) -> LaserErrors:
     """By the data sheet: a calibration is of displacements of the storeys, from where they rest."""
     return LaserErrors(configuration.sensors.accuracy, configuration.laser_ranges[1])
+
+
+def _identified_of(found: Findings, tilts: int, block: Block, known: Identified | None) -> Identified:
+    """What is known of the specimen with the restitution of `block`, over that of its sides as configured.
+
+    The factor holds with these sides only, so the finding says them, and the restitution itself.
+    """
+    theory, r = theoretical_restitution(block), found.restitution
+    by = "sizes of the swings" if found.by_amplitudes else "exact motion"
+    sides = f"2b = {2.0 * block.b:.6g} m, 2h_b = {2.0 * block.h_b:.6g} m"
+    finding = Finding(
+        name="restitution_factor",
+        value=r.value / theory,
+        standard_uncertainty=r.uncertainty / theory,
+        source=f"free rocking, {tilts} tilts, by the {by}: r_exp = {r.value:.6f} of a block of {sides}",
+        date=datetime.now(UTC).replace(microsecond=0),
+    )
+    return (known or Identified()).extended([finding])

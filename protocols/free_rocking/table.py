@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from math import degrees, log10
 
 from bench.report.columns import right_aligned
-from protocols.free_rocking.point import ALL, RockingPoint
+from protocols.free_rocking.protocol import ALL, RockingPoint
 
 _TITLES = ("", "tilt", "impacts", "r", "U (k=2)", "r / r_th", "U (k=2)", "r, amplitudes", "U (k=2)", "residual")
 _UNITS = ("", "[deg]", "[1]", "[1]", "[1]", "[1]", "[1]", "[1]", "[1]", "[um]")

@@ -12,7 +12,7 @@ from bench.analysis.free_decay.modal import OMEGA1, XI1
 from bench.analysis.gain import COVERAGE
 from bench.analysis.rounding import plus_minus
 from bench.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION, new_figure, set_grid
-from protocols.free_vibration.results import FrameResult
+from protocols.common.decays.results import FrameResult
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

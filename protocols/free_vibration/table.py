@@ -5,8 +5,8 @@ from math import tau
 
 from bench.analysis.rounding import plus_minus
 from bench.report.columns import right_aligned
-from protocols.free_vibration.point import DecayPoint
-from protocols.free_vibration.results import FrameResult
+from protocols.common.decays.point import DecayPoint
+from protocols.common.decays.results import FrameResult
 
 _TITLES = ("decay", "k1", "k2", "xi1", "xi2", "f1", "f2", "drift", "residual", "xi1 over drift")
 _UNITS = ("", "[N/m]", "[N/m]", "[%]", "[%]", "[Hz]", "[Hz]", "[mm]", "[um]", "[%/mm]")

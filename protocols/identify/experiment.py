@@ -1,80 +1,135 @@
-"""The identification as a session takes it."""
+"""The identification on a bench: its level and demands, its plan, and the response in thirds of an octave."""
 
-from collections.abc import Sequence
-from pathlib import Path
+from collections.abc import Iterator, Sequence
+from functools import cached_property
+from math import ceil, degrees, floor, log2
 
 import numpy as np
 
+from bench.analysis.gain import COVERAGE
 from bench.config.model import BenchConfiguration
 from bench.control.table_model import TableModel
-from bench.engine.steps import Plan
-from bench.preflight.forecast import Forecast
-from bench.progress import Progress, silent
+from bench.engine.steps import Say
+from bench.events import PointFinished
+from bench.preflight.asked import UNKNOWN_SHAKER
+from bench.preflight.bounds import bounds
+from bench.preflight.forecast import Demand, Forecast
+from bench.protocol import Plan, Prepared, Result, Sources
 from bench.record.tables import Column, Table
-from protocols.identify.parameters import IdentifyParameters
-from protocols.identify.point import IdentifiedBand
+from bench.report.columns import right_aligned
+from bench.report.style import write_figure
+from protocols.common.identification.level import planned
+from protocols.common.identification.parameters import IdentifyParameters
+from protocols.common.identification.plan import expected_duration, identified
+from protocols.identify.figure import response_figure
+from protocols.identify.protocol import IdentifiedBand
 from sim.parameters import Parameters
 
+_UNKNOWN = {
+    "drive_voltage": "nothing is known of this table: the probes find out, within limits.drive_voltage",
+    "drive_slew": "nothing is known of this table: the probes find out, within limits.drive_slew",
+    **UNKNOWN_SHAKER,
+}
 
-class Identification:
-    """The table's response to its drive, as a file that other runs load."""
 
-    name = "identify"
-    figure_name = "table_response.png"
-    kept_name = "table_model.json"
-    point_type: type[Parameters] = IdentifiedBand
+class Identification(Prepared[IdentifyParameters]):
+    """The table's response to its drive, as a file that other runs load. Refuses a band that this bench cannot make."""
 
-    def __init__(self, parameters: IdentifyParameters) -> None:
-        self.parameters = parameters
+    def __init__(
+        self, parameters: IdentifyParameters, configuration: BenchConfiguration, stored: Sources | None = None
+    ) -> None:
+        super().__init__(parameters, configuration, stored)
+        self._found = planned(parameters, configuration)
         self._model: TableModel | None = None
 
-    def check(self, configuration: BenchConfiguration) -> None:
-        """Raise InvalidInput for a band that this bench cannot make."""
-        from protocols.identify.level import planned
+    @cached_property
+    def forecast(self) -> Forecast:
+        """The demands of the strongest multisine: its motions are known beforehand, and linear."""
+        self.progress("predicting what the run asks of the bench")
+        found = self._found
+        where = f"a multisine of {found.level:.3g} m/s2"
+        demands = [
+            Demand(quantity, found.asked[quantity], None, where)
+            if quantity in found.asked
+            else Demand(quantity, None, None, _UNKNOWN[quantity])
+            for quantity in bounds(self.configuration)
+        ]
+        return Forecast(demands=tuple(demands), duration=expected_duration(self.parameters, found))
 
-        planned(self.parameters, configuration)
-
-    def preflight(self, configuration: BenchConfiguration, progress: Progress = silent) -> Forecast:
-        """The most that is asked of every limited quantity."""
-        from protocols.identify.preflight import forecast
-
-        progress("predicting what the run asks of the bench")
-        return forecast(self.parameters, configuration)
-
-    def predict(self, configuration: BenchConfiguration) -> Table:
+    @cached_property
+    def prediction(self) -> Table:
         """The motion that is wanted of the table, line by line."""
-        from protocols.identify.level import planned
-
-        found = planned(self.parameters, configuration)
-        peak = np.abs(found.motions[0])
+        peak = np.abs(self._found.motions[0])
         return {
-            "frequency": Column(found.grid.frequency, "Hz", "lines of the multisines"),
+            "frequency": Column(self._found.grid.frequency, "Hz", "lines of the multisines"),
             "acceleration": Column(peak, "m/s2", "amplitude of the table's acceleration that is asked for"),
         }
 
-    def plan(self, configuration: BenchConfiguration) -> Plan:
-        """The lab sheet."""
-        from protocols.identify.sheet import identify_plan
+    def plan(self) -> Plan:
+        self._model = None
+        self._model = yield from identified(self.parameters, self.configuration, self._found)
+        points = list(thirds(self._model))
+        for point in points:
+            yield Say(PointFinished(point))
+        return self.result(points)
 
-        def keep(model: TableModel) -> None:
-            self._model = model
+    def result(self, points: Sequence[Parameters]) -> Result:
+        model = self._model
+        return Result(
+            points=tuple(points),
+            text=_table([point for point in points if isinstance(point, IdentifiedBand)]),
+            figures={"table_response.png": lambda path: write_figure(path, response_figure(model))},
+            files={} if model is None else {"table_model.json": model.write},
+        )
 
-        return identify_plan(self.parameters, configuration, keep)
 
-    def keep(self, path: Path) -> None:
-        """Write the identified table for other runs, if it was identified."""
-        if self._model is not None:
-            self._model.write(path)
+def thirds(model: TableModel) -> Iterator[IdentifiedBand]:
+    """The model in thirds of an octave around 1 Hz times powers of 2^(1/3); those without a line are left out."""
+    frequency = np.array(model.frequency)
+    response = np.array(model.real) + 1j * np.array(model.imaginary)
+    low, high = model.band
+    for number in range(floor(3.0 * log2(low)), ceil(3.0 * log2(high)) + 1):
+        middle = 2.0 ** (number / 3.0)
+        inside = (frequency >= middle * 2.0 ** (-1.0 / 6.0)) & (frequency < middle * 2.0 ** (1.0 / 6.0))
+        if not inside.any():
+            continue
+        gain = _rms(np.abs(response[inside]))
+        nearest = int(np.argmin(np.abs(frequency - middle)))
+        yield IdentifiedBand(
+            frequency_hz=middle,
+            gain_m_s2_v=gain,
+            phase_rad=float(np.angle(response[nearest])),
+            uncertainty=COVERAGE * _rms(np.array(model.uncertainty)[inside]) / gain,
+            distortion=_rms(np.array(model.distortion)[inside]) / gain,
+            noise_m_s2_hz=_rms(np.array(model.noise)[inside]),
+            coherence=float(np.array(model.coherence)[inside].min()),
+            lines=int(np.count_nonzero(inside)),
+        )
 
-    def table(self, points: Sequence[Parameters]) -> str:
-        """The response in thirds of an octave."""
-        from protocols.identify.table import bands_table
 
-        return bands_table([point for point in points if isinstance(point, IdentifiedBand)])
+def _rms(values: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> float:
+    return float(np.sqrt(np.mean(values**2)))
 
-    def figure(self, points: Sequence[Parameters], prediction: Table, path: Path) -> None:  # noqa: ARG002
-        """Every line of the response, and what is uncertain about it."""
-        from bench.report.style import write_figure
-        from protocols.identify.figure import response_figure
 
-        write_figure(path, response_figure(self._model))
+_TITLES = ("frequency", "gain", "phase", "U (k=2)", "distortion", "noise", "coherence", "lines")
+_UNITS = ("[Hz]", "[m/s2/V]", "[deg]", "[%]", "[%]", "[m/s2/Hz^0.5]", "[1]", "[1]")
+
+
+def _table(points: Sequence[IdentifiedBand]) -> str:
+    """One row for each third of an octave."""
+    if not points:
+        return "Nothing was identified."
+    return "\n".join(right_aligned(_TITLES, _UNITS, (_cells(point) for point in points)))
+
+
+def _cells(point: IdentifiedBand) -> tuple[str, ...]:
+    return (
+        f"{point.frequency_hz:.3g}",
+        f"{point.gain_m_s2_v:.4g}",
+        f"{degrees(point.phase_rad):.1f}",
+        f"{100.0 * point.uncertainty:.2g}",
+        f"{100.0 * point.distortion:.2g}",
+        f"{point.noise_m_s2_hz:.2g}",
+        f"{point.coherence:.5f}",
+        f"{point.lines}",
+    )

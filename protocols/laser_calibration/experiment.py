@@ -1,44 +1,50 @@
-"""The laser calibration as a session takes it."""
+"""The laser calibration on a bench: both lasers against one motion, as a file that other runs load."""
 
 from collections.abc import Sequence
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bench.analysis.laser_calibration import LaserCalibration
+from bench.config.calibration_file import write_calibration
 from bench.config.model import BenchConfiguration
-from bench.engine.steps import Plan
-from bench.preflight.forecast import Forecast
-from bench.progress import Progress, silent
+from bench.control.legs import Leg, program
+from bench.preflight.asked import UNKNOWN_SHAKER
+from bench.preflight.bounds import bounds
+from bench.preflight.forecast import Demand, Forecast
+from bench.preflight.load import load
+from bench.preflight.response import response_of
+from bench.protocol import Plan, Prepared, Result, Sources
 from bench.record.tables import Column, Table
-from protocols.laser_calibration.parameters import LaserCalibrationParameters
-from protocols.laser_calibration.point import CalibratedSensor
+from bench.report.style import write_figure
+from protocols.laser_calibration.figure import errors_figure
+from protocols.laser_calibration.fit import Fitted
+from protocols.laser_calibration.protocol import CalibratedSensor, LaserCalibrationParameters
+from protocols.laser_calibration.sheet import START, calibration_plan, expected_duration, passes_of
+from protocols.laser_calibration.table import sensors_table
 from sim.errors import InvalidInput
 from sim.parameters import Parameters
-
-if TYPE_CHECKING:
-    from protocols.laser_calibration.fit import Fitted
 
 MARGIN = 1.05
 """Share of the amplitude that must be allowed: the drive is calibrated below it."""
 
+_UNKNOWN = {
+    "drive_voltage": "nothing is known of this table: the probes find out, within limits.drive_voltage",
+    "drive_slew": "nothing is known of this table: the probes find out, within limits.drive_slew",
+    **UNKNOWN_SHAKER,
+}
 
-class LasersCalibrated:
-    """Both lasers against one motion, as a file that other runs load."""
 
-    name = "laser-calibration"
-    figure_name = "laser_errors.png"
-    kept_name = "laser_calibration.json"
-    point_type: type[Parameters] = CalibratedSensor
+class LaserCalibrationRun(Prepared[LaserCalibrationParameters]):
+    """Refuses lasers that do not see the table, and motions that the bench does not allow."""
 
-    def __init__(self, parameters: LaserCalibrationParameters) -> None:
-        self.parameters = parameters
+    def __init__(
+        self, parameters: LaserCalibrationParameters, configuration: BenchConfiguration, stored: Sources | None = None
+    ) -> None:
+        super().__init__(parameters, configuration, stored)
         self._found: LaserCalibration | None = None
         self._curves: tuple[Fitted, Fitted] | None = None
-
-    def check(self, configuration: BenchConfiguration) -> None:
-        """Raise InvalidInput for lasers that do not see the table, and for motions that the bench does not allow."""
         p, limits = self.parameters, configuration.limits
         if configuration.laser_reference != "ground":
             raise InvalidInput(
@@ -65,48 +71,63 @@ class LasersCalibrated:
                 needs = f"{p.amplitude:g} m needs {value:.3g} {unit} there, limits.{quantity} = {most:g} {unit}"
                 raise InvalidInput("omega", p.omega, needs)
 
-    def preflight(self, configuration: BenchConfiguration, progress: Progress = silent) -> Forecast:
-        """The most that is asked of every limited quantity."""
-        from protocols.laser_calibration.preflight import forecast
+    @cached_property
+    def forecast(self) -> Forecast:
+        """The demands of the largest pass: sines of the table with the clamped storeys as a rigid load."""
+        self.progress("predicting what the run asks of the bench")
+        amplitude, omega, frame = (
+            self.parameters.amplitude,
+            self.parameters.omega,
+            self.configuration.known_specimen.frame,
+        )
+        duration = expected_duration(self.parameters)
+        level = amplitude * omega**2
+        asked = load(
+            program((Leg(START, level, omega), Leg(duration, level, omega))),
+            START,
+            duration,
+            payload=frame.m1 + frame.m2,
+            mover=self.configuration.mover,
+            response=response_of(self.configuration),
+            heating_time=self.configuration.limits.heating_time,
+        )
+        halves = [0.5 * whole for whole in self.configuration.laser_ranges]
+        asked |= {"laser_1": amplitude / halves[0], "laser_2": amplitude / halves[1], "drift": 0.0}
+        where = f"the pass of {1e3 * amplitude:.1f} mm"
+        demands = [
+            Demand(quantity, asked[quantity], None, where)
+            if quantity in asked
+            else Demand(quantity, None, None, _UNKNOWN[quantity])
+            for quantity in bounds(self.configuration)
+        ]
+        return Forecast(demands=tuple(demands), duration=duration)
 
-        progress("predicting what the run asks of the bench")
-        return forecast(self.parameters, configuration)
-
-    def predict(self, configuration: BenchConfiguration) -> Table:  # noqa: ARG002
+    @cached_property
+    def prediction(self) -> Table:
         """The passes that are asked for."""
-        from protocols.laser_calibration.sheet import passes_of
-
         omega, amplitude = np.array(passes_of(self.parameters)).T
         return {
             "omega": Column(omega, "rad/s", "circular frequency of each pass"),
             "amplitude": Column(amplitude, "m", "amplitude of the table in it"),
         }
 
-    def plan(self, configuration: BenchConfiguration) -> Plan:
-        """The lab sheet."""
-        from protocols.laser_calibration.sheet import calibration_plan
+    def plan(self) -> Plan:
+        self._found = self._curves = None
+        return self.collected(calibration_plan(self.parameters, self.configuration, self._keep))
 
-        def keep(found: LaserCalibration, curves: "tuple[Fitted, Fitted]") -> None:
-            self._found, self._curves = found, curves
+    def result(self, points: Sequence[Parameters]) -> Result:
+        found, curves = self._found, self._curves
 
-        return calibration_plan(self.parameters, configuration, keep)
+        def write(path: Path) -> None:
+            if found is not None:
+                write_calibration(path, found)
 
-    def keep(self, path: Path) -> None:
-        """Write the calibration for other runs, if there is one."""
-        if self._found is not None:
-            from bench.config.calibration_file import write_calibration
+        return Result(
+            points=tuple(points),
+            text=sensors_table([point for point in points if isinstance(point, CalibratedSensor)]),
+            figures={"laser_errors.png": lambda path: write_figure(path, errors_figure(curves))},
+            files={} if found is None else {"laser_calibration.json": write},
+        )
 
-            write_calibration(path, self._found)
-
-    def table(self, points: Sequence[Parameters]) -> str:
-        """One row for each sensor."""
-        from protocols.laser_calibration.table import sensors_table
-
-        return sensors_table([point for point in points if isinstance(point, CalibratedSensor)])
-
-    def figure(self, points: Sequence[Parameters], prediction: Table, path: Path) -> None:  # noqa: ARG002
-        """The lasers' errors over their readings."""
-        from bench.report.style import write_figure
-        from protocols.laser_calibration.figure import errors_figure
-
-        write_figure(path, errors_figure(self._curves))
+    def _keep(self, found: LaserCalibration, curves: tuple[Fitted, Fitted]) -> None:
+        self._found, self._curves = found, curves

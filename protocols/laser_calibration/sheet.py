@@ -25,18 +25,17 @@ from bench.engine.steps import (
     Listen,
     Measured,
     Outcome,
-    Plan,
     RampOut,
     Say,
     Step,
 )
 from bench.events import FitFinished, FittedParameter, PointFinished, Progress, Series, StepStarted
 from drivers.rig import Handwork
-from protocols.check.probe import probed_drive
 from protocols.common.calibrate import SETTLING, Unmeasurable, calibrate_drive, need_cycles
+from protocols.common.probe import probed_drive
 from protocols.laser_calibration.fit import Fitted, Pass, calibration, fitted, one_pass
-from protocols.laser_calibration.parameters import LaserCalibrationParameters
-from protocols.laser_calibration.point import sensors
+from protocols.laser_calibration.protocol import LaserCalibrationParameters
+from protocols.laser_calibration.sensors import sensors
 
 REST = 2.0
 """Time at rest over which the lasers' readings there, and the zero of the signals, are taken [s]."""
@@ -86,7 +85,7 @@ def calibration_plan(
     parameters: LaserCalibrationParameters,
     configuration: BenchConfiguration,
     keep: Callable[[LaserCalibration, tuple[Fitted, Fitted]], None],
-) -> Plan:
+) -> Generator[Step, Outcome, None]:
     """The whole calibration as steps; `keep` is given what was found."""
     bare = configuration.known_specimen.bare()
     yield Handle(Handwork.LOCK_FRAME, bare, _CLAMP)

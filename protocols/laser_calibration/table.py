@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from bench.report.columns import right_aligned
-from protocols.laser_calibration.point import CalibratedSensor
+from protocols.laser_calibration.protocol import CalibratedSensor
 
 _TITLES = ("sensor", "scale - 1", "U (k=2)", "covered", "order", "largest error", "left, U", "delay")
 _UNITS = ("", "[%]", "[%]", "[mm]", "[1]", "[um]", "[um]", "[ms]")

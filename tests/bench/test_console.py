@@ -32,7 +32,7 @@ from bench.events import (
 )
 from drivers.rig import Block
 from protocols.harmonic.protocol import HarmonicPoint, PointStatus
-from protocols.identify.point import IdentifiedBand
+from protocols.identify.protocol import IdentifiedBand
 from tests.bench.twin_bench import estimate
 
 NAN = float("nan")

@@ -9,8 +9,8 @@ from bench.cli.flags import given
 from bench.config.numbers import read_band, read_number, read_values
 from bench.config.validation import problems, validated
 from bench.prediction.requests import SineRequest
+from protocols.common.identification.parameters import IdentifyParameters
 from protocols.harmonic.protocol import HarmonicParameters
-from protocols.identify.parameters import IdentifyParameters
 from sim.errors import InvalidInput
 from sim.specimen import Frame
 

@@ -24,8 +24,7 @@ from bench.record.tables import Column
 from bench.report.page.document import Listing, Picture, Table
 from drivers.rig import Channel, Handwork
 from protocols.earthquake.live import Watch
-from protocols.earthquake.parameters import EarthquakeParameters
-from protocols.earthquake.point import EarthquakePoint, PointStatus
+from protocols.earthquake.protocol import EarthquakeParameters, EarthquakePoint, PointStatus
 from sim.specimen import Specimen
 from sim.virtual_bench import VirtualBenchParameters
 from tests.loopback import LoopbackRig

@@ -16,7 +16,7 @@ from bench.guard.limits import Debounce, Limits
 from bench.prediction.requests import SineRequest
 from bench.preflight.compiled import compile_run
 from drivers.hardware.parameters import CoilCurrent, Hardware, TableAcceleration, TableDisplacement, TableForce
-from protocols.check.parameters import CheckParameters
+from protocols.check.protocol import CheckParameters
 from protocols.harmonic.protocol import HarmonicParameters
 from sim.errors import InvalidInput
 from sim.specimen import Frame, Specimen, Spring

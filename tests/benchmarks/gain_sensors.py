@@ -13,7 +13,7 @@ from bench.analysis.gain import SensorAccuracy
 from bench.analysis.laser_calibration import LaserCalibration
 from bench.analysis.signals import SignalMap
 from protocols.laser_calibration.fit import calibration, fitted, one_pass
-from protocols.laser_calibration.parameters import LaserCalibrationParameters
+from protocols.laser_calibration.protocol import LaserCalibrationParameters
 from protocols.laser_calibration.sheet import passes_of
 from sim.excitation import SineProgram, Sweep
 from sim.gain import predict_gain

@@ -26,8 +26,8 @@ from bench.analysis.free_rocking.laser_errors import CLOCK, WAVES, LaserErrors
 from bench.analysis.free_rocking.swings import Seen
 from bench.analysis.free_rocking.tilt import Tilt, analysed
 from bench.analysis.gain import SensorAccuracy
-from protocols.free_rocking.parameters import FreeRockingParameters
 from protocols.free_rocking.planned import planned_tilts, recording_time
+from protocols.free_rocking.protocol import FreeRockingParameters
 from sim import block_face
 from sim.arrangement import Arrangement
 from sim.free_rocking import FreeRocking, critical_angle, energy, frequency_parameter, theoretical_restitution

@@ -26,12 +26,11 @@ from bench.analysis.free_decay.response import Constants
 from bench.analysis.sensor_accuracy import SensorAccuracy
 from bench.analysis.signals import SignalMap
 from bench.config.model import BenchConfiguration
+from protocols.common.decays.decays import LETTING_GO, setting_of
+from protocols.common.decays.pulse import QUIET, pulse_of
+from protocols.common.decays.results import result_of
 from protocols.coupling_stiffness.difference import reference_of, spring_of
-from protocols.free_vibration.decays import LETTING_GO
-from protocols.free_vibration.parameters import FreeVibrationParameters
-from protocols.free_vibration.pulse import QUIET, pulse_of
-from protocols.free_vibration.results import result_of
-from protocols.free_vibration.sheet import setting_of
+from protocols.free_vibration.protocol import FreeVibrationParameters
 from sim.arrangement import Arrangement
 from sim.sensors import Laser
 from sim.specimen import Frame, Specimen

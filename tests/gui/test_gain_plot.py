@@ -13,8 +13,8 @@ from bench.gui.gain_lines import lines_of, mark_of
 from bench.gui.gain_plot import GainPlot
 from bench.gui.palette import DARK, LIGHT
 from bench.record.tables import Column, Table
-from protocols.earthquake.point import EarthquakePoint
-from protocols.earthquake.point import PointStatus as Ended
+from protocols.earthquake.protocol import EarthquakePoint
+from protocols.earthquake.protocol import PointStatus as Ended
 from protocols.harmonic.protocol import HarmonicPoint, PointStatus
 
 RECORDS: Table = {

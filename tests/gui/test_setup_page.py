@@ -10,6 +10,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFileDialog, QTreeWidgetItem
 from pytestqt.qtbot import QtBot
 
+from bench.analysis.check_line import CheckLine, judged, stated
 from bench.catalogue import load_protocol
 from bench.config.dump import as_toml
 from bench.config.model import BenchConfiguration
@@ -20,7 +21,6 @@ from bench.gui import texts
 from bench.gui.configuration_tree import ConfigurationTree
 from bench.gui.window import Window
 from bench.link.messages import Ended, Run, Told
-from protocols.check.line import CheckLine, judged, stated
 from sim.identified import Finding, Identified
 from tests.gui.conftest import SpokenLink
 from tests.link.experiment import bench, order

@@ -13,9 +13,8 @@ from bench.cli.main import main
 from bench.config.toml import read_configuration
 from bench.engine.steps import Arm, Done, Play, Say
 from bench.events import PointFinished
-from protocols.earthquake.histories import Histories
-from protocols.earthquake.parameters import EarthquakeParameters
-from protocols.earthquake.sheet import EarthquakeSheet
+from protocols.earthquake.campaign import EarthquakeCampaign
+from protocols.earthquake.protocol import EarthquakeParameters
 from sim.specimen import Specimen
 from tests.bench.virtual_table import bench_with, identify
 
@@ -179,8 +178,8 @@ def test_a_record_that_the_table_cannot_make_is_left_out_and_says_so(bench: Path
     configuration = read_configuration(bench)
     tight = configuration.limits.model_copy(update={"drive_voltage": 0.05})
     parameters = EarthquakeParameters(records=("synthetic:kobe",), beta=(0.25, 0.64), table_band="1.5:25")
-    sheet = EarthquakeSheet(parameters, configuration.model_copy(update={"limits": tight}), Histories())
-    plan, steps = sheet.plan(), []
+    prepared = EarthquakeCampaign(parameters, configuration.model_copy(update={"limits": tight}))
+    plan, steps = prepared.plan(), []
     try:
         step = next(plan)
         while True:

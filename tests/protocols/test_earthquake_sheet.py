@@ -17,16 +17,12 @@ from bench.control.target import integrated
 from bench.engine.steps import Arm, Done, Fallen, Handle, Outcome, Play, Played, RampOut, Say, Step
 from bench.events import PointFinished, Progress, StepStarted
 from drivers.rig import Handwork, RigError
-from protocols.earthquake.check import check
-from protocols.earthquake.histories import Histories
+from protocols.common.identification.signal import grid
+from protocols.earthquake.campaign import EarthquakeCampaign
 from protocols.earthquake.pace import Pace
-from protocols.earthquake.parameters import EarthquakeParameters
-from protocols.earthquake.point import EarthquakePoint
-from protocols.earthquake.preflight import forecast
+from protocols.earthquake.protocol import EarthquakeParameters, EarthquakePoint
 from protocols.earthquake.records import shakings
-from protocols.earthquake.sheet import EarthquakeSheet
-from protocols.earthquake.table import identification, identification_time, stored_table, table_for, table_warnings
-from protocols.identify.signal import grid
+from protocols.earthquake.table import TableSource, identification, stored_table, table_for, table_warnings
 from sim.errors import InvalidInput
 from sim.shaker import Shaker
 from sim.virtual_bench import VirtualBenchParameters
@@ -92,7 +88,7 @@ def played_through(
     configuration: BenchConfiguration, parameters: EarthquakeParameters, answer: Answer
 ) -> tuple[list[Step], list[EarthquakePoint]]:
     """Every step of the plan, and its points; `answer` is shown a step and what is being done, None is the usual."""
-    plan = EarthquakeSheet(parameters, configuration, Histories()).plan()
+    plan = EarthquakeCampaign(parameters, configuration).plan()
     steps, doing = list[Step](), ""
     try:
         step = next(plan)
@@ -214,16 +210,17 @@ def test_a_model_with_too_narrow_a_band_is_refused(
 
 def test_a_model_of_something_else_than_the_bare_frame_is_told(stored: Callable[..., BenchConfiguration]) -> None:
     other = stored(specimen="block with the spring of beta = 0.97")
-    (said,) = forecast(ONE, other).warnings
+    (said,) = EarthquakeCampaign(ONE, other).forecast.warnings
     assert "'block with the spring of beta = 0.97' on the table" in said
     Path(other.table_model or "").unlink()
-    assert table_warnings(ONE, stored()) == ()
+    configuration = stored()
+    assert table_warnings(ONE, configuration, stored_table(ONE, configuration)) == ()
 
 
 def test_a_mode_below_the_band_is_told() -> None:
     """The paper's frame has its first mode at 1.006 Hz; 1.6 times that is where a record's band may begin."""
     for low, told in ((1.6, 0), (1.62, 1)):
-        found = table_warnings(ONE.model_copy(update={"table_band": f"{low}:25"}), BenchConfiguration())
+        found = table_warnings(ONE.model_copy(update={"table_band": f"{low}:25"}), BenchConfiguration(), None)
         assert len(found) == told
         assert all("first mode at 1.01 Hz lies below" in warning for warning in found)
 
@@ -235,36 +232,37 @@ def test_the_identification_is_planned_beforehand_down_to_any_band() -> None:
         return ONE.model_copy(update={"table_band": f"{low:g}:25"}), BenchConfiguration(simulation=simulated)
 
     asked, low = reaching(0.2)
-    check(asked, low)
+    EarthquakeCampaign(asked, low)
     wanted = identification(asked, low)
     f = grid(wanted, low, low.specimen.bare()).frequency
     assert f[0] <= 0.1
     assert np.sum((f >= 0.1) & (f < 0.2)) >= 4
     assert identification(ONE, low).period == 8.0
     with pytest.raises(InvalidInput, match=r"from 0\.0667 Hz"):
-        check(*reaching(0.05))
+        EarthquakeCampaign(*reaching(0.05))
 
 
 def test_the_forecast_holds_the_identification_and_what_was_made_of_each_record(
     stored: Callable[..., BenchConfiguration],
 ) -> None:
     configuration = BenchConfiguration()
-    found, known = forecast(ONE, configuration), forecast(ONE, stored())
+    campaign = EarthquakeCampaign(ONE, configuration)
+    found, known = campaign.forecast, EarthquakeCampaign(ONE, stored()).forecast
     assert found.stages[0].name == "the identification of the table"
     assert [stage.name for stage in found.stages[1:]] == [stage.name for stage in known.stages]
-    longer = identification_time(ONE, configuration)
+    longer = campaign.table.duration
     assert (found.duration or 0.0) - (known.duration or 0.0) == pytest.approx(longer)
     assert longer > 3 * 3 * 8.0
     (note,) = found.notes
     assert note.startswith("synthetic kobe: ")
-    assert all(step in note for step in shakings(ONE, configuration)[0].prepared.steps)
+    assert all(step in note for step in campaign.shakings[0].prepared.steps)
 
 
 def test_an_identification_counts_in_the_campaigns_progress() -> None:
     configuration = BenchConfiguration()
-    seconds = identification_time(ONE, configuration)
-    pace = Pace(ONE, shakings(ONE, configuration), seconds)
-    plan = table_for(ONE, configuration, pace)
+    source = TableSource.of(ONE, configuration, None)
+    pace = Pace(ONE, shakings(ONE, configuration), source.duration)
+    plan = table_for(source, configuration, pace)
     step = next(plan)
     while not isinstance(step, Play):
         step = plan.send(Done())

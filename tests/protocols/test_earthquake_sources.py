@@ -9,8 +9,8 @@ from bench.accelerograms.accelerogram import Accelerogram
 from bench.control.table_model import TableModel
 from bench.record.reader import open_record
 from bench.record.recorder import Recorder
-from protocols.earthquake.point import EarthquakePoint
-from protocols.earthquake.sources import Sources
+from protocols.earthquake.protocol import EarthquakePoint
+from protocols.earthquake.sources import FileSources
 from tests.loopback import LoopbackRig
 
 
@@ -27,7 +27,7 @@ def model() -> TableModel:
     return TableModel(date=date, specimen="bare frame", sample_rate=2000.0, level=0.1, frequency=lines, **values)
 
 
-def through_a_file(path: Path, sources: Sources) -> Sources | None:
+def through_a_file(path: Path, sources: FileSources) -> FileSources | None:
     rig = LoopbackRig()
     recorder = Recorder(
         path,
@@ -39,11 +39,11 @@ def through_a_file(path: Path, sources: Sources) -> Sources | None:
     )
     recorder.close("completed")
     with open_record(path) as kept:
-        return Sources.stored(kept.tables)
+        return FileSources.stored(kept.tables)
 
 
 def test_records_and_table_model_come_back_to_the_last_bit(tmp_path: Path) -> None:
-    made = Sources((record("Newhall", 1000, 0.02, False), record("ä b", 377, 1.0 / 3.0, True)), model())
+    made = FileSources((record("Newhall", 1000, 0.02, False), record("ä b", 377, 1.0 / 3.0, True)), model())
     found = through_a_file(tmp_path / "run.h5", made)
     assert found is not None
     assert found.table == made.table
@@ -54,7 +54,7 @@ def test_records_and_table_model_come_back_to_the_last_bit(tmp_path: Path) -> No
 
 
 def test_a_file_of_before_has_none_and_a_campaign_without_a_model_has_no_model(tmp_path: Path) -> None:
-    assert Sources.stored({}) is None
-    found = through_a_file(tmp_path / "run.h5", Sources((record("a", 5, 0.01, True),), None))
+    assert FileSources.stored({}) is None
+    found = through_a_file(tmp_path / "run.h5", FileSources((record("a", 5, 0.01, True),), None))
     assert found is not None
     assert found.table is None

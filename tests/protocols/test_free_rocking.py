@@ -20,9 +20,8 @@ from bench.publication.free_rocking import rocking_section
 from bench.record.reader import open_record
 from bench.results import FILE
 from bench.session import SessionResult, run_session
-from protocols.free_rocking.parameters import FreeRockingParameters
 from protocols.free_rocking.planned import planned_tilts, seen_displacement
-from protocols.free_rocking.point import ALL, RockingPoint
+from protocols.free_rocking.protocol import ALL, FreeRockingParameters, RockingPoint
 from sim.errors import InvalidInput
 from sim.free_rocking import critical_angle
 from sim.sensors import FilterUnit, Laser

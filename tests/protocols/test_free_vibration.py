@@ -28,9 +28,9 @@ from bench.report.page.document import Picture, Table
 from bench.results import FILE
 from bench.session import SessionResult, run_session
 from protocols.common.calibrate import Unmeasurable
-from protocols.coupling_stiffness.parameters import CouplingStiffnessParameters
-from protocols.free_vibration.parameters import FreeVibrationParameters
-from protocols.free_vibration.pulse import SHARE, planned
+from protocols.common.decays.pulse import SHARE, planned
+from protocols.coupling_stiffness.protocol import CouplingStiffnessParameters
+from protocols.free_vibration.protocol import FreeVibrationParameters
 from sim.errors import InvalidInput
 from sim.identified import Correlation, Finding, Identified
 from sim.parameters import Parameters
@@ -249,7 +249,7 @@ def test_a_run_that_fails_does_not_leave_the_table_clamped(tmp_path: Path, monke
     def useless(*_: object) -> None:
         raise Unusable("nothing was seen")
 
-    monkeypatch.setattr("protocols.free_vibration.decays.released_decay", useless)
+    monkeypatch.setattr("protocols.common.decays.decays.released_decay", useless)
     parameters = FreeVibrationParameters(excitation="hand", repeats=1, window=5.0)
     result, events = run(parameters, bench(), tmp_path / "run")
     assert "no decay could be used" in result.reason
@@ -263,7 +263,7 @@ def test_a_spring_that_fails_does_not_leave_its_block_clamped(monkeypatch: pytes
         raise Unmeasurable("no decay could be used")
         yield
 
-    monkeypatch.setattr("protocols.coupling_stiffness.sheet._decays", useless)
+    monkeypatch.setattr("protocols.coupling_stiffness.experiment.CouplingStiffness._decays", useless)
     springs, asked = prepared(KNOWN_REFERENCE, bench(identified=KNOWN)), []
     with pytest.raises(Unmeasurable):
         asked.extend(springs.plan())

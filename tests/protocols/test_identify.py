@@ -23,11 +23,11 @@ from bench.preflight.response import response_of
 from bench.record.reader import open_record
 from bench.results import FILE
 from bench.session import SessionResult, run_session
-from protocols.identify.level import BLOCK_SHARE, SHARE, planned
-from protocols.identify.motion import RESTING, largest
-from protocols.identify.parameters import IdentifyParameters
-from protocols.identify.point import IdentifiedBand
-from protocols.identify.signal import grid
+from protocols.common.identification.level import BLOCK_SHARE, SHARE, planned
+from protocols.common.identification.motion import RESTING, largest
+from protocols.common.identification.parameters import IdentifyParameters
+from protocols.common.identification.signal import grid
+from protocols.identify.protocol import IdentifiedBand
 from sim.errors import InvalidInput
 from sim.excitation import SampledRecord
 from sim.linear import frame_matrices

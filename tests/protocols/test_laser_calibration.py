@@ -19,7 +19,7 @@ from bench.config.toml import read_configuration
 from bench.record.reader import open_record
 from drivers.rig import Channel
 from protocols.laser_calibration.fit import Pass, calibration, fitted
-from protocols.laser_calibration.parameters import LaserCalibrationParameters
+from protocols.laser_calibration.protocol import LaserCalibrationParameters
 from sim.errors import InvalidInput
 
 PROTOCOL = load_protocol("laser-calibration")

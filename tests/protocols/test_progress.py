@@ -10,12 +10,12 @@ from bench.engine.operator import Unattended
 from bench.engine.requests import Requests
 from bench.events import Event, Progress
 from bench.session import run_session
-from protocols.check.parameters import CheckParameters
-from protocols.coupling_stiffness.parameters import CouplingStiffnessParameters
-from protocols.free_rocking.parameters import FreeRockingParameters
-from protocols.free_vibration.parameters import FreeVibrationParameters
-from protocols.identify.parameters import IdentifyParameters
-from protocols.laser_calibration.parameters import LaserCalibrationParameters
+from protocols.check.protocol import CheckParameters
+from protocols.common.identification.parameters import IdentifyParameters
+from protocols.coupling_stiffness.protocol import CouplingStiffnessParameters
+from protocols.free_rocking.protocol import FreeRockingParameters
+from protocols.free_vibration.protocol import FreeVibrationParameters
+from protocols.laser_calibration.protocol import LaserCalibrationParameters
 from sim.parameters import Parameters
 from sim.virtual_bench import VirtualBenchParameters
 

@@ -25,9 +25,9 @@ from bench.record.reader import open_record
 from bench.record.recorder import Recorder
 from drivers.rig import Rig
 from drivers.simulated import SimulatedRig
+from protocols.common.identification.motion import RESTING, largest
 from protocols.common.replicate import Replicated, replicate
-from protocols.identify.motion import RESTING, largest
-from protocols.identify.point import IdentifiedBand
+from protocols.identify.protocol import IdentifiedBand
 from sim.specimen import Frame, Specimen
 from sim.virtual_bench import VirtualBenchParameters
 from tests.bench.virtual_table import RATE, bench_with, earthquake, identify, target_of

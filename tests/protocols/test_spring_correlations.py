@@ -5,10 +5,10 @@ import pytest
 from numpy.typing import NDArray
 
 from bench.analysis.free_decay.combine import Combined
+from protocols.common.decays.findings import findings_of
+from protocols.common.decays.results import FrameResult
 from protocols.coupling_stiffness.difference import known_reference, reference_of, replaces, spring_of
-from protocols.coupling_stiffness.told import spring_findings
-from protocols.free_vibration.results import FrameResult
-from protocols.free_vibration.told import findings_of
+from protocols.coupling_stiffness.findings import spring_findings
 from sim.identified import Identified
 
 Array = NDArray[np.float64]

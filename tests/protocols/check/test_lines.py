@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from bench.analysis.check_line import CheckLine, Verdict
 from bench.analysis.gain import SensorAccuracy
 from bench.config.model import BenchConfiguration
 from bench.engine.steps import Heard
@@ -10,8 +11,7 @@ from drivers.hardware.parameters import Hardware, Lasers
 from drivers.rig import Channel
 from protocols.check.delays import allowed_delay, delay_lines
 from protocols.check.drive import dead_time, drive_lines
-from protocols.check.line import CheckLine, Verdict
-from protocols.check.parameters import CheckParameters
+from protocols.check.protocol import CheckParameters
 from protocols.check.resting import resting_lines
 from protocols.check.scales import scale_lines, signed_scale
 from protocols.check.sines import Sines

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from bench.analysis.check_line import Verdict
 from bench.catalogue import load_protocol
 from bench.config.model import Acquisition, BenchConfiguration
 from bench.engine.operator import Unattended
@@ -18,8 +19,7 @@ from drivers.daqmx.parameters import Daq
 from drivers.emulation.laboratory import Laboratory
 from drivers.hardware.parameters import Hardware
 from drivers.laboratory_client import ask
-from protocols.check.line import Verdict
-from protocols.check.parameters import CheckParameters
+from protocols.check.protocol import CheckParameters
 from protocols.check.safety import safety_lines
 from sim.specimen import Specimen
 from sim.virtual_bench import VirtualBenchParameters

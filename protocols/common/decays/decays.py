@@ -11,11 +11,12 @@ from bench.engine.steps import Handle, Outcome, Say, Step
 from bench.events import PointFinished, StepStarted, Warned
 from drivers.rig import Handwork
 from protocols.common.calibrate import Unmeasurable
-from protocols.free_vibration.parameters import DecayParameters, FreeVibrationParameters
-from protocols.free_vibration.playing import WAITING, Pace, found_level, played
-from protocols.free_vibration.pulse import QUIET, Planned, Pulse, window_of
-from protocols.free_vibration.results import FrameResult, point_of, result_of
-from protocols.free_vibration.told import fit_finished
+from protocols.common.decays.findings import fit_finished
+from protocols.common.decays.masses import masses_weighed
+from protocols.common.decays.parameters import DecayParameters
+from protocols.common.decays.playing import WAITING, Pace, found_level, played
+from protocols.common.decays.pulse import QUIET, Planned, Pulse, window_of
+from protocols.common.decays.results import FrameResult, point_of, result_of
 from sim.parameters import Parameters
 from sim.specimen import Specimen
 
@@ -61,9 +62,9 @@ def pulsed_decays(
 
 
 def released_decays(
-    parameters: FreeVibrationParameters, specimen: Specimen, setting: Setting, pace: Pace
+    parameters: DecayParameters, pull: float, specimen: Specimen, setting: Setting, pace: Pace
 ) -> Generator[Step, Outcome, list[Decay]]:
-    pull, window = parameters.pull, window_of(parameters, specimen)
+    window = window_of(parameters, specimen)
     silence = np.zeros(round((LETTING_GO + window) * setting.sample_rate))
 
     def once(activity: str) -> Generator[Step, Outcome, Decay]:
@@ -116,6 +117,24 @@ def _repeated(
 def probing_duration(pulse: Pulse) -> float:
     """Expected time of the probes before the decays [s]."""
     return PROBES * (pulse.begin + WAITING)
+
+
+def setting_of(parameters: DecayParameters, configuration: BenchConfiguration) -> Setting:
+    """What is known before the first decay. Masses that are identified have the uncertainty that goes with them."""
+    frame = configuration.known_specimen.frame
+    return Setting(
+        sample_rate=configuration.sample_rate,
+        ranges=configuration.laser_ranges,
+        on_table=configuration.laser_reference == "table",
+        accuracy=configuration.analysis,
+        masses=(frame.m1, frame.m2),
+        weighed=masses_weighed(parameters, configuration.identified),
+    )
+
+
+def pulsed_duration(parameters: DecayParameters, pulse: Pulse) -> float:
+    """Expected length of the decays after pulses [s]."""
+    return probing_duration(pulse) + parameters.repeats * (pulse.length + WAITING)
 
 
 def _reason(found: Planned) -> str:

@@ -13,7 +13,7 @@ from bench.analysis.free_decay.decay import Decay
 from bench.analysis.free_decay.doubt import COMMON
 from bench.analysis.free_decay.modal import K1, K2, NAMES, XI1, XI2
 from bench.analysis.gain import COVERAGE
-from protocols.free_vibration.point import DecayPoint
+from protocols.common.decays.point import DecayPoint
 
 Array = NDArray[np.float64]
 
@@ -154,3 +154,13 @@ def _part(name: str, decays: Sequence[Decay], frame: Combined) -> Array:
     """Standard uncertainty by one part: those of single decays average out, those of all do not."""
     variances = np.array([np.diag(one.doubt.parts[name]) for one in decays])
     return np.sqrt(np.mean(variances, axis=0) if name in COMMON else np.sum(frame.weights**2 * variances, axis=0))
+
+
+def nonlinear_text(result: FrameResult) -> str:
+    """That the damping depends on the amplitude, and by how much."""
+    told = [
+        f"xi{mode + 1} changes by {slope:.2g} +- {doubt:.1g} per metre of drift"
+        for mode, (slope, doubt) in enumerate(zip(result.slopes.values, result.slope_uncertainty, strict=True))
+        if result.nonlinear[mode]
+    ]
+    return f"the damping depends on the amplitude: {', '.join(told)}; what is stated is its mean over the decays"

@@ -9,8 +9,8 @@ from bench.analysis.free_decay.decay import Decay
 from bench.analysis.free_decay.modal import K1, K2, NAMES, UNITS, XI1, XI2
 from bench.analysis.rounding import in_brackets
 from bench.events import FitFinished, FittedParameter, Series
-from protocols.free_vibration.results import FrameResult
-from protocols.free_vibration.weighed import MASSES, known_masses
+from protocols.common.decays.masses import MASSES, known_masses
+from protocols.common.decays.results import FrameResult
 from sim.identified import Correlation, Finding, Identified, possible
 
 Array = NDArray[np.float64]

@@ -4,8 +4,8 @@ from bench.analysis.free_rocking.points import AFTER
 from bench.config.model import BenchConfiguration
 from bench.preflight.bounds import bounds
 from bench.preflight.forecast import Demand, Forecast
-from protocols.free_rocking.parameters import FreeRockingParameters
 from protocols.free_rocking.planned import beam_heights, planned_tilts, seen_displacement
+from protocols.free_rocking.protocol import FreeRockingParameters
 from protocols.free_rocking.sheet import expected_duration
 from sim.errors import InvalidInput
 

@@ -1,6 +1,34 @@
-"""What the decays told of a spring."""
+"""The stiffness of mounted springs: what it asks for, what it states of a spring, and the object that others find."""
 
-from sim.parameters import Parameters, quantity
+from typing import TYPE_CHECKING, Annotated
+
+from pydantic import Field, field_validator
+
+from bench.protocol import Prepared, Protocol, Sources
+from protocols.common.decays.parameters import DecayParameters
+from sim.parameters import COUPLING, Parameters, each_once, quantity
+
+if TYPE_CHECKING:
+    from bench.config.model import BenchConfiguration
+
+Stiffness = Annotated[float, Field(gt=0, le=100)]
+
+
+class CouplingStiffnessParameters(DecayParameters):
+    """Decays of the frame with each spring mounted on a block that is held, and of the bare frame before."""
+
+    beta: tuple[Stiffness, ...] = quantity(
+        (0.25, 0.64, 0.97), "1", "stiffness ratios on the labels of the springs", min_length=1, usual=COUPLING
+    )
+    repeats: int = quantity(3, "1", "decays that are combined, of each spring and of the bare frame", ge=1, le=50)
+    reference: bool = quantity(
+        True,
+        "",
+        "begin with the bare frame, so that what both have in common cancels; else k1 is taken as identified before",
+    )
+
+    _each_once = field_validator("beta")(each_once)
+
 
 _U = "its expanded uncertainty (k = 2)"
 
@@ -39,3 +67,28 @@ class SpringPoint(Parameters):
     birge: float | None = quantity(
         None, "1", "largest Birge ratio: scatter of the decays over their own uncertainty; absent for one decay"
     )
+
+
+def _prepare(
+    parameters: CouplingStiffnessParameters, configuration: "BenchConfiguration", stored: "Sources | None"
+) -> Prepared[CouplingStiffnessParameters]:
+    from protocols.coupling_stiffness.experiment import CouplingStiffness
+
+    return CouplingStiffness(parameters, configuration, stored)
+
+
+PROTOCOL = Protocol(
+    name="coupling-stiffness",
+    summary="Stiffness of mounted springs, from the shift of the frame's modes with the block held.",
+    details=(
+        "Decays of the bare frame, then with each spring mounted and its block clamped to the table: the spring "
+        "adds to the stiffness of the first storey. Its stiffness is the difference, and beta as mounted follows. "
+        "The result, specimen.json, is what other runs load."
+    ),
+    example="--beta 0.4 --specimen FILE",
+    parameters=CouplingStiffnessParameters,
+    point=SpringPoint,
+    prepare=_prepare,
+    figures=("coupling_stiffness.png",),
+    files=("specimen.json",),
+)

@@ -11,7 +11,7 @@ from bench.config.model import BenchConfiguration
 from bench.engine.steps import Arm, Fallen, Outcome, Play, Played, RampOut, Say, Step
 from bench.events import Event, Progress, StepStarted, Warned
 from protocols.common.calibrate import PROBE, Unmeasurable
-from protocols.free_vibration.pulse import QUIET, SHARE, Pulse
+from protocols.common.decays.pulse import QUIET, SHARE, Pulse
 
 Array = NDArray[np.float64]
 

@@ -1,10 +1,5 @@
-"""What the free vibration test asks for: declared once, used by command line, file and documentation."""
+"""What every test by free decays asks for."""
 
-from typing import Literal
-
-from pydantic import model_validator
-
-from sim.errors import InvalidInput
 from sim.parameters import Parameters, quantity
 
 
@@ -42,22 +37,3 @@ class DecayParameters(Parameters):
     mass_correlation: float = quantity(
         0.0, "1", "correlation of the errors of the two masses: 1 where they are the balance's, as a whole", ge=0, le=1
     )
-
-
-class FreeVibrationParameters(DecayParameters):
-    """Free decays of the bare frame, after a pulse of the table or let go by hand on a locked table."""
-
-    excitation: Literal["pulse", "hand"] = quantity(
-        "pulse", "", "what sets the frame in motion: a short motion of the table, or a hand that lets storey 2 go"
-    )
-    pull: float = quantity(0.020, "m", "how far storey 2 is held aside before it is let go by hand", gt=0, le=0.2)
-
-    @model_validator(mode="after")
-    def _hands_make_no_pulse_and_pulses_do_not_pull(self) -> "FreeVibrationParameters":
-        others = {"hand": ("drift", "pulse"), "pulse": ("pull",)}
-        for item in others[self.excitation]:
-            value, default = getattr(self, item), FreeVibrationParameters.model_fields[item].default
-            if value != default:
-                other = "pulse" if self.excitation == "hand" else "hand"
-                raise InvalidInput(item, value, f'it belongs to the excitation "{other}"; leave it out')
-        return self

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from bench.config.model import BenchConfiguration
 from bench.preflight.bounds import bounds
 from bench.preflight.response import response_of
-from protocols.identify.motion import RESTING, largest
-from protocols.identify.parameters import IdentifyParameters
-from protocols.identify.signal import Complex, Grid, drive_for, grid, wanted_motions
+from protocols.common.identification.motion import RESTING, largest
+from protocols.common.identification.parameters import IdentifyParameters
+from protocols.common.identification.signal import Complex, Grid, drive_for, grid, wanted_motions
 from sim.specimen import Specimen
 
 SHARE = 0.75
@@ -24,8 +24,8 @@ BLOCK_SHARE = 0.6
 class Planned:
     """What is to be played: acceleration spectra `motions` at the lines of `grid`, whose largest peak is `level`.
 
-    `asked` are the largest magnitudes of what they are predicted to ask for, see `protocols.identify.motion`. `binds`
-    names what sets the level.
+    `asked` are the largest magnitudes of what they are predicted to ask for, see the module `motion`. `binds` names
+    what sets the level.
     """
 
     grid: Grid

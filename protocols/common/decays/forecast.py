@@ -4,7 +4,7 @@ from bench.config.model import BenchConfiguration
 from bench.preflight.asked import UNKNOWN_SHAKER
 from bench.preflight.bounds import bounds
 from bench.preflight.forecast import Demand, Forecast
-from protocols.free_vibration.pulse import Planned
+from protocols.common.decays.pulse import Planned
 
 _UNKNOWN = {
     "drive_voltage": "nothing is known of this table: the probes find out, within limits.drive_voltage",

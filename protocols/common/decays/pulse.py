@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from bench.config.model import BenchConfiguration
 from bench.preflight.bounds import bounds
 from bench.preflight.response import SimulatedTable, response_of
-from protocols.free_vibration.parameters import DecayParameters
-from protocols.identify.motion import RESTING, largest
+from protocols.common.decays.parameters import DecayParameters
+from protocols.common.identification.motion import RESTING, largest
 from sim.linear import frame_matrices
 from sim.specimen import Specimen
 

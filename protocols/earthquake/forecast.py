@@ -1,4 +1,4 @@
-"""What a seismic campaign will ask of the bench: every record with every specimen, over what is not known of it."""
+"""Demands of a seismic campaign: every record with every specimen, over the uncertainty of the specimen."""
 
 from collections.abc import Sequence
 
@@ -13,11 +13,9 @@ from bench.preflight.response import response_of
 from bench.progress import Progress, counting, silent
 from protocols.earthquake.asked import Travel, load, travel
 from protocols.earthquake.pace import Pace
-from protocols.earthquake.parameters import EarthquakeParameters
-from protocols.earthquake.records import Shaking, shakings
-from protocols.earthquake.table import identification, stored_table, table_warnings
-from protocols.identify.level import planned
-from protocols.identify.sheet import expected_duration
+from protocols.earthquake.protocol import EarthquakeParameters
+from protocols.earthquake.records import Shaking
+from protocols.earthquake.table import TableSource, table_warnings
 from sim.loading import load_model
 from sim.specimen import Specimen
 from sim.sweep import in_threads
@@ -46,43 +44,39 @@ _UNKNOWN = {
 
 
 def forecast(
-    parameters: EarthquakeParameters, configuration: BenchConfiguration, progress: Progress = silent
+    parameters: EarthquakeParameters,
+    configuration: BenchConfiguration,
+    shakings: Sequence[Shaking],
+    table: TableSource,
+    progress: Progress = silent,
 ) -> Forecast:
     """The demands of the identification and of every record with the bare frame and with every spring, and the chance
     that the block stands.
-
-    Raises InvalidInput for a record that cannot be read or prepared, a table model that cannot be used or a table that
-    cannot be identified.
     """
     load_model(progress)
-    progress("preparing the records")
-    found = shakings(parameters, configuration)
-    progress("planning the identification of the table")
-    first, duration = _identification(parameters, configuration)
+    first = _identification(table)
     specimens = [configuration.known_specimen.bare(), *map(configuration.known_specimen.coupled, parameters.beta)]
     asked, done = [*first], counting(progress, f"simulating every record with {1 + DRAWS} specimens")
-    for shaking in found:
+    for shaking in shakings:
         for specimen in specimens:
             asked.append(_asked(shaking, specimen, configuration))
-            done(len(asked) - len(first), len(found) * len(specimens))
+            done(len(asked) - len(first), len(shakings) * len(specimens))
     return Forecast(
         demands=tuple(demand(quantity, asked, _UNKNOWN) for quantity in bounds(configuration)),
         stages=tuple(Stage(each.name, (), each.chance) for each in asked),
-        duration=Pace(parameters, found, duration).total,
-        warnings=table_warnings(parameters, configuration),
-        notes=tuple(f"{shaking.name}: {'; '.join(shaking.prepared.steps)}" for shaking in found),
+        duration=Pace(parameters, shakings, table.duration).total,
+        warnings=table_warnings(parameters, configuration, table.model),
+        notes=tuple(f"{shaking.name}: {'; '.join(shaking.prepared.steps)}" for shaking in shakings),
     )
 
 
-def _identification(parameters: EarthquakeParameters, configuration: BenchConfiguration) -> tuple[list[Asked], float]:
-    """What the identification at the campaign's begin asks, and how long it takes [s]: nothing with a stored model."""
-    if stored_table(parameters, configuration) is not None:
-        return [], 0.0
-    wanted = identification(parameters, configuration)
-    found = planned(wanted, configuration)
+def _identification(table: TableSource) -> list[Asked]:
+    """The demands of the identification at the campaign's begin: none with a stored model."""
+    if table.found is None:
+        return []
     # linear and at a level that keeps its distance: no specimen within its uncertainty changes much of it
-    values = {quantity: np.full(1 + DRAWS, value) for quantity, value in found.asked.items()}
-    return [Asked("the identification of the table", values, None)], expected_duration(wanted, found)
+    values = {quantity: np.full(1 + DRAWS, value) for quantity, value in table.found.asked.items()}
+    return [Asked("the identification of the table", values, None)]
 
 
 def _asked(shaking: Shaking, specimen: Specimen, configuration: BenchConfiguration) -> Asked:

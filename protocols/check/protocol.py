@@ -1,10 +1,16 @@
-"""What the loop check asks for, and what it lets pass."""
+"""The loop check: what it asks for and lets pass, its lines as text, and the object that others find."""
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field, field_validator
 
+from bench.analysis.check_line import CheckLine
+from bench.protocol import Prepared, Protocol, Sources
+from protocols.check.table import sentence
 from sim.parameters import Parameters, each_once, quantity
+
+if TYPE_CHECKING:
+    from bench.config.model import BenchConfiguration
 
 Frequency = Annotated[float, Field(gt=0, le=60)]
 
@@ -40,3 +46,27 @@ class CheckParameters(Parameters):
     highest_omega: float = quantity(
         20.0, "rad/s", "highest frequency of the tests to come: there a delay does most harm", gt=0, le=60
     )
+
+
+def _prepare(
+    parameters: CheckParameters, configuration: "BenchConfiguration", stored: "Sources | None"
+) -> Prepared[CheckParameters]:
+    from protocols.check.experiment import LoopCheck
+
+    return LoopCheck(parameters, configuration, stored)
+
+
+PROTOCOL = Protocol(
+    name="check",
+    summary="Check the loop of the configured bench at low level, line by line: passed or failed, and what to do.",
+    details=(
+        "Listens to every channel at rest, then drives sines of one velocity with the frame locked to the table, and "
+        "compares polarity, scale and delay of all sensors, and the drive. The exit code is 1 also when a line failed."
+    ),
+    example="--config bench.toml",
+    parameters=CheckParameters,
+    point=CheckLine,
+    prepare=_prepare,
+    figures=("margins.png",),
+    log_line=sentence,
+)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from bench.config.model import BenchConfiguration
 from bench.engine.steps import Outcome, Say, Step
 from bench.events import Warned
-from protocols.free_vibration.parameters import DecayParameters
+from protocols.common.decays.parameters import DecayParameters
 from sim.errors import InvalidInput
 from sim.identified import Identified
 

@@ -5,11 +5,11 @@ from datetime import UTC, datetime
 
 from bench.analysis.free_decay.modal import K1
 from bench.analysis.gain import COVERAGE
+from protocols.common.decays.findings import correlations_of, covariance_of, findings_of, sizes_of, through_masses
+from protocols.common.decays.masses import MASSES, known_masses
+from protocols.common.decays.results import SIGNIFICANT, FrameResult, parts_as_json, point_of
 from protocols.coupling_stiffness.difference import SpringResult, replaces
-from protocols.coupling_stiffness.point import SpringPoint
-from protocols.free_vibration.results import SIGNIFICANT, FrameResult, parts_as_json, point_of
-from protocols.free_vibration.told import correlations_of, covariance_of, findings_of, sizes_of, through_masses
-from protocols.free_vibration.weighed import MASSES, known_masses
+from protocols.coupling_stiffness.protocol import SpringPoint
 from sim.identified import Correlation, Finding, Identified, possible, spring_name
 
 SOURCE = "shift of the frame's modes with the block held"

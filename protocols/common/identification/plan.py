@@ -1,11 +1,11 @@
-"""The lab sheet of the identification.
+"""The steps of an identification.
 
 1. The specimen is mounted. The table is probed from a drive too small to do harm up to the level.
 2. Multisines with random phases are played, each from rest; their first periods are left out.
-3. Response, noise and distortion follow from the periods; the frequencies are summed up in thirds of an octave.
+3. Response, noise and distortion follow from the periods.
 """
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Generator, Sequence
 from datetime import UTC, datetime
 
 import numpy as np
@@ -15,17 +15,16 @@ from bench.analysis.signals import ACCELERATION, DISPLACEMENT
 from bench.config.model import BenchConfiguration
 from bench.control.identification import identify_table, line_amplitudes, line_response, sensor_agreement
 from bench.control.table_model import TableModel
-from bench.engine.steps import Fallen, Handle, Outcome, Plan, Played, Say, Step
-from bench.events import PointFinished, StepStarted, TableIdentified, Warned
+from bench.engine.steps import Fallen, Handle, Outcome, Played, Say, Step
+from bench.events import StepStarted, TableIdentified, Warned
 from drivers.rig import Handwork
 from protocols.common.calibrate import Unmeasurable
-from protocols.identify.level import Planned, mounted_name, planned, specimen_of
-from protocols.identify.motion import RESTING, largest
-from protocols.identify.parameters import IdentifyParameters
-from protocols.identify.playing import OVERHEAD, Rules, played
-from protocols.identify.point import thirds
-from protocols.identify.probe import probed_response
-from protocols.identify.signal import drive_for
+from protocols.common.identification.level import Planned, mounted_name, specimen_of
+from protocols.common.identification.motion import RESTING, largest
+from protocols.common.identification.parameters import IdentifyParameters
+from protocols.common.identification.playing import OVERHEAD, Rules, played
+from protocols.common.identification.probe import probed_response
+from protocols.common.identification.signal import drive_for
 from sim.specimen import Specimen
 
 Array = NDArray[np.float64]
@@ -43,11 +42,11 @@ def expected_duration(parameters: IdentifyParameters, found: Planned) -> float:
     return probes + parameters.realisations * (found.grid.duration + OVERHEAD)
 
 
-def identify_plan(
-    parameters: IdentifyParameters, configuration: BenchConfiguration, keep: Callable[[TableModel], None]
-) -> Plan:
-    """The whole identification as steps; `keep` is given what was found."""
-    specimen, found = specimen_of(parameters, configuration), planned(parameters, configuration)
+def identified(
+    parameters: IdentifyParameters, configuration: BenchConfiguration, found: Planned
+) -> Generator[Step, Outcome, TableModel]:
+    """The identification with the motions that were `found`, from the specimen on the table to the model."""
+    specimen = specimen_of(parameters, configuration)
     rules = Rules(
         configuration.limits,
         found.grid.sample_rate,
@@ -74,10 +73,8 @@ def identify_plan(
         rules.remains((parameters.realisations - number) * each)
         yield Say(rules.progress(f"finished multisine {number} of {parameters.realisations}"))
     model, agreement = _identified(records, found, specimen)
-    keep(model)
     yield from _told(model, agreement)
-    for point in thirds(model):
-        yield Say(PointFinished(point))
+    return model
 
 
 def _mounting(specimen: Specimen) -> Handle:

@@ -11,7 +11,7 @@ from bench.control.identification import steady_periods
 from bench.control.multisine import Lines, band_lines, drive_amplitudes, multisine, waveform
 from bench.control.octaves import octave_mean
 from bench.control.target import REACH
-from protocols.identify.parameters import IdentifyParameters
+from protocols.common.identification.parameters import IdentifyParameters
 from sim.errors import InvalidInput
 from sim.specimen import Specimen
 from sim.steady import resting_rates

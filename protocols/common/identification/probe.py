@@ -15,8 +15,8 @@ from bench.control.multisine import waveform
 from bench.engine.steps import Fallen, Outcome, Played, Say, Step
 from bench.events import StepStarted
 from protocols.common.calibrate import PROBE, Unmeasurable
-from protocols.identify.playing import Rules, played
-from protocols.identify.signal import Complex, Grid, drive_for, seen_peak
+from protocols.common.identification.playing import Rules, played
+from protocols.common.identification.signal import Complex, Grid, drive_for, seen_peak
 
 GROWTH = 10.0
 """Most by which the table's motion grows from one probe to the next."""

@@ -1,10 +1,10 @@
 """What is refused before anything moves."""
 
 from bench.config.model import BenchConfiguration
-from protocols.free_vibration.parameters import DecayParameters, FreeVibrationParameters
-from protocols.free_vibration.playing import LEAST
-from protocols.free_vibration.pulse import SHARE, planned, pulse_of
-from protocols.free_vibration.weighed import check_masses
+from protocols.common.decays.masses import check_masses
+from protocols.common.decays.parameters import DecayParameters
+from protocols.common.decays.playing import LEAST
+from protocols.common.decays.pulse import SHARE, planned, pulse_of
 from sim.errors import InvalidInput
 from sim.specimen import Specimen
 
@@ -27,7 +27,7 @@ def check_pulse(parameters: DecayParameters, configuration: BenchConfiguration, 
         raise InvalidInput("pulse", pulse.duration, f"{allowed}: raise that limit, or give another length")
 
 
-def check_pull(parameters: FreeVibrationParameters, configuration: BenchConfiguration) -> None:
+def check_pull(parameters: DecayParameters, pull: float, configuration: BenchConfiguration) -> None:
     """Raise InvalidInput for a pull that leaves the lasers' range or the drift's limit, or that they hardly see."""
     check_masses(parameters, configuration)
     # the storeys swing to the other side of where they are held
@@ -35,6 +35,6 @@ def check_pull(parameters: FreeVibrationParameters, configuration: BenchConfigur
         SHARE * 0.5 * configuration.limits.drift,
         *(SHARE * 0.5 * min(configuration.limits.laser_range, 1.0) * 0.5 * each for each in configuration.laser_ranges),
     )
-    if not LEAST <= parameters.pull <= room:
+    if not LEAST <= pull <= room:
         allowed = f"{LEAST:g} to {room:.3g} m: limits.drift and the lasers' ranges allow no more"
-        raise InvalidInput("pull", parameters.pull, allowed)
+        raise InvalidInput("pull", pull, allowed)

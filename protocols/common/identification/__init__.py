@@ -1,0 +1,1 @@
+"""The identification of the table by multisines, as a stage of any protocol."""
