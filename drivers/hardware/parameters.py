@@ -154,8 +154,15 @@ class Hardware(Parameters):
     @property
     def analogue_lasers(self) -> tuple[tuple[str, LaserInput], ...]:
         """The analogue inputs of the lasers; none when they are read serially."""
-        if self.lasers.connection == "serial":
-            return ()
+        return () if self.lasers.connection == "serial" else self._lasers
+
+    @property
+    def serial_lasers(self) -> tuple[tuple[str, LaserInput], ...]:
+        """The lasers on serial ports; none when they are read as analogue inputs."""
+        return self._lasers if self.lasers.connection == "serial" else ()
+
+    @property
+    def _lasers(self) -> tuple[tuple[str, LaserInput], ...]:
         return ("laser_1", self.laser_1), ("laser_2", self.laser_2)
 
     @model_validator(mode="after")

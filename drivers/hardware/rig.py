@@ -1,4 +1,5 @@
-"""The bench in the laboratory behind the interface of every rig: the DAQ is master, lasers are placed on its clock."""
+"""The bench in the laboratory behind the interface of every rig: the DAQ is master, what has a clock of its own is
+placed on its clock."""
 
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
@@ -16,7 +17,8 @@ from drivers.further import FurtherChannel
 from drivers.hands import Person, RemoteHands
 from drivers.hardware.channels import analogue_channels
 from drivers.hardware.parameters import Hardware
-from drivers.hardware.serial_lasers import SerialLasers
+from drivers.hardware.serial_lasers import open_serial_lasers
+from drivers.hardware.tracks import Tracks
 from drivers.optoncdt.analogue import require_input_range
 from drivers.rig import Alignment, Block, Channel, Counts, Handwork
 
@@ -45,7 +47,6 @@ class HardwareRig:
 
     def __init__(self, hardware: Hardware, *, lead: int, further: Sequence[FurtherChannel] = ()) -> None:
         self._clock = WallClock()
-        serial = hardware.lasers.connection == "serial"
         inputs = [*(one for _, one in (*hardware.transducers, *hardware.analogue_lasers)), *further]
         with ExitStack() as opened:
             # the DAQ before all that can fail: opening it makes the bench safe, whatever an earlier program left
@@ -55,11 +56,13 @@ class HardwareRig:
             self._hands = RemoteHands(hardware.hands) if hardware.hands is not None else Person()
             for name, given in hardware.analogue_lasers:
                 require_input_range(f"hardware.{name}.range", given.range, hardware.lasers.load)
-            self._lasers = SerialLasers(hardware) if serial else None
-            if self._lasers is not None:
-                opened.callback(self._lasers.close)
+            # a second kind of sensor with a clock of its own joins this list
+            tracks = open_serial_lasers(hardware)
+            self._tracks = Tracks(tracks) if tracks else None
+            if self._tracks is not None:
+                opened.callback(self._tracks.close)
             analogue = analogue_channels(hardware, self._daq.scalings, self._daq.description, further)
-            self._channels = analogue if self._lasers is None else (*analogue, *self._lasers.channels)
+            self._channels = analogue if self._tracks is None else (*analogue, *self._tracks.channels)
             self._opened = opened.pop_all()
         self._state = _State.STOPPED
         self._failed = False
@@ -95,7 +98,7 @@ class HardwareRig:
 
     @property
     def alignments(self) -> tuple[Alignment, ...]:
-        return self._lasers.alignments if self._lasers is not None else ()
+        return self._tracks.alignments if self._tracks is not None else ()
 
     def interlocks(self) -> Mapping[str, bool]:
         with self._ending_on_failure():
@@ -104,8 +107,8 @@ class HardwareRig:
     def arm(self) -> None:
         if self._state is not _State.STOPPED:
             raise RigError(f"arm is refused: the rig is {self._state.value}; stop it first, or open a new one")
-        if self._lasers is not None:
-            self._lasers.begin(self.sample_rate, self._clock)
+        if self._tracks is not None:
+            self._tracks.begin(self.sample_rate, self._clock)
         with self._ending_on_failure():
             self._daq.prepare()
         self._drive.begin()
@@ -165,10 +168,10 @@ class HardwareRig:
     def _start(self) -> None:
         self._daq.start()
         self._state = _State.RUNNING
-        if self._lasers is not None:
-            self._look_at_clock(self._lasers, _FIRST_LOOKS)
+        if self._tracks is not None:
+            self._look_at_clock(self._tracks, _FIRST_LOOKS)
 
-    def _look_at_clock(self, lasers: SerialLasers, times: int) -> None:
+    def _look_at_clock(self, tracks: Tracks, times: int) -> None:
         """Bound the sample clock between two looks at the machine's clock.
 
         The looks are spread over the sample period: right after a block they would all fall on one phase of it, and
@@ -179,15 +182,15 @@ class HardwareRig:
             self._clock.wait_until(now() + self._phase / self.sample_rate)
             before = now()
             count = self._daq.acquired()
-            lasers.observe(before, count, now())
+            tracks.observe(before, count, now())
 
     def _read_all(self, n: int) -> Counts:
-        """Counts of all channels, shape (n, n_channels): from the DAQ, and from the lasers when they are serial."""
+        """Counts of all channels, shape (n, n_channels): from the DAQ, and from the tracks."""
         counts = self._daq.read(n)
-        if self._lasers is None:
+        if self._tracks is None:
             return counts
-        self._look_at_clock(self._lasers, _LOOKS)
-        return np.column_stack((counts, self._lasers.counts(self._drive.index, n)))
+        self._look_at_clock(self._tracks, _LOOKS)
+        return np.column_stack((counts, self._tracks.counts(self._drive.index, n)))
 
     def _require_armed(self, what: str) -> None:
         if self._state not in (_State.ARMED, _State.RUNNING):

@@ -11,8 +11,12 @@ from drivers.clock import WallClock, now
 from drivers.emulation.optoncdt.laser import EmulatedLaser
 from drivers.errors import RigError
 from drivers.hardware.parameters import Hardware, Laser1, Laser2, Lasers
-from drivers.hardware.serial_lasers import SerialLasers
+from drivers.hardware.serial_lasers import open_serial_lasers
+from drivers.hardware.tracks import Track, Tracks
 from drivers.optoncdt.faults import LOST
+from drivers.optoncdt.stream import Readings
+from drivers.rig import Channel
+from drivers.timebase.sensor_track import SensorTrack
 from sim.sensors import Laser
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="emulated serial lasers need pseudo-terminals")
@@ -37,14 +41,14 @@ def emulated() -> Iterator[tuple[EmulatedLaser, EmulatedLaser]]:
 
 
 @pytest.fixture
-def lasers(emulated: tuple[EmulatedLaser, EmulatedLaser]) -> Iterator[SerialLasers]:
+def lasers(emulated: tuple[EmulatedLaser, EmulatedLaser]) -> Iterator[Tracks]:
     first, second = (one.port for one in emulated)
     hardware = Hardware(
         lasers=Lasers(rate=4000.0, listening=1.5, delay=5e-3),
         laser_1=Laser1(port=first, baud=921_600),
         laser_2=Laser2(port=second, baud=921_600),
     )
-    made = SerialLasers(hardware)
+    made = Tracks(open_serial_lasers(hardware))
     yield made
     made.close()
 
@@ -52,7 +56,7 @@ def lasers(emulated: tuple[EmulatedLaser, EmulatedLaser]) -> Iterator[SerialLase
 class Run:
     """A sample clock that is the machine's, in blocks of `n` samples."""
 
-    def __init__(self, lasers: SerialLasers, n: int) -> None:
+    def __init__(self, lasers: Tracks, n: int) -> None:
         self.lasers, self.n = lasers, n
         lasers.begin(RATE, WallClock())
         self.began, self.first = now(), 0
@@ -71,7 +75,7 @@ class Run:
 
 
 def test_a_silent_laser_is_lost_and_soon_not_waited_for(
-    emulated: tuple[EmulatedLaser, EmulatedLaser], lasers: SerialLasers
+    emulated: tuple[EmulatedLaser, EmulatedLaser], lasers: Tracks
 ) -> None:
     run = Run(lasers, 200)
     deadline = now() + DEADLINE
@@ -90,7 +94,7 @@ def test_a_silent_laser_is_lost_and_soon_not_waited_for(
 
 
 def test_a_short_block_waits_for_half_its_duration_at_most(
-    emulated: tuple[EmulatedLaser, EmulatedLaser], lasers: SerialLasers, monkeypatch: pytest.MonkeyPatch
+    emulated: tuple[EmulatedLaser, EmulatedLaser], lasers: Tracks, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A laser that has just stopped counts as silent a tenth of a second later only; here it never does."""
     monkeypatch.setattr("drivers.optoncdt.sensor._SILENT_TIME", 1e9)
@@ -103,6 +107,63 @@ def test_a_short_block_waits_for_half_its_duration_at_most(
     assert 0.009 < np.median(waits) < 0.035
 
 
-def test_blocks_before_a_run_are_refused_as_such(lasers: SerialLasers) -> None:
+def test_blocks_before_a_run_are_refused_as_such(lasers: Tracks) -> None:
     with pytest.raises(RigError, match="arm the rig first"):
         lasers.observe(0.0, 1, 1.0)
+
+
+class Inclinometer:
+    """A second kind of sensor with a clock of its own: 100 values per second, the number of each is its value."""
+
+    def __init__(self) -> None:
+        self.closed = False
+        self._taken = 0
+
+    @property
+    def silent(self) -> bool:
+        return False
+
+    def start(self) -> None:
+        self._started = now()
+
+    def take(self) -> Readings:
+        arrived = int((now() - self._started) * 100.0)
+        index = np.arange(self._taken, arrived)
+        self._taken = arrived
+        time = index / 100.0
+        return Readings(index, time, index.astype(np.int32), self._started + time + 0.001)
+
+    def wait(self, timeout: float) -> bool:
+        WallClock().wait_until(now() + min(timeout, 0.01))
+        return True
+
+    def close(self) -> None:
+        self.closed = True
+
+
+def test_a_second_kind_of_sensor_is_one_more_track(emulated: tuple[EmulatedLaser, EmulatedLaser]) -> None:
+    first, second = (one.port for one in emulated)
+    hardware = Hardware(
+        lasers=Lasers(rate=4000.0, listening=1.5),
+        laser_1=Laser1(port=first, baud=921_600),
+        laser_2=Laser2(port=second, baud=921_600),
+    )
+    sensor = Inclinometer()
+    placing = SensorTrack("tilt", 100.0, 0.0, lambda code: code.astype(np.int16), 32_000, LOST)
+    channel = Channel("tilt", "angle", "rad", 1e-4, 0.0, (-32_000, 32_000), "an inclinometer")
+    tracks = Tracks([*open_serial_lasers(hardware), Track(sensor, channel, placing, 1.5)])
+    try:
+        assert [each.name for each in tracks.channels] == ["laser_1", "laser_2", "tilt"]
+        run = Run(tracks, 200)
+        blocks = [run.block()[0] for _ in range(8)]
+        assert [one.sensor for one in tracks.alignments] == ["laser_1", "laser_2", "tilt"]
+        shown = np.concatenate(blocks)[:, 2].astype(np.float64)
+        # a busy machine may be late with some
+        there = np.flatnonzero(np.abs(shown) < 32_000)
+        assert there.size > 400
+        # its value rises by 100 per second of its clock, which is the machine's: on the samples of the DAQ as well
+        slope = np.polyfit(there / RATE, shown[there], 1)[0]
+        assert slope == pytest.approx(100.0, rel=0.02)
+    finally:
+        tracks.close()
+    assert sensor.closed

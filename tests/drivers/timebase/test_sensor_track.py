@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from drivers.timebase.laser_track import LaserTrack
 from drivers.timebase.sample_clock import SampleClock
+from drivers.timebase.sensor_track import SensorTrack
 from tests.drivers.timebase.made_clocks import FLOOR, SWITCHED_ON, Daq, Stream, stream
 
 LOST, NO_PEAK, OFF = -32768, -32767, -32762
@@ -30,14 +30,14 @@ def codes(taken: NDArray[np.float64]) -> NDArray[np.int32]:
     return (32760 + np.rint(AMPLITUDE * np.sin(OMEGA * taken))).astype(np.int32)
 
 
-def track(delay: float = 0.0) -> LaserTrack:
-    return LaserTrack("laser_1", 4000.0, delay, marked, 32760, LOST)
+def track(delay: float = 0.0) -> SensorTrack:
+    return SensorTrack("laser_1", 4000.0, delay, marked, 32760, LOST)
 
 
 class Bench:
     """Feeds a track with what has arrived, and reads blocks as a rig does."""
 
-    def __init__(self, sent: Stream, daq: Daq, laser: LaserTrack) -> None:
+    def __init__(self, sent: Stream, daq: Daq, laser: SensorTrack) -> None:
         self.sent, self.daq, self.laser = sent, daq, laser
         self.code = codes(sent.taken)
         self.clock = SampleClock(daq.sample_rate)
@@ -79,7 +79,7 @@ def delays(daq: Daq, counts: NDArray[np.int16]) -> NDArray[np.float64]:
     return -np.arctan2((seen * np.cos(phase)).mean(axis=1), (seen * np.sin(phase)).mean(axis=1)) / OMEGA
 
 
-def known(rate: float = 1.0, delay: float = 0.0) -> tuple[LaserTrack, SampleClock]:
+def known(rate: float = 1.0, delay: float = 0.0) -> tuple[SensorTrack, SampleClock]:
     """A track of a sensor of 4000 1/s without any delay or error, and a clock that agrees: sensor second 2 is 0."""
     laser, clock = track(delay), SampleClock(1000.0)
     for count in range(1, 2001):
@@ -97,7 +97,7 @@ def ramp(index: NDArray[np.int64]) -> NDArray[np.int32]:
     return (32760 + index - 8000).astype(np.int32)
 
 
-def feed(laser: LaserTrack, index: NDArray[np.int64], code: NDArray[np.int32] | None = None) -> None:
+def feed(laser: SensorTrack, index: NDArray[np.int64], code: NDArray[np.int32] | None = None) -> None:
     laser.add(index, index / 4000.0, ramp(index) if code is None else code, 100.0 + index / 4000.0)
 
 

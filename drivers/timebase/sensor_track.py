@@ -20,7 +20,7 @@ _BACK = 0.25
 """A value that is older than the newest by more than this [s] is no repetition: the sensor's clock was restarted."""
 
 
-class LaserTrack:
+class SensorTrack:
     """Takes what the sensor `name` sends, and gives it on the grid of the sample clock.
 
     `rate` is how many values it takes per second, `delay` by how much later than their arrival says its values are
