@@ -146,7 +146,7 @@ def played(path: Path) -> Replayed:
     with open_record(path) as record:
         configuration = stored_configuration(record)
         assert configuration == BENCH
-        replayed = replay(record, Two(), configuration, clock=VirtualClock(), subscribers=[])
+        replayed = replay(record, Two().plan(configuration), configuration, clock=VirtualClock(), subscribers=[])
     assert path.read_bytes() == before
     return replayed
 
@@ -181,7 +181,7 @@ def test_a_limit_that_was_exceeded_is_exceeded_again(tmp_path: Path) -> None:
     tight = BENCH.model_copy(update={"limits": limits})
     ending = recorded(tmp_path / "run.h5", Two().plan(tight), loopback(), tight, Found)
     with open_record(tmp_path / "run.h5") as record:
-        replayed = replay(record, Two(), stored_configuration(record), clock=VirtualClock(), subscribers=[])
+        replayed = replay(record, Two().plan(tight), stored_configuration(record), clock=VirtualClock(), subscribers=[])
     assert replayed.identical
     assert (replayed.status, replayed.reason) == (ending.status, ending.reason)
     assert "displacement" in ending.reason

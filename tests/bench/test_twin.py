@@ -255,7 +255,7 @@ def test_a_recording_is_replayed_with_the_same_twin(tmp_path_factory: pytest.Tem
     assert ending.status == "stopped"
     with open_record(path) as record:
         rows = len(record.columns_of(TwinEstimate)["drift"])
-        played = replay(record, Shaken(), bench, clock=VirtualClock(), subscribers=[])
+        played = replay(record, Shaken().plan(bench), bench, clock=VirtualClock(), subscribers=[])
         assert record.columns_of(TwinEstimate)["excess"][-1] > 0.2
         mounted = next(event.text for event in record.events if event.kind == SpecimenMounted.__name__)
     assert rows > 30
