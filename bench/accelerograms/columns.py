@@ -18,6 +18,9 @@ from bench.accelerograms.text import RecordText
 from bench.accelerograms.units import UNITS, spelled
 from sim.errors import InvalidInput
 
+Array = NDArray[np.float64]
+
+
 _STEP = re.compile(rf"\bdt\s*[=:]\s*({NUMBER})", re.IGNORECASE)
 _UNIT = re.compile(r"\b[cm]?m/s(?:ec)?(?:(?:\^|\*\*)?2\b|/s(?:ec)?\b)", re.IGNORECASE)
 
@@ -33,8 +36,6 @@ def check_comments(text: RecordText, count: int, choices: Choices) -> None:
         if stated is not None and given is not None and UNITS[stated] != UNITS[given]:
             raise text.refusal(index, f"it says {stated}, and unit={given} was given; correct one of them")
 
-
-Array = NDArray[np.float64]
 
 _COMMENT = ("%", "#")
 _HEADING = re.compile(r"^(?P<name>.*?)\s*[\[(]\s*(?P<unit>[^\])]+?)\s*[\])]\s*$")

@@ -15,17 +15,28 @@ the rate (Bennett, Bell Syst. Tech. J. 27, 1948): slow motions leave it at low o
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
 from bench.analysis.signals import ACCELERATION, DISPLACEMENT
-from bench.analysis.transient_noise import noise_density
 from sim.errors import InvalidInput
 from sim.excitation import SampledRecord
 
 Array = NDArray[np.float64]
+
+
+def noise_density(rest: Array, sample_rate: float) -> tuple[Array, Array]:
+    """Frequencies [Hz] and one-sided spectral density [unit^2/Hz] of `rest`, shape (n,), without its linear trend."""
+    from scipy import signal
+
+    # `Any`: scipy's stubs know no linear trend
+    tools: Any = signal
+    frequency, power = tools.welch(rest, sample_rate, nperseg=max(rest.size // 4, 8), detrend="linear")
+    return np.asarray(frequency), np.asarray(power)
+
 
 MODEL_RATE = 1000.0
 """Samples per second that a model is given [1/s], or the bench's own where that is less."""

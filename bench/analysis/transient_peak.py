@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.analysis.transient_noise import noise_density
+from bench.analysis.transient_base import noise_density
 from sim.errors import InvalidInput
 
 Array = NDArray[np.float64]

@@ -18,6 +18,8 @@ from bench.analysis.cycles import HARMONICS
 from bench.control.calibration import DriveCalibration
 from sim.excitation import Sweep
 
+Array = NDArray[np.float64]
+
 
 class Glide:
     """Share k belongs to harmonic k + 1. They begin as a pure sine, (1, 0, 0, ...), and change along a smoothstep."""
@@ -55,9 +57,6 @@ def _pure() -> NDArray[np.complex128]:
     shares = np.zeros(HARMONICS, dtype=np.complex128)
     shares[0] = 1.0
     return shares
-
-
-Array = NDArray[np.float64]
 
 
 class Oscillator:

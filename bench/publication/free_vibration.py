@@ -1,4 +1,7 @@
-"""Free vibration of the frame and of its springs: values, budgets, damping over the amplitude."""
+"""Free vibration of the frame and of its springs: values, budgets, damping over the amplitude.
+
+Points of files from before there were budgets have none: what they lack is left out.
+"""
 
 import json
 from collections.abc import Mapping, Sequence

@@ -11,8 +11,7 @@ from bench.analysis.response_spectrum import pseudo_acceleration
 from bench.analysis.table_motion import at_rest_in_the_end, table_motion
 from bench.config.model import BenchConfiguration
 from bench.control.stroke import least_change
-from bench.control.stroke.fit import Method, StrokeFit, fit_stroke, periods_of
-from bench.control.stroke.highpass import high_passed
+from bench.control.stroke.fit import Method, StrokeFit, fit_stroke, high_passed, periods_of
 from bench.control.stroke.least_change import SineModes, oscillator_peak
 from bench.control.stroke.least_distance import Infeasible, shortest
 from bench.control.stroke.reach import Reach

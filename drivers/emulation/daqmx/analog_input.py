@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 
 from drivers.emulation.daqmx.errors import DaqmxFailure
 from drivers.emulation.daqmx.input_channel import InputChannel
-from drivers.emulation.daqmx.timing import SampleClock
-from drivers.emulation.daqmx.waiting import deadline_after, wait_until
+from drivers.emulation.daqmx.timing import SampleClock, deadline_after, wait_until
 from drivers.emulation.plant import Plant
 from sim.channel import Counts
 from sim.errors import InvalidInput

@@ -12,8 +12,7 @@ from drivers.emulation.daqmx.device import DeviceModel
 from drivers.emulation.daqmx.errors import DaqmxFailure, NotEmulated
 from drivers.emulation.daqmx.generation import Generation
 from drivers.emulation.daqmx.terminals import Instant, OutputTerminal
-from drivers.emulation.daqmx.timing import SampleClock
-from drivers.emulation.daqmx.waiting import deadline_after, wait_until
+from drivers.emulation.daqmx.timing import SampleClock, deadline_after, wait_until
 from drivers.emulation.plant import Plant
 
 TRANSFER_CONDITIONS = {

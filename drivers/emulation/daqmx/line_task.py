@@ -1,7 +1,11 @@
 """What digital input and output tasks have in common: channels of lines, and no clock."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+from nidaqmx.error_codes import DAQmxErrors
+
+from drivers.emulation.daqmx.errors import DaqmxFailure
 from drivers.emulation.daqmx.lines import Lines
 
 
@@ -66,3 +70,43 @@ class LineTask:
 
     def verdict(self) -> None:
         pass
+
+
+class DigitalInput(LineTask):
+    """A `Job` without clock."""
+
+    @property
+    def inputs(self) -> list[LineChannel]:
+        """Its channels."""
+        return self._made
+
+    def read(self) -> bytes:
+        """One byte per line as it is now, channel after channel; a channel with fewer lines is filled up with 0."""
+        width = self.lines_per_channel
+        return b"".join(
+            bytes(self._lines.shows(line.name) for line in channel.lines).ljust(width, b"\0") for channel in self.inputs
+        )
+
+
+class DigitalOutput(LineTask):
+    """A `Job` without clock."""
+
+    @property
+    def outputs(self) -> list[LineChannel]:
+        """Its channels."""
+        return self._made
+
+    def write(self, levels: Sequence[bool]) -> None:
+        """Set all lines, in order. Raises DaqmxFailure when there are more or fewer levels, or the watchdog bars it."""
+        if len(levels) != len(self.all_lines):
+            raise DaqmxFailure(
+                DAQmxErrors.NUM_LINES_MISMATCH_IN_READ_OR_WRITE,
+                f"Number of levels does not match the lines.\n\nLevels: {len(levels)}\nLines: {len(self.all_lines)}",
+            )
+        for line, high in zip(self.all_lines, levels, strict=True):
+            self._lines.write(line.device, line.name, high)
+
+    @property
+    def levels(self) -> tuple[bool, ...]:
+        """The lines as they are."""
+        return tuple(self._lines.is_high(line.name) for line in self.all_lines)

@@ -9,9 +9,7 @@ from scipy.interpolate import make_interp_spline
 from scipy.special import gammaincinv
 
 from bench.accelerograms.accelerogram import Accelerogram
-from bench.accelerograms.synthetic import NAMES, SHAPES, Pulse, synthetic_record
-from bench.accelerograms.synthetic.motion import pulse_acceleration
-from bench.accelerograms.synthetic.noise import SIGNIFICANT
+from bench.accelerograms.synthetic import NAMES, SHAPES, SIGNIFICANT, Pulse, pulse_acceleration, synthetic_record
 from sim.errors import InvalidInput
 
 SEEDS = range(24)

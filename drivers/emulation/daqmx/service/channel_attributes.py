@@ -12,11 +12,10 @@ from nidaqmx.error_codes import DAQmxErrors
 from drivers.emulation.daqmx.analog_input import AnalogInput
 from drivers.emulation.daqmx.analog_output import TRANSFER_CONDITIONS, AnalogOutput, OutputChannel
 from drivers.emulation.daqmx.catalogue import unflattened
-from drivers.emulation.daqmx.digital_input import DigitalInput
-from drivers.emulation.daqmx.digital_output import DigitalOutput
 from drivers.emulation.daqmx.errors import DaqmxFailure
 from drivers.emulation.daqmx.input_channel import InputChannel
 from drivers.emulation.daqmx.job import Job
+from drivers.emulation.daqmx.line_task import DigitalInput, DigitalOutput
 from drivers.emulation.daqmx.service.base import AboutAttribute, AboutTask, Service, attribute_of, unsupported
 
 

@@ -13,12 +13,10 @@ from drivers.emulation.daqmx.analog_input import AnalogInput
 from drivers.emulation.daqmx.analog_output import AnalogOutput, OutputChannel
 from drivers.emulation.daqmx.catalogue import unflattened
 from drivers.emulation.daqmx.converter import InputConverter
-from drivers.emulation.daqmx.digital_input import DigitalInput
-from drivers.emulation.daqmx.digital_output import DigitalOutput
 from drivers.emulation.daqmx.errors import DaqmxFailure
 from drivers.emulation.daqmx.input_channel import InputChannel, require_wiring
 from drivers.emulation.daqmx.job import Job
-from drivers.emulation.daqmx.line_task import Line, LineChannel
+from drivers.emulation.daqmx.line_task import DigitalInput, DigitalOutput, Line, LineChannel
 from drivers.emulation.daqmx.service.base import Service
 from drivers.emulation.daqmx.task import Task
 

@@ -5,9 +5,8 @@
 from nidaqmx._stubs import nidaqmx_pb2 as pb
 from nidaqmx.error_codes import DAQmxErrors
 
-from drivers.emulation.daqmx.digital_input import DigitalInput
-from drivers.emulation.daqmx.digital_output import DigitalOutput
 from drivers.emulation.daqmx.errors import DaqmxFailure, NotEmulated
+from drivers.emulation.daqmx.line_task import DigitalInput, DigitalOutput
 from drivers.emulation.daqmx.service.base import Service
 from drivers.emulation.daqmx.task import Task
 

@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 
 from drivers.emulation.daqmx.analog_input import AnalogInput
 from drivers.emulation.daqmx.catalogue import flattened
-from drivers.emulation.daqmx.digital_input import DigitalInput
-from drivers.emulation.daqmx.digital_output import DigitalOutput
 from drivers.emulation.daqmx.errors import DaqmxFailure, NotEmulated
+from drivers.emulation.daqmx.line_task import DigitalInput, DigitalOutput
 from drivers.emulation.daqmx.service.base import AboutTask, Service, attribute_of, unsupported
 from sim.channel import Counts
 

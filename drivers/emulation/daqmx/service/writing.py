@@ -9,8 +9,8 @@ from nidaqmx.error_codes import DAQmxErrors
 from numpy.typing import NDArray
 
 from drivers.emulation.daqmx.analog_output import AnalogOutput
-from drivers.emulation.daqmx.digital_output import DigitalOutput
 from drivers.emulation.daqmx.errors import DaqmxFailure, NotEmulated
+from drivers.emulation.daqmx.line_task import DigitalOutput
 from drivers.emulation.daqmx.service.base import Service, attribute_of, unsupported
 from drivers.emulation.daqmx.task import Task
 
