@@ -20,8 +20,10 @@ if TYPE_CHECKING:
     from bench.engine.steps import Outcome, Step
     from bench.events import Event
     from bench.preflight.forecast import Forecast
+    from bench.publication.campaign import Campaign
     from bench.record.reader import Record
     from bench.record.tables import Column, Table
+    from bench.report.page.document import Section
 
 P = TypeVar("P", bound=Parameters)
 
@@ -156,6 +158,7 @@ class Protocol(Generic[P]):
     data file and the summary, the main figure first. `positional` is the parameter that the command line takes without
     a flag. `log_line` turns a point into one line of a log: a protocol that has it is shown as a log, not as a
     picture. Without a `reanalysis` the plan is carried out again on the recorded samples with other parameters.
+    `report` makes the sections of a report that only this protocol has, from its data file.
     """
 
     name: str
@@ -170,3 +173,4 @@ class Protocol(Generic[P]):
     positional: str | None = None
     log_line: Callable[[Any], str] | None = None
     reanalysis: Reanalysis[P] | None = None
+    report: "Callable[[Campaign], Sequence[Section]] | None" = None

@@ -18,10 +18,10 @@ def protocol_of(record: "Record") -> "Protocol[Any]":
     return load_protocol(record.metadata.get("protocol", ""), "protocol of the record")
 
 
-def declared_parameters(record: "Record") -> type[Parameters] | None:
-    """How the parameters of the file's protocol are declared; None where it is not installed here."""
+def installed_protocol(record: "Record") -> "Protocol[Any] | None":
+    """The protocol of an open file; None where it is not installed here."""
     try:
-        return protocol_of(record).parameters
+        return protocol_of(record)
     except InvalidInput:
         return None
 

@@ -49,7 +49,7 @@ def report(
     when something was refused before. Files that exist are kept unless --overwrite is given.
     """
     progress("loading the program")
-    from bench.cli.recorded import declared_parameters
+    from bench.cli.recorded import installed_protocol
     from bench.publication.campaign import Campaign
     from bench.publication.report import campaign_report
     from bench.record.reader import open_record
@@ -58,7 +58,7 @@ def report(
         html = file.with_suffix(".report.html")
     check_outputs(html, pdf, overwrite=overwrite)
     with open_record(file) as record:
-        campaign = Campaign(file, record, declared_parameters(record))
+        campaign = Campaign(file, record, installed_protocol(record))
         document = campaign_report(campaign, progress)
         integrity = campaign.integrity
     if integrity.failing:

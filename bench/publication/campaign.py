@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from bench.config.model import BenchConfiguration
 from bench.config.validation import dotted, validated
@@ -17,6 +17,9 @@ from sim.parameters import Parameters
 from sim.specimen import Specimen
 from sim.uncertainty import SpecimenUncertainty
 
+if TYPE_CHECKING:
+    from bench.protocol import Protocol
+
 SETTING = {"frequency": "omega_rad_s", "stiffness": "beta", "record": "record"}
 """Fields of a point that say which test it is."""
 
@@ -25,12 +28,17 @@ SETTING = {"frequency": "omega_rad_s", "stiffness": "beta", "record": "record"}
 class Campaign:
     """An open file and where it lies. `configuration` is None where the file's is not one that this version knows.
 
-    `asked` declares the parameters of the file's protocol: None where this version does not know it.
+    `installed` is the file's protocol, None where it is not installed here.
     """
 
     path: Path
     record: Record
-    asked: type[Parameters] | None = None
+    installed: "Protocol[Any] | None" = None
+
+    @property
+    def asked(self) -> type[Parameters] | None:
+        """How the parameters of the file's protocol are declared; None where it is not installed here."""
+        return None if self.installed is None else self.installed.parameters
 
     @cached_property
     def protocol(self) -> str:

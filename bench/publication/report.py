@@ -1,6 +1,6 @@
 """The report of a campaign from its file: what was tested on what, how, and what came out beside the prediction."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from bench.progress import Progress, silent
@@ -12,7 +12,6 @@ from bench.publication.harmonic import histories_section, map_points, results_se
 from bench.publication.predicted import map_section
 from bench.publication.provenance import provenance_line, provenance_section
 from bench.publication.results import fits_section, identified_section, points_section
-from bench.publication.seismic import seismic_section
 from bench.publication.specimen import modes_section, specimen_section
 from bench.publication.typography import listed, moment
 from bench.report.page.document import Document, Notice, Part, Section
@@ -30,9 +29,8 @@ def campaign_report(campaign: Campaign, progress: Progress = silent) -> Document
     makers = _sections(campaign)
     for number, make in enumerate(makers):
         progress("computing and drawing the report", number, len(makers))
-        section = make()
-        if section is not None:
-            sections.append(section)
+        found = make()
+        sections += [] if found is None else [found] if isinstance(found, Section) else found
     return Document(
         title=f"Test report: {campaign.path.stem}" if campaign.path.stem != "campaign" else _title(campaign),
         summary=_summary(campaign),
@@ -41,9 +39,9 @@ def campaign_report(campaign: Campaign, progress: Progress = silent) -> Document
     )
 
 
-def _sections(campaign: Campaign) -> list[Callable[[], Section | None]]:
-    """What makes each section, or finds that there is none."""
-    made: list[Callable[[], Section | None]] = []
+def _sections(campaign: Campaign) -> list[Callable[[], Section | Sequence[Section] | None]]:
+    """What makes each section, or several; or finds that there is none."""
+    made: list[Callable[[], Section | Sequence[Section] | None]] = []
     if campaign.harmonic_points:
         # the map is that of the test's amplitude: without a test there is none to draw
         made += [
@@ -52,8 +50,9 @@ def _sections(campaign: Campaign) -> list[Callable[[], Section | None]]:
             lambda: map_section(campaign.specimen, _amplitude_factor(campaign), map_points(campaign)),
             lambda: histories_section(campaign),
         ]
-    if campaign.seismic_points:
-        made.append(lambda: seismic_section(campaign))
+    if campaign.installed is not None and campaign.installed.report is not None:
+        of_protocol = campaign.installed.report
+        made.append(lambda: of_protocol(campaign))
     configuration = campaign.configuration
     identified = None if configuration is None else configuration.identified
     made += [

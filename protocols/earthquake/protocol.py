@@ -10,6 +10,8 @@ from sim.parameters import COUPLING, Parameters, each_once, quantity
 
 if TYPE_CHECKING:
     from bench.config.model import BenchConfiguration
+    from bench.publication.campaign import Campaign
+    from bench.report.page.document import Section
 
 Stiffness = Annotated[float, Field(gt=0, le=100)]
 
@@ -163,6 +165,12 @@ def _prepare(
     return EarthquakeCampaign(parameters, configuration, stored)
 
 
+def _report(campaign: "Campaign") -> "list[Section]":
+    from protocols.earthquake.report import seismic_section
+
+    return [seismic_section(campaign)] if campaign.seismic_points else []
+
+
 PROTOCOL = Protocol(
     name="earthquake",
     summary="Earthquake records on the bare and the coupled frame: gain coefficient alpha_2 against prediction.",
@@ -182,4 +190,5 @@ PROTOCOL = Protocol(
         "drift_histories.png",
     ),
     positional="records",
+    report=_report,
 )

@@ -9,6 +9,7 @@ import pytest
 from pypdfium2 import PdfDocument
 
 from bench.analysis.signals import SignalMap
+from bench.catalogue import load_protocol
 from bench.cli.main import main
 from bench.publication import predicted
 from bench.publication.campaign import Campaign
@@ -16,7 +17,6 @@ from bench.publication.cycles import PERIODS, SAMPLES, Dwells
 from bench.publication.report import campaign_report
 from bench.record.reader import open_record
 from bench.report.page.document import Document, Picture, Section, Table
-from protocols.harmonic.protocol import HarmonicParameters
 from sim.gain import predict_gain
 
 SHORT = ["--omega", "20", "--beta", "0.25", "--ramp-time", "2", "--measured-cycles", "8"]
@@ -35,7 +35,7 @@ def document(file: Path) -> Iterator[Document]:
     with pytest.MonkeyPatch.context() as patch, open_record(file) as record:
         patch.setattr(predicted, "STEP", 1.0)
         patch.setattr(predicted, "BETA_STEP", 0.2)
-        yield campaign_report(Campaign(file, record, HarmonicParameters))
+        yield campaign_report(Campaign(file, record, load_protocol("harmonic")))
 
 
 def section(document: Document, key: str) -> Section:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from bench.analysis.signals import ACCELERATION, SignalMap
+from bench.catalogue import load_protocol
 from bench.cli.main import main
 from bench.config.model import Acquisition, BenchConfiguration, Simulation
 from bench.engine.steps import Arm, Handle, Plan, Play, RampOut
@@ -16,8 +17,6 @@ from bench.events import PointFinished, RunningGain, Warned
 from bench.publication.campaign import Campaign
 from bench.publication.conditions import damage_notice, limits_section
 from bench.publication.report import campaign_report
-from bench.publication.seismic import seismic_section
-from bench.publication.seismic_histories import played_records, signals_of
 from bench.record.reader import open_record
 from bench.record.recorder import Recorder
 from bench.record.tables import Column
@@ -25,6 +24,8 @@ from bench.report.page.document import Listing, Picture, Table
 from drivers.rig import Channel, Handwork
 from protocols.earthquake.live import Watch
 from protocols.earthquake.protocol import EarthquakeParameters, EarthquakePoint, PointStatus
+from protocols.earthquake.report import seismic_section
+from protocols.earthquake.report_histories import played_records, signals_of
 from sim.specimen import Specimen
 from sim.virtual_bench import VirtualBenchParameters
 from tests.loopback import LoopbackRig
@@ -184,7 +185,7 @@ def test_a_damaged_file_is_reported_and_says_so_first(
 def test_the_report_says_who_with_what_software_and_which_parameters(file: Path) -> None:
     with open_record(file) as record:
         assert not damage_notice(Campaign(file, record))
-        document = campaign_report(Campaign(file, record, EarthquakeParameters))
+        document = campaign_report(Campaign(file, record, load_protocol("earthquake")))
     assert "Operator: N. N. Notes: the new springs." in " ".join(str(part) for part in document.summary)
     facts, parameters, *_ = (part for part in document.sections[-1].parts if isinstance(part, Table))
     known = dict(facts.rows)

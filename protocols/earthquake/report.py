@@ -6,13 +6,13 @@ from typing import Any, cast
 from bench.config.validation import validated
 from bench.publication.campaign import Campaign
 from bench.publication.numbers import ABSENT, percent, plain, with_uncertainty, yes_or_no
-from bench.publication.seismic_histories import histories_parts
 from bench.publication.typography import counted, typeset
 from bench.record.tables import arrays
 from bench.report.earthquake_gains import gain_figure
 from bench.report.page.document import Column, Listing, Part, Picture, Section, Table
 from protocols.earthquake.protocol import EarthquakeParameters
 from protocols.earthquake.records import band_used
+from protocols.earthquake.report_histories import histories_parts
 from protocols.earthquake.statement import check_statement
 
 
