@@ -1,4 +1,4 @@
-"""Free rocking on a bench: the block's restitution, as a specimen file that other runs load."""
+"""Free rocking on a bench: room in the laser's range and what the filters leave of an impact, forecast, result."""
 
 from collections.abc import Sequence
 from functools import cached_property
@@ -6,44 +6,71 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.analysis.free_rocking.points import AFTER
 from bench.config.model import BenchConfiguration
 from bench.config.specimen_file import write_specimen
-from bench.preflight.forecast import Forecast
+from bench.preflight.bounds import bounds
+from bench.preflight.forecast import Demand, Forecast
 from bench.protocol import Plan, Prepared, Result, Sources
 from bench.record.tables import Column, Table
 from bench.report.style import write_figure
-from protocols.free_rocking.figure import rocking_figure
-from protocols.free_rocking.forecast import check, forecast
-from protocols.free_rocking.planned import planned_tilts
+from protocols.free_rocking.plan import RockingRun
 from protocols.free_rocking.protocol import FreeRockingParameters, RockingPoint
-from protocols.free_rocking.sheet import Bench, free_rocking_plan
-from protocols.free_rocking.table import rocking_table
+from protocols.free_rocking.results import rocking_figure, rocking_table
+from protocols.free_rocking.tilts import beam_heights, planned_tilts
+from sim.errors import InvalidInput
 from sim.free_rocking import FreeRocking, critical_angle, frequency_parameter
 from sim.parameters import Parameters
 
+LOWEST_CUTOFF = 1.25 / AFTER
+"""Cutoff of a Butterworth low-pass of fourth order [Hz] that keeps 5 % of an impact's kink for `AFTER`: some 2 um."""
+
+_MEETS = "the beam must meet the face of the tilted block: between {:.4f} and {:.4f} m at these tilts"
+
+_NOT_WATCHED = "laser 2 looks at the block: it shows no drift, and none is watched"
+
+_LASER_ON_BLOCK = "Laser 2 still looks at the block: turn it back to storey 2."
+
+_TABLE_LOCKED = "THE TABLE IS STILL LOCKED: take the clamps off before anything is driven."
+
 
 class FreeRockingTest(Prepared[FreeRockingParameters]):
-    """Refuses tilts that the laser cannot follow."""
+    """The restitution of the block. Refuses tilts that the laser cannot follow."""
 
     def __init__(
         self, parameters: FreeRockingParameters, configuration: BenchConfiguration, stored: Sources | None = None
     ) -> None:
         super().__init__(parameters, configuration, stored)
-        check(parameters, configuration)
-        self._bench = Bench()
+        self.tilts = planned_tilts(parameters, configuration.specimen)
+        self._check()
+        self._run = RockingRun(parameters, configuration, self.tilts)
 
     @cached_property
     def forecast(self) -> Forecast:
+        """No drive; the laser's share of its range; the duration."""
         self.progress("predicting what the run asks of the bench")
-        return forecast(self.parameters, self.configuration)
+        largest = max(abs(tilt.displacement) for tilt in self.tilts)
+        where = f"{1e3 * largest:.0f} mm of the block's face"
+        demands: list[Demand] = []
+        for quantity in bounds(self.configuration):
+            if quantity == "laser_2":
+                demands.append(Demand(quantity, largest / (0.5 * self.configuration.laser_ranges[1]), None, where))
+            elif quantity == "drift":
+                demands.append(Demand(quantity, None, None, _NOT_WATCHED))
+            else:
+                demands.append(Demand(quantity, 0.0, None, "nothing is driven"))
+        return Forecast(
+            demands=tuple(demands),
+            duration=sum(tilt.duration for tilt in self.tilts),
+            notes=("The drive stays at zero. The table is locked by hand, and unlocked at the end.",),
+        )
 
     @cached_property
     def prediction(self) -> Table:
-        """The impacts of every tilt, with the specimen as known."""
+        """The half swings of each tilt for the specimen as known."""
         specimen = self.configuration.known_specimen
         alpha, p = critical_angle(specimen.block), frequency_parameter(specimen.block, specimen.g)
-        tilts = planned_tilts(self.parameters, specimen)
-        motions = [FreeRocking(alpha, p, specimen.block.restitution, tilt) for tilt in tilts]
+        motions = [FreeRocking(alpha, p, specimen.block.restitution, tilt.angle) for tilt in self.tilts]
         used = [
             int(np.count_nonzero(motion.amplitudes > self.parameters.least_swing * abs(motion.tilt)))
             for motion in motions
@@ -58,30 +85,46 @@ class FreeRockingTest(Prepared[FreeRockingParameters]):
         }
 
     def plan(self) -> Plan:
-        self._bench = Bench()
-        return self.collected(free_rocking_plan(self.parameters, self.configuration, self._bench))
+        self._run = RockingRun(self.parameters, self.configuration, self.tilts)
+        return self.collected(self._run.steps())
 
     def result(self, points: Sequence[Parameters]) -> Result:
-        bench, rows = self._bench, [point for point in points if isinstance(point, RockingPoint)]
-        left = [
-            text
-            for there, text in (
-                (bench.watching, "Laser 2 still looks at the block: turn it back to storey 2."),
-                (bench.locked, "THE TABLE IS STILL LOCKED: take the clamps off before anything is driven."),
-            )
-            if there
-        ]
+        run, rows = self._run, [point for point in points if isinstance(point, RockingPoint)]
+        lines = [rocking_table(rows)]
+        if run.laser_on_block:
+            lines.append(_LASER_ON_BLOCK)
+        if run.table_locked:
+            lines.append(_TABLE_LOCKED)
 
         def write(path: Path) -> None:
-            if bench.identified is not None:
-                write_specimen(path, bench.identified)
-
-        def draw(path: Path) -> None:
-            write_figure(path, rocking_figure(rows, bench.tilts, bench.found))
+            if run.identified is not None:
+                write_specimen(path, run.identified)
 
         return Result(
             points=tuple(points),
-            text="\n".join([rocking_table(rows), *left]),
-            figures={"free_rocking.png": draw},
-            files={} if bench.identified is None else {"specimen.json": write},
+            text="\n".join(lines),
+            figures={
+                "free_rocking.png": lambda path: write_figure(path, rocking_figure(rows, run.tilts, run.findings))
+            },
+            files={} if run.identified is None else {"specimen.json": write},
         )
+
+    def _check(self) -> None:
+        """Raise InvalidInput where the laser cannot follow the block."""
+        p, configuration = self.parameters, self.configuration
+        low, high = beam_heights(self.tilts, configuration.specimen)
+        for tilt in self.tilts:
+            if tilt.displacement != tilt.displacement:
+                raise InvalidInput("height", p.height, _MEETS.format(low, high))
+            share = abs(tilt.displacement) / (0.5 * configuration.laser_ranges[1])
+            allowed = configuration.limits.laser_range
+            if share > allowed:
+                needs = f"the face moves by {1e3 * abs(tilt.displacement):.1f} mm there, {share:.2f} of half the range"
+                raise InvalidInput(
+                    "height", p.height, f"{needs} of laser 2; limits.laser_range = {allowed:g}: look lower"
+                )
+        if configuration.backend == "simulated":
+            cutoff = configuration.simulation.bench.filter_unit.cutoff
+            if cutoff < LOWEST_CUTOFF:
+                allowed = f"impacts must be forgotten within {1e3 * AFTER:.0f} ms: at least {LOWEST_CUTOFF:g} Hz"
+                raise InvalidInput("simulation.bench.filter_unit.cutoff", cutoff, allowed)

@@ -1,4 +1,4 @@
-"""Free rocking of the block: what it asks for, what it states of a tilt, and the object that others find."""
+"""Free rocking of the stand-alone block: parameters, the result of a tilt, and the protocol."""
 
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -9,6 +9,11 @@ from sim.parameters import Parameters, each_once, quantity
 
 if TYPE_CHECKING:
     from bench.config.model import BenchConfiguration
+
+ALL = "all tilts"
+"""Name of the row that combines the others."""
+
+_EXPANDED = "expanded uncertainty (k = 2)"
 
 Share = Annotated[float, Field(ge=0.1, le=0.9)]
 
@@ -37,12 +42,6 @@ class FreeRockingParameters(Parameters):
         8.0, "s", "time from the beginning of a recording until the block must have been let go", ge=5, le=60
     )
     attempts: int = quantity(2, "1", "recordings of a tilt before it is left out", ge=1, le=10)
-
-
-ALL = "all tilts"
-"""Name of the row that combines the others."""
-
-_EXPANDED = "expanded uncertainty (k = 2)"
 
 
 class RockingPoint(Parameters):
@@ -78,7 +77,9 @@ class RockingPoint(Parameters):
     push: float | None = quantity(
         None, "1", "by how much the block was pushed: tilt of a release from rest over the hand's"
     )
-    birge: float | None = quantity(None, "1", "scatter of the tilts' r_motion over what their uncertainties let expect")
+    birge: float | None = quantity(
+        None, "1", "scatter of the tilts' r_motion relative to that expected from their uncertainties"
+    )
     uncertainty_parts: str = quantity("", "", "standard uncertainty of r_exp by contribution, JSON object")
     remarks: str = quantity("", "", "what was noticed")
 

@@ -26,8 +26,8 @@ from bench.analysis.free_rocking.laser_errors import CLOCK, WAVES, LaserErrors
 from bench.analysis.free_rocking.swings import Seen
 from bench.analysis.free_rocking.tilt import Tilt, analysed
 from bench.analysis.gain import SensorAccuracy
-from protocols.free_rocking.planned import planned_tilts, recording_time
 from protocols.free_rocking.protocol import FreeRockingParameters
+from protocols.free_rocking.tilts import PlannedTilt, planned_tilts
 from sim import block_face
 from sim.arrangement import Arrangement
 from sim.free_rocking import FreeRocking, critical_angle, energy, frequency_parameter, theoretical_restitution
@@ -53,7 +53,7 @@ def repeat(seed: int, *, as_drawn: bool) -> list[tuple[float, float]]:
     asked, nominal = FreeRockingParameters(), Specimen()
     true = Specimen(block=Block(restitution_factor=factor)).coupled(0.0)
     bench = VirtualBench(VirtualBenchParameters(laser_2=laser), true, seed)
-    tilts = [_recorded(bench, true, nominal, asked, angle) for angle in planned_tilts(asked, nominal)]
+    tilts = [_recorded(bench, true, nominal, asked, tilt) for tilt in planned_tilts(asked, nominal)]
     found = findings(
         tilts, LaserErrors(SensorAccuracy(), laser.measuring_range), asked.height, asked.height_uncertainty
     )
@@ -86,7 +86,7 @@ def scattered(seed: int, *, scatter: float) -> list[tuple[float, float]]:
     alpha, p = critical_angle(nominal.block), frequency_parameter(nominal.block, nominal.g)
     theory, rate, r = theoretical_restitution(nominal.block), 2000.0, 0.97
     tilts: list[Tilt] = []
-    for angle in planned_tilts(asked, nominal):
+    for angle in (tilt.angle for tilt in planned_tilts(asked, nominal)):
         motion = Scattered(alpha, p, r, angle, start=3.0)
         object.__setattr__(motion, "drawn", scatter * random.standard_normal(400))
         times = np.arange(round((min(motion.rest_time, 40.0) + 1.25) * rate)) / rate
@@ -101,15 +101,15 @@ def scattered(seed: int, *, scatter: float) -> list[tuple[float, float]]:
 
 
 def _recorded(
-    bench: VirtualBench, true: Specimen, nominal: Specimen, asked: FreeRockingParameters, angle: float
+    bench: VirtualBench, true: Specimen, nominal: Specimen, asked: FreeRockingParameters, tilt: PlannedTilt
 ) -> Tilt:
     rate = bench.parameters.sample_rate
-    bench.mount(Arrangement(true, table_locked=True, watched=asked.height, tilt=angle))
+    bench.mount(Arrangement(true, table_locked=True, watched=asked.height, tilt=tilt.angle))
     bench.run(np.zeros(round(WARM_UP * rate)))
     bench.arm()
-    counts = bench.run(np.zeros(round(recording_time(asked, nominal, angle) * rate)))
+    counts = bench.run(np.zeros(round(tilt.recording * rate)))
     values = bench.channels[3].to_unit(counts[:, 3])
-    return analysed(Seen(values, rate, nominal.block, asked.height), nominal, asked.least_swing * abs(angle))
+    return analysed(Seen(values, rate, nominal.block, asked.height), nominal, asked.least_swing * abs(tilt.angle))
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

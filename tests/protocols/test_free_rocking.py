@@ -20,8 +20,8 @@ from bench.publication.free_rocking import rocking_section
 from bench.record.reader import open_record
 from bench.results import FILE
 from bench.session import SessionResult, run_session
-from protocols.free_rocking.planned import planned_tilts, seen_displacement
 from protocols.free_rocking.protocol import ALL, FreeRockingParameters, RockingPoint
+from protocols.free_rocking.tilts import planned_tilts
 from sim.errors import InvalidInput
 from sim.free_rocking import critical_angle
 from sim.sensors import FilterUnit, Laser
@@ -185,10 +185,11 @@ def test_preflight_says_that_nothing_is_driven(tmp_path: Path) -> None:
 def test_the_tilts_go_to_both_sides_smallest_first() -> None:
     alpha = critical_angle(Block())
     asked = FreeRockingParameters(tilts=(0.6, 0.3))
-    assert planned_tilts(asked, Specimen()) == pytest.approx([0.3 * alpha, -0.3 * alpha, 0.6 * alpha, -0.6 * alpha])
+    tilts = planned_tilts(asked, Specimen())
+    assert [tilt.angle for tilt in tilts] == pytest.approx([0.3 * alpha, -0.3 * alpha, 0.6 * alpha, -0.6 * alpha])
+    assert tilts[2].displacement == pytest.approx(0.3 * np.tan(0.6 * alpha))
     away = asked.model_copy(update={"sides": "away"})
-    assert planned_tilts(away, Specimen()) == pytest.approx([-0.3 * alpha, -0.6 * alpha])
-    assert seen_displacement(asked, Specimen(), 0.05) == pytest.approx(0.3 * np.tan(0.05))
+    assert [tilt.angle for tilt in planned_tilts(away, Specimen())] == pytest.approx([-0.3 * alpha, -0.6 * alpha])
 
 
 @pytest.mark.parametrize(

@@ -1,10 +1,11 @@
 # pyright: reportUnknownMemberType=false
-"""The rocking with its fit, what is left, r of every impact, and what the uncertainty is made of.
+"""The results as text for the terminal and as a figure: motion with fit, residual, restitution by impact, budget.
 
 matplotlib's keyword arguments have no types, hence the first line.
 """
 
 from collections.abc import Sequence
+from math import degrees, log10
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +14,7 @@ from bench.analysis.free_rocking.findings import Findings
 from bench.analysis.free_rocking.fit import ZERO
 from bench.analysis.free_rocking.tilt import Tilt
 from bench.analysis.gain import COVERAGE
+from bench.report.columns import right_aligned
 from bench.report.rocking_figure import Impacts, draw_impacts
 from bench.report.style import BLACK, BLUE, VERMILLION, new_figure, set_grid
 from protocols.free_rocking.protocol import ALL, RockingPoint
@@ -20,6 +22,18 @@ from protocols.free_rocking.protocol import ALL, RockingPoint
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+_TITLES = ("", "tilt", "impacts", "r", "U (k=2)", "r / r_th", "U (k=2)", "r, amplitudes", "U (k=2)", "residual")
+_UNITS = ("", "[deg]", "[1]", "[1]", "[1]", "[1]", "[1]", "[1]", "[1]", "[um]")
+
+
+def rocking_table(points: Sequence[RockingPoint]) -> str:
+    """One row for each tilt and one for all, and below them the block's parameters from its motion."""
+    if not points:
+        return "No tilt could be used."
+    lines = right_aligned(_TITLES, _UNITS, (_cells(point) for point in points))
+    combined = next((point for point in points if point.part == ALL), None)
+    return "\n".join(lines if combined is None else [*lines, "", *_combined(combined)])
 
 
 def rocking_figure(points: Sequence[RockingPoint], tilts: Sequence[Tilt], found: Findings | None) -> "Figure":
@@ -35,9 +49,42 @@ def rocking_figure(points: Sequence[RockingPoint], tilts: Sequence[Tilt], found:
     _motion(motion, left, max(tilts, key=lambda tilt: abs(tilt.swings.held)))
     draw_impacts(single, [_impacts(tilt) for tilt in tilts], combined.r_exp, combined.r_th)
     _parts(parts, found)
-    ratio, doubt = combined.ratio, combined.ratio_uncertainty
-    motion.set_title(f"r_exp / r_th = {ratio:.6f} +- {doubt:.1g} (k = 2), {combined.impacts} impacts", loc="left")
+    ratio, expanded = combined.ratio, combined.ratio_uncertainty
+    motion.set_title(f"r_exp / r_th = {ratio:.6f} +- {expanded:.1g} (k = 2), {combined.impacts} impacts", loc="left")
     return figure
+
+
+def _cells(point: RockingPoint) -> tuple[str, ...]:
+    return (
+        point.part,
+        "" if point.tilt_rad is None else f"{degrees(point.tilt_rad):+.2f}",
+        str(point.impacts),
+        *_pair(point.r_exp, point.r_exp_uncertainty),
+        *_pair(point.ratio, point.ratio_uncertainty),
+        *_pair(point.r_amplitudes, point.r_amplitudes_uncertainty),
+        f"{1e6 * point.residual_m:.1f}",
+    )
+
+
+def _combined(point: RockingPoint) -> list[str]:
+    trend, alpha = _pair(point.trend, point.trend_uncertainty), _pair(point.alpha_rad, point.alpha_uncertainty_rad)
+    p = _pair(point.p_rad_s, point.p_uncertainty_rad_s)
+    birge = "" if point.birge is None else f"; the tilts scatter {point.birge:.2f} times what is expected"
+    by = f", by the {point.estimator}" if point.estimator else ""
+    return [
+        f"r_exp / r_th = {point.ratio:.6f} +- {point.ratio_uncertainty:.1g} (k = 2){by}, r_th = {point.r_th:.6f}"
+        f"{birge}",
+        f"change of r over the impacts' speeds: {trend[0]} +- {trend[1]}",
+        f"alpha = {alpha[0]} +- {alpha[1]} rad, by the sides {point.alpha_sides_rad:.6f} rad",
+        f"p = {p[0]} +- {p[1]} rad/s, by the sides {point.p_sides_rad_s:.5f} rad/s",
+        *([f"see to: {point.remarks}"] if point.remarks else []),
+    ]
+
+
+def _pair(value: float, uncertainty: float) -> tuple[str, str]:
+    """A value and its uncertainty, both to two digits of the uncertainty."""
+    places = min(max(1 - int(log10(uncertainty) // 1), 0), 8) if uncertainty > 0.0 else 8
+    return f"{value:.{places}f}", f"{uncertainty:.{places}f}"
 
 
 def _motion(motion: "Axes", left: "Axes", tilt: Tilt) -> None:
