@@ -1,22 +1,38 @@
-"""The loop check on a bench: every channel and the path through the shaker, at low level."""
+"""The loop check on a bench: every channel and the path through the shaker, at low level.
 
-from collections.abc import Sequence
+1. The storeys are clamped to the table, so that every sensor measures one motion. All channels are acquired at rest.
+2. Only if every sensor measures: the drive is calibrated and sines of one velocity are driven.
+3. The clamps are taken off.
+"""
+
+from collections.abc import Generator, Iterable, Sequence
 from functools import cached_property
 
 import numpy as np
 
-from bench.analysis.check_line import CheckLine, Verdict
+from bench.analysis.check_line import CheckLine, Verdict, failed, untested
 from bench.config.model import BenchConfiguration
+from bench.engine.steps import Arm, Handle, Heard, Listen, Outcome, RampOut, Say, Step
+from bench.events import PointFinished, StepStarted
 from bench.protocol import Plan, Prepared, Result, Sources
 from bench.record.tables import Column, Table
 from bench.report.style import write_figure
-from protocols.check.drive import expected_drive
-from protocols.check.figure import margins
+from drivers.rig import Handwork
+from protocols.check.comparison import delay_lines, scale_lines
+from protocols.check.drive import drive_lines, expected_drive
 from protocols.check.protocol import CheckParameters
-from protocols.check.sheet import check_plan
-from protocols.check.table import lines_table
+from protocols.check.resting import resting_lines, safety_lines
+from protocols.check.results import lines_table, margins
+from protocols.check.sines import measured_sines
+from protocols.common.calibrate import Unmeasurable
 from sim.errors import InvalidInput
 from sim.parameters import Parameters
+
+REST = 2.0
+"""Time at rest before the table moves, over which the zero of the signals is taken [s]."""
+
+_CLAMP = "Take spring and block off the table and clamp both storeys to it; keep clear, the amplifier is switched on."
+_UNCLAMP = "Take the clamps off the storeys."
 
 
 class LoopCheck(Prepared[CheckParameters]):
@@ -52,7 +68,7 @@ class LoopCheck(Prepared[CheckParameters]):
         }
 
     def plan(self) -> Plan:
-        return self.collected(check_plan(self.parameters, self.configuration))
+        return self.collected(_steps(self.parameters, self.configuration))
 
     def result(self, points: Sequence[Parameters]) -> Result:
         lines = [point for point in points if isinstance(point, CheckLine)]
@@ -62,3 +78,48 @@ class LoopCheck(Prepared[CheckParameters]):
             figures={"margins.png": lambda path: write_figure(path, margins(lines))},
             passed=all(line.verdict is not Verdict.FAILED for line in lines),
         )
+
+
+def _steps(parameters: CheckParameters, configuration: BenchConfiguration) -> Generator[Step, Outcome, None]:
+    """The whole check as steps; every line is published as a point as soon as it is known."""
+    bare = configuration.known_specimen.bare()
+    yield Handle(Handwork.LOCK_FRAME, bare, _CLAMP)
+    yield Say(StepStarted("listen at rest"))
+    heard = yield Listen(parameters.rest)
+    if not isinstance(heard, Heard):
+        raise TypeError(f"listening came to {heard}")
+    yield from _publish(safety_lines(configuration))
+    resting = list(resting_lines(heard, parameters, configuration.analysis))
+    if heard.violation is not None and all(line.verdict is not Verdict.FAILED for line in resting):
+        resting.append(failed("table", "rest", f"{heard.violation} without drive: see to amplifier and limits"))
+    yield from _publish(resting)
+    if any(line.verdict is Verdict.FAILED for line in resting):
+        remedy = "the table was not moved: see to the failed lines, then check again"
+        yield from _publish([untested("bench", "motion", remedy)])
+    else:
+        yield from _motion(parameters, configuration)
+    yield Handle(Handwork.UNLOCK_FRAME, bare, _UNCLAMP)
+
+
+def _motion(parameters: CheckParameters, configuration: BenchConfiguration) -> Generator[Step, Outcome, None]:
+    yield Arm(REST)
+    try:
+        sines = yield from measured_sines(parameters)
+    except Unmeasurable as error:
+        yield RampOut(fast=True)
+        yield from _publish([failed("bench", "motion", str(error))])
+        return
+    yield RampOut()
+    on_ground = configuration.laser_reference == "ground"
+    yield from _publish(drive_lines(sines, parameters, configuration))
+    yield from _publish(scale_lines(sines, parameters, lasers=on_ground))
+    if on_ground:
+        yield from _publish(delay_lines(sines, parameters, configuration))
+    else:
+        remedy = "lasers on the table do not see its motion: stand them on the ground for this"
+        yield from _publish([untested("lasers", "polarity, scale and delay", remedy)])
+
+
+def _publish(lines: Iterable[CheckLine]) -> Generator[Step, Outcome, None]:
+    for line in lines:
+        yield Say(PointFinished(line))

@@ -1,4 +1,4 @@
-"""The loop check: what it asks for and lets pass, its lines as text, and the object that others find."""
+"""The loop check: parameters with their tolerances, and the protocol."""
 
 from typing import TYPE_CHECKING, Annotated
 
@@ -6,7 +6,7 @@ from pydantic import Field, field_validator
 
 from bench.analysis.check_line import CheckLine
 from bench.protocol import Prepared, Protocol, Sources
-from protocols.check.table import sentence
+from protocols.check.results import log_line
 from sim.parameters import Parameters, each_once, quantity
 
 if TYPE_CHECKING:
@@ -68,5 +68,5 @@ PROTOCOL = Protocol(
     point=CheckLine,
     prepare=_prepare,
     figures=("margins.png",),
-    log_line=sentence,
+    log_line=log_line,
 )

@@ -1,20 +1,24 @@
-"""Each channel with the output at zero: does it measure, is it alive, is it quiet."""
+"""The bench at rest: valid samples and noise of each channel with the output at zero, and the safety inputs."""
 
 from collections.abc import Iterator
 
 import numpy as np
 
-from bench.analysis.check_line import CheckLine, judged, stated
+from bench.analysis.check_line import CheckLine, judged, passed, stated, untested
 from bench.analysis.cycles import COMPLETE
 from bench.analysis.gain import SensorAccuracy
+from bench.config.model import BenchConfiguration
 from bench.engine.steps import Heard
 from drivers.rig import Channel, Counts
 from protocols.check.protocol import CheckParameters
 
 _STUCK = 0.01
-"""Scatter [counts] below which a channel does not live: one sample in ten thousand that differs gives as much."""
+"""Scatter [counts] below which a channel is stuck: one sample in ten thousand that differs gives as much."""
 
 _LASERS = ("laser_1", "laser_2")
+
+_MISSING = "the program does not read it: see that it opens the enable chain by itself"
+_ALONE = "nothing opens the enable relay when the program dies: wire a heartbeat relay, or set a watchdog"
 
 
 def resting_lines(heard: Heard, parameters: CheckParameters, accuracy: SensorAccuracy) -> Iterator[CheckLine]:
@@ -35,6 +39,22 @@ def resting_lines(heard: Heard, parameters: CheckParameters, accuracy: SensorAcc
         yield judged(channel.name, what, share, (COMPLETE, 1.0), "1", _reason(channel, counts[~valid]), expected=1.0)
         if share >= COMPLETE:
             yield _noise(channel, counts[valid], limits.get(channel.name))
+
+
+def safety_lines(configuration: BenchConfiguration) -> Iterator[CheckLine]:
+    """A line for each safety input, once the bench has been acquired at rest; none for a simulated bench.
+
+    An input that is open refuses the arming, and one that opens ends the check: those that are read were good.
+    """
+    if configuration.backend != "hardware":
+        return
+    daq = configuration.hardware.daq
+    for name, given in daq.safety_inputs.items():
+        yield passed(name, f"{given.line} was {given.good}: good")
+    for name in daq.missing_inputs:
+        yield untested(name, "safety input", _MISSING)
+    if daq.watchdog is None and daq.heartbeat is None:
+        yield untested("enable line", "heartbeat or watchdog", _ALONE)
 
 
 def _noise(channel: Channel, counts: Counts, limit: float | None) -> CheckLine:

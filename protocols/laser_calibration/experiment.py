@@ -18,11 +18,10 @@ from bench.preflight.response import response_of
 from bench.protocol import Plan, Prepared, Result, Sources
 from bench.record.tables import Column, Table
 from bench.report.style import write_figure
-from protocols.laser_calibration.figure import errors_figure
 from protocols.laser_calibration.fit import Fitted
+from protocols.laser_calibration.plan import START, calibration_steps, expected_duration, planned_passes
 from protocols.laser_calibration.protocol import CalibratedSensor, LaserCalibrationParameters
-from protocols.laser_calibration.sheet import START, calibration_plan, expected_duration, passes_of
-from protocols.laser_calibration.table import sensors_table
+from protocols.laser_calibration.results import errors_figure, sensors_table
 from sim.errors import InvalidInput
 from sim.parameters import Parameters
 
@@ -105,7 +104,7 @@ class LaserCalibrationRun(Prepared[LaserCalibrationParameters]):
     @cached_property
     def prediction(self) -> Table:
         """The passes that are asked for."""
-        omega, amplitude = np.array(passes_of(self.parameters)).T
+        omega, amplitude = np.array(planned_passes(self.parameters)).T
         return {
             "omega": Column(omega, "rad/s", "circular frequency of each pass"),
             "amplitude": Column(amplitude, "m", "amplitude of the table in it"),
@@ -113,7 +112,7 @@ class LaserCalibrationRun(Prepared[LaserCalibrationParameters]):
 
     def plan(self) -> Plan:
         self._found = self._curves = None
-        return self.collected(calibration_plan(self.parameters, self.configuration, self._keep))
+        return self.collected(calibration_steps(self.parameters, self.configuration, self._keep))
 
     def result(self, points: Sequence[Parameters]) -> Result:
         found, curves = self._found, self._curves

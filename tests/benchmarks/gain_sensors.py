@@ -13,8 +13,8 @@ from bench.analysis.gain import SensorAccuracy
 from bench.analysis.laser_calibration import LaserCalibration
 from bench.analysis.signals import SignalMap
 from protocols.laser_calibration.fit import calibration, fitted, one_pass
+from protocols.laser_calibration.plan import planned_passes
 from protocols.laser_calibration.protocol import LaserCalibrationParameters
-from protocols.laser_calibration.sheet import passes_of
 from sim.excitation import SineProgram, Sweep
 from sim.gain import predict_gain
 from sim.linear import steady_response
@@ -94,7 +94,7 @@ class Sensors:
         """What a calibration finds of these sensors."""
         asked = LaserCalibrationParameters()
         passes = []
-        for omega, amplitude in passes_of(asked):
+        for omega, amplitude in planned_passes(asked):
             t = np.arange(round((asked.cycles + 2) * tau / omega * RATE)) / RATE
             x, v, a = (amplitude * omega**k * np.sin(omega * t + 0.5 * k * np.pi) for k in range(3))
             zero = np.zeros(t.size)

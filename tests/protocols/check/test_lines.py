@@ -9,11 +9,10 @@ from bench.config.model import BenchConfiguration
 from bench.engine.steps import Heard
 from drivers.hardware.parameters import Hardware, Lasers
 from drivers.rig import Channel
-from protocols.check.delays import allowed_delay, delay_lines
+from protocols.check.comparison import allowed_delay, delay_lines, scale_lines, signed_scale
 from protocols.check.drive import dead_time, drive_lines
 from protocols.check.protocol import CheckParameters
 from protocols.check.resting import resting_lines
-from protocols.check.scales import scale_lines, signed_scale
 from protocols.check.sines import Sines
 from sim.specimen import Frame, Specimen
 

@@ -20,7 +20,7 @@ from drivers.emulation.laboratory import Laboratory
 from drivers.hardware.parameters import Hardware
 from drivers.laboratory_client import ask
 from protocols.check.protocol import CheckParameters
-from protocols.check.safety import safety_lines
+from protocols.check.resting import safety_lines
 from sim.specimen import Specimen
 from sim.virtual_bench import VirtualBenchParameters
 

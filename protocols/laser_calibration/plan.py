@@ -1,6 +1,6 @@
-"""The lab sheet of the laser calibration.
+"""The steps of the laser calibration.
 
-1. The storeys are clamped to the table, so that every sensor sees one motion.
+1. The storeys are clamped to the table, so that every sensor measures one motion.
 2. The table is driven by slow sines, each pass a little smaller than the one before.
 3. The clamps are taken off.
 """
@@ -35,7 +35,7 @@ from protocols.common.calibrate import SETTLING, Unmeasurable, calibrate_drive, 
 from protocols.common.probe import probed_drive
 from protocols.laser_calibration.fit import Fitted, Pass, calibration, fitted, one_pass
 from protocols.laser_calibration.protocol import LaserCalibrationParameters
-from protocols.laser_calibration.sensors import sensors
+from protocols.laser_calibration.results import calibrated_sensors
 
 REST = 2.0
 """Time at rest over which the lasers' readings there, and the zero of the signals, are taken [s]."""
@@ -59,7 +59,7 @@ _UNCLAMP = "Take the clamps off the storeys."
 _LOOSE = "the first storey is pulled aside although no block stands on the table: check lasers and clamps"
 
 
-def passes_of(parameters: LaserCalibrationParameters) -> list[tuple[float, float]]:
+def planned_passes(parameters: LaserCalibrationParameters) -> list[tuple[float, float]]:
     """Frequency [rad/s] and amplitude [m] of the passes: the slow ones first."""
     slow = parameters.passes // 2
     return [
@@ -77,11 +77,11 @@ def expected_duration(parameters: LaserCalibrationParameters) -> float:
 
 def _measuring(parameters: LaserCalibrationParameters, after: int = 0) -> float:
     """Expected time of the passes but the first `after`, and of the end [s]."""
-    lengths = [CHANGE + (SETTLING + parameters.cycles) * tau / omega for omega, _ in passes_of(parameters)]
+    lengths = [CHANGE + (SETTLING + parameters.cycles) * tau / omega for omega, _ in planned_passes(parameters)]
     return sum(lengths[after:]) + (END if after < len(lengths) else 0.0)
 
 
-def calibration_plan(
+def calibration_steps(
     parameters: LaserCalibrationParameters,
     configuration: BenchConfiguration,
     keep: Callable[[LaserCalibration, tuple[Fitted, Fitted]], None],
@@ -92,7 +92,7 @@ def calibration_plan(
     yield Say(StepStarted("the lasers at rest"))
     heard = yield Listen(REST)
     if not isinstance(heard, Heard):
-        raise TypeError(f"listening came to {heard}")
+        raise TypeError(f"acquiring at rest came to {heard}")
     rests = _rests(heard)
     yield Arm(REST)
     try:
@@ -116,8 +116,8 @@ def calibration_plan(
     )
     keep(found, curves)
     for number, (curve, laser) in enumerate(zip(curves, found.lasers, strict=True), 1):
-        yield Say(_told(f"laser_{number}", curve, laser.delay, laser.delay_uncertainty))
-    for point in sensors(found):
+        yield Say(_fit_event(f"laser_{number}", curve, laser.delay, laser.delay_uncertainty))
+    for point in calibrated_sensors(found):
         yield Say(PointFinished(point))
     yield Handle(Handwork.UNLOCK_FRAME, bare, _UNCLAMP)
 
@@ -134,7 +134,7 @@ def _passes(parameters: LaserCalibrationParameters) -> Generator[Step, Outcome, 
         known = measured
         yield Calibrate(known)
     passes: list[Pass] = []
-    for number, (omega, amplitude) in enumerate(passes_of(parameters), 1):
+    for number, (omega, amplitude) in enumerate(planned_passes(parameters), 1):
         text = f"pass {number} of {parameters.passes}: {1e3 * amplitude:.1f} mm at {omega:g} rad/s"
         yield Say(StepStarted(text))
         yield Say(_progress(parameters, number - 1, text))
@@ -172,7 +172,7 @@ def _rests(heard: Heard) -> tuple[float, float]:
     return found[0], found[1]
 
 
-def _told(name: str, curve: Fitted, delay: float, doubt: float) -> FitFinished:
+def _fit_event(name: str, curve: Fitted, delay: float, uncertainty: float) -> FitFinished:
     at = np.linspace(curve.low, curve.high, curve.without.shape[1])
     fit = np.polynomial.chebyshev.chebval(np.linspace(-1.0, 1.0, at.size), curve.error)
     passes = {
@@ -187,5 +187,5 @@ def _told(name: str, curve: Fitted, delay: float, doubt: float) -> FitFinished:
             "error": Series(fit - fit.mean(), "m", "reading minus displacement as the table's sensor shows it"),
             **passes,
         },
-        {"delay": FittedParameter(delay, doubt, "s")},
+        {"delay": FittedParameter(delay, uncertainty, "s")},
     )
