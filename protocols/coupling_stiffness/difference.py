@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from bench.analysis.free_decay.modal import K1, K2
 from protocols.common.decays.findings import FOUND
-from protocols.common.decays.results import SIGNIFICANT, FrameResult
+from protocols.common.decays.frame import SIGNIFICANT, FrameResult
 from sim.identified import Identified
 
 Array = NDArray[np.float64]
@@ -61,7 +61,7 @@ class SpringResult:
         return sqrt(sum(part**2 for part in self.parts.values()))
 
 
-def reference_of(result: FrameResult) -> Reference:
+def measured_reference(result: FrameResult) -> Reference:
     """The bare frame as it was measured in the same run."""
     places = list(FOUND.values())
     shift = result.shared_shift[places]
@@ -69,7 +69,7 @@ def reference_of(result: FrameResult) -> Reference:
     return Reference(tuple(FOUND), result.frame.values[places], whole - shift @ result.shared @ shift.T, shift)
 
 
-def known_reference(known: Identified | None) -> Reference | None:
+def identified_reference(known: Identified | None) -> Reference | None:
     """The bare frame as it was identified before; None where it was not.
 
     How it follows the masses is what its covariance with m1 and m2 says; not at all where that says nothing.
@@ -86,12 +86,12 @@ def known_reference(known: Identified | None) -> Reference | None:
     return Reference(names, values, whole, shift)
 
 
-def changed(bare: FrameResult, known: Identified | None) -> str | None:
+def frame_change(bare: FrameResult, known: Identified | None) -> str | None:
     """By how many standard uncertainties k1 and k2 differ from what is known; None where neither does (99 %)."""
-    before = known_reference(known)
+    before = identified_reference(known)
     if before is None:
         return None
-    now = reference_of(bare)
+    now = measured_reference(bare)
     off: Array = now.shift[:2] - before.shift[:2]
     variance = np.diag(now.apart)[:2] + np.diag(before.apart)[:2] + np.diag(off @ bare.shared @ off.T)
     apart = (now.values[:2] - before.values[:2]) / np.sqrt(variance)
@@ -105,7 +105,7 @@ def replaces(bare: FrameResult, known: Identified) -> bool:
 
     Better is by the determinant of the covariance: one number for k1, k2, xi1 and xi2, which belong together.
     """
-    if not set(FOUND) <= set(known.names) or changed(bare, known) is not None:
+    if not set(FOUND) <= set(known.names) or frame_change(bare, known) is not None:
         return True
     places = list(FOUND.values())
     now = float(np.linalg.det(_relative(bare.frame.covariance[np.ix_(places, places)], bare.frame.values[places])))
@@ -113,7 +113,7 @@ def replaces(bare: FrameResult, known: Identified) -> bool:
     return now < float(np.linalg.det(_relative(known.covariance(tuple(FOUND)), values)))
 
 
-def spring_of(label: float, held: FrameResult, reference: Reference) -> SpringResult:
+def spring_result(label: float, held: FrameResult, reference: Reference) -> SpringResult:
     """The spring that makes the difference."""
     k1, shared = float(reference.values[0]), held.shared
     shift = held.shared_shift[K1] - reference.shift[0]

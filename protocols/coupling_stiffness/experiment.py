@@ -21,25 +21,22 @@ from bench.protocol import Plan, Prepared, Result, Sources
 from bench.record.tables import Column, Table
 from bench.report.style import write_figure
 from drivers.rig import Handwork
-from protocols.common.decays.checks import check_pulse
-from protocols.common.decays.decays import pulsed_decays, pulsed_duration, setting_of
-from protocols.common.decays.forecast import pulse_forecast
-from protocols.common.decays.masses import masses_told
-from protocols.common.decays.playing import Pace
-from protocols.common.decays.pulse import Planned, frequencies, planned
-from protocols.common.decays.results import SIGNIFICANT, FrameResult, nonlinear_text, result_of
+from protocols.common.decays.decays import fit_setting, pulsed_decays, pulsed_duration
+from protocols.common.decays.findings import check_masses, mass_warning
+from protocols.common.decays.frame import SIGNIFICANT, FrameResult, frame_result, nonlinear_text
+from protocols.common.decays.pulse import frequencies, plan_pulse, pulse_forecast
+from protocols.common.decays.recording import Pace
 from protocols.coupling_stiffness.difference import (
     Reference,
     SpringResult,
-    changed,
-    known_reference,
-    reference_of,
-    spring_of,
+    frame_change,
+    identified_reference,
+    measured_reference,
+    spring_result,
 )
-from protocols.coupling_stiffness.figure import springs_figure
 from protocols.coupling_stiffness.findings import bare_point, spring_findings, spring_point
 from protocols.coupling_stiffness.protocol import CouplingStiffnessParameters, SpringPoint
-from protocols.coupling_stiffness.table import springs_table
+from protocols.coupling_stiffness.results import springs_figure, springs_table
 from sim.errors import InvalidInput, RockbenchError
 from sim.identified import Identified
 from sim.parameters import Parameters
@@ -67,27 +64,24 @@ class CouplingStiffness(Prepared[CouplingStiffnessParameters]):
             raise InvalidInput("reference", False, allowed)
         self._specimens: dict[str, Specimen] = {BARE: known.bare()} if parameters.reference else {}
         self._specimens |= {SPRING.format(beta): known.coupled(beta) for beta in parameters.beta}
-        for specimen in self._specimens.values():
-            check_pulse(parameters, configuration, specimen)
+        check_masses(parameters, configuration)
+        self._pulses = {
+            name: plan_pulse(parameters, configuration, specimen) for name, specimen in self._specimens.items()
+        }
         self._bare: FrameResult | None = None
         self._springs: list[SpringResult] = []
         self._clamped = False
         """Whether a block is clamped to the table."""
 
-    @cached_property
-    def _pulses(self) -> dict[str, Planned]:
-        """The pulse for each specimen."""
-        return {name: planned(self.parameters, self.configuration, each) for name, each in self._specimens.items()}
-
     @property
-    def duration(self) -> float:
+    def _duration(self) -> float:
         """Expected length of a run [s]."""
         return sum(pulsed_duration(self.parameters, plan.pulse) + BY_HAND for plan in self._pulses.values())
 
     @cached_property
     def forecast(self) -> Forecast:
         self.progress("predicting what the run asks of the bench")
-        return pulse_forecast(self.configuration, self._pulses, self.duration)
+        return pulse_forecast(self.configuration, self._pulses, self._duration)
 
     @cached_property
     def prediction(self) -> Table:
@@ -112,25 +106,25 @@ class CouplingStiffness(Prepared[CouplingStiffnessParameters]):
         def write(path: Path) -> None:
             write_specimen(path, known.extended(*spring_findings(bare, springs, known)))
 
-        told = springs_table([point for point in points if isinstance(point, SpringPoint)])
+        text = springs_table([point for point in points if isinstance(point, SpringPoint)])
         return Result(
             points=tuple(points),
-            text=f"{told}\n{STILL_CLAMPED}" if self._clamped else told,
+            text=f"{text}\n{STILL_CLAMPED}" if self._clamped else text,
             figures={"coupling_stiffness.png": lambda path: write_figure(path, springs_figure(springs))},
             files={"specimen.json": write} if bare is not None or springs else {},
         )
 
     def _steps(self) -> Generator[Step, Outcome, None]:
         p, configuration = self.parameters, self.configuration
-        setting, pace = setting_of(p, configuration), Pace(self.duration)
+        setting, pace = fit_setting(p, configuration), Pace(self._duration)
         bare = configuration.known_specimen.bare()
-        reference = known_reference(configuration.identified)
-        yield from masses_told(configuration)
+        reference = identified_reference(configuration.identified)
+        yield from mass_warning(configuration)
         if p.reference:
             yield Handle(Handwork.REMOVE_BLOCK, bare, "Take the spring and the block off the table.")
             found = self._bare = yield from self._decays(BARE, setting, pace)
-            reference = reference_of(found)
-            if (off := changed(found, configuration.identified)) is not None:
+            reference = measured_reference(found)
+            if (off := frame_change(found, configuration.identified)) is not None:
                 yield Say(Warned(f"the bare frame is not what it was when it was identified: {off}"))
             yield Say(PointFinished(bare_point(found, 0)))
         if reference is None:
@@ -163,11 +157,11 @@ class CouplingStiffness(Prepared[CouplingStiffnessParameters]):
         )
         yield Handle(Handwork.HOLD_BLOCK, specimen, request)
 
-        def told(result: FrameResult, number: int) -> SpringPoint:
-            return spring_point(spring_of(beta, result, reference), specimen.nominal_k_c, number)
+        def point(result: FrameResult, number: int) -> SpringPoint:
+            return spring_point(spring_result(beta, result, reference), specimen.nominal_k_c, number)
 
-        held = yield from self._decays(name, setting, pace, told)
-        spring = spring_of(beta, held, reference)
+        held = yield from self._decays(name, setting, pace, point)
+        spring = spring_result(beta, held, reference)
         if abs(spring.k2_apart) > SIGNIFICANT:
             yield Say(
                 Warned(
@@ -175,7 +169,7 @@ class CouplingStiffness(Prepared[CouplingStiffnessParameters]):
                     " whether the block, its clamp or the spring touch the second storey, or give under the spring",
                 )
             )
-        yield Say(PointFinished(told(held, 0)))
+        yield Say(PointFinished(point(held, 0)))
         return spring
 
     def _decays(
@@ -183,13 +177,13 @@ class CouplingStiffness(Prepared[CouplingStiffnessParameters]):
         name: str,
         setting: Setting,
         pace: Pace,
-        told: Callable[[FrameResult, int], SpringPoint] | None = None,
+        point: Callable[[FrameResult, int], SpringPoint] = bare_point,
     ) -> Generator[Step, Outcome, FrameResult]:
         """The decays of one frame, which has just been mounted, with a point for each."""
-        pace.gone += BY_HAND
-        pulse, told = self._pulses[name], told or bare_point
-        decays = yield from pulsed_decays(self.parameters, self.configuration, pulse, setting, pace, name, told=told)
-        result = result_of(decays, setting.masses, setting.weighed)
+        pace.elapsed += BY_HAND
+        pulse = self._pulses[name]
+        decays = yield from pulsed_decays(self.parameters, self.configuration, pulse, setting, pace, name, point)
+        result = frame_result(decays, setting.masses, setting.weighed)
         if result.nonlinear.any():
             yield Say(Warned(f"{name}: {nonlinear_text(result)}"))
         return result

@@ -5,9 +5,16 @@ from datetime import UTC, datetime
 
 from bench.analysis.free_decay.modal import K1
 from bench.analysis.gain import COVERAGE
-from protocols.common.decays.findings import correlations_of, covariance_of, findings_of, sizes_of, through_masses
-from protocols.common.decays.masses import MASSES, known_masses
-from protocols.common.decays.results import SIGNIFICANT, FrameResult, parts_as_json, point_of
+from protocols.common.decays.findings import (
+    MASSES,
+    correlations_with,
+    frame_findings,
+    known_covariance,
+    known_masses,
+    standard_uncertainties,
+    through_masses,
+)
+from protocols.common.decays.frame import SIGNIFICANT, FrameResult, decay_point, parts_as_json
 from protocols.coupling_stiffness.difference import SpringResult, replaces
 from protocols.coupling_stiffness.protocol import SpringPoint
 from sim.identified import Correlation, Finding, Identified, possible, spring_name
@@ -22,7 +29,7 @@ _SHARED = (
 
 def bare_point(result: FrameResult, number: int) -> SpringPoint:
     """The bare frame as a point."""
-    point = point_of(result, number)
+    point = decay_point(result, number)
     shared = {name: getattr(point, name) for name in _SHARED}
     return SpringPoint(
         decay=number, k1_with_spring_n_m=point.k1_n_m, k1_with_spring_uncertainty=point.k1_uncertainty, **shared
@@ -52,11 +59,11 @@ def spring_findings(
     `known` is what was identified before: quantities that stay there hang together with the springs as well.
     """
     framed = bare is not None and replaces(bare, known)
-    findings, correlations = findings_of(bare, known) if bare is not None and framed else ([], [])
+    findings, correlations = frame_findings(bare, known) if bare is not None and framed else ([], [])
     date = datetime.now(UTC).replace(microsecond=0)
     made = {spring_name(spring.label) for spring in springs} | {finding.name for finding in findings}
     kept = [name for name in known.names if name not in made]
-    sizes = sizes_of(known)
+    sizes = standard_uncertainties(known)
     for place, spring in enumerate(springs):
         name, size = spring_name(spring.label), spring.uncertainty
         if not possible(name, spring.k_c):
@@ -72,7 +79,7 @@ def spring_findings(
             # what they have in common: masses and timebase, and the bare frame that both are compared with
             common = spring.shift @ spring.held.shared @ other.shift + spring.reference.apart[0, 0]
             covariances[spring_name(other.label)] = float(common)
-        correlations += correlations_of(name, size, covariances, sizes)
+        correlations += correlations_with(name, size, covariances, sizes)
     return findings, correlations
 
 
@@ -82,4 +89,4 @@ def _with_known(spring: SpringResult, known: Identified, other: str, *, measured
     if measured:
         return through_masses(spring.shift[:2], known, other) if masses else 0.0
     held = through_masses(spring.held.mass_shift[K1], known, other) if masses else 0.0
-    return held - covariance_of(known, "k1", other)
+    return held - known_covariance(known, "k1", other)

@@ -2,7 +2,7 @@
 
 1. The block is taken off. By hand: the table is locked, the frame pulled aside before each decay, and let go.
 2. By a pulse: the table is probed from a drive too small to do harm up to the drift.
-3. Each decay is recorded, fitted, and told; a decay that cannot be used is repeated once.
+3. Each decay is recorded, fitted, and published; a decay that cannot be used is repeated once.
 4. All decays together make the result.
 """
 
@@ -22,18 +22,15 @@ from bench.protocol import Plan, Prepared, Result, Sources
 from bench.record.tables import Column, Table
 from bench.report.style import write_figure
 from drivers.rig import Handwork
-from protocols.common.decays.checks import check_pull, check_pulse
-from protocols.common.decays.decays import LETTING_GO, pulsed_decays, pulsed_duration, released_decays, setting_of
-from protocols.common.decays.findings import findings_of, impossible
-from protocols.common.decays.forecast import hand_forecast, pulse_forecast
-from protocols.common.decays.masses import masses_told
-from protocols.common.decays.playing import WAITING, Pace
-from protocols.common.decays.point import DecayPoint
-from protocols.common.decays.pulse import Planned, frequencies, planned, window_of
-from protocols.common.decays.results import FrameResult, nonlinear_text, point_of, result_of
-from protocols.free_vibration.figure import decay_figure
+from protocols.common.decays.decays import fit_setting, pulsed_decays, pulsed_duration
+from protocols.common.decays.findings import check_masses, frame_findings, impossible_values, mass_warning
+from protocols.common.decays.frame import FrameResult, decay_point, frame_result, nonlinear_text
+from protocols.common.decays.parameters import DecayPoint
+from protocols.common.decays.pulse import PlannedPulse, frequencies, plan_pulse, pulse_forecast
+from protocols.common.decays.recording import Pace
 from protocols.free_vibration.protocol import FreeVibrationParameters
-from protocols.free_vibration.table import decays_table
+from protocols.free_vibration.release import check_pull, hand_forecast, release_duration, released_decays
+from protocols.free_vibration.results import decay_figure, decays_table
 from sim.errors import RockbenchError
 from sim.identified import Identified
 from sim.parameters import Parameters
@@ -52,33 +49,25 @@ class FreeVibration(Prepared[FreeVibrationParameters]):
     ) -> None:
         super().__init__(parameters, configuration, stored)
         self._specimen = configuration.known_specimen.bare()
+        check_masses(parameters, configuration)
+        self._pulse: PlannedPulse | None = None
+        """The pulse that sets the frame ringing; None where it is released by hand."""
         if parameters.excitation == "hand":
-            check_pull(parameters, parameters.pull, configuration)
+            check_pull(parameters, configuration)
+            self._duration = release_duration(parameters, self._specimen)
         else:
-            check_pulse(parameters, configuration, self._specimen)
+            self._pulse = plan_pulse(parameters, configuration, self._specimen)
+            self._duration = pulsed_duration(parameters, self._pulse.pulse)
         self._frame: FrameResult | None = None
         self._locked = False
         """Whether the table is clamped."""
 
     @cached_property
-    def pulse(self) -> Planned:
-        """The pulse that sets the frame ringing."""
-        return planned(self.parameters, self.configuration, self._specimen)
-
-    @property
-    def duration(self) -> float:
-        """Expected length of the test [s]."""
-        p = self.parameters
-        if p.excitation == "hand":
-            return p.repeats * (LETTING_GO + window_of(p, self._specimen) + WAITING)
-        return pulsed_duration(p, self.pulse.pulse)
-
-    @cached_property
     def forecast(self) -> Forecast:
         self.progress("predicting what the run asks of the bench")
-        if self.parameters.excitation == "hand":
-            return hand_forecast(self.configuration, self.parameters.pull, self.duration)
-        return pulse_forecast(self.configuration, {"bare frame": self.pulse}, self.duration)
+        if self._pulse is None:
+            return hand_forecast(self.configuration, self.parameters.pull, self._duration)
+        return pulse_forecast(self.configuration, {"bare frame": self._pulse}, self._duration)
 
     @cached_property
     def prediction(self) -> Table:
@@ -96,33 +85,33 @@ class FreeVibration(Prepared[FreeVibrationParameters]):
 
     def _steps(self) -> Generator[Step, Outcome, None]:
         p, specimen = self.parameters, self._specimen
-        setting, pace = setting_of(p, self.configuration), Pace(self.duration)
-        yield from masses_told(self.configuration)
+        setting, pace = fit_setting(p, self.configuration), Pace(self._duration)
+        yield from mass_warning(self.configuration)
         yield Handle(Handwork.REMOVE_BLOCK, specimen, "Take the spring and the block off the table.")
-        if p.excitation == "hand":
+        if self._pulse is None:
             decays = yield from self._locked_decays(specimen, setting, pace)
         else:
-            decays = yield from pulsed_decays(p, self.configuration, self.pulse, setting, pace, "free vibration")
-        found = self._frame = result_of(decays, setting.masses, setting.weighed)
+            decays = yield from pulsed_decays(p, self.configuration, self._pulse, setting, pace, "free vibration")
+        found = self._frame = frame_result(decays, setting.masses, setting.weighed)
         if found.nonlinear.any():
             yield Say(Warned(nonlinear_text(found)))
-        yield Say(PointFinished(point_of(found, 0)))
-        if (left_out := impossible(found)) is not None:
+        yield Say(PointFinished(decay_point(found, 0)))
+        if (left_out := impossible_values(found)) is not None:
             yield Say(Warned(left_out))
         known = self.configuration.identified or Identified()
-        yield Say(SpecimenIdentified(known.extended(*findings_of(found, known))))
+        yield Say(SpecimenIdentified(known.extended(*frame_findings(found, known))))
 
     def result(self, points: Sequence[Parameters]) -> Result:
         found, known = self._frame, self.configuration.identified or Identified()
 
         def write(path: Path) -> None:
             if found is not None:
-                write_specimen(path, known.extended(*findings_of(found, known)))
+                write_specimen(path, known.extended(*frame_findings(found, known)))
 
-        told = decays_table([point for point in points if isinstance(point, DecayPoint)], found)
+        text = decays_table([point for point in points if isinstance(point, DecayPoint)], found)
         return Result(
             points=tuple(points),
-            text=f"{told}\n{STILL_LOCKED}" if self._locked else told,
+            text=f"{text}\n{STILL_LOCKED}" if self._locked else text,
             figures={"free_vibration.png": lambda path: write_figure(path, decay_figure(found, "bare frame"))},
             files={} if found is None else {"specimen.json": write},
         )
@@ -134,7 +123,7 @@ class FreeVibration(Prepared[FreeVibrationParameters]):
         decays: list[Decay] = []
         failed: RockbenchError | None = None
         try:
-            decays = yield from released_decays(self.parameters, self.parameters.pull, specimen, setting, pace)
+            decays = yield from released_decays(self.parameters, specimen, setting, pace)
         except RockbenchError as error:
             failed = error
         yield Handle(Handwork.UNLOCK_TABLE, specimen, "Take the clamp off the table.")

@@ -5,8 +5,7 @@ from typing import TYPE_CHECKING, Literal
 from pydantic import model_validator
 
 from bench.protocol import Prepared, Protocol, Sources
-from protocols.common.decays.parameters import DecayParameters
-from protocols.common.decays.point import DecayPoint
+from protocols.common.decays.parameters import DecayParameters, DecayPoint
 from sim.errors import InvalidInput
 from sim.parameters import quantity
 

@@ -26,11 +26,12 @@ from bench.analysis.free_decay.response import Constants
 from bench.analysis.sensor_accuracy import SensorAccuracy
 from bench.analysis.signals import SignalMap
 from bench.config.model import BenchConfiguration
-from protocols.common.decays.decays import LETTING_GO, setting_of
-from protocols.common.decays.pulse import QUIET, pulse_of
-from protocols.common.decays.results import result_of
-from protocols.coupling_stiffness.difference import reference_of, spring_of
+from protocols.common.decays.decays import fit_setting
+from protocols.common.decays.frame import frame_result
+from protocols.common.decays.pulse import QUIET, decay_pulse
+from protocols.coupling_stiffness.difference import measured_reference, spring_result
 from protocols.free_vibration.protocol import FreeVibrationParameters
+from protocols.free_vibration.release import RELEASE
 from sim.arrangement import Arrangement
 from sim.sensors import Laser
 from sim.specimen import Frame, Specimen
@@ -60,19 +61,19 @@ def trial(seed: int, decays: int, excitation: str) -> Trial:
     random = np.random.default_rng([20, seed])
     frame, k_c = _drawn(random)
     parameters = VirtualBenchParameters(laser_1=_laser(random), laser_2=_laser(random))
-    setting = setting_of(PARAMETERS, CONFIGURATION)
+    setting = fit_setting(PARAMETERS, CONFIGURATION)
     truth = quantities(Constants(frame.m1, frame.m2, frame.k1, frame.k2, *frame.dashpots))
     specimen = Specimen(frame=frame)
     bench = VirtualBench(parameters, specimen, seed)
     recorded = partial(_released if excitation == "hand" else _pulsed, bench)
-    bare = result_of([recorded(Arrangement(specimen)) for _ in range(decays)], setting.masses, setting.weighed)
+    bare = frame_result([recorded(Arrangement(specimen)) for _ in range(decays)], setting.masses, setting.weighed)
     errors, stated = bare.frame.values - truth, bare.uncertainty
     if excitation == "pulse":
         held = Arrangement(specimen.with_spring(k_c), block_clamped=True)
-        spring = spring_of(
+        spring = spring_result(
             0.25,
-            result_of([recorded(held) for _ in range(decays)], setting.masses, setting.weighed),
-            reference_of(bare),
+            frame_result([recorded(held) for _ in range(decays)], setting.masses, setting.weighed),
+            measured_reference(bare),
         )
         errors, stated = np.append(errors, spring.k_c - k_c), np.append(stated, spring.uncertainty)
         truth = np.append(truth, k_c)
@@ -113,17 +114,17 @@ def _signals(bench: VirtualBench, rest: float, volts: Array) -> Array:
 def _pulsed(bench: VirtualBench, arrangement: Arrangement) -> Decay:
     bench.mount(arrangement)
     assumed = ASSUMED.with_spring(arrangement.specimen.k_c) if arrangement.block_clamped else ASSUMED
-    pulse = pulse_of(PARAMETERS, CONFIGURATION, assumed)
+    pulse = decay_pulse(PARAMETERS, CONFIGURATION, assumed)
     signals = _signals(bench, 2.0, pulse.record(VOLTS))
-    return pulsed_decay(signals, setting_of(PARAMETERS, CONFIGURATION), QUIET, pulse.begin)
+    return pulsed_decay(signals, fit_setting(PARAMETERS, CONFIGURATION), QUIET, pulse.begin)
 
 
 def _released(bench: VirtualBench, arrangement: Arrangement) -> Decay:
     bench.mount(Arrangement(arrangement.specimen, table_locked=True, pull=PARAMETERS.pull))
     bench.arm()
-    length = LETTING_GO + pulse_of(PARAMETERS, CONFIGURATION, ASSUMED).window
+    length = RELEASE + decay_pulse(PARAMETERS, CONFIGURATION, ASSUMED).window
     signals = _signals(bench, 2.0, np.zeros(round(length * bench.parameters.sample_rate)))
-    return released_decay(signals, setting_of(PARAMETERS, CONFIGURATION))
+    return released_decay(signals, fit_setting(PARAMETERS, CONFIGURATION))
 
 
 def main() -> None:

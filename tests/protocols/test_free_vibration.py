@@ -28,7 +28,7 @@ from bench.report.page.document import Picture, Table
 from bench.results import FILE
 from bench.session import SessionResult, run_session
 from protocols.common.calibrate import Unmeasurable
-from protocols.common.decays.pulse import SHARE, planned
+from protocols.common.decays.pulse import SHARE, plan_pulse
 from protocols.coupling_stiffness.protocol import CouplingStiffnessParameters
 from protocols.free_vibration.protocol import FreeVibrationParameters
 from sim.errors import InvalidInput
@@ -195,7 +195,7 @@ def test_a_spring_against_a_frame_that_was_identified_before(tmp_path: Path) -> 
 def test_the_pulse_keeps_its_distance_from_every_limit(tmp_path: Path) -> None:
     parameters = FreeVibrationParameters(drift=0.5)
     configuration = bench(limits=Limits(drift=0.04))
-    found = planned(parameters, configuration, configuration.specimen.bare())
+    found = plan_pulse(parameters, configuration, configuration.specimen.bare())
     assert (found.binds, found.drift) == ("drift", pytest.approx(SHARE * 0.04))
     preflight = compile_run("free-vibration", prepared(parameters, configuration), tmp_path)
     assert preflight.refusal is None
@@ -249,7 +249,7 @@ def test_a_run_that_fails_does_not_leave_the_table_clamped(tmp_path: Path, monke
     def useless(*_: object) -> None:
         raise Unusable("nothing was seen")
 
-    monkeypatch.setattr("protocols.common.decays.decays.released_decay", useless)
+    monkeypatch.setattr("protocols.free_vibration.release.released_decay", useless)
     parameters = FreeVibrationParameters(excitation="hand", repeats=1, window=5.0)
     result, events = run(parameters, bench(), tmp_path / "run")
     assert "no decay could be used" in result.reason

@@ -5,9 +5,9 @@ import pytest
 from numpy.typing import NDArray
 
 from bench.analysis.free_decay.combine import Combined
-from protocols.common.decays.findings import findings_of
-from protocols.common.decays.results import FrameResult
-from protocols.coupling_stiffness.difference import known_reference, reference_of, replaces, spring_of
+from protocols.common.decays.findings import frame_findings
+from protocols.common.decays.frame import FrameResult
+from protocols.coupling_stiffness.difference import identified_reference, measured_reference, replaces, spring_result
 from protocols.coupling_stiffness.findings import spring_findings
 from sim.identified import Identified
 
@@ -62,16 +62,18 @@ def expected(timebase: float) -> Array:
 
 
 def springs_after(known: Identified, label: float) -> Identified:
-    reference = known_reference(known)
+    reference = identified_reference(known)
     assert reference is not None
-    spring = spring_of(label, frame(with_spring(label)), reference)
+    spring = spring_result(label, frame(with_spring(label)), reference)
     return known.extended(*spring_findings(None, [spring], known))
 
 
 @pytest.mark.parametrize("timebase", [0.0, 1e-4])
 def test_all_in_one_run_hangs_together_as_the_errors_do(timebase: float) -> None:
     bare = frame(BARE, timebase)
-    springs = [spring_of(each, frame(with_spring(each), timebase), reference_of(bare)) for each in (0.25, 0.97)]
+    springs = [
+        spring_result(each, frame(with_spring(each), timebase), measured_reference(bare)) for each in (0.25, 0.97)
+    ]
     found = Identified().extended(*spring_findings(bare, springs, Identified()))
     errors = expected(timebase)
     np.testing.assert_allclose(found.correlation(NAMES), np.corrcoef(errors), atol=0.012)
@@ -80,14 +82,14 @@ def test_all_in_one_run_hangs_together_as_the_errors_do(timebase: float) -> None
 
 
 def test_springs_found_one_after_the_other_against_a_known_frame_do_so_as_well() -> None:
-    known = Identified().extended(*findings_of(frame(BARE), Identified()))
+    known = Identified().extended(*frame_findings(frame(BARE), Identified()))
     found = springs_after(springs_after(known, 0.25), 0.97)
     np.testing.assert_allclose(found.correlation(NAMES), np.corrcoef(expected(0.0)), atol=0.012)
 
 
 def test_a_frame_measured_again_keeps_the_weighing_and_what_springs_share_with_it() -> None:
-    known = springs_after(Identified().extended(*findings_of(frame(BARE), Identified())), 0.25)
-    again = known.extended(*findings_of(frame(BARE), known))
+    known = springs_after(Identified().extended(*frame_findings(frame(BARE), Identified())), 0.25)
+    again = known.extended(*frame_findings(frame(BARE), known))
     assert again.finding("m1") == known.finding("m1")
     errors = expected(0.0)
     weighing = errors[2:4]
@@ -100,10 +102,10 @@ def test_a_frame_measured_again_keeps_the_weighing_and_what_springs_share_with_i
 def test_an_earlier_frame_stays_unless_it_changed_or_is_known_better_now(
     spread: float, moved: float, kept: bool
 ) -> None:
-    known = Identified().extended(*findings_of(frame(BARE), Identified()))
+    known = Identified().extended(*frame_findings(frame(BARE), Identified()))
     bare = frame(BARE + np.array([moved, *[0.0] * 7]), spread=spread * SPREAD)
     assert replaces(bare, known) is not kept
-    spring = spring_of(0.25, frame(with_spring(0.25)), reference_of(bare))
+    spring = spring_result(0.25, frame(with_spring(0.25)), measured_reference(bare))
     found = known.extended(*spring_findings(bare, [spring], known))
     assert (found.finding("k1") == known.finding("k1")) is kept
     source = found.finding("k1")

@@ -1,5 +1,9 @@
-"""What a decay came to, as the event that is kept and shown, and as findings for other runs."""
+"""Findings of the frame: the fit of a decay as an event, findings for other runs, and the masses they depend on.
 
+The masses of the storeys are those of a specimen file, else as configured.
+"""
+
+from collections.abc import Generator
 from datetime import UTC, datetime
 
 import numpy as np
@@ -8,9 +12,12 @@ from numpy.typing import NDArray
 from bench.analysis.free_decay.decay import Decay
 from bench.analysis.free_decay.modal import K1, K2, NAMES, UNITS, XI1, XI2
 from bench.analysis.rounding import in_brackets
-from bench.events import FitFinished, FittedParameter, Series
-from protocols.common.decays.masses import MASSES, known_masses
-from protocols.common.decays.results import FrameResult
+from bench.config.model import BenchConfiguration
+from bench.engine.steps import Outcome, Say, Step
+from bench.events import FitFinished, FittedParameter, Series, Warned
+from protocols.common.decays.frame import FrameResult
+from protocols.common.decays.parameters import DecayParameters
+from sim.errors import InvalidInput
 from sim.identified import Correlation, Finding, Identified, possible
 
 Array = NDArray[np.float64]
@@ -20,103 +27,150 @@ SOURCE = "free vibration of the bare frame"
 FOUND = {"k1": K1, "k2": K2, "xi1": XI1, "xi2": XI2}
 """Quantities that go into the file of the specimen."""
 
+MASSES = ("m1", "m2")
+
 
 def fit_finished(decay: Decay, name: str) -> FitFinished:
-    """The decay with its fit, as measured by the lasers."""
+    """The event of a fitted decay, as measured by the lasers."""
     fit, stretch = decay.fit, decay.fit.stretch
     columns = {"time": Series(stretch.time, "s", "time since the start of the recording")}
-    for place, laser in enumerate(("laser_1", "laser_2")):
-        seen, fitted = stretch.seen[place], fit.fitted[place]
-        columns[laser] = Series(seen, "m", f"what {laser} saw, means over the step of the time")
+    for row, laser in enumerate(("laser_1", "laser_2")):
+        measured, fitted = stretch.seen[row], fit.fitted[row]
+        columns[laser] = Series(measured, "m", f"what {laser} saw, means over the step of the time")
         columns[f"{laser}_fitted"] = Series(fitted, "m", f"what {laser} would see of the fitted frame")
-        columns[f"{laser}_residual"] = Series(seen - fitted, "m", "measured less fitted")
+        columns[f"{laser}_residual"] = Series(measured - fitted, "m", "measured less fitted")
     columns["table_displacement"] = Series(stretch.table, "m", "motion of the table that the fit follows")
-    sizes = np.sqrt(np.diag(decay.doubt.own + decay.doubt.common))
+    uncertainties = np.sqrt(np.diag(decay.doubt.own + decay.doubt.common))
     parameters = {
-        key: FittedParameter(float(value), float(size), unit)
-        for key, value, size, unit in zip(NAMES, decay.quantities, sizes, UNITS, strict=True)
+        key: FittedParameter(float(value), float(uncertainty), unit)
+        for key, value, uncertainty, unit in zip(NAMES, decay.quantities, uncertainties, UNITS, strict=True)
     }
-    return FitFinished(name, line_of(decay.quantities, sizes), columns, parameters)
+    return FitFinished(name, _summary(decay.quantities, uncertainties), columns, parameters)
 
 
-def line_of(values: np.ndarray, sizes: np.ndarray) -> str:
-    """The four quantities with their standard uncertainties, in one line."""
-    return ", ".join(
-        f"{name} {in_brackets(float(values[place]), float(sizes[place]))}"
-        + (f" {UNITS[place]}" if UNITS[place] != "1" else "")
-        for name, place in FOUND.items()
-    )
+def frame_findings(result: FrameResult, known: Identified) -> tuple[list[Finding], list[Correlation]]:
+    """Stiffnesses, damping ratios and the masses they were found with, with the correlations of all of them.
 
-
-def findings_of(result: FrameResult, known: Identified) -> tuple[list[Finding], list[Correlation]]:
-    """Stiffnesses, damping ratios and the masses they were found with, and how all of them hang together.
-
-    Masses that are known stay as they are; through them the frame hangs together with what else is known. A value that
-    cannot be, such as a damping fitted below zero, is left out.
+    Masses that are known stay as they are; through them the frame is correlated with what else is known. A value that
+    is impossible, such as a damping fitted below zero, is left out.
     """
-    places = list(FOUND.values())
-    inner = result.frame.covariance[np.ix_(places, places)]
-    across = result.mass_shift[places] @ result.weighed
+    indices = list(FOUND.values())
+    inner = result.frame.covariance[np.ix_(indices, indices)]
+    across = result.mass_shift[indices] @ result.weighed
     whole = np.block([[inner, across], [across.T, result.weighed]])
-    sizes = np.sqrt(np.diag(whole))
-    names, values = [*FOUND, "m1", "m2"], [*result.frame.values[places].tolist(), *result.masses]
+    uncertainties = np.sqrt(np.diag(whole))
+    names, values = [*FOUND, "m1", "m2"], [*result.frame.values[indices].tolist(), *result.masses]
     date = datetime.now(UTC).replace(microsecond=0)
-    sources = [*[SOURCE] * len(FOUND), *(f"as configured, with {size:.2g} kg left open" for size in sizes[-2:])]
+    sources = [*[SOURCE] * len(FOUND), *(f"as configured, with {mass:.2g} kg left open" for mass in uncertainties[-2:])]
     findings = [
-        Finding(name=name, value=value, standard_uncertainty=float(size), source=origin, date=date)
-        for name, value, size, origin in zip(names, values, sizes, sources, strict=True)
+        Finding(name=name, value=value, standard_uncertainty=float(uncertainty), source=origin, date=date)
+        for name, value, uncertainty, origin in zip(names, values, uncertainties, sources, strict=True)
         if possible(name, value)
     ]
-    made = {finding.name for finding in findings}
-    alike = np.clip(whole / np.where(sizes > 0.0, np.outer(sizes, sizes), 1.0), -1.0, 1.0)
+    stated = {finding.name for finding in findings}
+    coefficients = np.clip(
+        whole / np.where(uncertainties > 0.0, np.outer(uncertainties, uncertainties), 1.0), -1.0, 1.0
+    )
     correlations = [
-        Correlation(first=first, second=names[j], coefficient=float(alike[i, j]))
+        Correlation(first=first, second=names[j], coefficient=float(coefficients[i, j]))
         for i, first in enumerate(names)
         for j in range(i + 1, len(names))
-        if sizes[i] > 0.0 and sizes[j] > 0.0 and {first, names[j]} <= made
+        if uncertainties[i] > 0.0 and uncertainties[j] > 0.0 and {first, names[j]} <= stated
     ]
     if known_masses(known) is None:
         return findings, correlations
     correlations = [one for one in correlations if one.pair != frozenset(MASSES)]
     kept = known.without(*FOUND, *MASSES).names
-    shifts = dict(zip(FOUND, result.mass_shift[places], strict=True))
-    for name, shift in ((name, shift) for name, shift in shifts.items() if name in made):
-        size = float(sizes[names.index(name)])
-        correlations += correlations_of(
-            name, size, {each: through_masses(shift, known, each) for each in kept}, sizes_of(known)
+    shifts = dict(zip(FOUND, result.mass_shift[indices], strict=True))
+    for name, shift in ((name, shift) for name, shift in shifts.items() if name in stated):
+        own = float(uncertainties[names.index(name)])
+        correlations += correlations_with(
+            name, own, {each: through_masses(shift, known, each) for each in kept}, standard_uncertainties(known)
         )
     return [finding for finding in findings if finding.name in FOUND], correlations
 
 
-def impossible(result: FrameResult) -> str | None:
-    """What of a result goes into no file because it cannot be; None where all can."""
+def impossible_values(result: FrameResult) -> str | None:
+    """A warning that names physically impossible values, which go into no file; None where all are possible."""
     values = {name: float(result.frame.values[place]) for name, place in FOUND.items()}
-    told = [f"{name} = {value:.3g}" for name, value in values.items() if not possible(name, value)]
-    return f"{', '.join(told)} cannot be, and is not kept for other runs" if told else None
+    texts = [f"{name} = {value:.3g}" for name, value in values.items() if not possible(name, value)]
+    return f"{', '.join(texts)} cannot be, and is not kept for other runs" if texts else None
 
 
 def through_masses(shift: Array, known: Identified, name: str) -> float:
-    """Covariance of what follows the known masses by `shift`, shape (2,), with another quantity that is known."""
-    return float(shift @ [covariance_of(known, mass, name) for mass in MASSES])
+    """Covariance of a quantity that depends on the known masses by `shift`, shape (2,), with a known quantity."""
+    return float(shift @ [known_covariance(known, mass, name) for mass in MASSES])
 
 
-def covariance_of(known: Identified, first: str, second: str) -> float:
+def known_covariance(known: Identified, first: str, second: str) -> float:
     """Covariance of two findings, or the variance of one."""
     places = (first,) if first == second else (first, second)
     return float(known.covariance(places)[0, -1])
 
 
-def correlations_of(
-    name: str, size: float, covariances: dict[str, float], sizes: dict[str, float]
+def correlations_with(
+    name: str, own: float, covariances: dict[str, float], others: dict[str, float]
 ) -> list[Correlation]:
-    """Those of `name`, of standard uncertainty `size`, with others by their covariances with it and their `sizes`."""
+    """Correlations of `name`, of standard uncertainty `own`, with others by covariances and standard uncertainties."""
     return [
-        Correlation(first=name, second=other, coefficient=float(np.clip(covariance / (sizes[other] * size), -1.0, 1.0)))
+        Correlation(first=name, second=other, coefficient=float(np.clip(covariance / (others[other] * own), -1.0, 1.0)))
         for other, covariance in covariances.items()
-        if covariance != 0.0 and other in sizes and size > 0.0 and sizes[other] > 0.0
+        if covariance != 0.0 and other in others and own > 0.0 and others[other] > 0.0
     ]
 
 
-def sizes_of(known: Identified) -> dict[str, float]:
+def standard_uncertainties(known: Identified) -> dict[str, float]:
     """Standard uncertainties of what is known, by name."""
     return {finding.name: finding.standard_uncertainty for finding in known.findings}
+
+
+def known_masses(known: Identified | None) -> Identified | None:
+    """What is known, where both masses are; else None."""
+    return known if known is not None and set(MASSES) <= set(known.names) else None
+
+
+def mass_covariance(parameters: DecayParameters, known: Identified | None) -> NDArray[np.float64]:
+    """Covariance of both masses [kg2], shape (2, 2)."""
+    if (found := known_masses(known)) is not None:
+        return found.covariance(MASSES)
+    rho = parameters.mass_correlation
+    return parameters.mass_uncertainty**2 * np.array([[1.0, rho], [rho, 1.0]])
+
+
+def check_masses(parameters: DecayParameters, configuration: BenchConfiguration) -> None:
+    """Raise InvalidInput for a stated weighing where the specimen file has one of its own."""
+    if (known := known_masses(configuration.identified)) is None:
+        return
+    for item in ("mass_uncertainty", "mass_correlation"):
+        value = getattr(parameters, item)
+        if value != DecayParameters.model_fields[item].default:
+            allowed = (
+                f"{_masses_text(known)} are those of the specimen file: leave it out, or take both out of that file"
+            )
+            raise InvalidInput(item, value, allowed)
+
+
+def mass_warning(configuration: BenchConfiguration) -> Generator[Step, Outcome, None]:
+    """Warn where the configuration has other masses than the specimen file, whose masses count."""
+    if (known := known_masses(configuration.identified)) is None:
+        return
+    frame = configuration.specimen.frame
+    found = {name: finding for name in MASSES if (finding := known.finding(name)) is not None}
+    if any(finding.value != getattr(frame, name) for name, finding in found.items()):
+        asked = f"specimen.frame has m1 = {frame.m1:.6g} kg, m2 = {frame.m2:.6g} kg"
+        text = f"the masses are those of the specimen file, {_masses_text(known)}; {asked}, which does not count"
+        yield Say(Warned(text))
+
+
+def _summary(values: np.ndarray, uncertainties: np.ndarray) -> str:
+    """The four quantities with their standard uncertainties, in one line."""
+    return ", ".join(
+        f"{name} {in_brackets(float(values[index]), float(uncertainties[index]))}"
+        + (f" {UNITS[index]}" if UNITS[index] != "1" else "")
+        for name, index in FOUND.items()
+    )
+
+
+def _masses_text(known: Identified) -> str:
+    found = [finding for name in MASSES if (finding := known.finding(name)) is not None]
+    return ", ".join(f"{one.name} = {one.value:.6g} kg ({one.standard_uncertainty:.2g} kg)" for one in found)

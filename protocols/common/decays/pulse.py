@@ -1,4 +1,4 @@
-"""The pulse: its shape, and how strong it may be.
+"""The pulse that sets the frame ringing: its shape, its level, what it demands of the bench.
 
     w(t) = sin(phi) - sin(2 phi) / 2,    phi = 2 pi t / T,    0 <= t <= T
 
@@ -7,6 +7,7 @@ there and back; one that follows with its acceleration comes to rest where it is
 both modes ring.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import log, pi, sqrt
 
@@ -14,10 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.config.model import BenchConfiguration
+from bench.preflight.asked import UNKNOWN_SHAKER
 from bench.preflight.bounds import bounds
+from bench.preflight.forecast import Demand, Forecast
 from bench.preflight.response import SimulatedTable, response_of
 from protocols.common.decays.parameters import DecayParameters
 from protocols.common.identification.motion import RESTING, largest
+from sim.errors import InvalidInput
 from sim.linear import frame_matrices
 from sim.specimen import Specimen
 
@@ -32,13 +36,25 @@ QUIET = 2.0
 LEFT, LONGEST = 1.0 / 12.0, 60.0
 """What is left of the first mode at the end of the window, and the longest window that is chosen by itself [s]."""
 
+LEAST = 0.003
+"""Drift [m] below which a decay is drowned by the steps of the lasers."""
+
+_FEWEST = 20
+"""Samples of a pulse below which it has no shape."""
+
 _PADDING = 20.0
 """Rest after a pulse in a Fourier transform [s]."""
+
+_UNKNOWN = {
+    "drive_voltage": "nothing is known of this table: the probes find out, within limits.drive_voltage",
+    "drive_slew": "nothing is known of this table: the probes find out, within limits.drive_slew",
+    **UNKNOWN_SHAKER,
+}
 
 
 @dataclass(frozen=True, eq=False)
 class Pulse:
-    """A pulse of `duration` [s], watched for `window` [s] afterwards, at `sample_rate` [1/s]."""
+    """A pulse of `duration` [s], recorded for `window` [s] afterwards, at `sample_rate` [1/s]."""
 
     duration: float
     window: float
@@ -52,7 +68,7 @@ class Pulse:
         return made / np.abs(made).max()
 
     def record(self, volts: float, window: float | None = None) -> Array:
-        """What is played for a peak of `volts`: rest, pulse, and zeros for the window, or for another one [s]."""
+        """The drive for a peak of `volts`: rest, pulse, and zeros for the window, or for another one [s]."""
         before, after = (round(time * self.sample_rate) for time in (QUIET, self.window if window is None else window))
         return np.concatenate((np.zeros(before), volts * self.shape, np.zeros(after)))
 
@@ -75,15 +91,15 @@ def frequencies(specimen: Specimen) -> Array:
     return np.sqrt(np.linalg.eigvalsh(stiffness / np.outer(root, root)))
 
 
-def pulse_of(parameters: DecayParameters, configuration: BenchConfiguration, specimen: Specimen) -> Pulse:
+def decay_pulse(parameters: DecayParameters, configuration: BenchConfiguration, specimen: Specimen) -> Pulse:
     """The pulse for a specimen, bare or with its block held."""
     omegas = frequencies(specimen)
     duration = parameters.pulse or 2.0 * pi / sqrt(float(omegas.prod()))
-    return Pulse(duration, window_of(parameters, specimen), configuration.sample_rate)
+    return Pulse(duration, decay_window(parameters, specimen), configuration.sample_rate)
 
 
-def window_of(parameters: DecayParameters, specimen: Specimen) -> float:
-    """How long a decay is watched [s]."""
+def decay_window(parameters: DecayParameters, specimen: Specimen) -> float:
+    """Length of a decay after its excitation [s]."""
     if parameters.window is not None:
         return parameters.window
     rate = specimen.frame.xi1 * float(frequencies(specimen).min())
@@ -91,38 +107,59 @@ def window_of(parameters: DecayParameters, specimen: Specimen) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Planned:
-    """What a pulse is expected to ask for, by the keys of `bench.preflight.bounds`, when the drift reaches `drift` [m];
-    `binds` names what sets that. What is not known is not there.
+class PlannedPulse:
+    """A pulse with the drift [m] that it is expected to reach, and its demands by the keys of `bench.preflight.bounds`.
+
+    Quantities that are not known are absent. `binds` names what sets the drift.
     """
 
     pulse: Pulse
     drift: float
-    asked: dict[str, float]
+    demands: dict[str, float]
     binds: str
 
 
-def planned(parameters: DecayParameters, configuration: BenchConfiguration, specimen: Specimen) -> Planned:
+def plan_pulse(parameters: DecayParameters, configuration: BenchConfiguration, specimen: Specimen) -> PlannedPulse:
     """The pulse at the level that the bench allows.
 
     A simulated bench's table is that of its shaker; any other is taken as one whose velocity follows the drive.
+    Raises InvalidInput for a pulse that has no shape, or that the limits leave too little of.
     """
-    pulse = pulse_of(parameters, configuration, specimen)
-    unit = _asked(pulse, configuration, specimen)
+    pulse = decay_pulse(parameters, configuration, specimen)
+    if pulse.shape.size < _FEWEST:
+        least = _FEWEST / configuration.sample_rate
+        raise InvalidInput("pulse", pulse.duration, f"at this sample rate it needs {least:g} s at least")
+    if parameters.drift < LEAST:
+        raise InvalidInput("drift", parameters.drift, f"the steps of the lasers drown a decay below {LEAST:g} m")
+    unit = _unit_demands(pulse, configuration, specimen)
     limits = {name: SHARE * bound.limit for name, bound in bounds(configuration).items()}
     allowed = {name: limits[name] / value for name, value in unit.items() if value > 0.0}
     binds = min(allowed, key=lambda name: allowed[name])
     wanted = parameters.drift / unit["drift"]
     scale = min(wanted, allowed[binds])
-    return Planned(
-        pulse,
-        scale * unit["drift"],
-        {name: scale * value for name, value in unit.items()},
-        "drift asked for" if wanted <= allowed[binds] else binds,
-    )
+    binding = "drift asked for" if wanted <= allowed[binds] else binds
+    drift = scale * unit["drift"]
+    if drift < LEAST:
+        needs = f"limits of {binding} leave {drift:.2g} m of drift, a decay needs {LEAST:g} m"
+        raise InvalidInput("pulse", pulse.duration, f"{needs}: raise that limit, or give another length")
+    return PlannedPulse(pulse, drift, {name: scale * value for name, value in unit.items()}, binding)
 
 
-def _asked(pulse: Pulse, configuration: BenchConfiguration, specimen: Specimen) -> dict[str, float]:
+def pulse_forecast(configuration: BenchConfiguration, pulses: Mapping[str, PlannedPulse], duration: float) -> Forecast:
+    """The most that any of the pulses asks for; `pulses` by the name of the specimen."""
+    demands: list[Demand] = []
+    for quantity in bounds(configuration):
+        known = {name: pulse.demands[quantity] for name, pulse in pulses.items() if quantity in pulse.demands}
+        if not known:
+            demands.append(Demand(quantity, None, None, _UNKNOWN[quantity]))
+            continue
+        name = max(known, key=lambda each: known[each])
+        where = f"the pulse of {pulses[name].pulse.duration:.2g} s, {name}"
+        demands.append(Demand(quantity, known[name], None, where))
+    return Forecast(demands=tuple(demands), duration=duration)
+
+
+def _unit_demands(pulse: Pulse, configuration: BenchConfiguration, specimen: Specimen) -> dict[str, float]:
     """The largest magnitudes under a drive of 1 V, or, where the table is not known, a velocity of 1 m/s."""
     drive = pulse.record(1.0, 5.0)
     response = response_of(configuration)

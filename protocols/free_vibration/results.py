@@ -1,9 +1,11 @@
 # pyright: reportUnknownMemberType=false
-"""The decays: what was measured and fitted, what is left, its spectrum, damping over amplitude, and the budget.
+"""The results as text for the terminal and as a figure: decay, residual, spectrum, budget, damping over amplitude.
 
 matplotlib's keyword arguments have no types, hence the first line.
 """
 
+from collections.abc import Sequence
+from math import tau
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,12 +13,17 @@ import numpy as np
 from bench.analysis.free_decay.modal import OMEGA1, XI1
 from bench.analysis.gain import COVERAGE
 from bench.analysis.rounding import plus_minus
+from bench.report.columns import right_aligned
 from bench.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION, new_figure, set_grid
-from protocols.common.decays.results import FrameResult
+from protocols.common.decays.frame import FrameResult
+from protocols.common.decays.parameters import DecayPoint
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+_TITLES = ("decay", "k1", "k2", "xi1", "xi2", "f1", "f2", "drift", "residual", "xi1 over drift")
+_UNITS = ("", "[N/m]", "[N/m]", "[%]", "[%]", "[Hz]", "[Hz]", "[mm]", "[um]", "[%/mm]")
 
 PARTS = {
     "noise": BLUE,
@@ -30,13 +37,21 @@ PARTS = {
 QUANTITIES = ("$k_1$", "$k_2$", r"$\xi_1$", r"$\xi_2$")
 
 
+def decays_table(points: Sequence[DecayPoint], result: FrameResult | None) -> str:
+    """One row for each decay, the last for all of them, with expanded uncertainties (k = 2); then the correlations."""
+    if not points:
+        return "Nothing was identified."
+    lines = right_aligned(_TITLES, _UNITS, (_cells(point) for point in points))
+    return "\n".join([*lines, *(_notes(points[-1], result) if result is not None else ())])
+
+
 def decay_figure(result: FrameResult | None, title: str) -> "Figure":
     """Six panels; without a result they are empty."""
     figure = new_figure(9.0, 10.5)
     grid = figure.add_gridspec(4, 2, height_ratios=(3, 2, 2.6, 2.6))
     decay, rest = figure.add_subplot(grid[0, :]), figure.add_subplot(grid[1, :])
     spectrum, budget = figure.add_subplot(grid[2, 0]), figure.add_subplot(grid[2, 1])
-    damping = [figure.add_subplot(grid[3, place]) for place in range(2)]
+    damping = [figure.add_subplot(grid[3, column]) for column in range(2)]
     for panel in (decay, rest, spectrum, budget, *damping):
         set_grid(panel)
     decay.set_title(title if result is not None else "nothing was identified", loc="left", fontsize=10)
@@ -50,6 +65,37 @@ def decay_figure(result: FrameResult | None, title: str) -> "Figure":
     return figure
 
 
+def _cells(point: DecayPoint) -> tuple[str, ...]:
+    return (
+        str(point.decay) if point.decay else "all",
+        plus_minus(point.k1_n_m, point.k1_uncertainty),
+        plus_minus(point.k2_n_m, point.k2_uncertainty),
+        plus_minus(100.0 * point.xi1, 100.0 * point.xi1_uncertainty),
+        plus_minus(100.0 * point.xi2, 100.0 * point.xi2_uncertainty),
+        plus_minus(point.omega1_rad_s / tau, point.omega1_uncertainty / tau),
+        plus_minus(point.omega2_rad_s / tau, point.omega2_uncertainty / tau),
+        f"{1e3 * point.drift_peak_m:.1f}",
+        f"{1e6 * point.residual_m:.1f}",
+        plus_minus(0.1 * point.slope1_per_m, 0.1 * point.slope1_uncertainty),
+    )
+
+
+def _notes(point: DecayPoint, result: FrameResult) -> list[str]:
+    damping = (
+        "The damping does not depend on the amplitude, as far as can be told."
+        if point.damping_is_linear
+        else "The damping depends on the amplitude: see the figure; what is stated is its mean over the decays."
+    )
+    # parts of one decay and of all, by the name of the largest
+    largest = {
+        name: max(result.parts, key=lambda part: float(result.parts[part][index]))
+        for index, name in enumerate(("k1", "k2", "xi1", "xi2"))
+    }
+    most = ", ".join(f"{name}: {part}" for name, part in largest.items())
+    birge = "" if point.birge is None else f" Birge ratio at most {point.birge:.2f}."
+    return ["", f"+- is the expanded uncertainty, k = 2. Largest part of it: {most}.{birge}", damping]
+
+
 def _draw_decay(decay: "Axes", rest: "Axes", result: FrameResult) -> None:
     fit = result.decays[0].fit
     time = fit.stretch.time
@@ -59,8 +105,8 @@ def _draw_decay(decay: "Axes", rest: "Axes", result: FrameResult) -> None:
     decay.axvline(result.decays[0].begin, color=GREY, linewidth=0.8)
     decay.set_ylabel("drift [mm]")
     decay.legend(loc="upper right", fontsize=8)
-    for place, colour in enumerate((BLUE, GREEN)):
-        rest.plot(time, 1e6 * fit.residual[place], color=colour, linewidth=0.5, label=f"laser {place + 1}")
+    for row, colour in enumerate((BLUE, GREEN)):
+        rest.plot(time, 1e6 * fit.residual[row], color=colour, linewidth=0.5, label=f"laser {row + 1}")
     rest.set_ylabel("measured - fitted\n[um]")
     rest.set_xlabel("time [s]")
     rest.legend(loc="upper right", fontsize=8, ncols=2)
@@ -70,12 +116,12 @@ def _draw_spectrum(panel: "Axes", result: FrameResult) -> None:
     from scipy import signal
 
     welch: Any = signal.welch
-    for place, colour in enumerate((BLUE, GREEN)):
+    for row, colour in enumerate((BLUE, GREEN)):
         powers: list[np.ndarray] = []
         frequency = np.zeros(0)
         for one in result.decays:
             rate = 1.0 / one.fit.stretch.step
-            left = one.fit.residual[place]
+            left = one.fit.residual[row]
             frequency, power = welch(left, rate, nperseg=min(2048, left.size))
             powers.append(power)
         panel.loglog(
@@ -83,7 +129,7 @@ def _draw_spectrum(panel: "Axes", result: FrameResult) -> None:
             1e6 * np.sqrt(np.mean(powers, axis=0)[1:]),
             color=colour,
             linewidth=0.8,
-            label=f"laser {place + 1}",
+            label=f"laser {row + 1}",
         )
     for mode, omega in enumerate(result.frame.values[OMEGA1:]):
         name = "modes" if mode == 0 else None
@@ -96,13 +142,13 @@ def _draw_spectrum(panel: "Axes", result: FrameResult) -> None:
 def _draw_budget(panel: "Axes", result: FrameResult) -> None:
     """Standard uncertainties relative to the values, part by part, and the whole."""
     width = 0.8 / (len(result.parts) + 1)
-    places = np.arange(len(QUANTITIES))
+    positions = np.arange(len(QUANTITIES))
     relative = np.abs(result.frame.values[: len(QUANTITIES)])
     bars = {**{name: result.parts[name] for name in result.parts}, "together": result.uncertainty}
-    for number, (name, sizes) in enumerate(bars.items()):
-        share = 100.0 * sizes[: len(QUANTITIES)] / relative
-        panel.bar(places + number * width, share, width, color=PARTS.get(name, BLACK), label=name)
-    panel.set_xticks(places + 0.4 - 0.5 * width, QUANTITIES)
+    for number, (name, uncertainties) in enumerate(bars.items()):
+        share = 100.0 * uncertainties[: len(QUANTITIES)] / relative
+        panel.bar(positions + number * width, share, width, color=PARTS.get(name, BLACK), label=name)
+    panel.set_xticks(positions + 0.4 - 0.5 * width, QUANTITIES)
     panel.set_ylabel("standard uncertainty [%]")
     panel.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), fontsize=7, ncols=4, frameon=False)
 
@@ -120,10 +166,10 @@ def _draw_damping(panel: "Axes", result: FrameResult, mode: int) -> None:
             lw=0.8,
         )
     value = 100.0 * result.frame.values[XI1 + mode]
-    slope, doubt = (0.1 * values[mode] for values in (result.slopes.values, result.slope_uncertainty))
+    slope, uncertainty = (0.1 * values[mode] for values in (result.slopes.values, result.slope_uncertainty))
     panel.axhline(value, color=VERMILLION, linewidth=0.9)
     panel.set_xlabel(f"drift in mode {mode + 1} [mm]")
     panel.set_ylabel(rf"$\xi_{mode + 1}$ [%]")
     verdict = "significant" if result.nonlinear[mode] else "not significant"
-    told = plus_minus(slope, COVERAGE * doubt)
-    panel.set_title(f"slope {told} %/mm (k = 2), {verdict} (99 %)", loc="left", fontsize=8)
+    text = plus_minus(slope, COVERAGE * uncertainty)
+    panel.set_title(f"slope {text} %/mm (k = 2), {verdict} (99 %)", loc="left", fontsize=8)

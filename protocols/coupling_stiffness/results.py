@@ -1,25 +1,40 @@
 # pyright: reportUnknownMemberType=false
-"""The springs: as mounted over as labelled, the decay of each, and what the uncertainty is made of.
+"""The springs as text for the terminal and as a figure: mounted against label, the decay of each, the budget.
 
 matplotlib's keyword arguments have no types, hence the first line.
 """
 
 from collections.abc import Sequence
+from math import tau
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bench.analysis.gain import COVERAGE
 from bench.analysis.rounding import plus_minus
+from bench.report.columns import right_aligned
 from bench.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILLION, new_figure, set_grid
 from protocols.coupling_stiffness.difference import SpringResult
+from protocols.coupling_stiffness.protocol import SpringPoint
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+_TITLES = ("spring", "decays", "k1 + kC", "kC", "nominal kC", "beta", "k2", "f1", "f2")
+_UNITS = ("", "", "[N/m]", "[N/m]", "[N/m]", "[1]", "[N/m]", "[Hz]", "[Hz]")
+
 SHOWN = 6.0
 """Time of a decay that is drawn after the pulse [s]: enough to see its modes."""
+
+
+def springs_table(points: Sequence[SpringPoint]) -> str:
+    """The bare frame and every spring, all decays together, with expanded uncertainties (k = 2)."""
+    together = [point for point in points if point.decay == 0]
+    if not together:
+        return "Nothing was identified."
+    lines = right_aligned(_TITLES, _UNITS, (_cells(point) for point in together))
+    return "\n".join([*lines, "", "+- is the expanded uncertainty, k = 2."])
 
 
 def springs_figure(springs: Sequence[SpringResult]) -> "Figure":
@@ -34,17 +49,31 @@ def springs_figure(springs: Sequence[SpringResult]) -> "Figure":
         return figure
     _draw_compared(compared, springs)
     _draw_budget(budget, springs)
-    for place, spring in enumerate(springs):
-        above = figure.add_subplot(grid[1 + 2 * place, :])
-        _draw_decay(above, figure.add_subplot(grid[2 + 2 * place, :], sharex=above), spring)
+    for row, spring in enumerate(springs):
+        above = figure.add_subplot(grid[1 + 2 * row, :])
+        _draw_decay(above, figure.add_subplot(grid[2 + 2 * row, :], sharex=above), spring)
     return figure
+
+
+def _cells(point: SpringPoint) -> tuple[str, ...]:
+    return (
+        "none" if point.beta is None else f"{point.beta:g}",
+        str(point.decays),
+        plus_minus(point.k1_with_spring_n_m, point.k1_with_spring_uncertainty),
+        "" if point.k_c_n_m is None else plus_minus(point.k_c_n_m, point.k_c_uncertainty or 0.0),
+        "" if point.k_c_nominal_n_m is None else f"{point.k_c_nominal_n_m:.2f}",
+        "" if point.beta_mounted is None else plus_minus(point.beta_mounted, point.beta_uncertainty or 0.0),
+        plus_minus(point.k2_n_m, point.k2_uncertainty),
+        plus_minus(point.omega1_rad_s / tau, point.omega1_uncertainty / tau),
+        plus_minus(point.omega2_rad_s / tau, point.omega2_uncertainty / tau),
+    )
 
 
 def _draw_compared(panel: "Axes", springs: Sequence[SpringResult]) -> None:
     labels = np.array([spring.label for spring in springs])
     mounted = np.array([spring.beta for spring in springs])
-    doubts = np.array([COVERAGE * spring.beta_uncertainty for spring in springs])
-    panel.errorbar(labels, 100.0 * (mounted / labels - 1.0), 100.0 * doubts / labels, fmt="o", ms=4, color=BLUE)
+    expanded = np.array([COVERAGE * spring.beta_uncertainty for spring in springs])
+    panel.errorbar(labels, 100.0 * (mounted / labels - 1.0), 100.0 * expanded / labels, fmt="o", ms=4, color=BLUE)
     panel.axhline(0.0, color=BLACK, linewidth=0.8)
     panel.set_xlabel(r"$\beta$ on the label [1]")
     panel.set_ylabel(r"$\beta$ as mounted, off its label [%]")
@@ -52,14 +81,14 @@ def _draw_compared(panel: "Axes", springs: Sequence[SpringResult]) -> None:
 
 def _draw_budget(panel: "Axes", springs: Sequence[SpringResult]) -> None:
     """Standard uncertainties of the stiffness relative to it, part by part, and the whole."""
-    places = np.arange(len(springs))
+    positions = np.arange(len(springs))
     names = [*springs[0].parts, "together"]
     width = 0.8 / len(names)
     for number, (name, colour) in enumerate(zip(names, (BLUE, GREEN, GREY, ORANGE, BLACK), strict=True)):
-        sizes = [spring.uncertainty if name == "together" else spring.parts[name] for spring in springs]
-        share = [100.0 * size / spring.k_c for size, spring in zip(sizes, springs, strict=True)]
-        panel.bar(places + number * width, share, width, color=colour, label=name)
-    panel.set_xticks(places + 0.4 - 0.5 * width, [f"{spring.label:g}" for spring in springs])
+        uncertainties = [spring.uncertainty if name == "together" else spring.parts[name] for spring in springs]
+        share = [100.0 * part / spring.k_c for part, spring in zip(uncertainties, springs, strict=True)]
+        panel.bar(positions + number * width, share, width, color=colour, label=name)
+    panel.set_xticks(positions + 0.4 - 0.5 * width, [f"{spring.label:g}" for spring in springs])
     panel.set_xlabel(r"$\beta$ on the label [1]")
     panel.set_ylabel("standard uncertainty of $k_C$ [%]")
     panel.margins(y=0.35)

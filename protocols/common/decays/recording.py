@@ -1,4 +1,4 @@
-"""How a pulse is played, and how strong it must be: found out from one too small to do harm."""
+"""Recording of decays: progress of the run, the drive played from rest, and the search for its level."""
 
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from bench.config.model import BenchConfiguration
 from bench.engine.steps import Arm, Fallen, Outcome, Play, Played, RampOut, Say, Step
 from bench.events import Event, Progress, StepStarted, Warned
 from protocols.common.calibrate import PROBE, Unmeasurable
-from protocols.common.decays.pulse import QUIET, SHARE, Pulse
+from protocols.common.decays.pulse import LEAST, QUIET, SHARE, Pulse
 
 Array = NDArray[np.float64]
 
@@ -22,18 +22,15 @@ STILL = 5e-5
 """Scatter of the storeys at rest below which they are still [m]; a laser's steps stay below."""
 
 WAITING = 45.0
-"""Time that passes besides what is played: until the storeys are still, rest, ramp [s]."""
+"""Expected time of a recording besides its drive: until the storeys are still, rest, ramp [s]."""
 
-AUDIBLE = 20.0
+DETECTABLE = 20.0
 """How many times its noise the drift must reach in a probe."""
 
 GROWTH, NEAR = 10.0, 2.0
 """Most by which the drive grows from one probe to the next; a probe is the last when less than the other is left."""
 
-LEAST = 0.003
-"""Drift [m] below which a decay is drowned by the steps of the lasers."""
-
-_LISTENED = 3.0
+_PROBED = 3.0
 """Time after a probe's pulse in which the largest motion comes [s]."""
 
 _MOST = 6
@@ -42,42 +39,42 @@ _MOST = 6
 
 @dataclass
 class Pace:
-    """How far the run is: `expected` [s] in all, `gone` [s] of it."""
+    """Progress of a run: `expected` duration [s] of the whole, `elapsed` [s] of it."""
 
     expected: float
-    gone: float = 0.0
+    elapsed: float = 0.0
 
     def progress(self, activity: str) -> Progress:
         """Where the run stands."""
-        return Progress(self.gone / self.expected, self.expected - self.gone, activity)
+        return Progress(self.elapsed / self.expected, self.expected - self.elapsed, activity)
 
-    def over(self, begun: float, planned: float) -> None:
-        """A part for which `planned` [s] were expected, and which began when `begun` [s] were gone, is over.
+    def finish(self, begun: float, planned: float) -> None:
+        """End a part for which `planned` [s] were expected, and which began when `begun` [s] had elapsed.
 
         The time that it really took, with more probes or fewer, or a repetition, is expected in its place.
         """
-        self.expected += self.gone - begun - planned
+        self.expected += self.elapsed - begun - planned
 
     def watch(self, sample_rate: float, activity: str) -> Callable[[Array], Event]:
-        """Tells how far it is, block by block."""
+        """Makes the progress from each block of signals."""
         since = 0
 
-        def look(signals: Array) -> Event:
+        def progress(signals: Array) -> Event:
             nonlocal since
             since += len(signals)
-            gone = min(self.gone + since / sample_rate, self.expected)
-            return Progress(gone / self.expected, self.expected - gone, activity)
+            elapsed = min(self.elapsed + since / sample_rate, self.expected)
+            return Progress(elapsed / self.expected, self.expected - elapsed, activity)
 
-        return look
+        return progress
 
 
-def played(volts: Array, sample_rate: float, pace: Pace, activity: str) -> Generator[Step, Outcome, Array]:
+def record(volts: Array, sample_rate: float, pace: Pace, activity: str) -> Generator[Step, Outcome, Array]:
     """Arm, play and ramp out; the signals, shape (n, 6). Raises Unmeasurable when something fell."""
     yield Arm(REST, STILL)
     outcome = yield Play(volts, pace.watch(sample_rate, activity))
     end = yield RampOut(fast=isinstance(outcome, Fallen))
-    pace.gone += volts.size / sample_rate + WAITING
-    pace.expected = max(pace.expected, pace.gone)
+    pace.elapsed += volts.size / sample_rate + WAITING
+    pace.expected = max(pace.expected, pace.elapsed)
     if not isinstance(outcome, Played) or isinstance(end, Fallen):
         raise Unmeasurable(
             "storey 1 has moved aside for good: see to the frame, to what holds the block, and to laser 1"
@@ -85,7 +82,7 @@ def played(volts: Array, sample_rate: float, pace: Pace, activity: str) -> Gener
     return outcome.signals
 
 
-def found_level(
+def find_level(
     pulse: Pulse, drift: float, configuration: BenchConfiguration, pace: Pace
 ) -> Generator[Step, Outcome, float]:
     """The drive [V] with which the pulse makes a peak of `drift` [m], or as much as the limits allow.
@@ -95,10 +92,10 @@ def found_level(
     volts, seen, limit = PROBE, 0.0, _largest_drive(pulse, configuration)
     for probe in range(1, _MOST + 1):
         yield Say(StepStarted(f"probe {probe}: a pulse of {volts:.3g} V"))
-        signals = yield from played(pulse.record(volts, _LISTENED), pulse.sample_rate, pace, "the pulse is probed")
+        signals = yield from record(pulse.record(volts, _PROBED), pulse.sample_rate, pace, "the pulse is probed")
         rest = round(QUIET * pulse.sample_rate)
         seen, noise = _peak(signals[:, DRIFT]), float(np.nanstd(signals[:rest, DRIFT]))
-        if not seen > AUDIBLE * noise:
+        if not seen > DETECTABLE * noise:
             if volts >= GROWTH * PROBE:
                 raise Unmeasurable(
                     f"the frame does not answer a pulse of {volts:.2g} V: {1e3 * seen:.2g} mm of drift, noise"
@@ -106,12 +103,12 @@ def found_level(
                 )
             volts *= GROWTH
             continue
-        room, binds = _room(signals, pulse.sample_rate, configuration)
+        room, binds = _headroom(signals, pulse.sample_rate, configuration)
         if limit / volts < room:
             room, binds = limit / volts, "limits of the drive"
         left = min(drift / seen, room)
         if left < NEAR:
-            return (yield from _accepted(left * volts, left * seen, drift, binds))
+            return (yield from _accept(left * volts, left * seen, drift, binds))
         volts *= min(GROWTH, left)
     raise Unmeasurable(
         f"after {_MOST} probes the drift comes to {1e3 * seen:.2g} mm where {1e3 * drift:.2g} mm are asked for: see to"
@@ -119,7 +116,7 @@ def found_level(
     )
 
 
-def _accepted(volts: float, seen: float, drift: float, binds: str) -> Generator[Step, Outcome, float]:
+def _accept(volts: float, seen: float, drift: float, binds: str) -> Generator[Step, Outcome, float]:
     if seen < LEAST:
         raise Unmeasurable(
             f"{binds} leaves {1e3 * seen:.2g} mm of drift, a decay needs {1e3 * LEAST:g} mm: raise the limit, or give"
@@ -130,7 +127,7 @@ def _accepted(volts: float, seen: float, drift: float, binds: str) -> Generator[
     return volts
 
 
-def _room(signals: Array, sample_rate: float, configuration: BenchConfiguration) -> tuple[float, str]:
+def _headroom(signals: Array, sample_rate: float, configuration: BenchConfiguration) -> tuple[float, str]:
     """By how much a motion may grow until it takes `SHARE` of a limit, and which that is."""
     limits, halves = configuration.limits, [0.5 * whole for whole in configuration.laser_ranges]
     acceleration, displacement = _peak(signals[:, ACCELERATION]), _peak(signals[:, DISPLACEMENT])

@@ -13,7 +13,7 @@ from bench.analysis.free_decay.decay import Decay
 from bench.analysis.free_decay.doubt import COMMON
 from bench.analysis.free_decay.modal import K1, K2, NAMES, XI1, XI2
 from bench.analysis.gain import COVERAGE
-from protocols.common.decays.point import DecayPoint
+from protocols.common.decays.parameters import DecayPoint
 
 Array = NDArray[np.float64]
 
@@ -67,8 +67,8 @@ class FrameResult:
         return np.abs(self.slopes.values) > SIGNIFICANT * self.slope_uncertainty
 
 
-def result_of(decays: Sequence[Decay], masses: tuple[float, float], weighed: Array) -> FrameResult:
-    """What decays of one frame come to."""
+def frame_result(decays: Sequence[Decay], masses: tuple[float, float], weighed: Array) -> FrameResult:
+    """The combined result of the decays of one frame."""
     frame = combine(
         [one.quantities for one in decays], [one.doubt.own for one in decays], [one.doubt.common for one in decays]
     )
@@ -84,20 +84,20 @@ def result_of(decays: Sequence[Decay], masses: tuple[float, float], weighed: Arr
     return FrameResult(tuple(decays), frame, slopes, masses, weighed, shift, late, parts)
 
 
-def point_of(result: FrameResult, number: int) -> DecayPoint:
+def decay_point(result: FrameResult, number: int) -> DecayPoint:
     """The result as a point; `number` 0 for all decays together."""
     names = dict(zip(NAMES, _FIELDS, strict=True))
     values = {
         name: value
-        for place, (field, doubt) in enumerate(names.values())
+        for index, (field, expanded) in enumerate(names.values())
         for name, value in (
-            (field, float(result.frame.values[place])),
-            (doubt, COVERAGE * float(result.uncertainty[place])),
+            (field, float(result.frame.values[index])),
+            (expanded, COVERAGE * float(result.uncertainty[index])),
         )
     }
     birge = result.frame.birge
     squares = [float(np.mean(one.fit.residual**2)) for one in result.decays]
-    slopes, doubts = result.slopes.values, COVERAGE * result.slope_uncertainty
+    slopes, expanded = result.slopes.values, COVERAGE * result.slope_uncertainty
     return DecayPoint(
         decay=number,
         decays=len(result.decays),
@@ -106,35 +106,35 @@ def point_of(result: FrameResult, number: int) -> DecayPoint:
         residual_m=float(np.sqrt(np.mean(squares))),
         birge=None if np.isnan(birge).any() else float(birge.max()),
         slope1_per_m=float(slopes[0]),
-        slope1_uncertainty=float(doubts[0]),
+        slope1_uncertainty=float(expanded[0]),
         slope2_per_m=float(slopes[1]),
-        slope2_uncertainty=float(doubts[1]),
+        slope2_uncertainty=float(expanded[1]),
         damping_is_linear=not bool(result.nonlinear.any()),
-        k1_parts=_parts_of(result, K1),
-        k2_parts=_parts_of(result, K2),
-        xi1_parts=_parts_of(result, XI1),
-        xi2_parts=_parts_of(result, XI2),
-        damping1_course=_course(result.decays[0].courses[0]) if number else "",
-        damping2_course=_course(result.decays[0].courses[1]) if number else "",
+        k1_parts=_parts_json(result, K1),
+        k2_parts=_parts_json(result, K2),
+        xi1_parts=_parts_json(result, XI1),
+        xi2_parts=_parts_json(result, XI2),
+        damping1_course=_course_json(result.decays[0].courses[0]) if number else "",
+        damping2_course=_course_json(result.decays[0].courses[1]) if number else "",
     )
 
 
 def parts_as_json(parts: Mapping[str, float]) -> str:
     """Standard uncertainties by part, the largest first."""
-    return json.dumps({name: _short(size) for name, size in sorted(parts.items(), key=lambda each: -each[1])})
+    return json.dumps({name: _short(part) for name, part in sorted(parts.items(), key=lambda each: -each[1])})
 
 
-def _parts_of(result: FrameResult, place: int) -> str:
-    return parts_as_json({name: float(part[place]) for name, part in result.parts.items()})
+def _parts_json(result: FrameResult, index: int) -> str:
+    return parts_as_json({name: float(part[index]) for name, part in result.parts.items()})
 
 
-def _course(course: DampingCourse) -> str:
+def _course_json(course: DampingCourse) -> str:
     rows = (course.amplitude, course.damping, course.uncertainty)
     return json.dumps([[_short(value) for value in row.tolist()] for row in rows])
 
 
 def _short(value: float) -> float:
-    """With five digits: texts of a data file are short."""
+    """Rounded to five digits, for the texts of a data file."""
     return float(f"{value:.5g}")
 
 
@@ -157,10 +157,10 @@ def _part(name: str, decays: Sequence[Decay], frame: Combined) -> Array:
 
 
 def nonlinear_text(result: FrameResult) -> str:
-    """That the damping depends on the amplitude, and by how much."""
-    told = [
-        f"xi{mode + 1} changes by {slope:.2g} +- {doubt:.1g} per metre of drift"
-        for mode, (slope, doubt) in enumerate(zip(result.slopes.values, result.slope_uncertainty, strict=True))
+    """A warning that the damping depends on the amplitude, with the slopes."""
+    slopes = [
+        f"xi{mode + 1} changes by {slope:.2g} +- {uncertainty:.1g} per metre of drift"
+        for mode, (slope, uncertainty) in enumerate(zip(result.slopes.values, result.slope_uncertainty, strict=True))
         if result.nonlinear[mode]
     ]
-    return f"the damping depends on the amplitude: {', '.join(told)}; what is stated is its mean over the decays"
+    return f"the damping depends on the amplitude: {', '.join(slopes)}; what is stated is its mean over the decays"
