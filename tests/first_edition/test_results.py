@@ -129,7 +129,16 @@ def test_its_file_has_every_table_and_column(run: Run) -> None:
     assert not {name: said for name, said in before.items() if after.get(RENAMED.get(name, name)) != said}
 
 
+def _journal(file: h5py.File) -> list[tuple[str, str]]:
+    """Kind and text of every event."""
+    kinds, texts = (file[f"entry/events/{name}"][:] for name in ("kind", "text"))
+    return [(kind.decode(), text.decode()) for kind, text in zip(kinds, texts, strict=True)]
+
+
 def test_its_journal_has_the_same_events_in_the_same_order(run: Run, unpacked: Callable[[str], Path]) -> None:
     with h5py.File(unpacked(run.name)) as old, h5py.File(run.folder / "campaign.h5") as new:
-        before, after = ([kind.decode() for kind in file["entry/events/kind"][:]] for file in (old, new))
-    assert [RENAMED.get(kind, kind) for kind in before] == after
+        before, after = _journal(old), _journal(new)
+    # the first edition did not warn, before anything else, of values outside their usual range
+    while after[0][0] == "Warned" and " the usual " in after[0][1]:
+        del after[0]
+    assert [RENAMED.get(kind, kind) for kind, _ in before] == [kind for kind, _ in after]
