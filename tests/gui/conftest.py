@@ -14,8 +14,8 @@ from bench.gui.palette import LIGHT
 from bench.gui.stop import StopFilter
 from bench.gui.window import Window
 from bench.link.messages import FromSession, Survey
+from tests.installed import installed
 from tests.link.experiment import SHAKING, bench
-from tests.plugins import installed
 
 PROTOCOLS = tuple(each for each in all_protocols()[0] if each.name != SHAKING.name)
 """Those of the project."""

@@ -5,7 +5,7 @@ from collections.abc import Generator
 import pytest
 
 from bench.catalogue import GROUP
-from tests.plugins import installed
+from tests.installed import installed
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -1,0 +1,120 @@
+"""Tone sweep: the acceleration of the table per volt of drive at a few frequencies, with the bare frame on it."""
+
+from collections.abc import Sequence
+from functools import cached_property
+from math import sqrt, tau
+
+import numpy as np
+from pydantic import PositiveFloat
+
+from bench.analysis.signals import ACCELERATION, SIGNALS
+from bench.control.calibration import DriveCalibration
+from bench.control.legs import Leg, program
+from bench.engine.steps import Arm, Calibrate, Dwell, Follow, Handle, Measured, RampOut, Say
+from bench.events import LiveValue, PointFinished, StepStarted
+from bench.preflight.bounds import bounds
+from bench.preflight.forecast import Demand, Forecast, Stage
+from bench.preflight.load import load
+from bench.preflight.response import response_of
+from bench.protocol import Plan, Prepared, Protocol, Result
+from bench.publication.campaign import Campaign
+from bench.record.tables import Column, Table
+from bench.report.page.document import Picture, Section
+from bench.report.style import new_figure, write_figure
+from bench.report.text_table import TextColumn, text_table
+from drivers.rig import Handwork
+from sim.parameters import Parameters, quantity
+
+
+class SweepParameters(Parameters):
+    """Sines of one drive amplitude, one frequency after the other."""
+
+    omega: tuple[PositiveFloat, ...] = quantity((10.0, 20.0, 40.0), "rad/s", "circular frequencies", min_length=1)
+    volts: float = quantity(0.05, "V", "amplitude of the drive", gt=0, le=1)
+    cycles: int = quantity(8, "1", "cycles that are measured at each frequency", ge=4, le=100)
+
+
+class SweepPoint(Parameters):
+    """The gain at one frequency."""
+
+    omega_rad_s: float = quantity(..., "rad/s", "circular frequency")
+    gain_m_s2_v: float = quantity(..., "m/s2/V", "acceleration of the table over the drive")
+    gain_uncertainty: float = quantity(..., "m/s2/V", "expanded uncertainty of the gain (k = 2), by its scatter")
+
+
+class ToneSweep(Prepared[SweepParameters]):
+    """The sweep on a bench; without a known table nothing is predicted."""
+
+    @cached_property
+    def gains(self) -> np.ndarray:
+        """Predicted gains [m/s2/V]; NaN where nothing is known of the table."""
+        table, omega = response_of(self.configuration), np.array(self.parameters.omega)
+        frame = self.configuration.known_specimen.frame
+        return omega * np.nan if table is None else table.gain(omega, frame.m1 + frame.m2)
+
+    @cached_property
+    def forecast(self) -> Forecast:
+        p, frame = self.parameters, self.configuration.known_specimen.frame
+        length = sum((p.cycles + 2) * tau / omega + 2.0 for omega in p.omega)
+        if (table := response_of(self.configuration)) is None:
+            return Forecast(duration=length)
+        steps = [(float(gain) * p.volts, omega) for gain, omega in zip(self.gains, p.omega, strict=True)]
+        legs = tuple(leg for level, omega in steps for leg in (Leg(1.0, level, omega), Leg(1.0, 0.0, omega)))
+        mass, mover, time = frame.m1 + frame.m2, self.configuration.mover, self.configuration.limits.heating_time
+        demands = load(program(legs), 0.0, length, payload=mass, mover=mover, response=table, heating_time=time)
+        found = [Demand(key, demands[key], None, "the sweep") for key in bounds(self.configuration) if key in demands]
+        return Forecast(tuple(found), (Stage("the sweep", legs),), length)
+
+    @cached_property
+    def prediction(self) -> Table:
+        omega, gain = np.array(self.parameters.omega), Column(self.gains, "m/s2/V", "predicted gain")
+        return {"omega": Column(omega, "rad/s", "circular frequency"), "gain": gain}
+
+    def plan(self) -> Plan:
+        p, bare, points = self.parameters, self.configuration.known_specimen.bare(), list[SweepPoint]()
+        yield Handle(Handwork.REMOVE_BLOCK, bare, "Take the spring and the block off the table.")
+        yield Arm(2.0)
+        yield Calibrate(DriveCalibration.flat(1.0))  # amplitudes are volts
+        for omega, predicted in zip(p.omega, self.gains, strict=True):
+            yield Say(StepStarted(f"sweep at {omega:g} rad/s"))
+            yield Follow((Leg(1.0, p.volts, omega),))
+            outcome = yield Dwell(p.cycles + 2)
+            cycles = outcome.cycles[2:] if isinstance(outcome, Measured) else ()
+            if len(cycles) >= 4:
+                gains = [abs(each.fundamental[ACCELERATION] / each.fundamental[len(SIGNALS)]) for each in cycles]
+                gain, doubt = float(np.mean(gains)), 2.0 * float(np.std(gains, ddof=1)) / sqrt(len(gains))
+                yield Say(LiveValue("gain of the table", gain, "m/s2/V", doubt, float(predicted)))
+                points.append(SweepPoint(omega_rad_s=omega, gain_m_s2_v=gain, gain_uncertainty=doubt))
+                yield Say(PointFinished(points[-1]))
+            yield Follow((Leg(1.0, 0.0, omega),))
+        yield RampOut()
+        return self.result(points)
+
+    def result(self, points: Sequence[Parameters]) -> Result:
+        rows = [point.model_dump() for point in points]
+        columns = [TextColumn("omega", "rad/s"), TextColumn("gain", "m/s2/V"), TextColumn("U (k=2)", "m/s2/V")]
+        text = text_table(columns, [[f"{value:.4g}" for value in row.values()] for row in rows])
+        return Result(tuple(points), text, figures={"gain.png": lambda path: write_figure(path, drawn(rows))})
+
+
+def drawn(rows):
+    figure = new_figure(6.0, 4.0)
+    panel = figure.add_subplot(xlabel="omega [rad/s]", ylabel="gain [m/s2/V]")
+    panel.errorbar(*([row[name] for row in rows] for name in SweepPoint.model_fields), fmt="o")
+    return figure
+
+
+def report(campaign: Campaign) -> list[Section]:
+    return [Section("sweep", "Tone sweep", [Picture(drawn(campaign.points), "Gain, k = 2.", "Gain over frequency.")])]
+
+
+PROTOCOL = Protocol(
+    name="tone-sweep",
+    summary="Gain of the table at a few frequencies.",
+    details="Drives sines of one amplitude with the bare frame on the table.",
+    parameters=SweepParameters,
+    point=SweepPoint,
+    prepare=ToneSweep,
+    figures=("gain.png",),
+    report=report,
+)
