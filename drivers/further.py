@@ -51,6 +51,14 @@ class FurtherChannel(CalibratedInput):
             raise InvalidInput("name", self.name, "this name is taken; give the channel another")
         return self
 
+    @model_validator(mode="after")
+    def _a_limit_that_can_be_measured(self) -> "FurtherChannel":
+        reach = (self.range - abs(self.zero)) / abs(self.sensitivity)
+        if self.limit is not None and self.limit > reach:
+            allowed = f"with its range and sensitivity the channel measures up to {reach:.4g} {self.unit} only"
+            raise InvalidInput("limit", self.limit, allowed)
+        return self
+
     @property
     def simulated(self) -> PlacedSensor:
         """The sensor on the simulated bench. Raises InvalidInput for what is not simulated there."""

@@ -11,13 +11,16 @@ from bench.analysis.laser_calibration import LaserCalibration
 from drivers.rig import Channel
 from sim.errors import InvalidInput
 
-SIGNALS = ("acceleration", "displacement", "u1", "drift", "laser_1", "laser_2")
+LASERS = ("laser_1", "laser_2")
+"""Channels of the lasers on the first and the second storey."""
+
+SIGNALS = ("acceleration", "displacement", "u1", "drift", *LASERS)
 """First columns of a signal array: table acceleration [m/s2], table displacement [m], first storey relative to the
 table [m], drift u2 - u1 [m], and what the two lasers see [m]."""
 
 ACCELERATION, DISPLACEMENT, U1, DRIFT, LASER_1, LASER_2 = range(6)
 
-MEASURED_BY = ("table_acceleration", "table_displacement", "laser_1", "laser_2")
+MEASURED_BY = ("table_acceleration", "table_displacement", *LASERS)
 """The channels that the signals are made of."""
 
 

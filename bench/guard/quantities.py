@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.analysis.signals import LASERS
 from drivers.rig import Channel
 
 Array = NDArray[np.float64]
@@ -55,7 +56,7 @@ class Quantities:
         self._tail = np.zeros(0)
         self._forget = float(np.exp(-1.0 / (heating_time * sample_rate)))
         self._heat = np.zeros(1)
-        self._middle = {name: _middle(channels[column]) for name, column in self._columns.items() if "laser" in name}
+        self._middle = {name: _middle(channels[column]) for name, column in self._columns.items() if name in LASERS}
 
     def of(self, values: Array) -> dict[str, Array]:
         """Magnitude of each quantity that the channels tell, shape (n,), by its key in `NAMES`."""

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.analysis.cycles import fit_cycle
+from bench.analysis.signals import MEASURED_BY
 from bench.analysis.steady import SPREAD, WINDOW, Steadiness, SteadyDetector
 from bench.link.messages import Traces
 from bench.link.reduction import TRACES
@@ -19,7 +20,7 @@ NEEDED = 2 * WINDOW
 HARMONICS = 3
 """Harmonics that are fitted: enough for the fundamental and the peak of a trace with a few hundred bins a cycle."""
 
-SENSORS = ("table_acceleration", "table_displacement", "laser_1", "laser_2")
+SENSORS = MEASURED_BY
 """What is judged: as the sensors see it. u1 and drift are small differences of these, and a laser that runs on its own
 clock moves them in size where it moves itself only in phase."""
 LASERS = (2, 3)

@@ -41,7 +41,7 @@ class Observed:
 
 
 def observe(signals: Array, rest: int, sample_rate: float) -> Observed:
-    """Signals of a whole record, shape (n, 6), whose first `rest` samples are still. Raises InvalidInput."""
+    """Signals of a whole record, shape (n, len(SIGNALS)), whose first `rest` samples are still. Raises InvalidInput."""
     still = signals[: round(QUIET * rest)]
     return Observed(
         base=base_motion(signals, still, sample_rate),

@@ -9,7 +9,7 @@ from sim.specimen import Specimen
 
 
 def overturning_time(signals: NDArray[np.float64], sample_rate: float, specimen: Specimen) -> float | None:
-    """Seconds since the first of `signals`, shape (n, 6), that end soon after a fall was noticed.
+    """Seconds since the first of `signals`, shape (n, len(SIGNALS)), that end soon after a fall was noticed.
 
     A fallen block holds the storey aside. The mean of u1 over a period of the frame's first mode is taken around each
     sample: it last passed the threshold of `FallWatch` when the block passed its critical angle for good. In ten

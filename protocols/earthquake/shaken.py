@@ -24,7 +24,7 @@ class Tracking:
 
 
 def tracking(shaking: Shaking, signals: Array) -> Tracking:
-    """Of `signals`, shape (n, 6), that begin with the record's drive and may go on after it."""
+    """Of `signals`, shape (n, len(SIGNALS)), that begin with the record's drive and may go on after it."""
     target = shaking.target
     moved = _seen(shaking, signals)
     wanted = _windowed(shaking, target.acceleration)

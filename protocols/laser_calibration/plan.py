@@ -12,6 +12,7 @@ from math import tau
 import numpy as np
 
 from bench.analysis.laser_calibration import LaserCalibration
+from bench.analysis.signals import LASERS
 from bench.config.model import BenchConfiguration
 from bench.control.calibration import DriveCalibration
 from bench.control.legs import Leg
@@ -163,7 +164,7 @@ def _progress(parameters: LaserCalibrationParameters, finished: int, activity: s
 def _rests(heard: Heard) -> tuple[float, float]:
     """Readings of both lasers at rest [m]. Raises Unmeasurable when one has nothing to read."""
     found: list[float] = []
-    for name in ("laser_1", "laser_2"):
+    for name in LASERS:
         column, channel = next((k, each) for k, each in enumerate(heard.channels) if each.name == name)
         values = channel.to_unit(heard.counts[:, column])
         if not np.isfinite(values).any():

@@ -16,6 +16,7 @@ from bench.control.legs import Leg
 from bench.engine.ending import Ending
 from bench.engine.steps import Arm, Calibrate, Dwell, Follow, Handle, Plan, RampOut
 from bench.events import Acquired, Event, LimitExceeded
+from bench.guard.quantities import Quantities
 from bench.gui.window import Window
 from bench.link.messages import Opened
 from bench.link.reduction import TRACES, Reduction
@@ -187,5 +188,22 @@ def test_a_row_that_cannot_be_is_refused(change: dict[str, object], says: str, t
 
 
 def test_a_limit_beyond_what_it_can_measure_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InvalidInput, match=rf"channels.{NAME}.limit = 50.0 .* measures up to"):
-        _run(tmp_path / "campaign.h5", _configuration(tmp_path, limit=50.0))
+    with pytest.raises(InvalidInput, match=r"channels\[0\].limit = 50.0 .* measures up to 19.8 m/s2"):
+        _configuration(tmp_path, limit=50.0)
+    # the converter of this bench reaches less far than the sensor
+    half = {"simulation": {"bench": {"converter": {"range": 5.0}}}}
+    narrow = BenchConfiguration.model_validate(_configuration(tmp_path, limit=15.0).model_dump() | half)
+    with pytest.raises(InvalidInput, match=rf"channels.{NAME}.limit = 15.0 .* measures up to"):
+        _run(tmp_path / "campaign.h5", narrow)
+
+
+def test_a_channel_that_is_called_a_laser_is_no_laser_of_a_storey(tmp_path: Path) -> None:
+    """The guard watches the place in the range of the two lasers on the storeys only."""
+    path = tmp_path / "bench.toml"
+    path.write_text(ROW.replace(NAME, "laser_tilt"), encoding="utf-8")
+    configuration = read_configuration(path)
+    with open_rig(configuration, realtime=False) as rig:  # type: ignore[attr-defined]
+        quantities = Quantities(rig.channels, rig.sample_rate, 60.0, None)
+        values = np.zeros((100, 5))
+        values[:, -1] = 19.0
+        assert quantities.of(values)["laser_range"].max() < 0.1
