@@ -259,7 +259,6 @@ def main(seconds: float, length: float) -> None:
     live(window, application, controller, length, seconds)
     hour(application, controller, length)
     controller.close()
-    window.run.block.close()
 
 
 if __name__ == "__main__":
