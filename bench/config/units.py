@@ -50,7 +50,8 @@ def _root(unit: str) -> tuple[float, str]:
         factor, root = _registry().get_root_units(_registry().parse_units(_as_pint(unit)))
     except (pint.PintError, ValueError, TypeError, ArithmeticError, AttributeError):
         raise ValueError(f"{unit!r} is no unit that is known: write it as mm, N/mm, m/s^2, Hz or deg") from None
-    text = str(root)
+    # pint's root of mass is the gram; a reader of SI expects the kilogram, and the factor cancels
+    text = str(root).replace("gram", "kilogram")
     return float(factor), "" if text == "dimensionless" else text
 
 
