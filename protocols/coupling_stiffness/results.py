@@ -12,8 +12,8 @@ import numpy as np
 
 from bench.analysis.gain import COVERAGE
 from bench.analysis.rounding import plus_minus
-from bench.report.columns import right_aligned
 from bench.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILLION, new_figure, set_grid
+from bench.report.text_table import TextColumn, text_table
 from protocols.coupling_stiffness.difference import SpringResult
 from protocols.coupling_stiffness.protocol import SpringPoint
 
@@ -21,8 +21,17 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_TITLES = ("spring", "decays", "k1 + kC", "kC", "nominal kC", "beta", "k2", "f1", "f2")
-_UNITS = ("", "", "[N/m]", "[N/m]", "[N/m]", "[1]", "[N/m]", "[Hz]", "[Hz]")
+_COLUMNS = (
+    TextColumn("spring", words=True),
+    TextColumn("decays"),
+    TextColumn("k1 + kC", "N/m"),
+    TextColumn("kC", "N/m"),
+    TextColumn("nominal kC", "N/m"),
+    TextColumn("beta", "1"),
+    TextColumn("k2", "N/m"),
+    TextColumn("f1", "Hz"),
+    TextColumn("f2", "Hz"),
+)
 
 SHOWN = 6.0
 """Time of a decay that is drawn after the pulse [s]: enough to see its modes."""
@@ -33,8 +42,8 @@ def springs_table(points: Sequence[SpringPoint]) -> str:
     together = [point for point in points if point.decay == 0]
     if not together:
         return "Nothing was identified."
-    lines = right_aligned(_TITLES, _UNITS, (_cells(point) for point in together))
-    return "\n".join([*lines, "", "+- is the expanded uncertainty, k = 2."])
+    table = text_table(_COLUMNS, map(_cells, together))
+    return "\n".join([table, "", "+- is the expanded uncertainty, k = 2."])
 
 
 def springs_figure(springs: Sequence[SpringResult]) -> "Figure":

@@ -14,26 +14,36 @@ from bench.analysis.free_rocking.findings import Findings
 from bench.analysis.free_rocking.fit import ZERO
 from bench.analysis.free_rocking.tilt import Tilt
 from bench.analysis.gain import COVERAGE
-from bench.report.columns import right_aligned
 from bench.report.rocking_figure import Impacts, draw_impacts
 from bench.report.style import BLACK, BLUE, VERMILLION, new_figure, set_grid
+from bench.report.text_table import TextColumn, text_table
 from protocols.free_rocking.protocol import ALL, RockingPoint
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_TITLES = ("", "tilt", "impacts", "r", "U (k=2)", "r / r_th", "U (k=2)", "r, amplitudes", "U (k=2)", "residual")
-_UNITS = ("", "[deg]", "[1]", "[1]", "[1]", "[1]", "[1]", "[1]", "[1]", "[um]")
+_COLUMNS = (
+    TextColumn("", words=True),
+    TextColumn("tilt", "deg"),
+    TextColumn("impacts", "1"),
+    TextColumn("r", "1"),
+    TextColumn("U (k=2)", "1"),
+    TextColumn("r / r_th", "1"),
+    TextColumn("U (k=2)", "1"),
+    TextColumn("r, amplitudes", "1"),
+    TextColumn("U (k=2)", "1"),
+    TextColumn("residual", "um"),
+)
 
 
 def rocking_table(points: Sequence[RockingPoint]) -> str:
     """One row for each tilt and one for all, and below them the block's parameters from its motion."""
     if not points:
         return "No tilt could be used."
-    lines = right_aligned(_TITLES, _UNITS, (_cells(point) for point in points))
+    table = text_table(_COLUMNS, map(_cells, points))
     combined = next((point for point in points if point.part == ALL), None)
-    return "\n".join(lines if combined is None else [*lines, "", *_combined(combined)])
+    return "\n".join([table] if combined is None else [table, "", *_combined(combined)])
 
 
 def rocking_figure(points: Sequence[RockingPoint], tilts: Sequence[Tilt], found: Findings | None) -> "Figure":

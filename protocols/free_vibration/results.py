@@ -13,8 +13,8 @@ import numpy as np
 from bench.analysis.free_decay.modal import OMEGA1, XI1
 from bench.analysis.gain import COVERAGE
 from bench.analysis.rounding import plus_minus
-from bench.report.columns import right_aligned
 from bench.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION, new_figure, set_grid
+from bench.report.text_table import TextColumn, text_table
 from protocols.common.decays.frame import FrameResult
 from protocols.common.decays.parameters import DecayPoint
 
@@ -22,8 +22,18 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_TITLES = ("decay", "k1", "k2", "xi1", "xi2", "f1", "f2", "drift", "residual", "xi1 over drift")
-_UNITS = ("", "[N/m]", "[N/m]", "[%]", "[%]", "[Hz]", "[Hz]", "[mm]", "[um]", "[%/mm]")
+_COLUMNS = (
+    TextColumn("decay", words=True),
+    TextColumn("k1", "N/m"),
+    TextColumn("k2", "N/m"),
+    TextColumn("xi1", "%"),
+    TextColumn("xi2", "%"),
+    TextColumn("f1", "Hz"),
+    TextColumn("f2", "Hz"),
+    TextColumn("drift", "mm"),
+    TextColumn("residual", "um"),
+    TextColumn("xi1 over drift", "%/mm"),
+)
 
 PARTS = {
     "noise": BLUE,
@@ -41,8 +51,8 @@ def decays_table(points: Sequence[DecayPoint], result: FrameResult | None) -> st
     """One row for each decay, the last for all of them, with expanded uncertainties (k = 2); then the correlations."""
     if not points:
         return "Nothing was identified."
-    lines = right_aligned(_TITLES, _UNITS, (_cells(point) for point in points))
-    return "\n".join([*lines, *(_notes(points[-1], result) if result is not None else ())])
+    table = text_table(_COLUMNS, map(_cells, points))
+    return "\n".join([table, *(_notes(points[-1], result) if result is not None else ())])
 
 
 def decay_figure(result: FrameResult | None, title: str) -> "Figure":

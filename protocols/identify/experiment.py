@@ -16,8 +16,8 @@ from bench.preflight.bounds import bounds
 from bench.preflight.forecast import Demand, Forecast
 from bench.protocol import Plan, Prepared, Result, Sources
 from bench.record.tables import Column, Table
-from bench.report.columns import right_aligned
 from bench.report.style import write_figure
+from bench.report.text_table import TextColumn, text_table
 from protocols.common.identification.level import planned
 from protocols.common.identification.parameters import IdentifyParameters
 from protocols.common.identification.plan import expected_duration, identified
@@ -111,15 +111,23 @@ def _rms(values: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-_TITLES = ("frequency", "gain", "phase", "U (k=2)", "distortion", "noise", "coherence", "lines")
-_UNITS = ("[Hz]", "[m/s2/V]", "[deg]", "[%]", "[%]", "[m/s2/Hz^0.5]", "[1]", "[1]")
+_COLUMNS = (
+    TextColumn("frequency", "Hz"),
+    TextColumn("gain", "m/s2/V"),
+    TextColumn("phase", "deg"),
+    TextColumn("U (k=2)", "%"),
+    TextColumn("distortion", "%"),
+    TextColumn("noise", "m/s2/Hz^0.5"),
+    TextColumn("coherence", "1"),
+    TextColumn("lines", "1"),
+)
 
 
 def _table(points: Sequence[IdentifiedBand]) -> str:
     """One row for each third of an octave."""
     if not points:
         return "Nothing was identified."
-    return "\n".join(right_aligned(_TITLES, _UNITS, (_cells(point) for point in points)))
+    return text_table(_COLUMNS, map(_cells, points))
 
 
 def _cells(point: IdentifiedBand) -> tuple[str, ...]:

@@ -12,16 +12,24 @@ import numpy as np
 
 from bench.analysis.budget import COVERAGE
 from bench.analysis.laser_calibration import LaserCalibration
-from bench.report.columns import right_aligned
 from bench.report.style import BLACK, BLUE, GREY, new_figure, set_grid
+from bench.report.text_table import TextColumn, text_table
 from protocols.laser_calibration.fit import Fitted
 from protocols.laser_calibration.protocol import CalibratedSensor
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_TITLES = ("sensor", "scale - 1", "U (k=2)", "covered", "order", "largest error", "left, U", "delay")
-_UNITS = ("", "[%]", "[%]", "[mm]", "[1]", "[um]", "[um]", "[ms]")
+_COLUMNS = (
+    TextColumn("sensor", words=True),
+    TextColumn("scale - 1", "%"),
+    TextColumn("U (k=2)", "%"),
+    TextColumn("covered", "mm"),
+    TextColumn("order", "1"),
+    TextColumn("largest error", "um"),
+    TextColumn("left, U", "um"),
+    TextColumn("delay", "ms"),
+)
 
 
 def calibrated_sensors(found: LaserCalibration) -> Iterator[CalibratedSensor]:
@@ -58,7 +66,7 @@ def sensors_table(points: Sequence[CalibratedSensor]) -> str:
     """One row for each sensor; "-" stands where a value is absent."""
     if not points:
         return "Nothing was calibrated."
-    return "\n".join(right_aligned(_TITLES, _UNITS, (_cells(point) for point in points)))
+    return text_table(_COLUMNS, map(_cells, points))
 
 
 def errors_figure(curves: tuple[Fitted, Fitted] | None) -> "Figure":
