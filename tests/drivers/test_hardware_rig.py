@@ -13,6 +13,7 @@ import pytest
 from drivers.daqmx.session import DaqSession
 from drivers.emulation.laboratory import Connection, Device, Laboratory
 from drivers.errors import ConnectionLost, DeviceNotFound, DeviceTimeout, RigError
+from drivers.further import FurtherChannel
 from drivers.hardware.parameters import Hardware
 from drivers.hardware.rig import HardwareRig
 from drivers.laboratory_client import ask
@@ -116,6 +117,19 @@ def test_a_controller_with_24_bit_inputs(crio: Laboratory) -> None:
     assert block.counts.dtype == np.int32
     assert all(channel.storage is np.int32 for channel in rig.channels)
     assert "NI 9239" in rig.channels[0].device
+
+
+def test_a_further_channel_shows_what_its_terminal_has(crio: Laboratory) -> None:
+    """On the terminal of the table's displacement, with a calibration of its own: the same motion in other units."""
+    given = crio.hardware.table_displacement
+    row = {"name": "again", "measures": "displacement", "unit": "m", "place": "table", "terminal": given.terminal}
+    row |= {"range": given.range, "sensitivity": -2.0 * given.sensitivity, "zero": given.zero}
+    with HardwareRig(crio.hardware, lead=LEAD, further=[FurtherChannel.model_validate(row)]) as rig:
+        names = [channel.name for channel in rig.channels]
+        (block,) = play(started(rig), np.zeros(200), 200)
+    assert names == ["table_displacement", "table_acceleration", "laser_1", "laser_2", "again"]
+    first, again = (rig.channels[k].to_unit(block.counts[:, k]) for k in (0, 4))
+    np.testing.assert_allclose(again, -0.5 * first, atol=1e-12)
 
 
 def test_an_input_whose_calibration_is_not_straight_gives_the_volts_of_the_bench(crio: Laboratory) -> None:
