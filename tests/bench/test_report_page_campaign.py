@@ -23,10 +23,16 @@ SHORT = ["--omega", "20", "--beta", "0.25", "--ramp-time", "2", "--measured-cycl
 LOOSE = ["--settle-tolerance", "0.01", "--amplitude-tolerance", "0.01"]
 
 
+NOTE = "<script>alert(1)</script> 5 % & #[x]"
+
+
 @pytest.fixture(scope="module")
 def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("campaign") / "run"
-    assert main(["run", "harmonic", "--yes", "--json", "--out", str(folder), "--seed", "7", *SHORT, *LOOSE]) == 0
+    people = ["--operator", "<b>Ann</b>", "--note", NOTE]
+    assert (
+        main(["run", "harmonic", "--yes", "--json", "--out", str(folder), "--seed", "7", *people, *SHORT, *LOOSE]) == 0
+    )
     return folder / "campaign.h5"
 
 
@@ -142,9 +148,15 @@ def test_the_command_writes_both_forms_and_overwrites_only_when_asked(
     text = html.read_text(encoding="utf-8")
     assert text.startswith("<!DOCTYPE html>")
     assert text.count("<svg ") == 5
+    # what a person noted is text, in the summary and in the provenance
+    assert "<script>" not in text
+    assert "<b>Ann" not in text
+    assert text.count("&lt;script&gt;alert(1)&lt;/script&gt; 5 % &amp; #[x]") == 2
     # five figures and a dozen tables
     with PdfDocument(pdf) as printed:
         assert len(printed) >= 5
+        whole = "".join(page.get_textpage().get_text_range() for page in printed)
+        assert "".join(whole.split()).count("".join(NOTE.split())) == 2
     assert [path.name for path in sorted(tmp_path.iterdir())] == ["a.html", "a.pdf"]
 
 

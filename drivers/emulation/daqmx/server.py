@@ -8,17 +8,38 @@ from typing import Any, Self, cast
 
 import grpc
 import session_pb2 as sessions
-from nidaqmx._stubs.nidaqmx_pb2_grpc import add_NiDAQmxServicer_to_server
+from nidaqmx._stubs.nidaqmx_pb2_grpc import NiDAQmxServicer, add_NiDAQmxServicer_to_server
 from session_pb2_grpc import SessionUtilitiesServicer, add_SessionUtilitiesServicer_to_server
 
 from drivers.emulation.daqmx.device import DeviceModel
 from drivers.emulation.daqmx.driver import Driver
 from drivers.emulation.daqmx.faults import Boundary, Faults
 from drivers.emulation.daqmx.lines import Wires
-from drivers.emulation.daqmx.service.daqmx import NiDaqmx
+from drivers.emulation.daqmx.service.channel_attributes import ChannelAttributeService
+from drivers.emulation.daqmx.service.channels import ChannelService
+from drivers.emulation.daqmx.service.lines import LineService
+from drivers.emulation.daqmx.service.reading import ReadingService
+from drivers.emulation.daqmx.service.system import SystemService
+from drivers.emulation.daqmx.service.timing import TimingService
+from drivers.emulation.daqmx.service.watchdogs import WatchdogService
+from drivers.emulation.daqmx.service.writing import WritingService
 from drivers.emulation.plant import Plant
 from sim.errors import InvalidInput
 from sim.sensors import Converter
+
+
+class NiDaqmx(
+    SystemService,
+    WatchdogService,
+    ChannelService,
+    ChannelAttributeService,
+    TimingService,
+    ReadingService,
+    WritingService,
+    LineService,
+    NiDAQmxServicer,
+):
+    """Whatever is not here is UNIMPLEMENTED, as the base class says."""
 
 
 class SessionUtilities(SessionUtilitiesServicer):
