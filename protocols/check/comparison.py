@@ -37,7 +37,7 @@ def scale_lines(sines: Sines, parameters: CheckParameters, *, lasers: bool) -> I
     """Two lines for each sensor but the one that the others are compared with.
 
     That is the table's displacement, unless the accelerometer contradicts it and the lasers side with the
-    accelerometer. `lasers` says whether they see the table's motion.
+    accelerometer. With `lasers` they are compared too: they stand on the ground.
     """
     seen = {"table_displacement": sines.displacement, "table_acceleration": sines.accelerometer}
     if lasers:
@@ -53,7 +53,7 @@ def scale_lines(sines: Sines, parameters: CheckParameters, *, lasers: bool) -> I
 def delay_lines(sines: Sines, parameters: CheckParameters, configuration: BenchConfiguration) -> Iterator[CheckLine]:
     """One line for each laser, one for their difference, and the setting that takes the common delay away.
 
-    A delay is positive where the laser says later than the table's displacement what both have seen.
+    A delay is positive where the laser lags behind the table's displacement.
     """
     most = allowed_delay(configuration.known_specimen, parameters.highest_omega, parameters.u1_error)
     setting = _setting(configuration)
@@ -93,8 +93,8 @@ def delay_lines(sines: Sines, parameters: CheckParameters, configuration: BenchC
 def signed_scale(omega: NDArray[np.float64], amplitudes: Amplitudes, reference: Amplitudes) -> tuple[float, float]:
     """Scale of a sensor over that of another, negative where it moves the other way, and its standard uncertainty.
 
-    The magnitude is extrapolated to frequency zero with a term in omega^2: a clamp gives way a little, and what it
-    carries then moves by (omega / omega_clamp)^2 more than the table.
+    The magnitude is extrapolated to frequency zero with a term in omega^2: a clamp yields, and its load then moves
+    by (omega / omega_clamp)^2 more than the table.
     """
     ratio = amplitudes / reference
     basis = np.column_stack((np.ones(omega.size), omega**2))

@@ -81,13 +81,13 @@ class LoopCheck(Prepared[CheckParameters]):
 
 
 def _steps(parameters: CheckParameters, configuration: BenchConfiguration) -> Generator[Step, Outcome, None]:
-    """The whole check as steps; every line is published as a point as soon as it is known."""
+    """The steps of the whole check; every line is published as a point as soon as it is measured."""
     bare = configuration.known_specimen.bare()
     yield Handle(Handwork.LOCK_FRAME, bare, _CLAMP)
     yield Say(StepStarted("listen at rest"))
     heard = yield Listen(parameters.rest)
     if not isinstance(heard, Heard):
-        raise TypeError(f"listening came to {heard}")
+        raise TypeError(f"acquiring at rest came to {heard}")
     yield from _publish(safety_lines(configuration))
     resting = list(resting_lines(heard, parameters, configuration.analysis))
     if heard.violation is not None and all(line.verdict is not Verdict.FAILED for line in resting):

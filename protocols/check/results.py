@@ -30,7 +30,7 @@ _COLUMNS = (
 )
 
 _OUTSIDE = 1.5
-"""Where a line that is far beyond its limits is drawn."""
+"""Position at which a line far beyond its limits is drawn."""
 
 
 def lines_table(lines: Sequence[CheckLine]) -> str:

@@ -35,7 +35,7 @@ class Sines:
 
     @property
     def accelerometer(self) -> NDArray[np.complex128]:
-        """The table's displacement as the accelerometer says it [m]: x'' = -omega^2 x."""
+        """The table's displacement by the accelerometer [m]: x'' = -omega^2 x."""
         return -self.acceleration / self.omega**2
 
 

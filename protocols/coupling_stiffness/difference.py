@@ -87,7 +87,7 @@ def identified_reference(known: Identified | None) -> Reference | None:
 
 
 def frame_change(bare: FrameResult, known: Identified | None) -> str | None:
-    """By how many standard uncertainties k1 and k2 differ from what is known; None where neither does (99 %)."""
+    """Significant differences (99 %) of k1 and k2 from the identified frame, as text; None where there are none."""
     before = identified_reference(known)
     if before is None:
         return None

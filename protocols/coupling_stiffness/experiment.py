@@ -43,7 +43,7 @@ from sim.parameters import Parameters
 from sim.specimen import Specimen
 
 BARE, SPRING = "bare frame", "spring of beta = {:g}"
-"""Names of what stands on the table."""
+"""Names of the specimens on the table."""
 
 BY_HAND = 120.0
 """Time to mount a spring [s]."""
@@ -71,7 +71,7 @@ class CouplingStiffness(Prepared[CouplingStiffnessParameters]):
         self._bare: FrameResult | None = None
         self._springs: list[SpringResult] = []
         self._clamped = False
-        """Whether a block is clamped to the table."""
+        """True while a block is clamped to the table."""
 
     @property
     def _duration(self) -> float:

@@ -1,4 +1,4 @@
-"""What the decays came to, as points and as findings for other runs."""
+"""Results of the decays: points, and findings for other runs."""
 
 from collections.abc import Sequence
 from datetime import UTC, datetime
@@ -56,7 +56,7 @@ def spring_findings(
 ) -> tuple[list[Finding], list[Correlation]]:
     """The stiffness of each spring, and the bare frame where it is known best from this run, with all correlations.
 
-    `known` is what was identified before: quantities that stay there hang together with the springs as well.
+    `known` are the quantities identified before: those that stay are correlated with the springs as well.
     """
     framed = bare is not None and replaces(bare, known)
     findings, correlations = frame_findings(bare, known) if bare is not None and framed else ([], [])
@@ -76,7 +76,7 @@ def spring_findings(
             weighed = spring.held.weighed @ spring.shift[:2]
             covariances |= {mass: value for mass, value in zip(MASSES, weighed, strict=True) if mass in made}
         for other in springs[:place]:
-            # what they have in common: masses and timebase, and the bare frame that both are compared with
+            # both share masses, timebase, and the bare frame as reference
             common = spring.shift @ spring.held.shared @ other.shift + spring.reference.apart[0, 0]
             covariances[spring_name(other.label)] = float(common)
         correlations += correlations_with(name, size, covariances, sizes)
@@ -84,7 +84,7 @@ def spring_findings(
 
 
 def _with_known(spring: SpringResult, known: Identified, other: str, *, measured: bool) -> float:
-    """Covariance of k_c with what was identified before: by the masses, and by k1 where it was not measured along."""
+    """Covariance of k_c with an identified quantity: by the masses, and by k1 where it was not measured too."""
     masses = known_masses(known) is not None
     if measured:
         return through_masses(spring.shift[:2], known, other) if masses else 0.0

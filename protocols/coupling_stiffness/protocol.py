@@ -1,4 +1,4 @@
-"""The stiffness of mounted springs: what it asks for, what it states of a spring, and the object that others find."""
+"""The stiffness of mounted springs: parameters, the result of a spring, and the protocol."""
 
 from typing import TYPE_CHECKING, Annotated
 

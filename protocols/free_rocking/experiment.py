@@ -1,4 +1,4 @@
-"""Free rocking on a bench: room in the laser's range and what the filters leave of an impact, forecast, result."""
+"""Free rocking on a bench: limits of laser and filters, forecast, prediction, result."""
 
 from collections.abc import Sequence
 from functools import cached_property

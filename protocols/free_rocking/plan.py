@@ -39,7 +39,7 @@ BACK = "Turn laser 2 back to storey 2."
 
 
 class RockingRun:
-    """One run: its steps, its findings so far, and what the operator has changed at the bench."""
+    """One run: its steps, its findings so far, and the state of table and laser."""
 
     def __init__(
         self, parameters: FreeRockingParameters, configuration: BenchConfiguration, tilts: Sequence[PlannedTilt]

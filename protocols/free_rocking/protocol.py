@@ -45,7 +45,7 @@ class FreeRockingParameters(Parameters):
 
 
 class RockingPoint(Parameters):
-    """Restitution of the block's impacts, what its motion says of its shape, and what its sides say of both."""
+    """Restitution of the block's impacts and its shape, by its motion and by its sides."""
 
     part: str = quantity(..., "", "which tilt, or all of them")
     tilt_rad: float | None = quantity(None, "rad", "tilt in the hand, above zero towards the frame")

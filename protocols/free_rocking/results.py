@@ -102,7 +102,7 @@ def _motion(motion: "Axes", left: "Axes", tilt: Tilt) -> None:
     end = float(fit.times[-1]) + 1.0
     shown = slice(None, int(end * seen.sample_rate), max(round(seen.sample_rate / 500.0), 1))
     motion.plot(seen.times[shown], 1e3 * (seen.displacement[shown] - zero), color=BLACK, lw=0.9, label="measured")
-    # pieces between impacts: what lies between them was left out
+    # the fit has no samples between its pieces: NaN breaks the line there
     broken = np.insert(1e3 * (fit.fitted - zero), np.flatnonzero(np.diff(fit.swing)) + 1, np.nan)
     times = np.insert(fit.times, np.flatnonzero(np.diff(fit.swing)) + 1, np.nan)
     motion.plot(times, broken, "--", color=VERMILLION, lw=1.2, label="exact motion, fitted")

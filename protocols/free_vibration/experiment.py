@@ -60,7 +60,7 @@ class FreeVibration(Prepared[FreeVibrationParameters]):
             self._duration = pulsed_duration(parameters, self._pulse.pulse)
         self._frame: FrameResult | None = None
         self._locked = False
-        """Whether the table is clamped."""
+        """True while the table is clamped."""
 
     @cached_property
     def forecast(self) -> Forecast:
@@ -71,7 +71,7 @@ class FreeVibration(Prepared[FreeVibrationParameters]):
 
     @cached_property
     def prediction(self) -> Table:
-        """The modes as they are assumed."""
+        """The assumed modes."""
         frame = self.configuration.known_specimen.frame
         omega = np.sort(frequencies(self._specimen))
         return {

@@ -1,4 +1,4 @@
-"""Free vibration of the bare frame: what it asks for, and the object that others find."""
+"""Free vibration of the bare frame: parameters and the protocol."""
 
 from typing import TYPE_CHECKING, Literal
 

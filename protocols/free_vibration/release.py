@@ -1,4 +1,4 @@
-"""Release of the frame by hand on a locked table: what is refused, the forecast, the decays."""
+"""Release of the frame by hand on a locked table: limits, forecast, decays."""
 
 from collections.abc import Generator
 
@@ -39,7 +39,7 @@ def hand_forecast(configuration: BenchConfiguration, pull: float, duration: floa
     known = {"laser_1": 2.0 * pull / halves[0], "laser_2": 2.0 * pull / halves[1], "drift": 2.0 * pull}
     return Forecast(
         demands=tuple(
-            Demand(quantity, known.get(quantity, 0.0), None, "storey 2 is let go on a locked table")
+            Demand(quantity, known.get(quantity, 0.0), None, "storey 2 is released on a locked table")
             for quantity in bounds(configuration)
         ),
         duration=duration,

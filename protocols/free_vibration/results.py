@@ -92,9 +92,9 @@ def _cells(point: DecayPoint) -> tuple[str, ...]:
 
 def _notes(point: DecayPoint, result: FrameResult) -> list[str]:
     damping = (
-        "The damping does not depend on the amplitude, as far as can be told."
+        "The damping does not depend significantly on the amplitude."
         if point.damping_is_linear
-        else "The damping depends on the amplitude: see the figure; what is stated is its mean over the decays."
+        else "The damping depends on the amplitude: see the figure; the stated value is its mean over the decays."
     )
     # parts of one decay and of all, by the name of the largest
     largest = {

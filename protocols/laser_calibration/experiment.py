@@ -18,7 +18,7 @@ from bench.preflight.response import response_of
 from bench.protocol import Plan, Prepared, Result, Sources
 from bench.record.tables import Column, Table
 from bench.report.style import write_figure
-from protocols.laser_calibration.fit import Fitted
+from protocols.laser_calibration.fit import ErrorCurve
 from protocols.laser_calibration.plan import START, calibration_steps, expected_duration, planned_passes
 from protocols.laser_calibration.protocol import CalibratedSensor, LaserCalibrationParameters
 from protocols.laser_calibration.results import errors_figure, sensors_table
@@ -43,13 +43,13 @@ class LaserCalibrationRun(Prepared[LaserCalibrationParameters]):
     ) -> None:
         super().__init__(parameters, configuration, stored)
         self._found: LaserCalibration | None = None
-        self._curves: tuple[Fitted, Fitted] | None = None
+        self._curves: tuple[ErrorCurve, ErrorCurve] | None = None
         p, limits = self.parameters, configuration.limits
         if configuration.laser_reference != "ground":
             raise InvalidInput(
                 "lasers.reference",
                 "table",
-                "lasers on the table do not see its motion: stand both on the ground for this, and say so",
+                "lasers on the table do not measure its motion: stand both on the ground, and set this to ground",
             )
         if configuration.calibrated is not None:
             raise InvalidInput(
@@ -103,7 +103,7 @@ class LaserCalibrationRun(Prepared[LaserCalibrationParameters]):
 
     @cached_property
     def prediction(self) -> Table:
-        """The passes that are asked for."""
+        """The planned passes."""
         omega, amplitude = np.array(planned_passes(self.parameters)).T
         return {
             "omega": Column(omega, "rad/s", "circular frequency of each pass"),
@@ -128,5 +128,5 @@ class LaserCalibrationRun(Prepared[LaserCalibrationParameters]):
             files={} if found is None else {"laser_calibration.json": write},
         )
 
-    def _keep(self, found: LaserCalibration, curves: tuple[Fitted, Fitted]) -> None:
+    def _keep(self, found: LaserCalibration, curves: tuple[ErrorCurve, ErrorCurve]) -> None:
         self._found, self._curves = found, curves

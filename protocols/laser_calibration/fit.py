@@ -1,17 +1,17 @@
-"""From cycles of one motion to the errors of the lasers that saw it.
+"""Errors of the lasers from cycles of one common motion.
 
 Under a slow sine of the table a laser's reading is r = x + e(r) - d v + c omega^2 x: its error e by the place, its
-delay d, and what the clamps yield, c, because the storeys must be accelerated; passes at two frequencies tell c from a
-scale. All is fitted by least squares to the mean cycles of the passes, at even steps of the phase, with e as Chebyshev
-polynomials of the reading. That the table's motion is no pure sine does no harm: both sensors show what it is.
+delay d, and the compliance of the clamps, c, as the storeys are accelerated; passes at two frequencies separate c from
+a scale. All are fitted by least squares to the mean cycles of the passes, at even steps of the phase, with e as
+Chebyshev polynomials of the reading. The table's motion need not be a pure sine: both sensors measure it.
 
-The order is the lowest whose curve, fitted to all passes but one, foretells the one left out as well as the best does,
-within one standard error. What is left open of the curve is the scatter of what is found without each pass in turn
-(jackknife), and what higher orders would add.
+The order is the lowest whose curve, fitted to all passes but one, predicts the one left out as well as the best does,
+within one standard error. The uncertainty of the curve is the scatter of the curves found without each pass in turn
+(jackknife), and the contribution of higher orders.
 
 The lasers are the standards of length: data sheets allow a laser a smooth error of some share of its whole range, which
-over the span of the passes says more of a scale than the table's sensors do. So the mean of the spans of both lasers is
-taken as true; the table's sensors and each laser are told against it.
+over the span of the passes determines a scale better than the table's sensors do. So the mean of the spans of both
+lasers is taken as true; the table's sensors and each laser are compared with it.
 """
 
 from collections.abc import Sequence
@@ -33,7 +33,7 @@ Array = NDArray[np.float64]
 HIGHEST = 9
 """Highest order that is tried: above it the cycles, fitted with ten harmonics, show less and less."""
 
-PLACES = 201
+READINGS = 201
 """Readings at which curves are compared."""
 
 
@@ -52,13 +52,13 @@ class Pass:
 
 
 @dataclass(frozen=True, eq=False)
-class Fitted:
+class ErrorCurve:
     """The curve of one laser against the table's displacement as shown, as Chebyshev coefficients `error` [m] over the
     readings from `low` to `high` [m]; `delay` [s].
 
-    `scores` are the root mean squares [m] of what each order from 1 on foretells wrongly; `residual` [m] is that of
-    what the chosen one leaves. `without`, shape (passes, PLACES) [m], are the curves, and `delays` [s] the delays,
-    found without each pass in turn.
+    `scores` are the root mean squares [m] of the prediction errors of each order from 1 on; `residual` [m] is that of
+    the contribution of higher orders. `without`, shape (passes, READINGS) [m], are the curves, and `delays` [s] the
+    delays, found without each pass in turn.
     """
 
     low: float
@@ -79,7 +79,7 @@ class Fitted:
 
     @property
     def slope(self) -> float:
-        """How much more its readings span than the displacement, over what they span."""
+        """Span of its readings in excess of that of the displacement, relative to the former."""
         ends = chebyshev.chebval(np.array([-1.0, 1.0]), self.error)
         return float(ends[1] - ends[0]) / (self.high - self.low)
 
@@ -91,11 +91,11 @@ class Fitted:
 
 
 def jackknife(found: Array) -> float:
-    """Standard uncertainty of what was found of n passes, from what is found without each, shape (n,)."""
+    """Standard uncertainty of a value from n passes, by the values found without each in turn, shape (n,)."""
     return sqrt((found.size - 1) / found.size * float(np.sum((found - found.mean()) ** 2)))
 
 
-def one_pass(cycles: Sequence[Cycle], omega: float) -> Pass:
+def mean_pass(cycles: Sequence[Cycle], omega: float) -> Pass:
     """A pass at `omega` [rad/s] from its cycles; their signals are counted from the rest."""
     waves = mean_waves(cycles)
     moved = np.mean([cycle.fundamental for cycle in cycles], axis=0)
@@ -108,10 +108,10 @@ def one_pass(cycles: Sequence[Cycle], omega: float) -> Pass:
     )
 
 
-def fitted(passes: Sequence[Pass], laser: int, rest: float) -> Fitted:
+def fit_curve(passes: Sequence[Pass], laser: int, rest: float) -> ErrorCurve:
     """The curve of laser 0 or 1 that rests at the reading `rest` [m]; the passes have two frequencies or more."""
     readings = [rest + each.lasers[laser] for each in passes]
-    # what all passes cover
+    # the range that all passes cover
     low, high = max(float(r.min()) for r in readings), min(float(r.max()) for r in readings)
     rows = [_columns(r, each, low, high) for r, each in zip(readings, passes, strict=True)]
     errors = [r - each.displacement for r, each in zip(readings, passes, strict=True)]
@@ -137,8 +137,8 @@ def fitted(passes: Sequence[Pass], laser: int, rest: float) -> Fitted:
     order = int(np.flatnonzero(means <= allowed)[0]) + 1
     whole, finest = solved(order), solved(HIGHEST)
     alone: Array = np.array([solved(order, out) for out in every])
-    at = np.linspace(-1.0, 1.0, PLACES)
-    return Fitted(
+    at = np.linspace(-1.0, 1.0, READINGS)
+    return ErrorCurve(
         low=low,
         high=high,
         error=whole[:-2],
@@ -152,7 +152,7 @@ def fitted(passes: Sequence[Pass], laser: int, rest: float) -> Fitted:
 
 def calibration(
     passes: Sequence[Pass],
-    curves: tuple[Fitted, Fitted],
+    curves: tuple[ErrorCurve, ErrorCurve],
     rests: tuple[float, float],
     devices: tuple[str, str],
     accuracy: SensorAccuracy,
@@ -162,8 +162,8 @@ def calibration(
     valid_days: float,
     date: datetime,
 ) -> LaserCalibration:
-    """All that the passes say. `reference_linearity` is that of the displacement sensor, relative to what is covered;
-    `accuracy` and `ranges` [m] are what the data sheets say of the lasers.
+    """The calibration of all sensors. `reference_linearity` is that of the displacement sensor, relative to the covered
+    range; `accuracy` and `ranges` [m] are those of the lasers' data sheets.
     """
     slopes = [curve.slope for curve in curves]
     # the mean span of the lasers is true: shown displacements times this factor
@@ -184,9 +184,9 @@ def calibration(
     ]
     span = min(curve.high - curve.low for curve in curves)
     ratios = np.array([each.ratio for each in passes])
-    standard = np.sqrt(np.mean([_span_doubt(span, accuracy, whole) ** 2 for whole in ranges]) / 2.0)
+    standard = np.sqrt(np.mean([_span_uncertainty(span, accuracy, whole) ** 2 for whole in ranges]) / 2.0)
     scatter = np.hypot(np.std(ratios, ddof=1) / sqrt(len(passes)), jackknife((curves[0].slopes + curves[1].slopes) / 2))
-    # what is left of the curves tilts them, too
+    # the uncertainty of the curves tilts them, too
     bent = np.hypot(curves[0].uncertainty, curves[1].uncertainty) / (0.5 * span)
     return LaserCalibration(
         date=date,
@@ -202,8 +202,8 @@ def calibration(
     )
 
 
-def _span_doubt(span: float, accuracy: SensorAccuracy, whole: float) -> float:
-    """Standard relative uncertainty of what one laser with the range `whole` [m] says of a `span` [m].
+def _span_uncertainty(span: float, accuracy: SensorAccuracy, whole: float) -> float:
+    """Standard relative uncertainty of a `span` [m] measured by one laser with the range `whole` [m].
 
     Of its scale, half the variance of the difference of two; of its linearity, a sine of any phase and some waves: the
     difference of two of its values, span apart, is 2 sin(pi w span / R) cos(phase) of its height.
@@ -213,7 +213,7 @@ def _span_doubt(span: float, accuracy: SensorAccuracy, whole: float) -> float:
     return float(np.hypot(accuracy.laser_linearity * whole * bent / span, accuracy.laser_mismatch / sqrt(2.0)))
 
 
-def _rescaled(curve: Fitted, factor: float) -> Array:
+def _rescaled(curve: ErrorCurve, factor: float) -> Array:
     """The error against the true displacement, `factor` times the shown one: r - factor (r - e), as coefficients."""
     error = factor * curve.error
     error[:2] += (1.0 - factor) * np.array([0.5 * (curve.high + curve.low), 0.5 * (curve.high - curve.low)])
@@ -221,7 +221,7 @@ def _rescaled(curve: Fitted, factor: float) -> Array:
 
 
 def _columns(readings: Array, each: Pass, low: float, high: float) -> Array:
-    """Chebyshev polynomials up to HIGHEST, and what a delay and a yielding clamp do; shape (k, HIGHEST + 3)."""
+    """Chebyshev polynomials up to HIGHEST, and the effects of a delay and a yielding clamp; shape (k, HIGHEST + 3)."""
     place = (2.0 * readings - high - low) / (high - low)
     columns = (chebyshev.chebvander(place, HIGHEST), -each.speed, each.omega**2 * each.displacement)
     return np.column_stack(columns).astype(np.float64)

@@ -34,7 +34,7 @@ from bench.events import FitFinished, FittedParameter, PointFinished, Progress, 
 from drivers.rig import Handwork
 from protocols.common.calibrate import SETTLING, Unmeasurable, calibrate_drive, need_cycles
 from protocols.common.probe import probed_drive
-from protocols.laser_calibration.fit import Fitted, Pass, calibration, fitted, one_pass
+from protocols.laser_calibration.fit import ErrorCurve, Pass, calibration, fit_curve, mean_pass
 from protocols.laser_calibration.protocol import LaserCalibrationParameters
 from protocols.laser_calibration.results import calibrated_sensors
 
@@ -45,7 +45,7 @@ SMALLER = 0.01
 """Share by which each pass is smaller than the first for every pass before it."""
 
 END = 5.0
-"""Expected time of the last ramp, and of what is computed after it [s]."""
+"""Expected time of the last ramp and of the computation after it [s]."""
 
 START, CHANGE = 12.0, 3.0
 """Time in which the table goes to the first pass, and from one to the next [s]. An amplifier that makes a velocity
@@ -85,9 +85,9 @@ def _measuring(parameters: LaserCalibrationParameters, after: int = 0) -> float:
 def calibration_steps(
     parameters: LaserCalibrationParameters,
     configuration: BenchConfiguration,
-    keep: Callable[[LaserCalibration, tuple[Fitted, Fitted]], None],
+    keep: Callable[[LaserCalibration, tuple[ErrorCurve, ErrorCurve]], None],
 ) -> Generator[Step, Outcome, None]:
-    """The whole calibration as steps; `keep` is given what was found."""
+    """The steps of the whole calibration; `keep` is called with its results."""
     bare = configuration.known_specimen.bare()
     yield Handle(Handwork.LOCK_FRAME, bare, _CLAMP)
     yield Say(StepStarted("the lasers at rest"))
@@ -102,7 +102,7 @@ def calibration_steps(
         yield RampOut(fast=True)
         raise
     yield RampOut()
-    curves = fitted(passes, 0, rests[0]), fitted(passes, 1, rests[1])
+    curves = fit_curve(passes, 0, rests[0]), fit_curve(passes, 1, rests[1])
     devices = {channel.name: channel.device for channel in heard.channels}
     found = calibration(
         passes,
@@ -150,13 +150,13 @@ def _passes(parameters: LaserCalibrationParameters) -> Generator[Step, Outcome, 
             raise Unmeasurable(_LOOSE)
         cycles = outcome.cycles[SETTLING:]
         need_cycles(cycles, parameters.cycles)
-        passes.append(one_pass(cycles, omega))
+        passes.append(mean_pass(cycles, omega))
     yield Say(_progress(parameters, len(passes), "finished the passes"))
     return passes
 
 
 def _progress(parameters: LaserCalibrationParameters, finished: int, activity: str) -> Progress:
-    """By what is left of the plan: before the first pass the drive has been calibrated."""
+    """Progress by the remaining plan: before the first pass the drive has been calibrated."""
     left = _measuring(parameters, finished)
     return Progress(1.0 - left / expected_duration(parameters), left, activity)
 
@@ -173,7 +173,7 @@ def _rests(heard: Heard) -> tuple[float, float]:
     return found[0], found[1]
 
 
-def _fit_event(name: str, curve: Fitted, delay: float, uncertainty: float) -> FitFinished:
+def _fit_event(name: str, curve: ErrorCurve, delay: float, uncertainty: float) -> FitFinished:
     at = np.linspace(curve.low, curve.high, curve.without.shape[1])
     fit = np.polynomial.chebyshev.chebval(np.linspace(-1.0, 1.0, at.size), curve.error)
     passes = {

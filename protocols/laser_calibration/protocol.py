@@ -1,4 +1,4 @@
-"""The laser calibration: what it asks for, what it finds of a sensor, and the object that others find."""
+"""The laser calibration: parameters, the result of a sensor, and the protocol."""
 
 from typing import TYPE_CHECKING
 

@@ -14,7 +14,7 @@ from bench.analysis.budget import COVERAGE
 from bench.analysis.laser_calibration import LaserCalibration
 from bench.report.style import BLACK, BLUE, GREY, new_figure, set_grid
 from bench.report.text_table import TextColumn, text_table
-from protocols.laser_calibration.fit import Fitted
+from protocols.laser_calibration.fit import ErrorCurve
 from protocols.laser_calibration.protocol import CalibratedSensor
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ def sensors_table(points: Sequence[CalibratedSensor]) -> str:
     return text_table(_COLUMNS, map(_cells, points))
 
 
-def errors_figure(curves: tuple[Fitted, Fitted] | None) -> "Figure":
+def errors_figure(curves: tuple[ErrorCurve, ErrorCurve] | None) -> "Figure":
     """Two panels for each laser; without curves they are empty."""
     figure = new_figure(9.0, 6.5)
     panels = figure.subplots(2, 2, width_ratios=(3, 1), squeeze=False)

@@ -12,7 +12,7 @@ from bench.analysis.cycles import Cycle, CycleAnalyser
 from bench.analysis.gain import SensorAccuracy
 from bench.analysis.laser_calibration import LaserCalibration
 from bench.analysis.signals import SignalMap
-from protocols.laser_calibration.fit import calibration, fitted, one_pass
+from protocols.laser_calibration.fit import calibration, fit_curve, mean_pass
 from protocols.laser_calibration.plan import planned_passes
 from protocols.laser_calibration.protocol import LaserCalibrationParameters
 from sim.excitation import SineProgram, Sweep
@@ -99,11 +99,11 @@ class Sensors:
             x, v, a = (amplitude * omega**k * np.sin(omega * t + 0.5 * k * np.pi) for k in range(3))
             zero = np.zeros(t.size)
             cycles = cycles_of(self.signals(Motion(x, v, a, zero, zero, zero, zero), None), omega)
-            passes.append(one_pass(cycles, omega))
+            passes.append(mean_pass(cycles, omega))
         rests = float(self.rest[0]), float(self.rest[1])
         return calibration(
             passes,
-            (fitted(passes, 0, rests[0]), fitted(passes, 1, rests[1])),
+            (fit_curve(passes, 0, rests[0]), fit_curve(passes, 1, rests[1])),
             rests,
             ("first", "second"),
             ACCURACY,

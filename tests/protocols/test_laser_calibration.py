@@ -18,7 +18,7 @@ from bench.config.model import BenchConfiguration
 from bench.config.toml import read_configuration
 from bench.record.reader import open_record
 from drivers.rig import Channel
-from protocols.laser_calibration.fit import Pass, calibration, fitted
+from protocols.laser_calibration.fit import Pass, calibration, fit_curve
 from protocols.laser_calibration.protocol import LaserCalibrationParameters
 from sim.errors import InvalidInput
 
@@ -57,7 +57,7 @@ def found(noise: float = 0.0) -> LaserCalibration:
     rests = [RESTS[k] + float(error(k, np.array(RESTS[k]))) for k in range(2)]
     return calibration(
         passes,
-        (fitted(passes, 0, rests[0]), fitted(passes, 1, rests[1])),
+        (fit_curve(passes, 0, rests[0]), fit_curve(passes, 1, rests[1])),
         (rests[0], rests[1]),
         ("laser A", "laser B"),
         SensorAccuracy(),

@@ -91,7 +91,7 @@ def repeat_decays(
 
 
 def fit_setting(parameters: DecayParameters, configuration: BenchConfiguration) -> Setting:
-    """What the fit of a decay takes as known. Masses that are identified have their own covariance."""
+    """The known values for the fit of a decay. Masses that are identified have their own covariance."""
     frame = configuration.known_specimen.frame
     return Setting(
         sample_rate=configuration.sample_rate,

@@ -51,8 +51,8 @@ def fit_finished(decay: Decay, name: str) -> FitFinished:
 def frame_findings(result: FrameResult, known: Identified) -> tuple[list[Finding], list[Correlation]]:
     """Stiffnesses, damping ratios and the masses they were found with, with the correlations of all of them.
 
-    Masses that are known stay as they are; through them the frame is correlated with what else is known. A value that
-    is impossible, such as a damping fitted below zero, is left out.
+    Masses that are known stay as they are; through them the frame is correlated with all other known quantities. A
+    value that is impossible, such as a damping fitted below zero, is left out.
     """
     indices = list(FOUND.values())
     inner = result.frame.covariance[np.ix_(indices, indices)]
@@ -120,12 +120,12 @@ def correlations_with(
 
 
 def standard_uncertainties(known: Identified) -> dict[str, float]:
-    """Standard uncertainties of what is known, by name."""
+    """Standard uncertainties of the known quantities, by name."""
     return {finding.name: finding.standard_uncertainty for finding in known.findings}
 
 
 def known_masses(known: Identified | None) -> Identified | None:
-    """What is known, where both masses are; else None."""
+    """The identified quantities where both masses are among them; else None."""
     return known if known is not None and set(MASSES) <= set(known.names) else None
 
 
@@ -138,7 +138,7 @@ def mass_covariance(parameters: DecayParameters, known: Identified | None) -> ND
 
 
 def check_masses(parameters: DecayParameters, configuration: BenchConfiguration) -> None:
-    """Raise InvalidInput for a stated weighing where the specimen file has one of its own."""
+    """Raise InvalidInput for mass uncertainties in the parameters where the specimen file has its own."""
     if (known := known_masses(configuration.identified)) is None:
         return
     for item in ("mass_uncertainty", "mass_correlation"):

@@ -41,7 +41,7 @@ class FrameResult:
 
     @property
     def shared_shift(self) -> Array:
-        """How the quantities follow what all frames of a run share: both masses and the timebase, shape (8, 3)."""
+        """Shift of the quantities with both masses and the timebase, which all frames of a run share, shape (8, 3)."""
         return np.column_stack((self.mass_shift, self.time_shift))
 
     @property
@@ -63,7 +63,7 @@ class FrameResult:
 
     @property
     def nonlinear(self) -> NDArray[np.bool_]:
-        """Which slope is significant, shape (2,)."""
+        """Whether each slope is significant, shape (2,)."""
         return np.abs(self.slopes.values) > SIGNIFICANT * self.slope_uncertainty
 
 

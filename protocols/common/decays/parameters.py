@@ -8,7 +8,7 @@ _COURSE = "amplitudes of the drift in the mode [m], damping ratios there, their 
 
 
 class DecayParameters(Parameters):
-    """How the frame is set in motion, for how long it is watched, and what the weighing of the storeys leaves open."""
+    """Excitation and length of the decays, and the uncertainty of the weighed masses."""
 
     drift: float = quantity(
         0.030,

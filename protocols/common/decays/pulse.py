@@ -1,4 +1,4 @@
-"""The pulse that sets the frame ringing: its shape, its level, what it demands of the bench.
+"""The pulse that sets the frame ringing: its shape, its level, its demands on the bench.
 
     w(t) = sin(phi) - sin(2 phi) / 2,    phi = 2 pi t / T,    0 <= t <= T
 
@@ -34,7 +34,7 @@ QUIET = 2.0
 """Rest in the recording before the pulse [s]: the noise of the table's sensor is taken there."""
 
 LEFT, LONGEST = 1.0 / 12.0, 60.0
-"""What is left of the first mode at the end of the window, and the longest window that is chosen by itself [s]."""
+"""Remaining share of the first mode at the end of the window, and the longest automatic window [s]."""
 
 LEAST = 0.003
 """Drift [m] below which a decay is drowned by the steps of the lasers."""
@@ -74,7 +74,7 @@ class Pulse:
 
     @property
     def begin(self) -> float:
-        """When the free motion begins, from the start of the recording [s]."""
+        """Begin of the free motion, from the start of the recording [s]."""
         return QUIET + self.duration
 
     @property

@@ -25,7 +25,7 @@ WAITING = 45.0
 """Expected time of a recording besides its drive: until the storeys are still, rest, ramp [s]."""
 
 DETECTABLE = 20.0
-"""How many times its noise the drift must reach in a probe."""
+"""Least ratio of the drift in a probe to its noise."""
 
 GROWTH, NEAR = 10.0, 2.0
 """Most by which the drive grows from one probe to the next; a probe is the last when less than the other is left."""
@@ -34,7 +34,7 @@ _PROBED = 3.0
 """Time after a probe's pulse in which the largest motion comes [s]."""
 
 _MOST = 6
-"""Probes before a table that answers less than expected is given up."""
+"""Largest number of probes."""
 
 
 @dataclass
@@ -45,7 +45,7 @@ class Pace:
     elapsed: float = 0.0
 
     def progress(self, activity: str) -> Progress:
-        """Where the run stands."""
+        """The progress now."""
         return Progress(self.elapsed / self.expected, self.expected - self.elapsed, activity)
 
     def finish(self, begun: float, planned: float) -> None:
@@ -87,7 +87,7 @@ def find_level(
 ) -> Generator[Step, Outcome, float]:
     """The drive [V] with which the pulse makes a peak of `drift` [m], or as much as the limits allow.
 
-    Raises Unmeasurable when the frame does not answer, or cannot be brought to `LEAST`.
+    Raises Unmeasurable when the frame does not respond, or its drift does not reach `LEAST`.
     """
     volts, seen, limit = PROBE, 0.0, _largest_drive(pulse, configuration)
     for probe in range(1, _MOST + 1):
