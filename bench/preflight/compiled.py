@@ -101,7 +101,7 @@ def compile_run(protocol: str, prepared: Prepared[Any], folder: Path, progress: 
         margins=margins(forecast.demands, bounds(configuration)),
         room=None if forecast.duration is None else room(configuration, forecast.duration, folder),
         plan_hash=plan_hash(protocol, prepared.parameters, configuration, software()["rocking-bench"], forecast),
-        sensors=_aged(configuration),
+        sensors=(*_aged(configuration), *_unpredicted(configuration)),
         reviewed=Review(found.refusals, (*found.notices, *notices_of(prepared.parameters, specimen))),
         scales=scales_of(prepared.parameters, specimen),
     )
@@ -111,3 +111,12 @@ def _aged(configuration: BenchConfiguration) -> tuple[str, ...]:
     """A word where the lasers' calibration is too old."""
     said = None if configuration.calibrated is None else configuration.calibrated.expired(datetime.now(UTC))
     return () if said is None else (said,)
+
+
+def _unpredicted(configuration: BenchConfiguration) -> tuple[str, ...]:
+    """A word for each limit of a further channel: margins say nothing of it."""
+    return tuple(
+        f"the limit of {channel.name} ends a run, but what the plan asks of it is not predicted"
+        for channel in configuration.channels
+        if channel.limit is not None
+    )

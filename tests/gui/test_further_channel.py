@@ -207,3 +207,20 @@ def test_a_channel_that_is_called_a_laser_is_no_laser_of_a_storey(tmp_path: Path
         values = np.zeros((100, 5))
         values[:, -1] = 19.0
         assert quantities.of(values)["laser_range"].max() < 0.1
+
+
+def test_a_dry_run_says_that_its_limit_is_not_predicted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    _configuration(tmp_path, limit=12.0)
+    asked = [
+        "--omega",
+        "15",
+        "--beta",
+        "0.25",
+        "--config",
+        str(tmp_path / "bench.toml"),
+        "--out",
+        str(tmp_path / "out"),
+    ]
+    assert main(["run", "harmonic", *asked, "--dry-run"]) == 0
+    said = capsys.readouterr()
+    assert f"the limit of {NAME} ends a run" in " ".join((said.out + said.err).split())
