@@ -2,13 +2,16 @@
 
 import json
 import shutil
+import subprocess
+import sys
 import tomllib
 from collections.abc import Generator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from bench.catalogue import GROUP, all_protocols, load_protocol
+from bench.catalogue import PROTOCOLS, all_protocols, load_format, load_protocol
 from bench.cli.main import main
 from bench.cli.scene import Scene
 from bench.config.declared import declared
@@ -109,7 +112,7 @@ def test_a_plug_in_that_fails_to_load_is_named_and_hinders_nothing_else(tmp_path
     (folder / "half_written.py").write_text("PROTOCOL = 1 / 0\n", encoding="utf-8")
     (folder / "no_protocol.py").write_text("PROTOCOL = 'text'\n", encoding="utf-8")
     entries = {"broken": "half_written:PROTOCOL", "text": "no_protocol:PROTOCOL", "gone": "nowhere:PROTOCOL"}
-    with installed(folder, "rockbench-broken", {GROUP: entries}):
+    with installed(folder, "rockbench-broken", {PROTOCOLS: entries}):
         found, failed = all_protocols()
         assert {"harmonic", "check"} <= {each.name for each in found}
         broken, gone, text = failed
@@ -122,3 +125,25 @@ def test_a_plug_in_that_fails_to_load_is_named_and_hinders_nothing_else(tmp_path
         (line,) = [each for each in capsys.readouterr().err.splitlines() if "error" in each]
         assert "ZeroDivisionError: division by zero" in line
         assert main(["run", "harmonic", "--help"]) == 0
+
+
+def test_an_export_format_is_found_and_has_every_sample(done: Path, tmp_path: Path) -> None:
+    example = PLUGINS / "numpy_archive" / "numpy_archive.py"
+    assert len(example.read_text(encoding="utf-8").splitlines()) <= 60
+    folder = tmp_path / "site"
+    folder.mkdir()
+    shutil.copy(example, folder)
+    project = tomllib.loads((example.parent / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    file, out = done / "campaign.h5", tmp_path / "arrays"
+    with installed(folder, project["name"], project["entry-points"]):
+        assert load_format("npz").title == "NumPy"
+        command = [sys.executable, "-m", "bench", "export", str(file), "--to", "npz", "--out", str(out)]
+        ran = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert ran.returncode == 0, ran.stderr
+    with open_record(file) as record, np.load(out / "run-1.npz") as arrays:
+        run = record.runs[0]
+        np.testing.assert_array_equal(arrays["table_acceleration"], run.channels["table_acceleration"])
+        assert arrays["time"].shape == arrays["drive"].shape
+    with np.load(out / "points.npz") as points:
+        assert points["omega_rad_s"].tolist() == [10.0, 40.0]
+    assert json.loads((out / "units.json").read_text(encoding="utf-8"))["table_acceleration"] == "m/s2"

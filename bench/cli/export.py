@@ -1,15 +1,22 @@
 """`rockbench export`: a recorded campaign for other programs."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import App, Parameter
 
+from bench.catalogue import format_names
 from bench.cli.interrupt import answer
 from bench.cli.progress import Handed
 from bench.cli.prose import prose
 from bench.cli.refusal import tell, warn
 from bench.progress import silent
+
+if TYPE_CHECKING:
+    Format = str
+else:
+    # those that are installed: completion and help name them
+    Format = Literal[format_names()]
 
 
 def export_app() -> App:
@@ -24,8 +31,10 @@ def export(
     /,
     *,
     to: Annotated[
-        Literal["mat", "csv", "uff", "parquet"],
-        Parameter(help="MATLAB format 5, text, Universal File Format (dataset 58, binary), or Parquet."),
+        Format,
+        Parameter(
+            help="MATLAB format 5, text, Universal File Format (dataset 58, binary), Parquet, or an installed one."
+        ),
     ],
     out: Annotated[
         Path | None,

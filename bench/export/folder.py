@@ -1,10 +1,9 @@
 """A whole export: a new folder, complete or not there at all."""
 
 from pathlib import Path
-from typing import Literal
 from uuid import uuid4
 
-from bench.export import matlab, parquet, text, uff
+from bench.catalogue import load_format
 from bench.export.content import content_of
 from bench.progress import Progress, counting, silent
 from bench.record.integrity import Integrity
@@ -13,36 +12,29 @@ from bench.unfinished import unfinished
 from sim.errors import InvalidInput
 from sim.extras import require
 
-Format = Literal["mat", "csv", "uff", "parquet"]
-
 DAMAGED = "DAMAGED.txt"
 """File that travels with an export of what failed its checksum."""
 
-LIBRARIES = {"uff": "pyuff", "parquet": "pyarrow"}
-"""Formats whose library comes with the extra `export`."""
-
-_WRITERS = {"mat": matlab.write, "csv": text.write, "uff": uff.write, "parquet": parquet.write}
-
 
 def export(
-    record: Record, path: Path, to: Format, out: Path, *, raw: bool = False, progress: Progress = silent
+    record: Record, path: Path, to: str, out: Path, *, raw: bool = False, progress: Progress = silent
 ) -> tuple[list[Path], Integrity]:
     """Write an open file, read from `path`, into the new folder `out`; returns the files that are in it then, and
     whether the record is as it was written. What is not stands in the file DAMAGED.txt beside the others.
 
     Physical values are float64; with `raw` the counts are written with the way to values beside them. Raises
-    InvalidInput when `out` exists or cannot be made, or when the format cannot hold what there is, MissingExtra without
-    the format's library.
+    InvalidInput for a format that is not installed or cannot hold what there is, and when `out` exists or cannot be
+    made; MissingExtra without the format's library.
     """
-    if to in LIBRARIES:
-        require("export", f"--to {to}", LIBRARIES[to])
+    wanted = load_format(to)
+    if wanted.library:
+        require("export", f"--to {to}", wanted.library)
     if out.exists():
         raise InvalidInput("--out", str(out), "it exists, and nothing is ever overwritten; name another folder")
     integrity = record.integrity(None, counting(progress, "comparing the file with its checksums"))
     progress("writing the files of the export")
     content = content_of(record, path, raw=raw)
-    if to == "mat":
-        matlab.check(content)
+    wanted.check(content)
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         temporary = out.with_name(f".{out.name}-{uuid4().hex[:8]}")
@@ -50,7 +42,7 @@ def export(
     except OSError as error:
         raise InvalidInput("--out", str(out), f"the folder cannot be made: {error.strerror}") from None
     with unfinished(temporary):
-        _WRITERS[to](content, temporary)
+        wanted.write(content, temporary)
         if integrity.failing:
             lines = (f"{path.name} is damaged or was changed since it was written:", *integrity.failing.values())
             (temporary / DAMAGED).write_text("\n".join(lines) + "\n", encoding="utf-8")

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.export.content import Content, TableColumn
+from bench.export.format import ExportFormat
 from sim.errors import InvalidInput
 
 LARGEST = 2**31 - 1
@@ -129,3 +130,6 @@ def _values(column: TableColumn) -> NDArray[Any]:
 
 def _fields(info: Mapping[str, Any]) -> dict[str, Any]:
     return dict(zip(variables(list(info)), info.values(), strict=True))
+
+
+FORMAT = ExportFormat("MATLAB", write, check)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from bench.export.content import ROWS_AT_ONCE, Content, Signal, TableColumn
+from bench.export.format import ExportFormat
 
 
 def write(content: Content, folder: Path) -> None:
@@ -44,3 +45,6 @@ def _table(arrow: Any, columns: Sequence[TableColumn], about: Mapping[str, str])
     ]
     arrays = [arrow.array(each.values, type=kinds[each.kind]) for each in columns]
     return arrow.table(arrays, schema=arrow.schema(fields, metadata=dict(about)))
+
+
+FORMAT = ExportFormat("Parquet", write, library="pyarrow")

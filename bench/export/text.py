@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from bench.export.content import ROWS_AT_ONCE, Content, Signal, TableColumn
+from bench.export.format import ExportFormat
 
 DIGITS = 12
 """Significant digits of a value: the counts of a 24 bit converter can be had back from them."""
@@ -65,3 +66,6 @@ def _cell(value: object) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     return repr(value) if isinstance(value, float) else str(value)
+
+
+FORMAT = ExportFormat("CSV", write)

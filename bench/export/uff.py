@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from bench.export import text
 from bench.export.content import Content, Signal
+from bench.export.format import ExportFormat
 from bench.record.series import RecordedRun
 from sim.errors import InvalidInput
 
@@ -127,3 +128,6 @@ def _dataset(
         "x": time,
         "data": values.astype(np.float64, copy=False),
     }
+
+
+FORMAT = ExportFormat("UFF", write, library="pyuff")

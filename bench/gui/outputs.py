@@ -1,17 +1,19 @@
 """Report and export of a file, by the same commands as in a terminal; nothing is ever overwritten."""
 
+from contextlib import suppress
 from pathlib import Path
 
 from PySide6.QtCore import QUrl
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QPushButton, QSizePolicy, QWidget
 
+from bench.catalogue import format_names, load_format
 from bench.gui import texts
 from bench.gui.background import Command
 from bench.gui.header import set_level
+from sim.errors import InvalidInput
 
 FORMS = {"HTML": ("report", "--html"), "PDF": ("report", "--pdf")}
-FORMATS = {"MATLAB": "mat", "CSV": "csv", "UFF": "uff", "Parquet": "parquet"}
 
 
 def free(path: Path) -> Path:
@@ -34,7 +36,10 @@ class Outputs(QWidget):
         self.form, self.format = QComboBox(), QComboBox()
         self.form.addItems(list(FORMS))
         self.form.setAccessibleName(texts.REPORT)
-        self.format.addItems(list(FORMATS))
+        for name in format_names():
+            with suppress(InvalidInput):
+                self.format.addItem(load_format(name).title, name)
+        self.format.setCurrentIndex(max(self.format.findData("mat"), 0))
         self.format.setAccessibleName(texts.EXPORT)
         self.report, self.export = QPushButton(texts.REPORT), QPushButton(texts.EXPORT)
         self.report.setToolTip(texts.REPORT_TIP)
@@ -68,7 +73,7 @@ class Outputs(QWidget):
     def _export(self) -> None:
         file = self._file
         if file is not None:
-            to = FORMATS[self.format.currentText()]
+            to = str(self.format.currentData())
             self._run(free(file.with_name(f"{file.stem}-{to}")), "export", str(file), "--to", to, "--out")
 
     def _run(self, made: Path, *arguments: str) -> None:

@@ -5,6 +5,7 @@ import shutil
 import subprocess
 import sys
 import tracemalloc
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -18,7 +19,7 @@ from scipy.io import loadmat
 from bench.cli.main import main
 from bench.config.model import BenchConfiguration
 from bench.events import Acquired, Estimate, PointFinished, StepStarted
-from bench.export import content, folder, matlab, uff
+from bench.export import content, folder, matlab, text, uff
 from bench.record.reader import open_record
 from bench.record.recorder import Recorder
 from bench.record.tables import Column
@@ -304,7 +305,7 @@ def test_nothing_is_overwritten_and_nothing_left_half_done(
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setitem(folder._WRITERS, "csv", full)
+    monkeypatch.setattr(text, "FORMAT", replace(text.FORMAT, write=full))
     assert main(["export", str(campaign), "--to", "csv", "--out", str(tmp_path / "out")]) == 1
     assert "No space left" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
@@ -348,7 +349,7 @@ def test_names_are_made_valid_and_stay_different() -> None:
 
 @pytest.mark.parametrize(("to", "module", "piece"), [("csv", "text", 2000), ("parquet", "parquet", 8000)])
 def test_memory_does_not_grow_with_the_run(
-    tmp_path: Path, to: folder.Format, module: str, piece: int, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, to: str, module: str, piece: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(content, "ROWS_AT_ONCE", piece)
     monkeypatch.setattr(f"bench.export.{module}.ROWS_AT_ONCE", piece)

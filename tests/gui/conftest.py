@@ -7,7 +7,8 @@ import pytest
 from PySide6.QtWidgets import QApplication, QWidget
 from pytestqt.qtbot import QtBot
 
-from bench.catalogue import GROUP, all_protocols
+from bench import catalogue
+from bench.catalogue import all_protocols
 from bench.gui.app import dress
 from bench.gui.controller import Controller
 from bench.gui.palette import LIGHT
@@ -24,7 +25,7 @@ PROTOCOLS = tuple(each for each in all_protocols()[0] if each.name != SHAKING.na
 @pytest.fixture(scope="session", autouse=True)
 def _shaking_is_installed(tmp_path_factory: pytest.TempPathFactory) -> Generator[None]:
     """The sessions of these tests are processes of their own, and find their protocol as they find every other."""
-    entry_points = {GROUP: {"shaking": "tests.link.experiment:SHAKING"}}
+    entry_points = {catalogue.PROTOCOLS: {"shaking": "tests.link.experiment:SHAKING"}}
     with installed(tmp_path_factory.mktemp("shaking"), "rockbench-shaking", entry_points):
         yield
 
