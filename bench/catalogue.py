@@ -1,7 +1,9 @@
 """What is installed beside the program: protocols and export formats by entry points, each loaded when it is used."""
 
+import sys
 from collections.abc import Sequence
-from importlib.metadata import EntryPoint, entry_points
+from functools import lru_cache
+from importlib.metadata import EntryPoint, EntryPoints, entry_points
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from sim.errors import InvalidInput
@@ -55,7 +57,13 @@ def load_format(name: str) -> "ExportFormat":
 
 
 def _entries(group: str) -> dict[str, EntryPoint]:
-    return {entry.name: entry for entry in entry_points(group=group)}
+    return {entry.name: entry for entry in _on_path(group, tuple(sys.path))}
+
+
+@lru_cache(maxsize=8)
+def _on_path(group: str, _path: tuple[str, ...]) -> EntryPoints:
+    """Those of every package on the path, whose metadata are read once."""
+    return entry_points(group=group)
 
 
 def _names(group: str) -> tuple[str, ...]:

@@ -2,11 +2,10 @@
 
 import json
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, runtime_checkable
-from typing import Protocol as Interface
+from typing import Any
 
 from bench.analysis.signals import SignalMap
 from bench.config.model import BenchConfiguration
@@ -29,15 +28,6 @@ from drivers.clock import VirtualClock
 from drivers.rig import Rig
 from sim.errors import UNKNOWN, Cause
 from sim.parameters import Parameters
-
-
-@runtime_checkable
-class Attending(Interface):
-    """A subscriber that is shown the rig before anything moves."""
-
-    def opened(self, rig: Rig) -> None:
-        """The rig is open. It belongs to the thread that calls the subscriber, and only while it does."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -77,11 +67,13 @@ def run_session(
     requests: Requests,
     realtime: bool,
     about: Mapping[str, str] | None = None,
+    opened: Callable[[Rig], None] = lambda _rig: None,
     progress: Progress = silent,
 ) -> SessionResult:
     """Run a protocol that is `prepared` on its bench; leave data file, figures and summary in the folder `out`.
 
-    `about` is kept in the data file beside what is known of the run: the operator's name, notes. `progress` is told
+    `opened` is shown the rig before anything moves; it may be used only while the engine calls a subscriber. `about` is
+    kept in the data file beside what is known of the run: the operator's name, notes. `progress` is told
     what is done before the rig is opened and after it is closed.
     Raises InvalidInput, or KeyboardInterrupt when an end was asked for, before anything moves. Once the rig is armed
     every ending is a result, with its status.
@@ -119,9 +111,7 @@ def run_session(
         stream = Stream(rig.clock, [recorder, points, *subscribers])
         status, reason = "failed", "the program failed"
         try:
-            for subscriber in subscribers:
-                if isinstance(subscriber, Attending):
-                    subscriber.opened(rig)
+            opened(rig)
             signals = SignalMap(rig.channels, configuration.laser_reference, configuration.calibrated)
             engine = Engine(
                 rig,

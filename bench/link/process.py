@@ -84,12 +84,14 @@ def _run(asked: Run, host: Host, requests: Requests) -> FromSession:
         if requests.strongest is not None:
             raise KeyboardInterrupt
         prepared = protocol.prepare(asked.parameters, configuration, None)
+    teller = Teller(host)
     ended = run_session(
         protocol,
         prepared,
         out=asked.out,
         operator=AtTheClient(host, requests) if asked.person else Unattended(_policy(configuration)),
-        subscribers=[Teller(host)],
+        subscribers=[teller],
+        opened=teller.opened,
         requests=requests,
         realtime=asked.realtime,
         about=asked.about,
