@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pytestqt.qtbot import QtBot
 
 from bench.catalogue import PROTOCOLS, all_protocols, load_format, load_protocol
 from bench.cli.main import main
@@ -147,3 +148,13 @@ def test_an_export_format_is_found_and_has_every_sample(done: Path, tmp_path: Pa
     with np.load(out / "points.npz") as points:
         assert points["omega_rad_s"].tolist() == [10.0, 40.0]
     assert json.loads((out / "units.json").read_text(encoding="utf-8"))["table_acceleration"] == "m/s2"
+
+
+@pytest.mark.usefixtures("plugged")
+def test_its_form_is_made_for_the_window(qtbot: QtBot) -> None:
+    from bench.gui.form import Form
+
+    form = Form(load_protocol("tone-sweep").parameters)
+    qtbot.addWidget(form)
+    assert list(form.fields) == ["omega", "volts", "cycles"]
+    assert form.parameters().model_dump() == {"omega": (10.0, 20.0, 40.0), "volts": 0.05, "cycles": 8}
