@@ -18,7 +18,10 @@ RENAMED: dict[str, str] = {}
 name of today, each with the reason beside it.
 """
 
-CHANGED: dict[str, Any] = {}
+CHANGED: dict[str, Any] = {
+    # formats are found by entry points, and named in alphabetical order
+    "options: export --to: choices": "csv, mat, parquet, uff",
+}
 """What another value is meant for today, as "part: name: what" (such as "options: run harmonic --starts: default") to
 that value, each with the reason beside it.
 """
