@@ -55,7 +55,8 @@ class FurtherChannel(CalibratedInput):
     def _a_limit_that_can_be_measured(self) -> "FurtherChannel":
         reach = (self.range - abs(self.zero)) / abs(self.sensitivity)
         if self.limit is not None and self.limit > reach:
-            allowed = f"with its range and sensitivity the channel measures up to {reach:.4g} {self.unit} only"
+            scale = f"range = {self.range:g} V and sensitivity = {self.sensitivity:g}"
+            allowed = f"with {scale} the channel measures up to {reach:.4g} {self.unit} only"
             raise InvalidInput("limit", self.limit, allowed)
         return self
 

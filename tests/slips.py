@@ -103,6 +103,14 @@ COMPANY: dict[str, dict[str, Any]] = {
         "table_uncertainty": 1e-3,
     },
 }
+CHANNEL = {
+    "name": "storey_2_acceleration",
+    "measures": "acceleration",
+    "unit": "m/s2",
+    "place": "storey 2",
+    "sensitivity": 0.1,
+    "limit": 20.0,
+}
 FINDING = {"value": 213.0, "standard_uncertainty": 1.0, "source": "a test", "date": "2026-01-01T00:00:00Z"}
 FINDINGS = [{"name": "k1", **FINDING}, {"name": "k2", **FINDING, "value": 56.0}]
 
@@ -226,6 +234,8 @@ def _checked(path: tuple[str | int, ...], raw: str) -> Outcome:
         elif part == "correlations":
             data["identified"]["findings"] = FINDINGS
             empty = [{"first": "k1", "second": "k2"}]
+        elif part == "channels":
+            empty = [dict(CHANNEL)]
         elif part == "springs":
             empty = [{"label": 0.25, "k_c": 53.36}]
         place[part] = _copied(COMPANY[part]) if part in COMPANY else place.get(part, empty)

@@ -7,7 +7,7 @@ run says so then.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import sqrt, tau
+from math import inf, sqrt, tau
 
 from bench.config.model import BenchConfiguration
 from bench.config.usual import in_hertz, off_resonance, unusual
@@ -25,6 +25,17 @@ table passes its stroke in a quarter of a second; and a relative error of a cloc
 """
 _LEAST_ERROR = 1e-7
 """A triangulation laser that is true to less [m] over its range does not exist: the optoNCDT 1420 resolves 8 um."""
+_REACH = {
+    "acceleration": (0.5, 5000.0),
+    "velocity": (0.02, 50.0),
+    "displacement": (2e-4, 2.0),
+    "force": (1.0, 1e5),
+    "strain": (1e-5, 0.05),
+    "current": (0.02, 1000.0),
+}
+"""What sensors of each kind measure on benches of this size, in SI units, from the data sheets of the usual makers."""
+_LEAST_SHARE = 0.01
+"""A limit, or a noise over one hertz, that is unusual as a share of what a channel measures."""
 _SPRING_OFF = 2.0
 """A measured spring further than this factor from its label is unusual."""
 
@@ -238,8 +249,26 @@ def _unusual(configuration: BenchConfiguration) -> Iterator[str]:
     if true is not None:
         own = set(unusual(true, "simulation.specimen."))
         yield from (each for each in specimen_notices(true, "simulation.specimen.") if each not in own)
+    yield from _channels(configuration)
     yield from _findings(configuration)
     yield from _curves(configuration)
+
+
+def _channels(configuration: BenchConfiguration) -> Iterator[str]:
+    """Further sensors that measure much more or less than sensors of their kind do, or are limited far inside that."""
+    for place, channel in enumerate(configuration.channels):
+        item = f"channels[{place}] ({channel.name})"
+        yield from unusual(channel, f"channels[{place}].")
+        reach = (channel.range - abs(channel.zero)) / abs(channel.sensitivity)
+        low, high = _REACH.get(channel.measures, (0.0, inf))
+        if not low <= reach <= high:
+            scale = f"sensitivity = {channel.sensitivity:g} and range = {channel.range:g} V"
+            yield f"{item}: with {scale} it measures up to {reach:.3g} {channel.unit}, usual are {low:g} to {high:g}"
+        if channel.limit is not None and channel.limit < _LEAST_SHARE * reach:
+            yield f"{item}: limit = {channel.limit:g} {channel.unit} is below 1 % of what it measures, {reach:.3g}"
+        if channel.noise_density > _LEAST_SHARE * reach:
+            noise = f"noise_density = {channel.noise_density:g} {channel.unit}/Hz^0.5"
+            yield f"{item}: {noise} is above 1 % of what it measures, {reach:.3g} {channel.unit}"
 
 
 def _findings(configuration: BenchConfiguration) -> Iterator[str]:

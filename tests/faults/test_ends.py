@@ -40,7 +40,7 @@ def test_exit_status(
     monkeypatch.chdir(tmp_path)
 
     def start(*_: object, requests: Requests, out: Path, **__: object) -> SessionResult:
-        out.mkdir(parents=True)
+        out.mkdir(parents=True, exist_ok=True)
         bench = FaultyBench(out / "campaign.h5", DWELLING, FAULTS[name].begin, requests)
         story = run(bench)
         bench.rig.close()

@@ -8,6 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
+from bench.analysis.signals import DRIFT, SignalMap
 from bench.cli.main import main
 from bench.config.model import BenchConfiguration
 from bench.control.legs import program
@@ -132,7 +133,15 @@ def _largest_seen(monkeypatch: pytest.MonkeyPatch) -> dict[str, float]:
             seen[key] = max(seen[key], float(size.max()))
         return found
 
+    signals = SignalMap.of
+
+    def signals_of(self: SignalMap, values: np.ndarray) -> np.ndarray:
+        found = signals(self, values)
+        seen["drift"] = max(seen["drift"], float(np.nanmax(np.abs(found[:, DRIFT]))))
+        return found
+
     monkeypatch.setattr(Quantities, "of", of)
+    monkeypatch.setattr(SignalMap, "of", signals_of)
     return seen
 
 
