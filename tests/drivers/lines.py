@@ -9,9 +9,12 @@ def complex_amplitudes(
 ) -> NDArray[np.complex128]:
     """Amplitudes, shape (m,), of the lines `omega` [rad/s] in a signal, shape (n,), by least squares with its mean.
 
-    An amplitude a is the line Re(a exp(i omega t)), t from the first sample. The lines need not fit the length.
+    An amplitude a is the line Re(a exp(i omega t)), t from the first sample. The lines need not fit the length, and
+    samples that a busy computer read too late, which are NaN, are left out.
     """
     phase = np.outer(np.arange(signal.size) / sample_rate, omega)
     lines = np.hstack((np.cos(phase), -np.sin(phase), np.ones((signal.size, 1))))
-    found = np.linalg.lstsq(lines, signal)[0].astype(np.float64)
+    there = np.isfinite(signal)
+    assert there.mean() > 0.5, f"{np.count_nonzero(~there)} of {signal.size} samples are missing"
+    found = np.linalg.lstsq(lines[there], signal[there])[0].astype(np.float64)
     return found[: omega.size] + 1j * found[omega.size : 2 * omega.size]
