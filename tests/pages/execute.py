@@ -9,11 +9,12 @@ import subprocess
 import sys
 import time
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from tests.bench.accelerograms.real import CAMPAIGN as CAMPAIGN_RECORDS
 from tests.pages.blocks import ROOT, Block, Command, blocks
 
 CAMPAIGN = ROOT / "tests" / "data" / "first_edition" / "harmonic_point.h5.xz"
@@ -51,8 +52,7 @@ class Failure:
 
 def collection() -> Path | None:
     """Folder of the recorded ground motions, or None where they are not available."""
-    folder = Path(os.environ.get("ROCKBENCH_RECORDS", ROOT.parent / "shared" / "records" / "campaign"))
-    return folder if folder.is_dir() else None
+    return CAMPAIGN_RECORDS if CAMPAIGN_RECORDS.is_dir() else None
 
 
 def furnish(folder: Path, specimen: str) -> None:
@@ -109,9 +109,9 @@ def _run(block: Block, command: Command, folder: Path) -> Iterator[Failure]:
         yield Failure(block.where, command.line, "the page shows another output; printed was:\n" + done.stdout)
 
 
-def _parsed(block: Block, parse: object) -> Iterator[Failure]:
+def _parsed(block: Block, parse: Callable[[str], object]) -> Iterator[Failure]:
     try:
-        parse(block.text)  # type: ignore[operator]
+        parse(block.text)
     except ValueError as error:
         yield Failure(block.where, block.language, str(error))
 
