@@ -1,6 +1,6 @@
-"""`python -m bench`: the command `rockbench` where its script is not on the path."""
+"""`python -m bench`: runs the command `rockbench` if its script is not on the path."""
 
-from bench.cli.process import run
+from bench.app.cli.process import run
 
 if __name__ == "__main__":
     run()

@@ -1,8 +1,7 @@
-"""The events of a run: every one declared once, with its columns in the data file, its line in the journal and its word
-in the log.
+"""Events of a run, each declared once with its columns in the data file, its journal line and its label in the log.
 
-Recorder, live analysis, console and window are subscribers: functions that take an event. The engine calls them in
-its own thread, in the order of their subscription, so a subscriber that has work to do queues it.
+Recorder, live analysis, console and window are subscribers: functions called with each event. The engine calls them in
+its own thread, in the order of subscription, so that a subscriber must queue long computations.
 """
 
 from collections.abc import Callable, Mapping
@@ -14,7 +13,7 @@ from typing import ClassVar, TypeVar, dataclass_transform
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.rig import Alignment, Block, Handwork
+from drivers.rig import Alignment, Block, OperatorTask
 from sim.identified import Identified
 from sim.parameters import Parameters, column
 from sim.specimen import Specimen
@@ -23,7 +22,7 @@ Array = NDArray[np.float64]
 
 
 class State(StrEnum):
-    """What the bench is doing."""
+    """State of the bench."""
 
     IDLE = "idle"
     ARMED = "armed"
@@ -37,19 +36,19 @@ class State(StrEnum):
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened at `time`: seconds of the bench's clock since the session began.
+    """Event at `time`: seconds of the bench's clock since the session began.
 
-    The stream stamps the time of publication on an event that has none (NaN).
+    The stream sets the time of publication if an event has none (NaN).
     """
 
     table: ClassVar[str] = ""
-    """Where the data file keeps its columns, below /entry; empty when only the journal has it."""
+    """Path of its columns in the data file, below /entry; empty if the event is only in the journal."""
     journalled: ClassVar[bool] = True
-    """Whether the journal has a line of it; what comes many times a second would hide the rest."""
+    """Whether the event is in the journal; frequent events are not."""
     notice: ClassVar[str] = ""
-    """Its word in the log of terminal and window; empty for what is not logged."""
+    """Its label in the log of terminal and window; empty for events that are not logged."""
     grave: ClassVar[bool] = False
-    """Whether the operator should look."""
+    """Whether the event needs the operator's attention."""
 
     time: float = field(default=nan, kw_only=True, metadata={"unit": "s", "description": "bench time"})
 
@@ -67,10 +66,10 @@ E = TypeVar("E", bound=Event)
 def event(
     *, table: str = "", journalled: bool = True, notice: str = "", grave: bool = False, eq: bool = True
 ) -> Callable[[type[E]], type[E]]:
-    """Declare a frozen event; see the class variables of `Event`.
+    """Class decorator that declares a frozen event; see the class variables of `Event`.
 
     The columns of its `table` are the fields declared by `column`. A field of shape (n,), or a tuple of dataclasses
-    with columns of their own, makes as many rows of one event; these have no column of the time.
+    with their own columns, gives n rows for one event; such rows have no time column.
     """
 
     def declare(kind: type[E]) -> type[E]:
@@ -80,13 +79,15 @@ def event(
     return declare
 
 
-@event()
+@event(table="state_changes")
 class StateChanged(Event):
-    """The bench went from one state to another, and why."""
+    """Transition of the bench from one state to another, with its reason and `code` and `subject` of the cause."""
 
-    before: State
-    after: State
-    reason: str
+    before: State = column("", "state before the transition")
+    after: State = column("", "state after it")
+    reason: str = column("", "reason, as in the journal")
+    code: str = column("", "code of the cause of an ending; empty for an ordinary transition", default="")
+    subject: str = column("", "subject of the cause: kind of request, quantity of a limit, open inputs", default="")
 
     @property
     def line(self) -> str:
@@ -95,10 +96,10 @@ class StateChanged(Event):
 
 @event(journalled=False)
 class Acquired(Event):
-    """A block of samples as read, and the drive [V], shape (n,), that was played while it was taken.
+    """Block of samples as read, and the drive [V], shape (n,), played during its acquisition.
 
-    `run` counts the times the rig has been armed; the block's `first` sample index is counted within that run.
-    `signals`, shape (n, n_signals), are in SI units from the zero of the run, as `bench.analysis.signals` numbers them.
+    `run` counts the armings of the rig; the block's `first` sample index is relative to the start of the run.
+    `signals`, shape (n, n_signals), are in SI units, tared for the run, in the order of `bench.analysis.signals`.
     """
 
     run: int
@@ -107,13 +108,13 @@ class Acquired(Event):
     signals: Array = field(default_factory=lambda: np.empty((0, 0)))
 
 
-@event()
+@event(table="operator_actions")
 class SpecimenMounted(Event):
-    """A person has done `work`, by `amount` where it has one: `specimen` is what stands on the table now."""
+    """The operator has completed `work`, with its `amount` if it has one; `specimen` is now on the table."""
 
     specimen: Specimen
-    work: Handwork
-    amount: float | None = None
+    work: OperatorTask = column("", "action of the operator")
+    amount: float | None = column("of the action", "amount of the action; absent if it has none", default=None)
 
     @property
     def line(self) -> str:
@@ -124,9 +125,9 @@ class SpecimenMounted(Event):
 
 @event(table="instrument/alignments")
 class SensorsAligned(Event):
-    """How sensors with clocks of their own were placed on the sample clock in `run`; published when the run is over."""
+    """Alignment of sensors with free clocks to the sample clock in `run`; published at the end of the run."""
 
-    run: int = column("1", "how many times the rig had been armed")
+    run: int = column("1", "number of armings of the rig")
     alignments: tuple[Alignment, ...] = column("", "one row for each sensor")
 
     @property
@@ -136,7 +137,7 @@ class SensorsAligned(Event):
 
 @event(notice="step")
 class StepStarted(Event):
-    """A step of the plan began; `text` says which, as the lab sheet would."""
+    """A step of the plan began; `text` describes it."""
 
     text: str
 
@@ -147,7 +148,7 @@ class StepStarted(Event):
 
 @event(journalled=False)
 class Progress(Event):
-    """Share of the campaign that is done, 0 to 1, what is being done, and the estimated bench time left [s]."""
+    """Completed share of the campaign, 0 to 1, present step, and estimated remaining bench time [s]."""
 
     fraction: float
     remaining: float
@@ -156,10 +157,10 @@ class Progress(Event):
 
 @event(table="live_values", journalled=False)
 class LiveValue(Event):
-    """A number that a protocol follows while it measures, by its `label`; NaN while it is not known."""
+    """Running value of a quantity that a protocol measures, with its `label`; NaN while unknown."""
 
-    label: str = column("", "what the number is")
-    value: float = column("of the row", "its value so far, in the unit of the row")
+    label: str = column("", "description of the quantity")
+    value: float = column("of the row", "present value, in the unit of the row")
     unit: str = column("", 'SI unit of the row; "1" for a pure number', default="1")
     uncertainty: float = column("of the row", "its expanded uncertainty (k = 2); NaN if unknown", default=nan)
     predicted: float = column("of the row", "predicted value; NaN if there is none", default=nan)
@@ -167,14 +168,14 @@ class LiveValue(Event):
 
 @event(table="estimates", journalled=False)
 class Estimate(Event):
-    """The running gain coefficient of the point being tested; NaN while it is not known.
+    """Running gain coefficient of the point under test; NaN while unknown.
 
-    `predicted` is for the layer that the point is started towards.
+    `predicted` is for the branch of steady motion intended by the start of the point.
     """
 
     omega: float = column("rad/s", "circular frequency of the base motion")
     beta: float | None = column("1", "stiffness ratio of the coupling spring; absent for the bare frame")
-    cycles: int = column("1", "cycles over which the estimate was made")
+    cycles: int = column("1", "number of cycles of the estimate")
     drift_peak: float = column("m", "peak drift")
     alpha_2: float = column("1", "running gain of the peak drift, coupled over bare")
     uncertainty: float = column("1", "expanded uncertainty of alpha_2 (k = 2)")
@@ -183,13 +184,13 @@ class Estimate(Event):
 
 @event(table="running_gains", journalled=False)
 class RunningGain(Event):
-    """The gain under a record so far, `seconds` into it: the ratio of the peaks until now, measured and predicted.
+    """Gain under a record up to `seconds` into it: ratio of the peak drifts so far, measured and predicted.
 
-    Peaks are largest magnitudes of the drift since the record began; of the bare frame until the same second.
-    NaN while it is not known; `beta` is None for the bare frame.
+    Peaks are the largest magnitudes of the drift since the start of the record, for coupled and bare frame alike. NaN
+    while unknown; `beta` is None for the bare frame.
     """
 
-    record: str = column("", "the record that was played")
+    record: str = column("", "name of the record")
     beta: float | None = column("1", "stiffness ratio of the coupling spring; absent for the bare frame")
     seconds: float = column("s", "time into the record")
     drift_peak: float = column("m", "peak drift since the record began")
@@ -203,64 +204,64 @@ TWIN_TRACE = ("seconds", "u1", "u2", "theta", "drift_low", "drift_high")
 
 @event(table="twin", journalled=False, eq=False)
 class TwinEstimate(Event):
-    """Where the model is that runs with the test, and where the specimen: at the sample that the lasers took
-    `seconds` into `run`, the last that both are known for; `time` is when its block had been read.
+    """State of the live model and of the specimen at the last sample for which both are known, `seconds` into `run`.
+    `time` is when its block had been read.
 
-    `_low` and `_high` are the ends of the model's band, `_measured` what the lasers saw. `alpha_2` is known once the
-    protocol has stated one. `residual` is the root mean square of measured minus modelled drift over the last second,
-    `excess` that of what of the measured drift lies outside the band, both over the largest of the drift itself so far.
-    `members` make the band, with the nominal model. NaN where there is no such value.
+    `_low` and `_high` are the ends of the model's band, `_measured` the values of the lasers. `alpha_2` is available
+    once the protocol has published a gain. `residual` is the root mean square of measured minus modelled drift over the
+    last second, `excess` that of the measured drift outside the band, both relative to the largest drift so far.
+    `members` form the band, together with the nominal model. NaN where a value does not exist.
 
-    `trace`, shape (n, 6), is the model since the estimate before, every 10 ms: columns TWIN_TRACE.
+    `trace`, shape (n, 6), is the model's motion since the previous estimate, every 10 ms, with the columns TWIN_TRACE.
     """
 
     time: float = column("s", "bench time at which the block had been read", default=nan, kw_only=True)
-    run: int = column("1", "how many times the rig had been armed")
-    seconds: float = column("s", "time of the run that the values are for")
-    members: int = column("1", "models that made the band, besides the nominal one")
-    standing: float = column("1", "share of them whose block stood")
-    u1: float = column("m", "u1, of the model")
-    u1_low: float = column("m", "u1, where the model's band began")
-    u1_high: float = column("m", "u1, where it ended")
-    u1_measured: float = column("m", "u1, as measured")
-    u2: float = column("m", "u2, of the model")
-    u2_low: float = column("m", "u2, where the model's band began")
-    u2_high: float = column("m", "u2, where it ended")
-    u2_measured: float = column("m", "u2, as measured")
-    drift: float = column("m", "the drift, of the model")
-    drift_low: float = column("m", "the drift, where the model's band began")
-    drift_high: float = column("m", "the drift, where it ended")
-    drift_measured: float = column("m", "the drift, as measured")
-    drift_peak: float = column("m", "the largest drift since the rig was armed, of the model")
-    drift_peak_low: float = column("m", "the largest drift since the rig was armed, where the model's band began")
-    drift_peak_high: float = column("m", "the largest drift since the rig was armed, where it ended")
-    drift_peak_measured: float = column("m", "the largest drift since the rig was armed, as measured")
-    alpha_2: float = column("1", "the gain of the peak drift, coupled over bare, of the model")
-    alpha_2_low: float = column("1", "the gain of the peak drift, coupled over bare, where the model's band began")
-    alpha_2_high: float = column("1", "the gain of the peak drift, coupled over bare, where it ended")
-    alpha_2_measured: float = column("1", "the gain of the peak drift, coupled over bare, as measured")
-    theta: float = column("rad", "angle of the model's block")
-    residual: float = column("1", "rms of measured minus modelled drift over a second, over the drift's largest")
-    excess: float = column("1", "the same of what of the measured drift lay outside the band")
+    run: int = column("1", "number of armings of the rig")
+    seconds: float = column("s", "time in the run to which the values apply")
+    members: int = column("1", "models in the ensemble of the band, besides the nominal one")
+    standing: float = column("1", "share of these models whose block stands")
+    u1: float = column("m", "u1 of the model")
+    u1_low: float = column("m", "u1, lower end of the model's band")
+    u1_high: float = column("m", "u1, upper end of the model's band")
+    u1_measured: float = column("m", "u1, measured")
+    u2: float = column("m", "u2 of the model")
+    u2_low: float = column("m", "u2, lower end of the model's band")
+    u2_high: float = column("m", "u2, upper end of the model's band")
+    u2_measured: float = column("m", "u2, measured")
+    drift: float = column("m", "drift of the model")
+    drift_low: float = column("m", "drift, lower end of the model's band")
+    drift_high: float = column("m", "drift, upper end of the model's band")
+    drift_measured: float = column("m", "drift, measured")
+    drift_peak: float = column("m", "peak drift since arming, of the model")
+    drift_peak_low: float = column("m", "peak drift since arming, lower end of the model's band")
+    drift_peak_high: float = column("m", "peak drift since arming, upper end of the model's band")
+    drift_peak_measured: float = column("m", "peak drift since arming, measured")
+    alpha_2: float = column("1", "gain of the peak drift, coupled over bare, of the model")
+    alpha_2_low: float = column("1", "gain of the peak drift, coupled over bare, lower end of the model's band")
+    alpha_2_high: float = column("1", "gain of the peak drift, coupled over bare, upper end of the model's band")
+    alpha_2_measured: float = column("1", "gain of the peak drift, coupled over bare, measured")
+    theta: float = column("rad", "rocking angle of the model")
+    residual: float = column("1", "rms of measured minus modelled drift over 1 s, relative to the largest drift")
+    excess: float = column("1", "rms of the measured drift outside the band over 1 s, relative to the largest drift")
     trace: Array
 
 
 @event(table="passes", notice="pass")
 class PassFinished(Event):
-    """A drive was played to make the table follow `motion`: how well it did, pass `number` of a replication.
+    """A pass of a replication has ended: pass `number` of the iteration that makes the table follow `motion`.
 
     `error`, `repeatable`, `peak_error` and `spectrum_error` are relative, see `bench.control.passes.Pass`; `text`
-    says all of it.
+    summarises the pass.
     """
 
-    time: float = column("s", "bench time at which the pass was over", default=nan, kw_only=True)
-    motion: str = column("", "the motion that the table was to follow")
+    time: float = column("s", "bench time at the end of the pass", default=nan, kw_only=True)
+    motion: str = column("", "commanded motion of the table")
     number: int = column("1", "number of the pass, from 1 for each replication")
-    error: float = column("1", "root mean square error over that of the target, as measured")
-    repeatable: float = column("1", "the same without the part that does not repeat")
-    peak_error: float = column("1", "largest error over the peak of the target")
+    error: float = column("1", "measured rms error relative to the rms of the target")
+    repeatable: float = column("1", "error without its non-repeatable part")
+    peak_error: float = column("1", "largest error relative to the peak of the target")
     spectrum_error: float = column("1", "largest relative deviation of the response spectrum")
-    accepted: bool = column("1", "whether the error was the smallest so far; else the drive went back")
+    accepted: bool = column("1", "whether the error was the smallest so far; otherwise the previous drive is restored")
     text: str
 
     @property
@@ -270,17 +271,17 @@ class PassFinished(Event):
 
 @event(table="table_response", notice="table", eq=False)
 class TableIdentified(Event):
-    """The response of the table to its drive is known: values at the lines, each of shape (n_lines,), in the units of
-    `bench.control.table_model.TableModel`; `text` says when, with what on the table, and at what level.
+    """The response of the table was identified: values at the lines, each shape (n_lines,), in the units of
+    `bench.control.table_model.TableModel`; `text` states date, mounted specimen and level.
     """
 
     text: str
-    frequency: Array = column("Hz", "line of the identification")
+    frequency: Array = column("Hz", "frequency line of the identification")
     real: Array = column("m/s2/V", "table acceleration per drive, real part, exp(+i omega t)")
-    imaginary: Array = column("m/s2/V", "imaginary part")
-    uncertainty: Array = column("m/s2/V", "its standard uncertainty, noise and distortion together")
-    distortion: Array = column("m/s2/V", "standard deviation of one realisation by nonlinear distortion alone")
-    coherence: Array = column("1", "share of the acceleration's power that the drive explains")
+    imaginary: Array = column("m/s2/V", "table acceleration per drive, imaginary part")
+    uncertainty: Array = column("m/s2/V", "standard uncertainty of the response, from noise and distortion")
+    distortion: Array = column("m/s2/V", "standard deviation of one realisation due to nonlinear distortion alone")
+    coherence: Array = column("1", "share of the acceleration's power that is coherent with the drive")
     noise: Array = column("m/s2/Hz^0.5", "spectral density of the noise in the acceleration")
 
     @property
@@ -290,7 +291,7 @@ class TableIdentified(Event):
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """Values over the axis of a fit, shape (n,), their unit in SI symbols ("1" for a number), and what they are."""
+    """Values along the axis of a fit, shape (n,), their unit in SI symbols ("1" for a number), and description."""
 
     values: Array
     unit: str
@@ -299,7 +300,7 @@ class Series:
 
 @dataclass(frozen=True)
 class FittedParameter:
-    """What a fit found for a parameter of its model; the standard uncertainty has the same unit, NaN if unknown."""
+    """Fitted value of a parameter of a model; the standard uncertainty has the same unit, NaN if unknown."""
 
     value: float
     uncertainty: float
@@ -310,9 +311,9 @@ class FittedParameter:
 class FitFinished(Event):
     """A model was fitted to a stretch of a recording; `name` is short and unique within a session, `text` one line.
 
-    `columns` by name, all of one length: first the axis (such as the time), then what was measured, and to be compared
-    with it what was fitted, what is left, and so on. Names are fit for a file. Raises ValueError when they are not.
-    `bench.record.fits` keeps them.
+    `columns` by name, all of equal length: first the axis (such as time), then measured values and, for comparison,
+    fitted values, residuals and so on. Raises ValueError unless all names are valid in a data file. Stored by
+    `bench.datafile.declared`.
     """
 
     name: str
@@ -323,10 +324,10 @@ class FitFinished(Event):
     def __post_init__(self) -> None:
         shapes = {series.values.shape for series in self.columns.values()}
         if len(shapes) != 1 or len(*shapes) != 1:
-            raise ValueError(f"columns of the fit {self.name} have shapes {shapes}; they need to be one, (n,)")
+            raise ValueError(f"columns of the fit {self.name} have shapes {shapes}; they must be equal, (n,)")
         for name in (self.name, *self.columns):
             if not name.strip(".") or "/" in name:
-                raise ValueError(f"{name!r} in the fit {self.name} is no name for a file")
+                raise ValueError(f"{name!r} in the fit {self.name} is not a valid name in a data file")
 
     @property
     def line(self) -> str:
@@ -335,10 +336,7 @@ class FitFinished(Event):
 
 @event()
 class SpecimenIdentified(Event):
-    """What is known of the specimen by now: what was known before, with the findings of this run.
-
-    `bench.record.findings` keeps it.
-    """
+    """Present knowledge of the specimen: findings of this and earlier runs; stored by `bench.datafile.declared`."""
 
     identified: Identified
 
@@ -352,54 +350,58 @@ class SpecimenIdentified(Event):
 
 @event(notice="point")
 class PointFinished(Event):
-    """A point of the campaign has its result: an instance of the protocol's `point_type`, a row of `points`."""
+    """A point of the campaign is finished: its result is an instance of `point_type`, a row of `points`."""
 
     point: Parameters
 
 
-@event(notice="warning", grave=True)
+@event(table="warnings", notice="warning", grave=True)
 class Warned(Event):
-    """Something that the operator should know and that does not end the run."""
+    """Warning to the operator that does not end the run."""
 
     text: str
+    realtime: bool = column("1", "whether the warning depends on the speed of the computer", default=False)
 
     @property
     def line(self) -> str:
         return self.text
 
 
-@event(notice="LIMIT", grave=True)
+@event(table="exceeded_limits", notice="LIMIT", grave=True)
 class LimitExceeded(Event):
-    """The guard ended the run: `quantity` reached `value` where `limit` is allowed, both in `unit`."""
+    """The guard ended the run: `quantity` reached `value` beyond `limit`, both in `unit`."""
 
-    quantity: str
-    value: float
-    limit: float
-    unit: str
+    quantity: str = column("", "limited quantity")
+    value: float = column("of the row", "value of the quantity")
+    limit: float = column("of the row", "largest value allowed")
+    unit: str = column("", "SI unit of the row")
+    timing: bool = column(
+        "1", "whether the limit concerns the arrival of blocks, which is not in the samples", default=False
+    )
 
     @property
     def line(self) -> str:
         return f"{self.quantity} reached {self.value:.6g} {self.unit}; limit {self.limit:.6g} {self.unit}"
 
 
-@event(notice="asked")
+@event(table="operator_requests", notice="asked")
 class OperatorAsked(Event):
-    """The plan waits for a person: what to do and why, and of which kind the work is, where that is known."""
+    """The plan waits for the operator: requested action with its reason, and its kind, if known."""
 
     request: str
-    work: Handwork | None = None
+    work: OperatorTask | None = column("", "kind of the requested action; empty if unknown", default=None)
 
     @property
     def line(self) -> str:
         return self.request
 
 
-@event(notice="done")
+@event(table="operator_answers", notice="done")
 class OperatorAnswered(Event):
-    """The person (or the policy of an unattended run, `by`) says that it is done."""
+    """The operator, or the policy of an unattended run, named by `by`, confirmed the request."""
 
     request: str
-    by: str
+    by: str = column("", "person or policy that confirmed the request")
 
     @property
     def line(self) -> str:

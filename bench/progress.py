@@ -1,22 +1,22 @@
-"""How far a computation is: a callable that is handed down to it, and by which it reports."""
+"""Progress of a computation, reported through a callable."""
 
 from collections.abc import Callable
 from typing import Protocol
 
 
 class Progress(Protocol):
-    """Called by what may take long, in the thread that waits for it."""
+    """Callable that long computations call in the thread of their caller."""
 
     def __call__(self, phase: str, done: int = 0, total: int = 0, /) -> None:
-        """`phase` is what is being done, in words; `done` of its `total` parts are, where those can be counted."""
+        """Report `phase`, the present stage, of which `done` of `total` parts are complete, if countable."""
         ...
 
 
 def silent(phase: str, done: int = 0, total: int = 0, /) -> None:
-    """Report to nobody."""
+    """Discard the progress."""
 
 
 def counting(progress: Progress, phase: str) -> Callable[[int, int], None]:
-    """Report `phase` now, and return what counts its parts: called with how many of all are done."""
+    """Report `phase` now, and return a callable that reports how many of its parts are done: `(done, total)`."""
     progress(phase)
     return lambda done, total: progress(phase, done, total)

@@ -1,12 +1,13 @@
-"""A protocol as one object: what it asks for, how it is prepared on a bench, and the result of its run.
+"""A protocol as one object: its parameters, its preparation on a bench, and the result of its run.
 
-`docs/extending.md` has a complete example. A protocol is found by the entry point that names its `Protocol`.
+`docs/extending.md` has a complete example. A protocol is discovered by the entry point of its `Protocol` object.
 """
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeAlias, TypeVar
 from typing import Protocol as Interface
@@ -15,29 +16,30 @@ from bench.progress import Progress, silent
 from sim.parameters import Parameters
 
 if TYPE_CHECKING:
-    # a list of protocols and their flags need none of it
+    # imported for types only: listing protocols and their flags must be fast
     from bench.config.model import BenchConfiguration
+    from bench.datafile.reader import DataFile
+    from bench.datafile.tables import Column, Table
+    from bench.document.campaign import Campaign
+    from bench.document.document import Section
     from bench.engine.steps import Outcome, Step
     from bench.events import Event
-    from bench.preflight.forecast import Forecast
-    from bench.publication.campaign import Campaign
-    from bench.record.reader import Record
-    from bench.record.tables import Column, Table
-    from bench.report.page.document import Section
+    from bench.preflight.margins import Forecast
 
 P = TypeVar("P", bound=Parameters)
+T = TypeVar("T")
 
 Sources: TypeAlias = Mapping[str, Mapping[str, "Column"]]
-"""The tables of a data file, by name."""
+"""Tables of a data file, by name."""
 
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """The result of a run, also of one that broke off.
+    """Result of a run, complete or interrupted.
 
-    `text` is for the terminal, `findings` for the summary (ready for JSON). `figures` and `files` are written to the
-    folder of the run, each by a function of its path; their names are among those that the `Protocol` declares.
-    `passed` is the verdict of a protocol that judges the bench, and None of any other.
+    `text` is for the terminal, `findings` (JSON content) for the summary. `figures` and `files` are written to the
+    folder of the run, each by a function of its path; their names are among those declared by the `Protocol`. `passed`
+    is the verdict of a protocol that checks the bench, and None for any other.
     """
 
     points: tuple[Parameters, ...]
@@ -49,116 +51,138 @@ class Result:
 
 
 Plan: TypeAlias = Generator["Step", "Outcome", Result]
-"""The steps of a run, which return its result."""
+"""Generator of the steps of a run; returns the result."""
+
+
+def each_step(
+    plan: 'Generator["Step", "Outcome", T]', carry_out: 'Callable[["Step"], Generator["Step", "Outcome", "Outcome"]]'
+) -> 'Generator["Step", "Outcome", T]':
+    """`plan` with each step replaced by the steps of `carry_out(step)`, which returns the outcome of the step.
+
+    As with `yield from`, an exception thrown in is raised at the step of `plan`, which may handle it.
+    """
+    try:
+        step = next(plan)
+        while True:
+            try:
+                outcome = yield from carry_out(step)
+            except GeneratorExit:
+                raise
+            except BaseException as error:
+                step = plan.throw(error)
+            else:
+                step = plan.send(outcome)
+    except StopIteration as end:
+        return end.value
+    finally:
+        plan.close()
 
 
 class Prepared(ABC, Generic[P]):
-    """A protocol on a bench, checked and ready to be forecast, planned and run.
+    """Protocol prepared for a bench: checked, and ready to be forecast and run.
 
-    Whatever a run needs of parameters and configuration is computed once, here: a subclass keeps what forecast,
-    prediction and plan have in common. `stored` are the tables of the data file that is replayed or analysed again,
-    in place of the files that a new run reads; None for a new run.
+    The constructor computes once whatever forecast, prediction and plan share. `stored` are the tables of the data file
+    that is replayed or analysed again; they replace the input files that a new run reads. None for a new run.
 
-    The constructor of a subclass raises InvalidInput where the bench cannot do what is asked.
+    The constructor of a subclass raises InvalidInput for parameters beyond the capabilities of the bench.
     """
 
     def __init__(self, parameters: P, configuration: "BenchConfiguration", stored: "Sources | None" = None) -> None:
         self.parameters, self.configuration, self.stored = parameters, configuration, stored
         self.progress: Progress = silent
-        """What a long computation reports to."""
+        """Callable that receives the progress of long computations."""
 
     @cached_property
     def forecast(self) -> "Forecast":
-        """Stages, demands and duration; empty for a protocol that predicts nothing, which then has no margins.
+        """Stages, demands and duration; empty for a protocol without predictions, which then has no margins.
 
-        Raises InvalidInput for what cannot be planned at all.
+        Raises InvalidInput if no plan is possible.
         """
-        from bench.preflight.forecast import Forecast
+        from bench.preflight.margins import Forecast
 
         return Forecast()
 
     @cached_property
     def prediction(self) -> "Table":
-        """The expected results, stored before the first sample moves; may be empty."""
+        """Expected results, stored before the table moves; may be empty."""
         return {}
 
     @cached_property
     def sources(self) -> Sources:
-        """Contents of the files that were read besides the configuration, kept in the data file."""
+        """Contents of the input files other than the configuration, stored in the data file."""
         return {}
 
     @abstractmethod
     def plan(self) -> Plan:
-        """The steps from the beginning."""
+        """Steps of the run from the beginning; the generator returns the result."""
 
     def collected(self, steps: 'Generator["Step", "Outcome", object]') -> Plan:
-        """Carry out `steps`; returns the result of the points that they publish."""
-        from bench.engine.steps import Say
+        """Yield `steps`, and return the result of the points that they publish."""
+        from bench.engine.steps import Publish
         from bench.events import PointFinished
 
         points: list[Parameters] = []
-        try:
-            step = next(steps)
-            while True:
-                if isinstance(step, Say) and isinstance(step.event, PointFinished):
-                    points.append(step.event.point)
-                step = steps.send((yield step))
-        except StopIteration:
-            return self.result(points)
-        finally:
-            steps.close()
+
+        def collect(step: "Step") -> 'Generator["Step", "Outcome", "Outcome"]':
+            if isinstance(step, Publish) and isinstance(step.event, PointFinished):
+                points.append(step.event.point)
+            return (yield step)
+
+        yield from each_step(steps, collect)
+        return self.result(points)
 
     @abstractmethod
     def result(self, points: Sequence[Parameters]) -> Result:
-        """The result of a run that broke off, from the points that it has published."""
+        """Result of an interrupted run from the points that it has published."""
 
 
 class Follower(Interface):
-    """Watches the recorded plan while it is carried out again, and computes other results from the same samples.
+    """Subscriber to a replay of the recorded plan that computes results with other settings from the same samples.
 
-    A subscriber too: it is called with every event, the blocks of a step between `before` and `after`.
+    Called with every event; the blocks of a step arrive between `before` and `after`.
     """
 
     def before(self, step: "Step") -> None:
-        """A step is about to be carried out."""
+        """Called before a step."""
         ...
 
     def after(self, step: "Step", outcome: "Outcome") -> None:
-        """It came to `outcome`."""
+        """Called after a step, with its `outcome`."""
         ...
 
     def __call__(self, event: "Event") -> None: ...
 
     @property
     def points(self) -> Sequence[Parameters]:
-        """The results so far, one for each recorded point."""
+        """Results so far, one for each recorded point."""
         ...
 
 
 @dataclass(frozen=True)
 class Reanalysis(Generic[P]):
-    """How recorded results are computed again with other `settings`.
+    """Re-analysis of recorded results with other `settings`.
 
-    `follower` is given the settings, the recorded parameters, the configuration to analyse with, and the open file.
+    `follower` is called with settings, recorded parameters, configuration for the analysis, and the open file.
     """
 
     settings: type[Parameters]
-    follower: "Callable[[Any, P, BenchConfiguration, Record], Follower]"
+    follower: "Callable[[Any, P, BenchConfiguration, DataFile], Follower]"
 
 
 @dataclass(frozen=True)
 class Protocol(Generic[P]):
-    """One experiment. Flags, form, file metadata and documentation follow from `parameters`, tables from `point`.
+    """Experiment. Flags, form, file metadata and documentation are generated from `parameters`, tables from `point`.
 
-    `prepare` is given the parameters, the configuration of the bench, and the tables of a data file that is replayed
-    or analysed again, else None. It raises InvalidInput where the bench cannot do what is asked, and is the place for
-    heavy imports: the object itself is loaded for a list of protocols.
+    `prepare` takes the parameters, the bench configuration, and the tables of a data file that is replayed or analysed
+    again, else None. It raises InvalidInput for parameters beyond the capabilities of the bench. A list of protocols
+    imports the object itself: wrap a `prepare` with heavy imports in `deferred`.
 
-    `example` are arguments that its help shows. `figures` and `files` name everything that a run may write besides the
-    data file and the summary, the main figure first. `positional` is the parameter that the command line takes without
-    a flag. `log_line` turns a point into one line of a log: a protocol that has it is shown as a log, not as a
-    picture. Without a `reanalysis` the plan is carried out again on the recorded samples with other parameters.
-    `report` makes the sections of a report that only this protocol has, from its data file.
+    `example` are arguments shown in its help. `figures` and `files` name all files that a run may write besides data
+    file and summary, the main figure first. `positional` is the parameter that the command line accepts without a flag.
+    `log_line` formats a point as one log line: the run is then displayed as a log, not as a plot. Without a
+    `reanalysis`, an analysis runs the plan with other parameters on the recorded samples. `report` returns the
+    protocol's own sections of a report on its data file; if they include no table, the report lists all fields of the
+    points.
     """
 
     name: str
@@ -174,3 +198,13 @@ class Protocol(Generic[P]):
     log_line: Callable[[Any], str] | None = None
     reanalysis: Reanalysis[P] | None = None
     report: "Callable[[Campaign], Sequence[Section]] | None" = None
+
+
+def deferred(reference: str) -> Callable[..., Any]:
+    """Function or class `module:name`, as in an entry point, imported at the first call."""
+    module, name = reference.split(":")
+
+    def call(*args: Any, **kwargs: Any) -> Any:
+        return getattr(import_module(module), name)(*args, **kwargs)
+
+    return call

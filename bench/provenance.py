@@ -1,4 +1,4 @@
-"""What software made a result."""
+"""Versions of the software that produced a result."""
 
 import json
 import platform
@@ -8,13 +8,13 @@ from pathlib import Path
 
 
 def software() -> dict[str, str]:
-    """Versions of this program, of Python and of the libraries that numbers depend on."""
+    """Versions of this program, Python and the libraries that results depend on."""
     found = {"rocking-bench": _version("rocking-bench"), "python": platform.python_version()}
     return found | {name: _version(name) for name in ("numpy", "scipy", "numba", "h5py")}
 
 
 def revision() -> str:
-    """Git hash of this program, with "+" where its files were changed since; "unknown" when neither tells it."""
+    """Git hash of this program, with "+" after uncommitted changes; "unknown" outside a repository or package."""
     here = Path(__file__).parent
     try:
         found = subprocess.run(
@@ -25,7 +25,7 @@ def revision() -> str:
             timeout=10.0,
             check=True,
         )
-        # a program that was installed into some other project's checkout is no part of it
+        # ignore the repository of another project in which this program was installed
         subprocess.run(["git", "ls-files", "--error-unmatch", __file__], cwd=here, capture_output=True, check=True)
         return found.stdout.strip()
     except (OSError, subprocess.SubprocessError):
@@ -33,7 +33,7 @@ def revision() -> str:
 
 
 def _installed_revision() -> str:
-    """The hash that the installer noted when it took the program from a repository."""
+    """Hash recorded by the installer when it installed the program from a repository."""
     try:
         noted = json.loads(distribution("rocking-bench").read_text("direct_url.json") or "{}")
     except (PackageNotFoundError, OSError, json.JSONDecodeError):

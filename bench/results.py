@@ -1,3 +1,3 @@
-"""The names of what every campaign leaves in its folder; its figure has the name that the protocol gives it."""
+"""Names of the files of every campaign; figures are named by the protocol."""
 
 FILE, SUMMARY = "campaign.h5", "summary.json"

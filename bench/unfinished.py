@@ -1,13 +1,22 @@
-"""Results in the making: temporary files and folders that a process must not leave behind, however it ends.
+"""Unfinished results: temporary files and folders that a process must remove, however it ends.
 
-Whoever makes one removes it, or renames it when it is whole. The list here is for the one ending that runs no
-`finally`: an interrupted process whose main thread does not answer, see `bench.cli.interrupt`.
+The creator removes each one, or renames it when complete. The list here serves the one ending that runs no `finally`:
+an interrupted process whose main thread does not respond, see `bench.app.cli.interrupt`.
 """
 
+import os
 import shutil
-from collections.abc import Generator
+import time
+from collections.abc import Callable, Generator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from tempfile import gettempdir
+from uuid import uuid4
+
+from sim.errors import InvalidInput, RockbenchError
+
+HELD, PAUSE = 1.0, 0.05
+"""Time for which another program may hold a file that is renamed, and the pause between attempts [s]."""
 
 _paths: set[Path] = set()
 _reserved: set[Path] = set()
@@ -15,7 +24,7 @@ _reserved: set[Path] = set()
 
 @contextmanager
 def unfinished(path: Path) -> Generator[Path]:
-    """Within, a file or folder may be made at `path`; at the end it is removed, unless it was renamed or is `whole`."""
+    """Context manager to create a file or folder at `path`: removes it at exit unless it was renamed or is `whole`."""
     _paths.add(path)
     try:
         yield path
@@ -26,31 +35,76 @@ def unfinished(path: Path) -> Generator[Path]:
             _paths.discard(path)
 
 
+@contextmanager
+def temporary_folder() -> Generator[Path]:
+    """Context manager for an empty folder for files of this process; removes both at the end."""
+    with unfinished(Path(gettempdir(), f"rockbench-{uuid4().hex}")) as folder:
+        folder.mkdir(mode=0o700)
+        yield folder
+
+
+def replace(source: Path, target: Path) -> None:
+    """Rename a complete file to its name, replacing one that has it.
+
+    On Windows a scanner or an indexer may hold either for a moment: it is tried again for `HELD` seconds. Raises
+    OSError.
+    """
+    end = time.monotonic() + HELD
+    while True:
+        try:
+            os.replace(source, target)
+        except PermissionError:
+            if time.monotonic() >= end:
+                raise
+            time.sleep(PAUSE)
+        else:
+            return
+
+
+def write_new(path: Path, write: Callable[[Path], None], *, overwrite: bool = False) -> None:
+    """Writes a file under a temporary name in the folder of `path` and renames it when it is complete.
+
+    Raises InvalidInput when `path` exists and `overwrite` is False, or when its folder does not exist; RockbenchError
+    when the disk fails.
+    """
+    if path.exists() and not overwrite:
+        raise InvalidInput("file", str(path), "it exists and is never overwritten; name another")
+    if not path.parent.is_dir():
+        raise InvalidInput("file", str(path), "its folder does not exist; create it first")
+    # the temporary name keeps the suffix, from which a writer may choose the format
+    try:
+        with unfinished(path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")) as temporary:
+            write(temporary)
+            replace(temporary, path)
+    except OSError as error:
+        raise RockbenchError(f"{path} could not be written ({error.strerror or error}): check the disk") from error
+
+
 def whole(path: Path) -> None:
-    """What was made at `path` is a result: it stays."""
+    """Mark the file at `path` as complete: it is kept."""
     _paths.discard(path)
 
 
 def reserve(folder: Path) -> None:
-    """`folder` was made for results to come: an ending that runs no `finally` removes it if it is still empty."""
+    """Register `folder`, created for results: an ending that runs no `finally` removes it if it is still empty."""
     _reserved.add(folder)
 
 
 def remove_unfinished() -> None:
-    """Remove every file and folder in the making; from any thread, just before the process is ended."""
+    """Remove all unfinished files and folders; called from any thread just before the process exits."""
     for path in tuple(_paths):
         with suppress(OSError):
             _remove(path)
     for folder in tuple(_reserved):
         with suppress(OSError):
-            # neither is removed while anything is in it
+            # a folder that is not empty is kept
             folder.rmdir()
             folder.parent.rmdir()
 
 
 def _remove(path: Path) -> None:
     if path.is_dir():
-        # a second time for what another thread has put there during the first
+        # a second pass removes files created by another thread during the first
         shutil.rmtree(path, ignore_errors=True)
         shutil.rmtree(path, ignore_errors=True)
     else:

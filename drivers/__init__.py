@@ -1,1 +1,1 @@
-"""The instruments: one interface (`drivers.rig`) and every backend behind it."""
+"""Instruments: the interface of a rig (`drivers.rig`), simulated and hardware rigs, device drivers."""

@@ -1,33 +1,32 @@
-"""Time is handed in, never taken: virtual for dry runs, the wall clock for the real thing."""
+"""Clocks that pace a rig: virtual time, and the wall clock."""
 
 import time
 from typing import Protocol
 
 
 def now() -> float:
-    """The machine's clock [s since an arbitrary origin]: never decreases, steps by less than a microsecond.
+    """Machine's clock [s since an arbitrary origin]: never decreases, resolution better than a microsecond.
 
-    Everything that is placed in time is read off this one. The monotonic clock of the language may step by 15.6 ms on
-    Windows (documentation of Python, `time.monotonic` before 3.13), this counter does not. On Linux both are
-    CLOCK_MONOTONIC, so that other processes on the machine agree with it.
+    All time stamps use this clock. Python's monotonic clock may step by 15.6 ms on Windows (documentation of Python,
+    `time.monotonic` before 3.13); this counter does not. On Linux both are CLOCK_MONOTONIC, shared by all processes.
     """
     return time.perf_counter()
 
 
 class Clock(Protocol):
-    """Seconds since an arbitrary origin, and a way to let them pass."""
+    """Clock with an arbitrary origin, and a sleep on the same clock."""
 
     def now(self) -> float:
         """Seconds since the clock's origin; never decreases."""
         ...
 
     def wait_until(self, instant: float) -> None:
-        """Return when `now()` has reached `instant`."""
+        """Block until `now()` has reached `instant`."""
         ...
 
 
 class VirtualClock:
-    """Time that passes as fast as the machine allows: waiting only moves the hand."""
+    """Virtual time: a wait returns at once and sets the clock to its end."""
 
     def __init__(self) -> None:
         self._now = 0.0
@@ -40,7 +39,7 @@ class VirtualClock:
 
 
 class WallClock:
-    """The machine's clock."""
+    """Machine's clock in real time."""
 
     def now(self) -> float:
         return now()

@@ -1,19 +1,22 @@
-"""The rules for the drive that every rig keeps: what may be written, and what must be waiting when a block is read."""
+"""State and drive of a rig: refused calls, allowed samples, and the lead required when a block is read."""
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
+from enum import Enum
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.clock import Clock
 from drivers.errors import DriveUnderflow, RigError
 from sim.errors import InvalidInput
 
 
 class Drive:
-    """Checks the samples that are written and counts those that wait; nothing is played here.
+    """Checks written samples and counts queued ones; does not play them.
 
-    `range` is the largest magnitude [V], `lead` the number of samples that must wait beyond those of a block. Raises
+    `range` is the largest magnitude [V], `lead` the number of samples required beyond those of a block. Raises
     InvalidInput for a negative lead.
     """
 
@@ -24,37 +27,39 @@ class Drive:
         self.lead = lead
         self._waiting = 0
         self.index = 0
-        """Number of the sample that is read next, counted from `begin`."""
+        """Number of the next sample to be read, counted from `begin`."""
 
     def begin(self) -> None:
-        """A run begins: nothing waits, and sample 0 is the next."""
+        """Begin a run without queued samples, at sample 0."""
         self._waiting = self.index = 0
 
     def append(self, volts: NDArray[np.float64]) -> NDArray[np.float64]:
-        """A copy of `volts`, shape (n,), which waits from now on.
+        """Count `volts`, shape (n,), as queued, and return a copy.
 
-        Raises RigError when it is not one row, not finite or out of range.
+        Raises RigError unless it is one-dimensional, finite and within the range.
         """
         samples = np.array(volts, dtype=np.float64)
         if samples.ndim != 1:
-            raise RigError(f"a drive of shape {samples.shape} is refused: it must be one row of samples")
-        if not np.isfinite(samples).all():
-            raise RigError("a drive with samples that are not finite is refused")
-        if (peak := float(np.abs(samples).max(initial=0.0))) > self._range:
+            raise RigError(f"a drive of shape {samples.shape} is refused: it must be one-dimensional")
+        # a comparison with NaN is false
+        if not (samples.max(initial=0.0) <= self._range and samples.min(initial=0.0) >= -self._range):
+            if not np.isfinite(samples).all():
+                raise RigError("a drive with samples that are not finite is refused")
+            peak = float(np.abs(samples).max(initial=0.0))
             raise RigError(f"a drive of {peak:.6g} V is refused: the range is +-{self._range:g} V")
         self._waiting += samples.size
         return samples
 
     def require(self, n: int) -> None:
-        """Raise DriveUnderflow unless the lead waits beyond the next `n` samples."""
+        """Raise DriveUnderflow unless the lead is queued beyond the next `n` samples."""
         if self._waiting < n + self.lead:
             raise DriveUnderflow(
-                f"the drive ran out at sample {self.index}: {self._waiting} samples were waiting and {n + self.lead}"
-                " are needed; write earlier or read less at once"
+                f"the drive ran out at sample {self.index}: {self._waiting} samples were queued and {n + self.lead}"
+                " are required; write earlier, or increase acquisition.lead"
             )
 
     def advance(self, n: int, gap: int = 0) -> int:
-        """`n` samples were played and read, after a gap that used up no drive: the number of the first of them."""
+        """Count `n` samples as played and read, after a gap without drive. Returns the number of the first."""
         first = self.index + gap
         self._waiting -= n
         self.index = first + n
@@ -62,16 +67,76 @@ class Drive:
 
 
 def require_block(n: int) -> None:
-    """Raise InvalidInput unless `n` samples make a block."""
+    """Raise InvalidInput unless `n` is a valid block length."""
     if n < 1:
         raise InvalidInput("samples to read", n, "it must be at least 1")
 
 
 @contextmanager
 def ending_by(stop: Callable[[], None]) -> Generator[None]:
-    """What is refused inside ends the run."""
+    """Context manager that stops the rig when a RigError is raised inside."""
     try:
         yield
     except RigError:
         stop()
         raise
+
+
+class RigState(Enum):
+    """States of a rig. A rig whose sample clock starts with the first block is armed, then running."""
+
+    STOPPED = "not armed"
+    ARMED = "armed"
+    RUNNING = "running"
+    CLOSED = "closed"
+
+
+class RigBase:
+    """State, drive and clock of a rig: methods of `drivers.rig.Rig` common to all backends.
+
+    `lead` is the number of drive samples that must be queued. As a context manager it closes the rig.
+    """
+
+    def __init__(self, drive_range: float, lead: int, clock: Clock) -> None:
+        self._drive = Drive(drive_range, lead)
+        self._state = RigState.STOPPED
+        self.drive_range, self.lead, self.clock = drive_range, lead, clock
+
+    @property
+    def armed(self) -> bool:
+        """Whether the rig takes drive samples."""
+        return self._state in (RigState.ARMED, RigState.RUNNING)
+
+    def interlocks(self) -> Mapping[str, bool]:
+        return {}
+
+    def stop(self) -> None:
+        if self._state is not RigState.CLOSED:
+            self._state = RigState.STOPPED
+
+    def halt(self) -> None:
+        # only the state changes, so that a call from a signal handler or another thread never blocks
+        self.stop()
+
+    def close(self) -> None:
+        self._state = RigState.CLOSED
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def require_stopped(self, call: str, remedy: str = "stop it first") -> None:
+        """Raise RigError unless the rig is stopped."""
+        if self._state is not RigState.STOPPED:
+            raise RigError(f"{call} is refused: the rig is {self._state.value}; {remedy}")
+
+    def require_armed(self, call: str) -> None:
+        """Raise RigError unless the rig is armed."""
+        if not self.armed:
+            raise RigError(f"{call} is refused: the rig is {self._state.value}; arm it first")
+
+
+REARM = "stop it first, or open a new one"
+"""Remedy where a rig cannot be armed."""

@@ -1,4 +1,4 @@
-"""What goes wrong with instruments. Whatever is raised here, the output is at zero or on its way there."""
+"""Errors of instruments. With any of them, the output is at zero or being set to zero."""
 
 from collections.abc import Sequence
 
@@ -6,9 +6,9 @@ from sim.errors import Cause, CauseCode, RockbenchError
 
 
 class RigError(RockbenchError):
-    """The rig could not do what was asked; its output is at zero or on its way there.
+    """The rig could not carry out a command; its output is at zero or being set to zero.
 
-    `code` is the number that the instrument's own driver gave, where it gave one.
+    `code` is the error code of the instrument's own driver, if any.
     """
 
     error_code = "rig"
@@ -19,37 +19,37 @@ class RigError(RockbenchError):
 
 
 class DriveUnderflow(RigError):
-    """The output ran out of samples: more were asked to be played than were written."""
+    """The output ran out of samples: more were due than had been written."""
 
     error_code = "drive_underflow"
 
 
 class InputOverflow(RigError):
-    """Inputs were read too late: samples that nobody fetched were overwritten."""
+    """Inputs were read too late: unread samples were overwritten."""
 
     error_code = "input_overflow"
 
 
 class DeviceTimeout(RigError):
-    """A device did not answer in time."""
+    """A device did not respond in time."""
 
     error_code = "device_timeout"
 
 
 class ConnectionLost(RigError):
-    """A device that was there is gone."""
+    """The connection to a device was lost."""
 
     error_code = "connection_lost"
 
 
 class DeviceNotFound(RigError):
-    """A device, its driver or its port is not there, or somebody else holds it."""
+    """A device, its driver or its port is missing or held by another program."""
 
     error_code = "device_not_found"
 
 
 class SafetyInputOpen(RigError):
-    """Safety inputs, named by `inputs`, are not good: nothing is armed, and what was armed is cut."""
+    """The safety inputs named in `inputs` are open: arming is refused, and the output of an armed rig is cut."""
 
     error_code = CauseCode.SAFETY_INPUT
 
@@ -59,5 +59,20 @@ class SafetyInputOpen(RigError):
 
     @property
     def cause(self) -> Cause:
-        """The code, and the names of the inputs."""
+        """Error code, with the names of the inputs as subject."""
         return Cause(self.error_code, ", ".join(self.inputs))
+
+
+class BackendFault(RigError):
+    """The rig backend `backend` returned an invalid value, or raised an exception that a rig must not raise."""
+
+    error_code = "backend"
+
+    def __init__(self, backend: str, what: str) -> None:
+        super().__init__(f"the rig backend {backend} {what}; correct the backend")
+        self.backend = backend
+
+    @property
+    def cause(self) -> Cause:
+        """Error code, with the name of the backend as subject."""
+        return Cause(self.error_code, self.backend)

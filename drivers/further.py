@@ -1,33 +1,34 @@
-"""Analogue sensors besides those that every bench has: one row of the configuration each."""
+"""Additional analogue sensors, one configuration table each."""
 
 from typing import Literal
 
 from pydantic import model_validator
 
 from drivers.hardware.parameters import CalibratedInput
+from sim.channel import COIL_CURRENT, STOREYS, TABLE_ACCELERATION, TABLE_DISPLACEMENT, TABLE_FORCE
 from sim.errors import InvalidInput
 from sim.parameters import quantity
 from sim.sensors import SIMULATED, Place, PlacedSensor
 
 TAKEN = (
-    *("table_displacement", "table_acceleration", "table_force", "coil_current", "laser_1", "laser_2"),
+    *(TABLE_DISPLACEMENT, TABLE_ACCELERATION, TABLE_FORCE, COIL_CURRENT, *STOREYS),
     *("drive", "time", "blocks", "alignments", "sample_rate"),
 )
-"""Names that other channels have, or other things in the data file."""
+"""Reserved names: other channels and datasets of the data file."""
 
 
 class FurtherChannel(CalibratedInput):
-    """A further analogue sensor: recorded, watched, shown and exported as every channel is.
+    """An additional analogue sensor, recorded, monitored, displayed and exported like every channel.
 
-    On hardware it is an input of the DAQ; on the simulated bench it measures the motion of `place`.
+    On hardware it is a DAQ input; on the simulated bench it measures the motion of `place`.
     """
 
     name: str = quantity(..., "", "name of the channel", pattern=r"^[a-z][a-z0-9_]*$", example="storey_2_acceleration")
     measures: Literal["acceleration", "velocity", "displacement", "force", "strain", "current", "voltage"] = quantity(
-        ..., "", "what it measures", example="acceleration"
+        ..., "", "measured quantity", example="acceleration"
     )
     unit: str = quantity(..., "", "its SI unit", min_length=1, example="m/s2")
-    place: Place = quantity(..., "", "what it is mounted on", example="storey 2")
+    place: Place = quantity(..., "", "part on which it is mounted", example="storey 2")
     sensitivity: float = quantity(
         ..., "V/unit", "volts per unit as calibrated; its sign is the polarity", usual=(1e-6, 1e6), example=0.1
     )
@@ -35,20 +36,20 @@ class FurtherChannel(CalibratedInput):
     limit: float | None = quantity(
         None,
         "unit",
-        "largest magnitude from the zero taken at rest, beyond which the guard aborts; absent: it is not watched",
+        "largest magnitude from the zero taken at rest, beyond which the guard aborts; absent: not monitored",
         gt=0,
         example=20.0,
     )
-    warning: float = quantity(0.9, "1", "share of the limit from which the operator is warned", gt=0, le=1)
-    debounce: float = quantity(0.003, "s", "how long the limit must be exceeded before it counts", ge=0, le=1)
+    warning: float = quantity(0.9, "1", "fraction of the limit above which the operator is warned", gt=0, le=1)
+    debounce: float = quantity(0.003, "s", "time for which the limit must be exceeded before it trips", ge=0, le=1)
     noise_density: float = quantity(
-        0.0, "unit/Hz^0.5", "spectral density of the white noise of the simulated sensor", ge=0
+        0.0, "unit/Hz^0.5", "spectral density of the white noise of the simulated sensor", ge=0, example=2e-4
     )
 
     @model_validator(mode="after")
     def _a_name_of_its_own(self) -> "FurtherChannel":
         if self.name in TAKEN:
-            raise InvalidInput("name", self.name, "this name is taken; give the channel another")
+            raise InvalidInput("name", self.name, "this name is reserved; choose another")
         return self
 
     @model_validator(mode="after")
@@ -56,13 +57,13 @@ class FurtherChannel(CalibratedInput):
         reach = (self.range - abs(self.zero)) / abs(self.sensitivity)
         if self.limit is not None and self.limit > reach:
             scale = f"range = {self.range:g} V and sensitivity = {self.sensitivity:g}"
-            allowed = f"with {scale} the channel measures up to {reach:.4g} {self.unit} only"
+            allowed = f"with {scale} the channel measures only up to {reach:.4g} {self.unit}"
             raise InvalidInput("limit", self.limit, allowed)
         return self
 
     @property
     def simulated(self) -> PlacedSensor:
-        """The sensor on the simulated bench. Raises InvalidInput for what is not simulated there."""
+        """The sensor on the simulated bench. Raises InvalidInput for a motion that is not simulated."""
         if self.measures not in SIMULATED or self.place == "elsewhere":
             allowed = f"the simulated bench has {', '.join(SIMULATED)} of table and storeys"
             raise InvalidInput("measures", f"{self.measures} of {self.place}", allowed)

@@ -1,8 +1,8 @@
-"""What every backend offers: channels, a drive output, blocks of samples, and a way to cut the output.
+"""Interface of a rig: channels, drive output, blocks of samples, and cutting of the output.
 
-Sample `i` of the drive leaves the output while sample `i` of the inputs is taken: both are counted from
-`arm()`. The drive is non-regenerating: each sample is written once and played once, and at least
-`lead` samples must be waiting when a block is read.
+Sample `i` of the drive is output while sample `i` of the inputs is acquired: both are counted from `arm()`. The drive
+is non-regenerating: each sample is written once and played once, and at least `lead` samples must be queued when a
+block is read.
 """
 
 from collections.abc import Mapping
@@ -25,7 +25,7 @@ from sim.parameters import column
 class Block:
     """Consecutive samples of all inputs: `counts` has shape (n_samples, n_channels).
 
-    `first` is the index, since `arm()`, of the first sample: a reader sees a gap as a jump of it.
+    `first` is the index of the first sample since `arm()`; it jumps at a gap.
     """
 
     first: int
@@ -37,67 +37,76 @@ class Block:
 
 @dataclass(frozen=True)
 class Alignment:
-    """How the values of a sensor with a clock of its own were placed on the sample clock in one run.
+    """Alignment of a sensor with its own clock to the sample clock in one run.
 
-    A value taken at second t of the sensor's clock stands at second `offset + rate * t + delay` of the sample clock.
-    `residual` is the root mean square of what the fit leaves of the clock readings that bound it [s], `delay` the
-    fixed delay that was configured [s], `values` how many the sensor gave and `lost` how many it should have given.
+    A value taken at second t of the sensor's clock is placed at second `offset + rate * t + delay` of the sample clock.
+    `residual` is the root mean square residual of the clock readings that bound it [s], `delay` the configured delay
+    [s], `values` the number of values received and `lost` that of missing ones.
     """
 
     sensor: str = column("", "name of the channel")
-    offset: float = column("s", "time of the run at which second 0 of the sensor's clock stands, without delay")
+    offset: float = column("s", "time in the run at second 0 of the sensor's clock, without delay")
     rate: float = column("1", "seconds of the sample clock per second of the sensor's clock")
-    residual: float = column("s", "root mean square of what the fit leaves of the readings of the clocks")
-    delay: float = column("s", "fixed delay by which the values were placed later, as configured")
-    values: int = column("1", "values that the sensor gave")
-    lost: int = column("1", "values that it should have given and that did not arrive")
+    residual: float = column("s", "root mean square residual of the clock readings")
+    delay: float = column("s", "configured delay added to the time of the values")
+    values: int = column("1", "values received from the sensor")
+    lost: int = column("1", "missing values")
+    late: int = column("1", "samples whose values had not arrived when their block was due", default=0)
+    implausible: int = column("1", "values farther from their predecessors than the target can move", default=0)
 
     def __str__(self) -> str:
         rate, residual = 1e6 * (self.rate - 1.0), 1e6 * self.residual
-        given = f"{self.values} values, {self.lost} lost"
+        counted = (
+            f"{number} {what}"
+            for number, what in ((self.late, "samples late"), (self.implausible, "implausible"))
+            if number
+        )
+        given = ", ".join((f"{self.values} values, {self.lost} lost", *counted))
         return f"{self.sensor}: clock {rate:+.1f} ppm, readings within {residual:.0f} us, {given}"
 
 
-class Handwork(StrEnum):
-    """What a person does at the bench between two tests. Some of it comes with an amount, in SI units."""
+class OperatorTask(StrEnum):
+    """An operator's task on the bench between two tests. Some have an amount, in SI units."""
 
     MOUNT_SPRING = "mount spring"
-    """Block and spring are mounted, the block free to rock; the amount is what the spring's label says [N/m]."""
+    """Block and spring are mounted, the block free to rock; the amount is the nominal stiffness on the spring's label
+    [N/m].
+    """
     REMOVE_BLOCK = "remove block"
     STAND_BLOCK_UP = "stand block up"
     LOCK_FRAME = "lock frame"
     """The storeys are clamped to the table and move with it, without spring and block."""
     UNLOCK_FRAME = "unlock frame"
     HOLD_BLOCK = "hold block"
-    """As MOUNT_SPRING, with the block clamped to the table: it cannot lift, the spring is grounded on the table."""
+    """As MOUNT_SPRING, with the block clamped to the table: it cannot lift, and fixes the spring to the table."""
     LOCK_TABLE = "lock table"
-    """The table is clamped to the ground at mid stroke, whatever stands or will stand on it; it must not be driven."""
+    """The table is clamped to the ground at mid stroke, with any specimen; it must not be driven."""
     UNLOCK_TABLE = "unlock table"
     WATCH_BLOCK = "watch block"
-    """The block stands alone, without spring, and the laser of storey 2 looks horizontally at its face on the frame's
-    side, at the height of the amount above the table [m]: see `sim.block_face`. No spring is mounted while it does; it
-    has nothing to measure when the block is taken away."""
+    """The block stands alone, without spring, and the laser of storey 2 points horizontally at its face on the frame's
+    side, at the height of the amount above the table [m]: see `sim.block_face`. No spring can be mounted meanwhile;
+    without a block the laser has no target."""
     WATCH_STOREYS = "watch storeys"
-    """The laser of storey 2 looks at its storey again."""
+    """The laser of storey 2 measures its storey again."""
     TILT_BLOCK = "tilt block"
-    """The block that stands alone is held tilted by the amount [rad], above zero with its top towards the frame, and
-    let go without a push a few seconds after the rig is armed; to be done again before each test."""
+    """The stand-alone block is held tilted by the amount [rad], positive with its top towards the frame, and
+    released without a push a few seconds after the rig is armed; required before each test."""
     PULL_FRAME = "pull frame"
-    """Storey 2 is held aside by the amount [m] and let go without a push a few seconds after the rig is armed; to be
-    done again before each test."""
+    """Storey 2 is held displaced by the amount [m] and released without a push a few seconds after the rig is armed;
+    required before each test."""
 
 
 class Rig(Protocol):
-    """A bench that can be driven and read. Every backend passes `tests/drivers/conformance.py`."""
+    """Bench that can be driven and read. Every backend passes `bench.testing.conformance`."""
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """The inputs, in the order of the columns of a block."""
+        """The input channels, in the order of the columns of a block."""
         ...
 
     @property
     def sample_rate(self) -> float:
-        """Samples per second and channel, for inputs and drive alike, as the device made it [1/s]."""
+        """Samples per second per channel, for inputs and drive, as read back from the device [1/s]."""
         ...
 
     @property
@@ -107,7 +116,7 @@ class Rig(Protocol):
 
     @property
     def lead(self) -> int:
-        """How many drive samples must be waiting ahead of the sample that is read: the output latency."""
+        """Drive samples that must be written ahead of the sample being read: the output latency."""
         ...
 
     @property
@@ -122,15 +131,15 @@ class Rig(Protocol):
 
     @property
     def alignments(self) -> tuple[Alignment, ...]:
-        """How sensors with clocks of their own were placed on the sample clock since `arm()`; mostly none."""
+        """Alignments of sensors with their own clocks since `arm()`; usually none."""
         ...
 
     def interlocks(self) -> Mapping[str, bool]:
-        """The safety inputs that exist, by name, and whether each is good at this moment."""
+        """Existing safety inputs by name, and whether each is closed (good)."""
         ...
 
     def arm(self) -> None:
-        """Close the enable line with the output at zero; sample 0 is taken then, or when the first block is read."""
+        """Close the enable line with the output at zero; sample 0 is acquired then, or when the first block is read."""
         ...
 
     def write(self, volts: NDArray[np.float64]) -> None:
@@ -152,9 +161,9 @@ class Rig(Protocol):
     def halt(self) -> None:
         """Cut the enable line now, then put the output to zero. Allowed in every state, any number of times.
 
-        The one method that may be called while another is at work: from another thread while `read` waits, and from
-        a signal handler in the middle of any call, so it waits for no lock that a call may hold. A call that it
-        interrupts raises RigError, a `read` at the latest when its block was due.
+        The only method that may be called during another: from another thread while `read` waits, and from a signal
+        handler during any call, so it does not wait for locks held by calls. A call that it interrupts raises RigError,
+        a `read` at the latest when its block is due.
         """
         ...
 
@@ -162,9 +171,9 @@ class Rig(Protocol):
         """Stop, and release every device. Allowed any number of times."""
         ...
 
-    def handwork(self, work: Handwork, amount: float | None = None) -> None:
-        """Told that a person has done `work`, by `amount` where it has one, while the rig was stopped.
+    def perform(self, work: OperatorTask, amount: float | None = None) -> None:
+        """Register an operator's task `work`, with its `amount` if it has one, on a stopped rig.
 
-        A simulated rig does it to its specimen; a real one has nothing to do. Raises RigError when armed.
+        A simulated rig carries it out on its specimen; a real one does nothing. Raises RigError when armed.
         """
         ...

@@ -1,1 +1,1 @@
-"""The experiments: one file each, readable like a lab sheet."""
+"""Experiments: one protocol per package or module."""

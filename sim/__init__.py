@@ -1,5 +1,5 @@
-"""The physics of the bench: specimen, table and sensors as equations.
+"""Physics of the bench: equations of specimen, table and sensors.
 
-Knows no instrument, file, screen or protocol. Importing this package compiles nothing;
+Independent of instruments, files, screens and protocols. Importing this package compiles nothing;
 `sim.kernel` holds the compiled functions and is imported by the part that runs them.
 """

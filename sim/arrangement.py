@@ -1,4 +1,4 @@
-"""Specimen on the table, clamped or held by hand: constants of the moving system, and what the two lasers see of it."""
+"""Specimen on the table, with clamps and manual restraints: system constants, and motion of the laser targets."""
 
 from dataclasses import dataclass, replace
 from math import inf
@@ -19,13 +19,13 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Arrangement:
-    """A specimen and what was done to it by hand.
+    """A specimen with its clamps and manual restraints.
 
     table_locked : the table is clamped to the ground at mid stroke.
-    block_clamped : the block is clamped to the table: it rides, and the spring is grounded on it.
-    watched : height [m] at which laser 2 looks at the block's face; None: it looks at storey 2.
-    tilt : rotation [rad] at which the block is held by hand; 0 when nobody holds it.
-    pull : displacement [m] at which storey 2 is held by hand; 0 when nobody holds it.
+    block_clamped : the block is clamped to the table: it moves with the table, and the spring is fixed to it.
+    watched : height [m] at which laser 2 measures the block's face; None: it measures storey 2.
+    tilt : rotation [rad] at which the block is held by hand; 0 when it is free. pull : displacement [m] at which storey
+    2 is held by hand; 0 when it is free.
     """
 
     specimen: Specimen
@@ -37,11 +37,11 @@ class Arrangement:
 
     @property
     def held(self) -> bool:
-        """Whether somebody holds the block or the frame, and will let go."""
+        """Whether the block or the frame is held by hand until release."""
         return self.tilt != 0.0 or self.pull != 0.0
 
     def let_go(self) -> "Arrangement":
-        """The same with nobody's hand on it."""
+        """The same arrangement after release of the parts held by hand."""
         return replace(self, tilt=0.0, pull=0.0)
 
     def storeys(self) -> tuple[float, float]:
@@ -50,14 +50,14 @@ class Arrangement:
         return f.k2 / (f.k1 + f.k2 + self.specimen.k_c) * self.pull, self.pull
 
     def plant(self, shaker: Shaker, catch_angle: float) -> "Plant":
-        """The constants of the moving system as `sim.kernel.table` takes them.
+        """Constants of the moving system for `sim.kernel.table`.
 
-        What is clamped to the ground, and the storey in a firm hand, has an infinite mass: the forces on it are finite,
-        so its acceleration is exactly 0, and an impact on a locked table keeps the share r of fixed ground exactly.
+        A part clamped to the ground and a storey held by hand have an infinite mass: the forces on it are finite,
+        so its acceleration is exactly 0, and an impact on a locked table has exactly the restitution r of fixed ground.
         """
         plant = plant_of(self.specimen, shaker, catch_angle)
         if self.block_clamped:
-            # a mass on the table that nothing lifts
+            # the block's mass is fixed to the table
             plant = plant._replace(moving_mass=plant.moving_mass + plant.mass, mass=0.0)
         if self.table_locked:
             plant = plant._replace(moving_mass=inf)
@@ -65,7 +65,7 @@ class Arrangement:
 
 
 def plant_of(specimen: Specimen, shaker: Shaker, catch_angle: float) -> "Plant":
-    """The constants of shaker and specimen when nothing is clamped or held."""
+    """Constants of shaker and specimen without clamps and restraints."""
     from sim.kernel.plant import Plant
 
     f, k, (c1, c2) = specimen.frame, specimen.block, specimen.frame.dashpots
@@ -105,10 +105,10 @@ def plant_of(specimen: Specimen, shaker: Shaker, catch_angle: float) -> "Plant":
 
 
 def sights(states: Array, arrangement: Arrangement, on_ground: bool) -> Array:
-    """Displacement [m] and velocity [m/s] seen by laser 1, then by laser 2, shape (4, n).
+    """Displacement [m] and velocity [m/s] of the target of laser 1, then of laser 2, shape (4, n).
 
-    `states` are rows x, v, u1, u2, v1, v2, theta, omega, shape (8 or more, n); lasers that stand on the ground see the
-    table move too. Displacements count from mid range, which is what each laser looks at when it rests; NaN where
+    `states` are rows x, v, u1, u2, v1, v2, theta, omega, shape (8 or more, n); lasers mounted on the ground also
+    measure the table's motion. Displacements are relative to mid range, the reading of each laser at rest; NaN where
     there is no block, or the beam misses it.
     """
     x, v, u1, u2, v1, v2, theta, omega = states[:8]

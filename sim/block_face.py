@@ -1,14 +1,14 @@
-"""What a laser that looks horizontally at the face of the stand-alone block sees of its rotation.
+"""Displacement measured by a horizontal laser on the face of the rotating stand-alone block.
 
-The beam runs at height z above the table towards the face that is turned to the frame. A is the base corner under
-that face, B the one 2b behind it. theta > 0 turns the block about A, its top towards the frame, so the face is a line
-through A and the lit point moves by z tan(theta). theta < 0 turns it about B and lifts A: with n = (cos, -sin)(theta)
+The beam is at height z above the table and hits the face towards the frame. A is the base corner under
+that face, B the one 2b behind it. theta > 0 rotates the block about A, its top towards the frame; the face is a line
+through A and the lit point moves by z tan(theta). theta < 0 rotates it about B and lifts A: with n = (cos, -sin)(theta)
 normal to the face, the face is the line n p = 2b seen from B, which the beam meets 2b sec(theta) + z tan(theta) in
-front of B. Both together, displacements towards the frame being positive:
+front of B. For both signs, with displacements towards the frame positive:
 
     D = z tan(theta) + 2b (sec(theta) - 1) [theta < 0],    dD/dtheta = sec^2(theta) (z + 2b min(sin(theta), 0))
 
-D grows with theta as long as the beam meets the face, and theta follows from D in closed form.
+D increases with theta while the beam hits the face, and theta follows from D in closed form.
 """
 
 import numpy as np
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 def displacement(theta: ArrayLike, height: float, block: Block) -> Array:
     """Displacement [m] of the lit point along the beam, towards the frame, at rotations `theta` [rad], any shape.
 
-    `height` of the beam above the table [m]. NaN where the beam misses the face: over it or under it.
+    `height` of the beam above the table [m]. NaN where the beam passes above or below the face.
     """
     angle = np.asarray(theta, dtype=np.float64)
     sine, cosine = np.sin(angle), np.cos(angle)
@@ -34,14 +34,14 @@ def displacement(theta: ArrayLike, height: float, block: Block) -> Array:
 
 
 def heights(theta: ArrayLike, block: Block) -> tuple[Array, Array]:
-    """Between which heights above the table [m] the face is at rotations `theta` [rad], any shape."""
+    """Lowest and highest point of the face above the table [m] at rotations `theta` [rad], any shape."""
     angle = np.asarray(theta, dtype=np.float64)
     low = np.maximum(-2.0 * block.b * np.sin(angle), 0.0)
     return low, low + 2.0 * block.h_b * np.cos(angle)
 
 
 def displacement_rate(theta: ArrayLike, height: float, block: Block) -> Array:
-    """Derivative of `displacement` [m/rad]: times the angular velocity it is the velocity that the laser sees."""
+    """Derivative of `displacement` [m/rad]: times the angular velocity it is the velocity measured by the laser."""
     angle = np.asarray(theta, dtype=np.float64)
     return (height + 2.0 * block.b * np.minimum(np.sin(angle), 0.0)) / np.cos(angle) ** 2
 

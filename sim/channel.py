@@ -1,4 +1,4 @@
-"""One input of a bench: from counts to values."""
+"""An input channel and its conversion from counts to values."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -7,20 +7,28 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+TABLE_DISPLACEMENT, TABLE_ACCELERATION = "table_displacement", "table_acceleration"
+TABLE_FORCE, COIL_CURRENT = "table_force", "coil_current"
+STOREYS = ("laser_1", "laser_2")
+"""Names of the channels by measured motion, independent of the instrument: table and coil, first and second storey."""
+
 Counts = NDArray[np.int16 | np.int32]
-"""What a converter gives: 16 bits are enough for most, 24 bits need the wider integer."""
+"""Integer types of a converter's counts: 16 bits for most converters, 32 bits for 24-bit ones."""
 
 _NO_FAULTS: Mapping[int, str] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
 class Channel:
-    """One input. `value = offset + scale counts + higher[0] counts^2 + ...` in `unit`.
+    """Input channel.
 
-    `quantity` says what is measured: "displacement", "acceleration" or "voltage".
-    `valid` is the inclusive range of counts that are measurements: outside it the converter is saturated or the
-    sensor signals an error, and the sample becomes NaN. `faults` says what single counts outside it mean.
-    `higher` are the small terms of a converter whose own calibration is a polynomial.
+    `value = offset + scale counts + higher[0] counts^2 + ...` in `unit`.
+
+    `quantity` is the measured quantity: "displacement", "acceleration" or "voltage".
+    `valid` is the inclusive range of counts of valid measurements: outside it the converter is saturated or the
+    sensor signals an error, and the sample becomes NaN. `faults` gives the meaning of individual counts outside it.
+    `delay` has been taken out of its samples, with the standard uncertainty `delay_uncertainty`, both in seconds.
+    `higher` are the small higher-order terms of a converter whose own calibration is a polynomial.
     """
 
     name: str
@@ -32,6 +40,8 @@ class Channel:
     device: str
     higher: tuple[float, ...] = ()
     faults: Mapping[int, str] = field(default_factory=lambda: _NO_FAULTS)
+    delay: float = 0.0
+    delay_uncertainty: float = 0.0
 
     def to_unit(self, counts: Counts) -> NDArray[np.float64]:
         """Counts as values in `unit`, same shape; NaN where the counts are not a measurement."""

@@ -1,7 +1,7 @@
-"""Gain coefficients of many specimens that a motion may be of: a Monte Carlo, or first order, at one cost.
+"""Gain coefficients of an ensemble of specimens, for Monte Carlo or first-order uncertainties.
 
-Steady motions of the members lie near a known one, so all of them are found together by Newton's method from its
-section, with its Jacobian; those that are farther away are followed there one by one. Under a record each is a run.
+Steady motions of the members lie near a known one, so Newton's method finds all of them together from its section and
+Jacobian; members farther away are reached by continuation one by one. Under a record each member is a separate run.
 """
 
 from collections.abc import Sequence
@@ -21,13 +21,13 @@ from sim.sweep import Done, processors, sweep
 Floats = NDArray[np.float64]
 
 RUN_TOLERANCE = 1e-8
-"""Of the runs under a record: far below what an ensemble can tell."""
+"""Tolerance of the runs under a record: far below the statistical error of an ensemble."""
 
 _Member = tuple[Orbit, Specimen]
-"""A specimen, and the orbit near which its own is looked for."""
+"""Specimen and the known orbit from which the search for its own orbit starts."""
 
 CHUNK = 500
-"""Members that are followed together: enough to share what a step costs, few enough to be done within a second."""
+"""Members integrated together: enough to share the overhead of a step, few enough to finish within a second."""
 
 
 def steady_gains(
@@ -36,11 +36,11 @@ def steady_gains(
     bare_amplitude: float | None = None,
     done: Done | None = None,
 ) -> Floats:
-    """alpha_1 and alpha_2 of m specimens on the layer of each of n orbits, shape (n, m, 2), on all processors.
+    """alpha_1 and alpha_2 of m specimens on the branch of each of n orbits, shape (n, m, 2), on all processors.
 
     `members[i]` are the specimens at `orbits[i]`, under its frequency and amplitude; `bare_amplitude` [m/s2] is that of
-    the test without block, when it was another. NaN where a member has no such motion: it does not rest, or its orbit
-    cannot be followed there. `done` counts parts of the work.
+    the test without block, if different. NaN where a member has no such motion: its block does not rest, or
+    continuation does not reach its orbit. `done` reports the completed parts of the work.
     """
     every = [(orbit, specimen) for orbit, own in zip(orbits, members, strict=True) for specimen in own]
     parts = max(processors(), len(every) // CHUNK)
@@ -56,7 +56,7 @@ def steady_gains(
 def record_gains(members: Sequence[Specimen], record: SampledRecord) -> Floats:
     """alpha_1 and alpha_2 of n specimens under `record`, from rest, shape (n, 2), on all processors.
 
-    NaN where the block does not stand to the end.
+    NaN where the block overturns or the run fails.
     """
     runs = simulate_many([*members, *(specimen.bare() for specimen in members)], record, tolerance=RUN_TOLERANCE)
     peaks = np.array([(run.peaks.u1, run.peaks.drift) for run in runs]).reshape(2, -1, 2)

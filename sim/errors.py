@@ -1,4 +1,4 @@
-"""The family of errors that this software raises on purpose."""
+"""Base classes of the errors that this software raises deliberately."""
 
 import errno
 from dataclasses import dataclass
@@ -7,26 +7,33 @@ from typing import ClassVar
 
 
 class CauseCode(StrEnum):
-    """Causes of the end of a run that are no error of a type of its own."""
+    """Causes of a run's end that have no exception type."""
 
     UNKNOWN = "unknown"
     REQUEST = "request"
-    """Somebody asked for the end."""
+    """A person or client requested the end."""
     CLIENT_LOST = "client_lost"
     DECLINED = "declined"
-    """The operator did not do what was asked for."""
+    """The operator declined or did not complete a task."""
     LIMIT = "limit"
     RESIDUAL = "residual"
     """The live twin's residual exceeded its limit."""
     SAFETY_INPUT = "safety_input"
     DISK = "disk"
+    MEMORY = "memory"
+    """The computer is out of memory."""
+
+
+class Interruption(Exception):
+    """Ends a run early; raised in any code, and no error of that code."""
 
 
 @dataclass(frozen=True)
 class Cause:
-    """Why a run ended or was refused: the `error_code` of an error, or a `CauseCode`; advice depends on it alone.
+    """Cause of an ending or a refusal: the `error_code` of an error, or a `CauseCode`; advice depends on it alone.
 
-    `subject` is what it concerns: the quantity of a limit, the names of safety inputs, the item of a value.
+    `subject` is the item concerned: the quantity of a limit, the names of safety inputs, the name of a value, the kind
+    of a request ("stop", "abort" or "halt").
     """
 
     code: str = CauseCode.UNKNOWN
@@ -37,23 +44,23 @@ UNKNOWN = Cause()
 
 
 class RockbenchError(Exception):
-    """What happened, what was refused and what to do, in one line a person can act on.
+    """Error with a one-line message: what happened, what was refused, and the remedy.
 
-    `error_code` names the type to programs (docs/errors.md); a type without its own has that of its parent.
+    `error_code` identifies the type to programs (docs/errors.md); a type without its own inherits that of its parent.
     """
 
     error_code: ClassVar[str] = "error"
 
     @property
     def cause(self) -> Cause:
-        """The code, and what it concerns."""
+        """Error code and subject of the error."""
         return Cause(self.error_code)
 
 
 class InvalidInput(RockbenchError, ValueError):
-    """A value that was refused before anything started.
+    """A value refused before anything started.
 
-    `item` names the key, flag or argument; `value` is what was given; `allowed` says what would do.
+    `item` names the key, flag or argument; `value` the input; `allowed` describes valid input.
     """
 
     error_code = "invalid_input"
@@ -66,7 +73,7 @@ class InvalidInput(RockbenchError, ValueError):
 
     @property
     def cause(self) -> Cause:
-        """The code, and the item."""
+        """Error code, with the item as subject."""
         return Cause(self.error_code, self.item)
 
 
@@ -74,7 +81,9 @@ _OF_DISK = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.
 
 
 def cause_of(error: BaseException) -> Cause:
-    """The cause that any error is: that of ours, and of what the system reports of a disk."""
+    """Cause of any error, including disk errors of the operating system."""
     if isinstance(error, RockbenchError):
         return error.cause
+    if isinstance(error, MemoryError):
+        return Cause(CauseCode.MEMORY)
     return Cause(CauseCode.DISK if isinstance(error, OSError) and error.errno in _OF_DISK else CauseCode.UNKNOWN)

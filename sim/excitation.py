@@ -1,7 +1,7 @@
-"""What moves the base: sines whose amplitude and frequency change smoothly, and sampled records.
+"""Base excitation: sines whose amplitude and frequency change smoothly, and sampled records.
 
-Everything is packed into one table of segments that `sim.kernel` integrates without ever stepping across a
-segment's end. In a segment, with t counted from its start,
+Every excitation is packed into one table of segments; no integration step of `sim.kernel` crosses a segment's end. In a
+segment, with t counted from its start,
 
     a_g(t) = P(t) sin(phi_0 + omega_0 t + kappa t^2 / 2) + p_0 + p_1 t,   P a cubic polynomial.
 
@@ -31,13 +31,13 @@ class Excitation(Protocol):
         ...
 
     def packed(self) -> NDArray[np.float64]:
-        """The table of segments, shape (n, 10), as the module describes it."""
+        """The table of segments, shape (n, 10), as described in the module's docstring."""
         ...
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """A sine whose amplitude [m/s2] goes along a cubic smoothstep and whose frequency [rad/s] goes linearly.
+    """A sine whose amplitude [m/s2] follows a cubic smoothstep and whose frequency [rad/s] changes linearly.
 
     `amplitude` and `omega` are (start, end); equal ends make a dwell.
     """
@@ -57,12 +57,12 @@ class Sweep:
         return (self.omega[1] - self.omega[0]) / self.duration
 
     def amplitude_at(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Amplitude at times since the sweep's start [m/s2]; held at the ends outside it."""
+        """Amplitude at times since the sweep's start [m/s2]; constant beyond its ends."""
         x = np.clip(t / self.duration, 0.0, 1.0)
         return self.amplitude[0] + (self.amplitude[1] - self.amplitude[0]) * x * x * (3.0 - 2.0 * x)
 
     def omega_at(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Circular frequency at times since the sweep's start [rad/s]; held at the ends outside it."""
+        """Circular frequency at times since the sweep's start [rad/s]; constant beyond its ends."""
         x = np.clip(t / self.duration, 0.0, 1.0)
         return self.omega[0] + (self.omega[1] - self.omega[0]) * x
 
@@ -78,7 +78,7 @@ class Sweep:
 
 
 class SineProgram:
-    """Sweeps one after the other with a continuous phase, starting at `phase` [rad]."""
+    """Consecutive sweeps with a continuous phase, starting at `phase` [rad]."""
 
     def __init__(self, sweeps: Sequence[Sweep], phase: float = 0.0) -> None:
         for sweep in sweeps:
@@ -103,13 +103,15 @@ class SineProgram:
 
 
 class SampledRecord:
-    """Accelerations [m/s2] at a constant step [s], joined by straight lines: every sample is a breakpoint."""
+    """Accelerations [m/s2] at a constant step [s], interpolated linearly: every sample is a breakpoint."""
 
     def __init__(self, acceleration: NDArray[np.float64], dt: float) -> None:
         if not dt > 0.0:
             raise InvalidInput("dt of a record", dt, "it must be positive seconds")
         if acceleration.ndim != 1 or acceleration.size < 2 or not np.isfinite(acceleration).all():
-            raise InvalidInput("record", acceleration.shape, "it must be at least two finite samples in one row")
+            raise InvalidInput(
+                "record", acceleration.shape, "it must be one-dimensional with at least two finite samples"
+            )
         self.acceleration = acceleration
         self.dt = dt
 

@@ -1,4 +1,4 @@
-"""The parts of the installation that a headless run does not need."""
+"""Optional parts of the installation that a headless run does not need."""
 
 from importlib.util import find_spec
 
@@ -12,13 +12,13 @@ EXTRAS = {
     "pdf": ("typst",),
     "distributed": ("distributed",),
 }
-"""The packages that each extra of `pyproject.toml` brings and that this software imports."""
+"""Packages of each extra of `pyproject.toml` that this software imports."""
 
 
 class MissingExtra(InvalidInput):
     """An extra that the request needs is not installed; nothing was started.
 
-    `item` is what needs it, `value` the name of the extra, `allowed` the commands that install it.
+    `item` is the feature that needs it, `value` the name of the extra, `allowed` the commands that install it.
     """
 
     error_code = "missing_extra"
@@ -34,7 +34,7 @@ class MissingExtra(InvalidInput):
 def require(extra: str, purpose: str, *packages: str) -> None:
     """Check that an extra is installed, before anything starts; imports nothing.
 
-    `purpose` begins the sentence of the error: what needs it. Of the extra's packages all are looked for, or only
+    `purpose` is the subject of the error message: the feature that needs it. Checks all packages of the extra, or only
     those named. Raises MissingExtra.
     """
     for package in packages or EXTRAS[extra]:

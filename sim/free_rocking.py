@@ -1,4 +1,4 @@
-"""Free rocking of the stand-alone block on fixed ground, in closed form: what it does after it was tilted and let go.
+"""Free rocking of the stand-alone block on fixed ground, in closed form, after release from a tilt.
 
 Between impacts theta'' = -p^2 sin(alpha - theta) for theta > 0, and mirrored for theta < 0. With phi = alpha - |theta|
 this is phi'' = p^2 sin(phi), a pendulum near its upper rest. From the turning point of a half swing, where phi = phi_m,
@@ -27,14 +27,14 @@ from sim.specimen import Block
 Array = NDArray[np.float64]
 
 _SMALLEST = 1e-8
-"""Share of the energy at overturning below which the block is taken to stand: it is then tilted by 1e-9 rad at most."""
+"""Fraction of the energy at overturning below which the block counts as at rest: the tilt is then at most 1e-9 rad."""
 
 _MOST = 2000
-"""Impacts after which no further ones are followed."""
+"""Greatest number of impacts computed."""
 
 
 def critical_angle(block: Block) -> float:
-    """alpha = atan(b / h_b) [rad]: tilted farther, the block falls over."""
+    """alpha = atan(b / h_b) [rad], the tilt beyond which the block overturns."""
     return atan2(block.b, block.h_b)
 
 
@@ -49,10 +49,10 @@ def theoretical_restitution(block: Block) -> float:
 
 
 def energy(angle: Array, alpha: float) -> Array:
-    """Potential energy at `angle` [rad] over that at alpha, any shape.
+    """Potential energy at `angle` [rad] relative to that at alpha, any shape.
 
-    (cos(alpha - |theta|) - cos(alpha)) / (1 - cos(alpha)), by products of sines: a difference of cosines would cancel
-    near the ground.
+    (cos(alpha - |theta|) - cos(alpha)) / (1 - cos(alpha)), computed from products of sines: a difference of cosines
+    would cancel near the ground.
     """
     half = 0.5 * np.abs(angle)
     return np.asarray(np.sin(alpha - half) * np.sin(half) / np.sin(0.5 * alpha) ** 2)
@@ -63,7 +63,7 @@ class FreeRocking:
     """The motion of a block of critical angle `alpha` [rad] and frequency parameter `p` [rad/s], 0 < |tilt| < alpha.
 
     It rests at `tilt` [rad] until `start` [s]. An impact multiplies the angular velocity by
-    `restitution` + `trend` (s - `trend_at`), s being its speed over that of a fall from alpha, 0 to 1.
+    `restitution` + `trend` (s - `trend_at`), s being its speed relative to that of a fall from alpha, 0 to 1.
     """
 
     alpha: float
@@ -76,7 +76,7 @@ class FreeRocking:
 
     @cached_property
     def energies(self) -> Array:
-        """`energy` at the turning points, that of the release first, shape (n,)."""
+        """`energy` at the turning points, starting with the release, shape (n,)."""
         first = float(energy(np.array(self.tilt), self.alpha))
         if self.trend == 0.0:
             impacts = log(_SMALLEST / first) / (2.0 * log(self.restitution)) if self.restitution > 0.0 else 1.0
@@ -97,7 +97,7 @@ class FreeRocking:
 
     @cached_property
     def quarters(self) -> Array:
-        """Time from the ground to each turning point, and back [s], shape as `energies`."""
+        """Time from the ground to each turning point, equal to that back [s], shape as `energies`."""
         from scipy import special
 
         phi, half = self.alpha - self.amplitudes, 0.5 * self.amplitudes
@@ -114,7 +114,7 @@ class FreeRocking:
 
     @cached_property
     def turns(self) -> Array:
-        """Instants of the turning points [s], that of the release first, shape as `energies`."""
+        """Instants of the turning points [s], starting with the release, shape as `energies`."""
         return self.impacts - self.quarters
 
     @property
@@ -141,5 +141,5 @@ class FreeRocking:
 
     @property
     def rest_time(self) -> float:
-        """Instant [s] from which the block stands; of infinitely many impacts, those too small to see are left out."""
+        """Instant [s] at which the block comes to rest; of the infinitely many impacts the smallest are neglected."""
         return float(self.impacts[-1])

@@ -1,8 +1,8 @@
-"""The gain coefficients alpha_1 and alpha_2 that the model predicts for a steady sine and for a record.
+"""Gain coefficients alpha_1 and alpha_2 predicted by the model for a steady sine and for a record.
 
-alpha is a peak of the coupled frame over the same peak of the bare one (Eq. 10). Under a sine two steady motions can
-coexist, so a prediction has up to two layers; which one a test lands on is decided by its start. Under a record the
-peaks are those of the one motion that starts at rest, unless it ends with the block overturned.
+alpha is a peak of the coupled frame divided by the same peak of the bare one (Eq. 10). Under a sine two steady motions
+can coexist, so a prediction has up to two branches; the start of a test decides which one it reaches. Under a record
+the peaks are those of the motion that starts at rest, unless the block overturns.
 """
 
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ from sim.steady import NoOrbit, Orbit, resting_state, rocking_branch, rocking_or
 
 @dataclass(frozen=True, eq=False)
 class Layer:
-    """One steady motion and its gain coefficients."""
+    """Steady motion and its gain coefficients."""
 
     orbit: Orbit
     alpha_1: float
@@ -29,7 +29,7 @@ class Layer:
 
     @property
     def stable(self) -> bool:
-        """Whether a test can stay on it."""
+        """Whether the motion is stable."""
         return self.orbit.stable
 
     @property
@@ -40,7 +40,7 @@ class Layer:
 
 @dataclass(frozen=True, eq=False)
 class GainPrediction:
-    """Gain coefficients at one frequency. A layer is None where its motion does not exist or was not found.
+    """Gain coefficients at one frequency. A branch is None where its motion does not exist or was not found.
 
     `omega` [rad/s]; `beta`: the spring's label; `bare`: peaks of the frame without block, exact.
     """
@@ -54,7 +54,7 @@ class GainPrediction:
 
     @property
     def layers(self) -> dict[str, Layer]:
-        """The layers that exist, by name: "rocking", "resting"."""
+        """The existing branches of steady motion, by name: "rocking", "resting"."""
         named = {"rocking": self.rocking, "resting": self.resting}
         return {name: layer for name, layer in named.items() if layer is not None}
 
@@ -63,7 +63,7 @@ class GainPrediction:
 class SeismicGain:
     """Gain coefficients of the spring labelled `beta` under a record; both None unless the run was completed.
 
-    `motion` says whether and when the block overturned (`motion.overturned`, `motion.end_time`), and has the peaks;
+    `motion` has the overturning (`motion.overturned`, `motion.end_time`), if any, and the peaks;
     `bare` has those of the frame without block.
     """
 
@@ -79,7 +79,7 @@ def predict_gain(
 ) -> GainPrediction:
     """Gain coefficients under `amplitude` [m/s2] sin(`omega` [rad/s] t).
 
-    `bare_amplitude` [m/s2] is that of the test without block, when it was not the same.
+    `bare_amplitude` [m/s2] is that of the test without block, if different.
     Raises InvalidInput for a bare specimen or meaningless numbers. Source: Eq. (10).
     """
     resting = resting_state(specimen, omega, amplitude)
@@ -96,7 +96,7 @@ def gain_spectrum(
     amplitude: float,
     bare_amplitude: float | None = None,
 ) -> list[GainPrediction]:
-    """`predict_gain` at each of `omegas` [rad/s], cheaper: each orbit is predicted from its neighbours."""
+    """`predict_gain` at each of `omegas` [rad/s], but faster: each orbit is extrapolated from its neighbours."""
     places = [float(omega) for omega in omegas]
     try:
         branch = rocking_branch(specimen, places, amplitude)

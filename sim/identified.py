@@ -1,4 +1,4 @@
-"""What has been measured of a specimen: values, how certain they are, and how they hang together."""
+"""Identified properties of a specimen: values, standard uncertainties and correlations."""
 
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
@@ -14,7 +14,7 @@ from sim.parameters import Parameters, quantity, unit_of
 from sim.specimen import Block, Frame, Specimen, Spring
 
 SPRING = "k_c:"
-"""What the name of a spring's stiffness begins with; the spring's label beta follows."""
+"""Prefix of the name of a spring's stiffness; the spring's label beta follows."""
 
 UNITS = {name: unit_of(Frame.model_fields[name]) for name in ("m1", "m2", "k1", "k2", "xi1", "xi2")} | {
     name: unit_of(Block.model_fields[name]) for name in ("restitution_factor",)
@@ -24,16 +24,16 @@ UNITS = {name: unit_of(Frame.model_fields[name]) for name in ("m1", "m2", "k1", 
 _HIGHEST = {"xi1": 1.0, "xi2": 1.0, "restitution_factor": 2.0}
 _MAY_VANISH = ("xi1", "xi2")
 _ROUNDING = 1e-9
-"""How far below zero the least eigenvalue of a correlation matrix may be by the rounding of its coefficients."""
+"""Lowest eigenvalue accepted for a correlation matrix, whose coefficients are rounded."""
 
 
 def spring_name(label: float) -> str:
-    """The name of the stiffness of the spring that is labelled beta = `label`."""
+    """Name of the stiffness of the spring labelled beta = `label`."""
     return f"{SPRING}{label:.12g}"
 
 
 def spring_label(name: str) -> float | None:
-    """The label of the spring that `name` stands for; None when it is another quantity."""
+    """Label of the spring whose stiffness is called `name`; None for another quantity."""
     if not name.startswith(SPRING):
         return None
     try:
@@ -57,7 +57,7 @@ def unit(name: str) -> str:
 
 
 def possible(name: str, value: float) -> bool:
-    """Whether a finding of this quantity can have this value: what is fitted may fall beyond what can be."""
+    """Whether this value of the quantity is physically possible; that of a fit may not be."""
     above = value >= 0.0 if name in _MAY_VANISH else value > 0.0
     return above and value < _HIGHEST.get(name, np.inf)
 
@@ -68,13 +68,13 @@ def _canonical(name: str) -> str:
 
 
 class Finding(Parameters):
-    """One quantity of the specimen as it was measured."""
+    """One measured quantity of the specimen."""
 
     name: str = quantity(..., "", "the quantity: m1, m2, k1, k2, xi1, xi2, restitution_factor, or k_c:LABEL")
     value: float = quantity(..., "", "best estimate, in the quantity's SI unit", ge=0)
     standard_uncertainty: float = quantity(..., "", "standard uncertainty (k = 1), in the quantity's SI unit", ge=0)
-    source: str = quantity(..., "", "what it was found from")
-    date: AwareDatetime = quantity(..., "", "when it was measured")
+    source: str = quantity(..., "", "source of the value")
+    date: AwareDatetime = quantity(..., "", "date of the measurement")
 
     @property
     def unit(self) -> str:
@@ -101,7 +101,7 @@ class Finding(Parameters):
 
 
 class Correlation(Parameters):
-    """How the errors of two findings hang together."""
+    """Correlation of the errors of two findings."""
 
     first: str = quantity(..., "", "name of a finding")
     second: str = quantity(..., "", "name of another finding")
@@ -114,14 +114,14 @@ class Correlation(Parameters):
 
     @property
     def pair(self) -> frozenset[str]:
-        """The two names, in no order."""
+        """The two names, unordered."""
         return frozenset((self.first, self.second))
 
 
 class Identified(Parameters):
-    """Everything that has been measured of a specimen. Findings that no correlation names are independent."""
+    """All measured properties of a specimen. Findings without a stated correlation are independent."""
 
-    findings: tuple[Finding, ...] = quantity((), "", "what was measured, each quantity once")
+    findings: tuple[Finding, ...] = quantity((), "", "identified properties, each quantity once")
     correlations: tuple[Correlation, ...] = quantity((), "", "correlations between findings")
 
     @model_validator(mode="after")
@@ -129,11 +129,11 @@ class Identified(Parameters):
         names = self.names
         for index, name in enumerate(names):
             if name in names[:index]:
-                raise InvalidInput("findings", name, "each quantity may be there once")
+                raise InvalidInput("findings", name, "each quantity may occur once")
         labels = sorted((label, name) for name in names if (label := spring_label(name)) is not None)
         for (label, _), (next_label, name) in pairwise(labels):
             if isclose(label, next_label):
-                raise InvalidInput("findings", name, f"its label cannot be told from that of {spring_name(label)}")
+                raise InvalidInput("findings", name, f"label not distinguishable from that of {spring_name(label)}")
         pairs: set[frozenset[str]] = set()
         for one in self.correlations:
             for name in (one.first, one.second):
@@ -145,7 +145,7 @@ class Identified(Parameters):
             pairs.add(one.pair)
         if self.correlations and float(np.linalg.eigvalsh(self.correlation(names)).min()) < -_ROUNDING:
             refused = [one.coefficient for one in self.correlations]
-            allowed = "quantities cannot be correlated like this together: the matrix has a negative eigenvalue"
+            allowed = "these correlations contradict each other: their matrix has a negative eigenvalue"
             raise InvalidInput("correlations", refused, allowed)
         return self
 
@@ -155,22 +155,22 @@ class Identified(Parameters):
         return tuple(finding.name for finding in self.findings)
 
     def finding(self, name: str) -> Finding | None:
-        """The finding of a quantity; None when it has not been measured."""
+        """Finding of a quantity; None if it has not been measured."""
         return next((finding for finding in self.findings if finding.name == name), None)
 
     def covariance(self, names: Sequence[str]) -> NDArray[np.float64]:
-        """Covariance of the findings `names`, shape (n, n), SI. Raises InvalidInput for one that is not there."""
+        """Covariance of the findings `names`, shape (n, n), SI. Raises InvalidInput for an unknown name."""
         found = [self.finding(name) for name in names]
         if None in found:
             missing = names[found.index(None)]
-            raise InvalidInput("name", missing, f"it has not been identified; {', '.join(self.names) or 'nothing'} is")
+            raise InvalidInput("name", missing, f"not identified; identified: {', '.join(self.names) or 'nothing'}")
         sizes = np.array([finding.standard_uncertainty for finding in found if finding is not None])
         return self.correlation(names) * np.outer(sizes, sizes)
 
     def applied(self, specimen: Specimen) -> Specimen:
-        """`specimen` as it is known best: what was measured stands in place of what it says.
+        """The best estimate of `specimen`: identified values replace the declared ones.
 
-        The labels of the springs go on referring to its own k1. Raises InvalidInput for values that cannot be together.
+        The springs' labels still refer to its declared k1. Raises InvalidInput for inconsistent values.
         """
         values = {finding.name: finding.value for finding in self.findings}
         measured = tuple(
@@ -183,7 +183,7 @@ class Identified(Parameters):
         try:
             best = specimen.model_copy(
                 update={
-                    # built anew: a copy would keep the natural frequencies that the frame has cached
+                    # a new object: a copy would keep the frame's cached natural frequencies
                     "frame": Frame(**(specimen.frame.model_dump() | frame)),
                     "block": Block(**(specimen.block.model_dump() | block)),
                     "springs": others + measured,
@@ -192,7 +192,7 @@ class Identified(Parameters):
             )
         except ValidationError as error:
             cause = error.errors()[0].get("ctx", {}).get("error", error)
-            raise InvalidInput("findings", ", ".join(values), f"such a specimen cannot be: {cause}") from None
+            raise InvalidInput("findings", ", ".join(values), f"no such specimen exists: {cause}") from None
         return best if specimen.label is None else best.coupled(specimen.label)
 
     def correlation(self, names: Sequence[str]) -> NDArray[np.float64]:
@@ -205,14 +205,14 @@ class Identified(Parameters):
         return matrix
 
     def extended(self, findings: Iterable[Finding], correlations: Iterable[Correlation] = ()) -> "Identified":
-        """With newer findings, which replace older ones of the same name together with their correlations."""
+        """These findings and newer ones, which replace those of the same name together with their correlations."""
         findings, correlations = tuple(findings), tuple(correlations)
         kept, pairs = self.without(*(finding.name for finding in findings)), {one.pair for one in correlations}
         still = tuple(one for one in kept.correlations if one.pair not in pairs)
         return Identified(findings=kept.findings + findings, correlations=still + correlations)
 
     def without(self, *names: str) -> "Identified":
-        """What is left when the findings `names` are taken away, with every correlation of theirs."""
+        """The findings without `names` and without their correlations."""
         return Identified(
             findings=tuple(finding for finding in self.findings if finding.name not in names),
             correlations=tuple(one for one in self.correlations if not one.pair & set(names)),

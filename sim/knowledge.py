@@ -1,4 +1,4 @@
-"""How well a specimen is known, and specimens drawn from what is left open."""
+"""Uncertainty of a specimen's properties, and random specimens drawn from it."""
 
 from collections.abc import Mapping
 from math import hypot, sqrt
@@ -8,28 +8,37 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.identified import Finding, Identified, spring_name
-from sim.parameters import quantity
+from sim.parameters import Parameters, quantity
 from sim.specimen import Block, Frame, Specimen
-from sim.uncertainty import SpecimenUncertainty
+
+
+class SpecimenUncertainty(Parameters):
+    """Relative half widths of independent uniform distributions (GUM 4.3.7)."""
+
+    stiffness: float = quantity(0.05, "1", "of the stiffness of each storey", ge=0, le=0.5)
+    damping: float = quantity(0.30, "1", "of the damping ratio of each mode", ge=0, le=0.9)
+    restitution: float = quantity(0.01, "1", "of the block's restitution", ge=0, le=0.2)
+    spring: float = quantity(0.10, "1", "of the stiffness of the coupling spring", ge=0, le=0.5)
+
 
 LARGEST_DAMPING = 0.999
-"""A drawn damping ratio stays below 1, as a frame's must."""
+"""Upper bound of drawn damping ratios, below 1 as required of a frame."""
 
 ELASTIC = 1.0 - 1e-12
-"""A drawn restitution stays below 1, as a block's must, rounding included."""
+"""Upper bound of drawn restitutions, below 1 as required of a block, including rounding."""
 
 LEAST = 1e-3
-"""Share of its best estimate that a drawn quantity keeps: none is negative."""
+"""Lower bound of a drawn quantity as a fraction of its best estimate, so that none is negative."""
 
 RECTANGULAR = 1.0 / sqrt(3.0)
-"""Standard uncertainty of a quantity that may be anywhere within a half width of 1 (GUM 4.3.7)."""
+"""Standard uncertainty of a uniform distribution with half width 1 (GUM 4.3.7)."""
 
 Floats = NDArray[np.float64]
 
 FRAME = ("m1", "m2", "k1", "k2", "xi1", "xi2")
 RESTITUTION = "restitution_factor"
 SPRING = "k_c"
-"""Quantities that may be uncertain; SPRING is the stiffness of the mounted spring."""
+"""Quantities that can be uncertain; SPRING is the stiffness of the mounted spring."""
 
 _WIDTH = {
     "k1": "stiffness",
@@ -39,24 +48,27 @@ _WIDTH = {
     RESTITUTION: "restitution",
     SPRING: "spring",
 }
-"""The half width of each quantity. Masses have none: a balance knows them, or a fit has found them."""
+"""Half width of each quantity. Masses have none: they are weighed, or identified by a fit."""
 
 _OF_MASSES = "stiffness"
-"""The half width that stands for the masses where parts are looked at one by one: frame and masses are one fit."""
+"""Half width to which the masses are assigned in lists of contributions: frame and masses are one fit."""
 
 
 class SpecimenKnowledge(SpecimenUncertainty):
-    """Measured quantities by their covariance, jointly normal; the others by their half widths.
+    """Knowledge of a specimen: covariance of measured quantities (jointly normal), half widths of the others.
 
-    The specimens that it is asked about have the measured values already, see `Identified.applied`. `give` is a further
-    relative half width of the restitution.
+    Methods expect specimens with the measured values, see `Identified.applied`. `give` is an additional relative half
+    width of the restitution.
     """
 
     identified: Identified = Identified()
-    give: float = quantity(0.0, "1", "of the block's restitution, by a table that gives way at the impacts", ge=0, lt=1)
+    give: float = quantity(0.0, "1", "of the block's restitution, because the table moves at the impacts", ge=0, lt=1)
 
     def draws(self, specimen: Specimen, n: int, random: np.random.Generator) -> list[Specimen]:
-        """`n` specimens that `specimen` may really be. A restitution that would reach 1 is drawn just below."""
+        """`n` random specimens from the distribution around `specimen`.
+
+        A restitution that would reach 1 is set just below it.
+        """
         widths = np.array([getattr(self, width) for width in _WIDTH.values()])
         columns = dict(zip(_WIDTH, (1.0 + widths * random.uniform(-1.0, 1.0, (n, widths.size))).T, strict=True))
         if measured := self._measured(specimen):
@@ -70,7 +82,7 @@ class SpecimenKnowledge(SpecimenUncertainty):
         return [_off(specimen, dict(zip(columns, row, strict=True))) for row in rows]
 
     def relative(self, specimen: Specimen) -> dict[str, float]:
-        """Relative standard uncertainty of every quantity of `specimen` that is left open, by name."""
+        """Relative standard uncertainty of every uncertain quantity of `specimen`, by name."""
         sizes = {name: RECTANGULAR * float(getattr(self, width)) for name, width in _WIDTH.items()}
         measured = self._measured(specimen)
         sizes |= dict(zip(measured, self._spread(measured)[1], strict=True))
@@ -78,10 +90,10 @@ class SpecimenKnowledge(SpecimenUncertainty):
         return {name: size for name, size in sizes.items() if size > 0.0}
 
     def correlations(self, specimen: Specimen) -> dict[tuple[str, str], float]:
-        """Correlation coefficients of pairs of those quantities; pairs that are not here are independent."""
+        """Correlation coefficients of pairs of those quantities; pairs that are not listed are independent."""
         measured, sizes = self._measured(specimen), self.relative(specimen)
         names, (matrix, own) = list(measured), self._spread(measured)
-        # what else makes a quantity uncertain is independent, and weakens its correlations
+        # other sources of uncertainty are independent and reduce the correlations
         shares = [size / sizes[name] if name in sizes else 0.0 for name, size in zip(names, own, strict=True)]
         weakened = matrix * np.outer(shares, shares)
         return {
@@ -111,7 +123,7 @@ class SpecimenKnowledge(SpecimenUncertainty):
         return [(moved(step), moved(-step)) for step in steps.T if step.any()]
 
     def only(self, *widths: str) -> Self:
-        """With all but these half widths, and what was measured in place of them, taken as exactly known."""
+        """The same knowledge with all other quantities taken as exact."""
         findings = [
             finding if _governor(finding.name) in widths else finding.model_copy(update={"standard_uncertainty": 0.0})
             for finding in self.identified.findings
@@ -122,7 +134,7 @@ class SpecimenKnowledge(SpecimenUncertainty):
         return self.model_copy(update={**zero, "identified": identified, "give": give})
 
     def _measured(self, specimen: Specimen) -> dict[str, Finding]:
-        """The findings that speak of `specimen`, by the name of the quantity."""
+        """The findings that apply to `specimen`, by quantity."""
         names = {name: name for name in (*FRAME, RESTITUTION)}
         if specimen.label:
             names[SPRING] = spring_name(specimen.label)
@@ -137,25 +149,25 @@ class SpecimenKnowledge(SpecimenUncertainty):
 
 
 def root_of(matrix: Floats) -> Floats:
-    """A matrix R, shape (n, n), with R R' = `matrix`, which is symmetric and positive semidefinite but for rounding."""
+    """Matrix R, shape (n, n), with R R' = `matrix`, which is symmetric and, up to rounding, positive semidefinite."""
     values, vectors = np.linalg.eigh(matrix)
     root: Floats = vectors * np.sqrt(np.maximum(values, 0.0))
     return root
 
 
 def _governor(finding: str) -> str:
-    """The half width in whose place a finding stands."""
+    """Half width that is replaced by a finding."""
     return _WIDTH.get(finding, _OF_MASSES if finding in FRAME else _WIDTH[SPRING])
 
 
 def _off(specimen: Specimen, factors: Mapping[str, float]) -> Specimen:
-    """`specimen` with its values times the factors, kept within what a specimen can be.
+    """`specimen` with its values multiplied by the factors, within the physical range.
 
-    The spring's is on k_C, whatever k1 is.
+    The spring's factor scales k_C, independent of k1.
     """
     frame, block, beta = specimen.frame, specimen.block, specimen.beta
     f = dict.fromkeys((*FRAME, RESTITUTION, SPRING), 1.0) | {k: max(v, LEAST) for k, v in factors.items()}
-    # built anew: a copy would keep the natural frequencies that the frame has cached
+    # a new object: a copy would keep the frame's cached natural frequencies
     values = frame.model_dump() | {name: getattr(frame, name) * f[name] for name in FRAME}
     values |= {name: min(values[name], LARGEST_DAMPING) for name in ("xi1", "xi2")}
     elastic = ELASTIC / block.restitution if block.restitution > 0.0 else 1.0

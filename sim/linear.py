@@ -1,4 +1,4 @@
-"""What is linear: modes of the bare frame and of the coupled system, and the exact steady response to a sine.
+"""Linear analysis: modes of the bare frame and of the coupled system, and exact steady response to a sine.
 
 Complex amplitudes: a base acceleration a_g = A sin(omega t) = Im(A exp(i omega t)) gives u = Im(U exp(i omega t)).
 """
@@ -17,8 +17,8 @@ from sim.specimen import Frame, Specimen
 class Modes:
     """Undamped modes of a linear system, ascending.
 
-    `omega`, shape (n,) [rad/s]: sign(lambda) sqrt|lambda| for the eigenvalues lambda of M^-1 K. A negative entry is not
-    a frequency but the rate of growth of a *divergent* mode: its stiffness is negative.
+    `omega`, shape (n,) [rad/s]: sign(lambda) sqrt|lambda| for the eigenvalues lambda of M^-1 K. A negative entry is the
+    growth rate of a *divergent* mode, whose stiffness is negative.
     `shapes`, shape (n, n): column i is mode i, scaled to a unit u1 (or to a unit largest entry where u1 vanishes).
     """
 
@@ -27,7 +27,7 @@ class Modes:
 
     @property
     def divergent(self) -> NDArray[np.bool_]:
-        """Which modes grow instead of oscillating, shape (n,)."""
+        """Mask of the modes that grow instead of oscillating, shape (n,)."""
         return self.omega < 0.0
 
     @property
@@ -54,8 +54,9 @@ def bare_modes(frame: Frame) -> Modes:
 def coupled_modes(specimen: Specimen) -> Modes:
     """The three modes of the linearised coupled system; shapes over (u1, u2, theta). Source: Eq. (12) to (14).
 
-    The first is divergent while h1^2 k_C k1 / (k1 + k_C) < h_b M g: gravity pushes the block over more than spring and
-    frame, one behind the other, hold it. With the paper's frame h1^2 k1 < h_b M g, so it is so for every k_C.
+    The first is divergent while h1^2 k_C k1 / (k1 + k_C) < h_b M g: the overturning moment of gravity exceeds the
+    restoring moment of spring and frame in series. With the paper's frame h1^2 k1 < h_b M g, so this holds for every
+    k_C.
     """
     frame, block = specimen.frame, specimen.block
     frame_mass, _, frame_stiffness = frame_matrices(frame)
@@ -73,7 +74,7 @@ def steady_response(
 ) -> tuple[complex, complex]:
     """Complex amplitudes (U1, U2) [m] in the steady state under `amplitude` [m/s2] sin(`omega` [rad/s] t).
 
-    By default of the bare frame; with `resting`, of the frame whose spring is grounded on a block that never lifts.
+    By default for the bare frame; with `resting`, for the frame with its spring attached to a block that never lifts.
     Raises InvalidInput unless omega > 0 and the amplitude is finite.
     """
     if not (0.0 < omega < np.inf):
@@ -89,13 +90,13 @@ def steady_response(
 
 
 def steady_peaks(specimen: Specimen, omega: float, amplitude: float, *, resting: bool = False) -> Peaks:
-    """Greatest |u1| and |u2 - u1| [m] of `steady_response`; theta is 0."""
+    """Largest |u1| and |u2 - u1| [m] of `steady_response`; theta is 0."""
     u1, u2 = steady_response(specimen, omega, amplitude, resting=resting)
     return Peaks(u1=abs(u1), drift=abs(u2 - u1), theta=0.0)
 
 
 def _modes(mass: NDArray[np.float64], stiffness: NDArray[np.float64]) -> Modes:
-    """Modes of a symmetric pair with diagonal mass, through the symmetric M^-1/2 K M^-1/2."""
+    """Modes of symmetric matrices K and M, M diagonal, from the eigenvectors of M^-1/2 K M^-1/2."""
     root = np.sqrt(np.diag(mass))
     values, vectors = np.linalg.eigh(stiffness / np.outer(root, root))
     shapes = vectors / root[:, None]

@@ -1,27 +1,27 @@
-"""Loads the compiled model, or compiles it: at the first use after an installation, once, for many seconds."""
+"""Loading of the compiled model; the first use after an installation compiles it once, which takes many seconds."""
 
 import sys
 from collections.abc import Callable, Mapping
 from importlib import import_module
 
-MODEL = {"equations": 6, "roots": 6, "taylor": 10, "resting": 14, "rocking": 22, "period": 20}
-"""Modules of `sim.kernel` that every prediction takes, with the share of each in the time of compilation."""
+MODEL = {"roots": 6, "watching": 8, "resting": 14, "steps": 3, "rocking": 20, "members": 40}
+"""Modules of `sim.kernel` used by every prediction, with their share of the compilation time."""
 
-BENCH = {**MODEL, "laser": 3, "plant": 8, "table": 15}
-"""Those that a simulated bench takes."""
+BENCH = {**MODEL, "laser": 3, "filter": 2, "plant": 8, "table": 15}
+"""Modules used by a simulated bench."""
 
 
 def load_model(
     report: Callable[[str, int, int], None] = lambda _phase, _done, _all: None, modules: Mapping[str, int] = MODEL
 ) -> None:
-    """Import the `modules`. `report` is called with what is done, in words, the parts done and those of all."""
+    """Import the `modules`. `report` is called with a description, the number of parts done and the total."""
     if all(f"sim.kernel.{name}" in sys.modules for name in modules):
         return
     report("loading the model", 0, 0)
     is_compiled = import_module("sim.kernel.compiled").is_compiled
     phase = "loading the model"
     if not all(is_compiled(name) for name in modules):
-        phase = "compiling the model, once per installation, about 9 s"
+        phase = "compiling the model, once per installation, about 12 s"
     done, total = 0, sum(modules.values())
     for name, share in modules.items():
         report(phase, done, total)

@@ -1,7 +1,7 @@
 """Maps of the gain coefficients over frequency and stiffness: both steady motions, their existence and stability.
 
-A row of constant stiffness is followed over the frequency; from there every column is followed over the stiffness, all
-columns of a strip together, each predicted from the rows before. Nothing waits for a transient to die.
+Continuation over frequency gives a row of constant stiffness; from there every column is continued over stiffness, all
+columns of a strip together, each predicted from the previous rows. No transient has to be integrated.
 """
 
 from collections.abc import Sequence
@@ -22,12 +22,12 @@ from sim.sweep import Done, processors, sweep
 Floats = NDArray[np.float64]
 
 STRIPS = 2
-"""Strips of columns per processor: enough to share the work evenly, few enough to keep each one wide."""
+"""Strips of columns per processor: enough to balance the load, few enough to keep each strip wide."""
 
 
 @dataclass(frozen=True, eq=False)
 class LayerMap:
-    """One steady motion over the grid, n stiffnesses by m frequencies. Where it does not exist the numbers are NaN.
+    """Branch of steady motion over the grid of n stiffnesses by m frequencies; NaN where it does not exist.
 
     `peaks`, shape (n, m, 3): |u1|, |u2 - u1| [m], |theta| [rad]. `bare`, shape (m, 3): the same without block.
     `multipliers`, shape (n, m, 6) when rocking and (n, m, 4) at rest: Floquet multipliers per period of the drive.
@@ -39,7 +39,7 @@ class LayerMap:
 
     @property
     def exists(self) -> NDArray[np.bool_]:
-        """Where there is such a motion, shape (n, m)."""
+        """Mask of the cells with such a motion, shape (n, m)."""
         return np.isfinite(self.peaks[:, :, 0])
 
     @property
@@ -59,7 +59,7 @@ class LayerMap:
 
     @property
     def stable(self) -> NDArray[np.bool_]:
-        """Where the motion exists and small disturbances of it die out, shape (n, m)."""
+        """Mask of the cells where the motion exists and is stable, shape (n, m)."""
         return self.exists & (self.multiplier < 1.0)
 
 
@@ -89,11 +89,10 @@ def gain_map(
     scheduler: str | None = None,
     done: Done | None = None,
 ) -> GainMap:
-    """Gain coefficients, both layers, at every stiffness ratio of `betas` and frequency of `omegas` [rad/s].
+    """Gain coefficients of both branches at every stiffness ratio of `betas` and frequency of `omegas` [rad/s].
 
-    The base moves with `amplitude` [m/s2] sin(omega t), in the test without block with `bare_amplitude` if that was
-    another. `scheduler` and `done` are those of `sim.sweep.sweep`. Raises InvalidInput for an empty axis or meaningless
-    numbers.
+    The base moves with `amplitude` [m/s2] sin(omega t), in the test without block with `bare_amplitude` if different.
+    `scheduler` and `done` are those of `sim.sweep.sweep`. Raises InvalidInput for an empty axis or meaningless numbers.
     """
     rows, row_of = np.unique(np.asarray(betas, dtype=np.float64), return_inverse=True)
     columns, column_of = np.unique(np.asarray(omegas, dtype=np.float64), return_inverse=True)
@@ -128,7 +127,7 @@ def gain_map(
 
 @dataclass(frozen=True, eq=False)
 class _Strip:
-    """Columns that are followed together, from the solutions of the first row on."""
+    """Columns that are continued together from the solutions of the first row."""
 
     specimens: list[Specimen]
     omegas: Floats
@@ -148,7 +147,7 @@ def _follow_strip(strip: _Strip) -> tuple[Floats, Floats, Floats]:
         row = newton(q, guess, slope, accuracy=2)
         before = parameters(strip.specimens[i - 1], strip.omegas, strip.amplitude)
         for j in np.flatnonzero(~row.found).tolist():
-            # from the row before in shorter steps, or from a neighbour in this row
+            # from the previous row in shorter steps, or from a neighbour in this row
             starts = [(rows[-1], before, j), (row, q, j - 1), (row, q, min(j + 1, len(q) - 1))]
             known = ((at, origin[k], k) for at, origin, k in starts if k >= 0 and at.found[k])
             found = next(filter(None, (follow(origin, at.section[k], q[j]) for at, origin, k in known)), None)
@@ -163,7 +162,7 @@ def _follow_strip(strip: _Strip) -> tuple[Floats, Floats, Floats]:
 
 
 def _first_row(specimen: Specimen, omegas: Floats, amplitude: float) -> Solutions:
-    """The row that all columns start from; where the way along it is broken, each point is sought on its own."""
+    """First row, from which all columns start; where continuation along it fails, points are computed separately."""
     places = [float(omega) for omega in omegas]
     try:
         branch = branch_solutions(specimen, places, amplitude)
@@ -191,7 +190,7 @@ def _rows(solutions: Solutions, part: NDArray[np.intp]) -> Solutions:
 def _linear_peaks(
     specimen: Specimen, springs: Sequence[float], omegas: Floats, amplitude: float
 ) -> tuple[Floats, NDArray[np.complex128]]:
-    """Peaks, shape (n, m, 3), and complex amplitude of u1, shape (n, m), of the frame with grounded springs [N/m]."""
+    """Peaks, shape (n, m, 3), and complex u1, shape (n, m), of the frame with `springs` [N/m] fixed to the block."""
     mass, damping, stiffness = frame_matrices(specimen.frame)
     dynamic = stiffness - omegas[:, None, None] ** 2 * mass + 1j * omegas[:, None, None] * damping
     grounded = np.broadcast_to(dynamic, (len(springs), *dynamic.shape)).copy()

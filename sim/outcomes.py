@@ -1,6 +1,6 @@
-"""What a stated start leads to: one of the two steady motions, another motion, or the overturned block.
+"""Outcome of a given start-up: one of the two steady motions, another motion, or overturning.
 
-Several motions can coexist, and the way to them is chaotic: which one a test lands on is found by going there.
+Several motions can coexist, and the transient to them is chaotic: only integration shows which one a test reaches.
 """
 
 from collections.abc import Callable
@@ -21,26 +21,26 @@ from sim.steady import NoOrbit, check_steady, resting_state, rocking_orbit
 from sim.sweep import Done, sweep
 
 START_DURATION = 120.0
-"""Length [s] of the default start."""
+"""Duration [s] of the default start-up."""
 
 WITHIN = 0.02
-"""Relative difference of every peak from the steady motion's at which that counts as reached."""
+"""Largest relative difference of the peaks from those of a steady motion at which it counts as reached."""
 
 WINDOW = 20
-"""Periods of the drive over which the peaks are watched: more than the beats of a modulated motion last."""
+"""Periods of the drive over which the peaks are taken: longer than the beats of a modulated motion."""
 
 LEFT = 1e-3
-"""An undecided motion is watched on until a disturbance of the stable orbit would have shrunk to this part."""
+"""An undecided motion is continued until a disturbance of the stable orbit would have decayed to this fraction."""
 
 FEWEST_ROUNDS, MOST_ROUNDS = 10, 100
-"""Times WINDOW for which that may be: the fewest are for points without a stable orbit."""
+"""Minimum and maximum number of rounds of WINDOW periods for this; the minimum applies without a stable orbit."""
 
 StartProgram = Callable[[float, float], SineProgram]
-"""Makes the drive of a start from the frequency [rad/s] and the amplitude [m/s2] that it ends with."""
+"""Function that returns the drive of a start-up for its final frequency [rad/s] and amplitude [m/s2]."""
 
 
 class Outcome(StrEnum):
-    """Where a start leads. OTHER stays near neither steady motion: it is modulated, or of another period."""
+    """Outcome of a start-up. OTHER: a motion unlike either steady motion, modulated or of another period."""
 
     ROCKING = "rocking"
     RESTING = "resting"
@@ -51,7 +51,9 @@ class Outcome(StrEnum):
 
 @dataclass(frozen=True)
 class Reached:
-    """What a start led to. `time` [s] from its beginning: of the overturning, or when the outcome was decided.
+    """Outcome of a start-up.
+
+    `time` [s] from its beginning: of the overturning, or when the outcome was decided.
 
     `side`: the corner of the overturning. `peaks` over the last 20 periods of the drive; None when toppled or failed.
     """
@@ -63,7 +65,7 @@ class Reached:
 
 
 class Steady(NamedTuple):
-    """Peaks of the stable steady motions at one point, None where there is none, and the rocking one's multiplier."""
+    """Peaks of the stable steady motions at a point, None if there is none, and multiplier of the rocking motion."""
 
     rocking: Peaks | None
     resting: Peaks | None
@@ -84,12 +86,12 @@ class OutcomeMap:
     drift: NDArray[np.float64]
 
     def count(self, outcome: Outcome) -> int:
-        """In how many cells the start led there."""
+        """Number of cells with this outcome."""
         return int((self.outcome == str(outcome)).sum())
 
 
 def switched_on(omega: float, amplitude: float) -> SineProgram:
-    """The sine switched on at t = 0 and held for START_DURATION."""
+    """A sine of constant amplitude from t = 0 for START_DURATION."""
     return SineProgram([Sweep.dwell(START_DURATION, amplitude, omega)])
 
 
@@ -100,22 +102,22 @@ def reached(
     start: StartProgram = switched_on,
     steady: Steady | None = None,
 ) -> Reached:
-    """What `start` leads to, from rest, under a sine of `omega` [rad/s] and `amplitude` [m/s2] in the end.
+    """Outcome of `start`, from rest, which ends with a sine of `omega` [rad/s] and `amplitude` [m/s2].
 
-    The program must end with a dwell there of WINDOW periods or more. A motion that is near neither steady motion
-    after it is watched on. `steady`: the steady motions, if they are known already.
+    The program must end with a dwell of at least WINDOW periods at these values. A motion that is then unlike either
+    steady motion is continued. `steady`: the steady motions, if they are known already.
 
-    Raises InvalidInput for a bare frame, meaningless numbers, or a program that ends otherwise.
+    Raises InvalidInput for a bare frame, meaningless numbers, or a program with a different end.
     """
     check_steady(specimen, omega, amplitude)
     program, window = start(omega, amplitude), WINDOW * tau / omega
     last = program.sweeps[-1]
     if last.omega != (omega, omega) or last.amplitude != (amplitude, amplitude) or last.duration < window:
-        allowed = f"it must end with a dwell of {window:g} s or more at {omega:g} rad/s and {amplitude:g} m/s2"
+        allowed = f"it must end with a dwell of at least {window:g} s at {omega:g} rad/s and {amplitude:g} m/s2"
         raise InvalidInput("end of a start", last, allowed)
     steady = steady or _steady(specimen, omega, amplitude)
     phase = program.phase + sum(float(part.phase_at(np.array(part.duration))) for part in program.sweeps)
-    # whole periods, so that each round begins at the phase at which the one before ended
+    # whole periods, so that each round begins at the phase at which the previous one ended
     more = SineProgram([Sweep.dwell(window, amplitude, omega)], phase % tau)
     motion = simulate(specimen, program, peaks_from=program.duration - window)
     time, rounds = motion.end_time, 0
@@ -128,9 +130,9 @@ def reached(
 def outcome_map(
     gain_map: GainMap, start: StartProgram = switched_on, scheduler: str | None = None, done: Done | None = None
 ) -> OutcomeMap:
-    """What `start` leads to in every cell of a gain map. Raises InvalidInput as `reached` does.
+    """Outcome of `start` in every cell of a gain map. Raises InvalidInput as `reached` does.
 
-    `scheduler` is that of `sim.sweep.sweep`; there `start` must be picklable: a function of a module.
+    `scheduler` is that of `sim.sweep.sweep`; with a scheduler `start` must be picklable: a module-level function.
     """
     n, m = len(gain_map.betas), len(gain_map.omegas)
     cells = [
@@ -185,7 +187,7 @@ def _steady(specimen: Specimen, omega: float, amplitude: float) -> Steady:
 
 
 def _patience(steady: Steady) -> int:
-    """Rounds of WINDOW periods for which an undecided motion is watched."""
+    """Rounds of WINDOW periods for which an undecided motion is continued."""
     if steady.rocking is None:
         return FEWEST_ROUNDS
     return min(MOST_ROUNDS, max(FEWEST_ROUNDS, ceil(log(LEFT) / (WINDOW * log(steady.multiplier)))))

@@ -1,10 +1,10 @@
-"""Declarations of parameters and of recorded values: once, with unit, limits and meaning.
+"""Declarations of parameters and recorded values: unit, limits and meaning, each in one place.
 
-From the declaration of a parameter come the validation, the configuration file, the command-line flags,
-the documentation table and the metadata of the data file; from that of a recorded value its column in the data file,
-with reader, export and replay.
+Validation, configuration file, command-line flags, documentation table and the data file's metadata follow from the
+declaration of a parameter; the data file's column with reader, export and replay from that of a recorded value.
 """
 
+from collections.abc import Iterator
 from dataclasses import field
 from typing import Any, cast
 
@@ -12,8 +12,11 @@ from pydantic import BaseModel, ConfigDict, Field
 from pydantic.fields import FieldInfo
 
 NEAR, NEAR_ANGULAR = 20.0, 3.0
-"""Factors around a default within which a value calls for no notice: a slip of units is 1000, one of angles 2 pi, so
-that either shows while what was meant is within a factor of 50 or of 2 of the default."""
+"""Factors around a default within which a value causes no notice.
+
+A wrong prefix is a factor of 1000, a wrong angular unit 2 pi: either is noticed if the intended value is within a
+factor of 50 or 2 of the default.
+"""
 
 COUPLING = (0.02, 5.0)
 """Usual stiffness ratios of coupling springs: the paper has 0.25 to 0.97 and computes up to 1.2."""
@@ -25,6 +28,16 @@ class Parameters(BaseModel):
     """A frozen group of validated parameters in SI units; unknown names and non-finite numbers are refused."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    def __repr_args__(self) -> Iterator[tuple[str | None, Any]]:
+        """Values that differ from the defaults."""
+        for name, declared in type(self).model_fields.items():
+            value = getattr(self, name)
+            if declared.is_required() or value != declared.get_default(call_default_factory=True):
+                yield name, value
+
+    def __str__(self) -> str:
+        return repr(self)
 
 
 def quantity(
@@ -38,8 +51,8 @@ def quantity(
 ) -> Any:
     """Declare a field of `Parameters` with its SI `unit` ("1" for a pure number) and its `limits` (gt, ge, lt, le).
 
-    Within `usual`, lowest and highest magnitude in that unit, a value calls for no notice; see `usual_of`. A field that
-    is absent by default has an `example` of what a person may give.
+    A magnitude outside `usual`, (lowest, highest) in that unit, causes a notice; see `usual_of`. A field that
+    is absent by default has an `example` of valid input.
     """
     extra: dict[str, Any] = {"unit": unit}
     if usual is not None:
@@ -63,10 +76,10 @@ def unit_of(field: FieldInfo) -> str:
 
 
 def usual_of(field: FieldInfo) -> tuple[float, float] | None:
-    """Lowest and highest magnitude of a field that call for no notice; None where every value is as good as another.
+    """Range of magnitudes of a field that cause no notice; None if every value is plausible.
 
-    Where none is declared: for a quantity with a dimension, what is within a factor of `NEAR` of its default, closer
-    where 2 pi or degrees can slip in.
+    If not declared, for a quantity with a dimension: values within a factor of `NEAR` of its default, a smaller one
+    where 2 pi or degrees are a likely mistake.
     """
     extra = _extra(field)
     if "usual" in extra:
@@ -83,7 +96,7 @@ def usual_of(field: FieldInfo) -> tuple[float, float] | None:
 
 
 def example_of(field: FieldInfo) -> Any:
-    """What a person may give for a field that is absent by default; None where there is nothing to give."""
+    """Example of valid input for a field that is absent by default; None for other fields."""
     return _extra(field).get("example")
 
 
@@ -93,7 +106,7 @@ def _extra(field: FieldInfo) -> dict[str, Any]:
 
 
 def each_once(values: tuple[float, ...]) -> tuple[float, ...]:
-    """The values of a list of points, when none is there twice; ValueError otherwise. For use as a validator."""
+    """The values of a list of points; ValueError when one occurs twice. For use as a validator."""
     if len(set(values)) < len(values):
-        raise ValueError("each value may be asked for once")
+        raise ValueError("each value may occur once")
     return values

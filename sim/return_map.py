@@ -1,8 +1,8 @@
-"""The return map of steady rocking, its fixed points by Newton, and their continuation.
+"""Return map of steady rocking, its fixed points by Newton's method, and their continuation.
 
 Section: just after the impact into theta > 0. Unknowns x = [phase, u1, u2, v1, v2, omega], shape (6,), with the phase
-[rad] of the base's sine at that impact. The map goes over the next two impacts and takes 2 pi off the phase. It is
-located on events, so its derivative needs no saltation matrices and its eigenvalues are the Floquet multipliers.
+[rad] of the base's sine at that impact. The map covers the next two impacts and subtracts 2 pi from the phase. Its
+section is an event, so its derivative needs no saltation matrices and its eigenvalues are the Floquet multipliers.
 
 Parameters are one vector q, shape (18,): `Specimen.packed()`, omega [rad/s], amplitude [m/s2]. Everything is done for
 many points at once: q has shape (n, 18), x shape (n, 6).
@@ -21,13 +21,13 @@ from sim.specimen import Specimen
 Floats = NDArray[np.float64]
 
 ORDER, TOLERANCE = 18, 1e-11
-"""Of the Taylor steps: the map is then smooth to rounding, which differencing it needs."""
+"""Tolerance of the Taylor steps: it makes the map smooth to rounding, as its numerical differentiation requires."""
 
 Accuracy = Literal[2, 4]
-"""Order of the differences that make a Jacobian of 12 or of 24 maps."""
+"""Order of the differences for a Jacobian from 12 or 24 evaluations of the map."""
 
 DIFFERENCE: dict[Accuracy, float] = {2: 4e-6, 4: 5e-5}
-"""Relative steps: the multipliers then err by about 5e-10 and 5e-11, by truncation and rounding alike."""
+"""Relative steps at which truncation and rounding contribute equally to the multipliers' error, 5e-10 and 5e-11."""
 
 STENCIL: dict[Accuracy, tuple[Floats, Floats]] = {
     2: (np.array([1.0, -1.0]), np.array([0.5, -0.5])),
@@ -39,17 +39,17 @@ CLOSURE = 1e-12
 """Scaled mismatch over one period at which an orbit counts as closed."""
 
 SLOW = 0.1
-"""A known Jacobian is kept while each step of Newton leaves less of the mismatch than this."""
+"""A known Jacobian is kept while each Newton step reduces the mismatch to less than this fraction."""
 
 NEAR = 0.3
-"""Scaled mismatch beyond which a start is refused: Newton might end on another orbit than the one that is followed."""
+"""Scaled mismatch beyond which a start is rejected: Newton's method might converge to another orbit."""
 
 MOST_ITERATIONS = 10
 SMALLEST_ADVANCE = 1e-3
-"""Limits of Newton's iterations and of the steps of `follow`, as a part of the way."""
+"""Largest number of Newton iterations, and limits of the steps of `follow` as fractions of the path."""
 
 MOST_KNOWN = 5
-"""Points that an extrapolation goes through: more would magnify the rounding of the Jacobians."""
+"""Number of points used by an extrapolation: more would amplify the rounding errors of the Jacobians."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +65,7 @@ class Solution:
 class Solutions:
     """Fixed points: sections, shape (n, 6), Jacobians, (n, 6, 6), peaks, (n, 3), and which were found, (n,).
 
-    The phase is not wrapped: it stays near the start's. Rows that were not found are NaN.
+    The phase is not wrapped: it stays near that of the start. Rows of points not found are NaN.
     """
 
     section: Floats
@@ -78,7 +78,7 @@ class Solutions:
         return Solution(self.section[i], self.jacobian[i], self.peaks[i]) if self.found[i] else None
 
     def put(self, i: int, solution: Solution) -> None:
-        """Let row `i` be a solution that was found in another way."""
+        """Set row `i` to a solution found by other means."""
         self.section[i], self.jacobian[i], self.peaks[i] = solution.section, solution.jacobian, solution.peaks
         self.found[i] = True
 
@@ -102,22 +102,45 @@ def scales(q: Floats) -> Floats:
 
 
 def images(q: Floats, x: Floats, *, watch_peaks: bool = False) -> tuple[Floats, Floats]:
-    """The map at x, shape (n * m, 6), m starts for each row of q: images and peaks, shape (n * m, 3).
+    """Images of x, shape (n * m, 6), with m starts for each row of q, and their peaks, shape (n * m, 3).
 
-    An image is NaN when the block does not come back to the section.
+    An image is NaN if the block does not return to the section within three periods. The peaks are the largest
+    |u1|, |u2 - u1|, |theta| until then, 0 unless `watch_peaks`.
     """
-    from sim.kernel import period as kernel
+    from sim.kernel import members as kernel
 
-    out, peaks = np.empty((len(x), 6)), np.empty((len(x), 3))
-    contiguous = np.ascontiguousarray
-    kernel.images(contiguous(q), contiguous(x), ORDER, TOLERANCE, watch_peaks, out, peaks)
-    return out, peaks
+    n, row = len(x), np.repeat(np.arange(len(q)), len(x) // len(q))
+    omega, starts = q[row, 16], x[:, 5] > 0.0
+    segments, states, reports = np.zeros((n, 10)), np.zeros((n, 6)), np.empty((n, kernel.REPORT))
+    # an orbit that has not returned after three periods is not one of the drive's period
+    segments[:, 0], segments[:, 1], segments[:, 5], segments[:, 6] = 6.0 * pi / omega, q[row, 17], x[:, 0], omega
+    states[:, :4], states[:, 5] = x[:, 1:5], x[:, 5]
+    spans = np.arange(n)[:, None] + np.column_stack((np.zeros(n, np.int64), starts))
+    kernel.advance_members(
+        np.ascontiguousarray(q[:, :16]),
+        row,
+        segments,
+        spans,
+        states,
+        ORDER,
+        TOLERANCE,
+        0.5 * pi,
+        0.0,
+        np.full(n, 0.0 if watch_peaks else np.inf),
+        2,
+        reports,
+    )
+    out = np.full((n, 6), np.nan)
+    back = (reports[:, kernel.STATUS] == kernel.IMPACT_LIMIT) & (states[:, 5] > 0.0)
+    out[back, 0] = x[back, 0] + omega[back] * reports[back, kernel.END] - tau
+    out[back, 1:5], out[back, 5] = states[back, :4], states[back, 5]
+    return out, reports[:, kernel.PEAKS :].copy()
 
 
 def jacobians(q: Floats, x: Floats, accuracy: Accuracy = 4) -> Floats:
     """Derivatives of the map at x, shape (n, 6, 6); NaN where the map is not defined around x."""
     nodes, weights = STENCIL[accuracy]
-    # the steps as they are after rounding, exactly
+    # actual steps after rounding
     steps = (x + DIFFERENCE[accuracy] * scales(q)) - x
     starts = x[:, None, None, :] + (nodes[:, None, None] * np.eye(6)) * steps[:, None, None, :]
     out, _ = images(q, starts.reshape(-1, 6))
@@ -127,8 +150,9 @@ def jacobians(q: Floats, x: Floats, accuracy: Accuracy = 4) -> Floats:
 def newton(q: Floats, x: Floats, known: Floats | None = None, accuracy: Accuracy | None = 4) -> Solutions:
     """The fixed points near x, shape (n, 6); `known` are guesses of the Jacobians there, shape (n, 6, 6).
 
-    A Jacobian is used as long as it serves, since a chord step costs one map; at the end it is taken anew with
-    `accuracy`. None: it is not, and most of the cost is saved where only the points and their peaks are wanted.
+    A Jacobian is reused while Newton converges, since a chord step costs one evaluation; at the end it is computed
+    again with `accuracy`. None omits that, which saves most of the cost where only the points and their peaks are
+    needed.
     """
     n = len(x)
     place, peaks, sizes = x.copy(), np.full((n, 3), np.nan), scales(q)
@@ -157,9 +181,10 @@ def newton(q: Floats, x: Floats, known: Floats | None = None, accuracy: Accuracy
 
 
 def follow(origin: Floats, x: Floats, target: Floats) -> Solution | None:
-    """The fixed point at `target`, shape (18,), followed along the straight line from `x` near the one at `origin`.
+    """The fixed point at `target`, shape (18,), by continuation from `x`, near the one at `origin`.
 
-    Steps grow while Newton converges and are halved when it does not; None when they get too short.
+    The path is a straight line. Steps grow while Newton converges and are halved when it does not; None when they
+    become too short.
     """
     solution = newton(origin[None], x[None]).one(0)
     if solution is None:

@@ -1,12 +1,13 @@
 """Motion of the specimen under a base acceleration: rest, rocking, impacts, overturning.
 
-The integration is `sim.kernel.rocking`; here it gets names, checks and threads.
+A front end to `sim.kernel.rocking` with named types, checks and threads.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
 from importlib import import_module
+from itertools import chain
 from math import ceil, log, log10, nan, pi
 from typing import Literal
 
@@ -16,20 +17,24 @@ from numpy.typing import ArrayLike, NDArray
 from sim.errors import InvalidInput
 from sim.excitation import ROW, Excitation
 from sim.specimen import Specimen
-from sim.sweep import in_threads
+from sim.sweep import in_threads, processors
 
 TOLERANCE = 1e-10
 """Default relative tolerance of a step. The error over 120 s of steady rocking is of the same order."""
 
 REST_ANGLE = 1e-12
-"""Bounce [rad] below which the block comes to rest; bounds the error of the angle that stopping makes."""
+"""Bounce [rad] below which the block comes to rest; also the bound of the resulting error of the angle."""
 
 MOST_IMPACTS = 1_000_000
-"""Impacts after which a run is given up as failed; a decaying bounce needs some five hundred."""
+"""Impacts after which a run fails; a decaying bounce needs about five hundred."""
+
+
+SMALLEST_PART, LARGEST_PART = 8, 64
+"""Runs integrated in parallel by one thread: enough to fill the lanes, few enough to balance the load."""
 
 
 class Mode(IntEnum):
-    """What the block does; the value is the sign that the equations use."""
+    """State of contact of the block; the value is the sign sg of the equations."""
 
     REST = 0
     ROCK_A = 1
@@ -37,7 +42,7 @@ class Mode(IntEnum):
 
 
 class Status(StrEnum):
-    """How a run ended."""
+    """Ending of a run."""
 
     COMPLETED = "completed"
     OVERTURNED_A = "overturned about A"
@@ -61,7 +66,7 @@ class State:
 
     @property
     def mode(self) -> Mode:
-        """The contact mode, which angle and angular velocity decide: theta = 0 with omega > 0 is about to rock on A."""
+        """The contact mode, from angle and angular velocity: theta = 0 with omega > 0 starts to rock about A."""
         return Mode(int(np.sign(self.theta or self.omega)))
 
     def as_array(self) -> NDArray[np.float64]:
@@ -76,7 +81,7 @@ class State:
 
 @dataclass(frozen=True)
 class Peaks:
-    """Greatest |u1| [m], |u2 - u1| [m] and |theta| [rad]; not a number where they were not watched."""
+    """Greatest |u1| [m], |u2 - u1| [m] and |theta| [rad]; NaN where they were not requested."""
 
     u1: float
     drift: float
@@ -85,10 +90,10 @@ class Peaks:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """What a run did.
+    """Result of a run.
 
     `end_time` [s] is the time of overturning or failure if there was one. `samples` has shape (n, 6), columns as
-    `State.as_array`; rows after the end of the run are not there. None when no samples were asked for.
+    `State.as_array`; there are no rows after the end of the run. None when no samples were requested.
     """
 
     status: Status
@@ -119,12 +124,12 @@ def simulate(
 ) -> Motion:
     """Integrate the specimen from `state` (default: at rest) through the whole `excitation`.
 
-    `sample_times`, shape (n,), ascending [s]; `peaks_from` [s] starts the window of the peaks, None watches none;
+    `sample_times`, shape (n,), ascending [s]; `peaks_from` [s] starts the window of the peaks, None requests none;
     `overturning_angle` [rad] is the |theta| that ends the run. A run that overturns or fails is a result, not an error.
-    Neither samples nor peaks move the motion, and each costs only when asked for.
+    Samples and peaks do not affect the motion and cost time only when requested.
 
-    Raises InvalidInput, before anything is integrated, for values outside their meaning.
-    Source: Eq. (8), (9), (A.1) and (A.3) of the paper; coming to rest is described in `sim.kernel.rocking.run`.
+    Raises InvalidInput, before anything is integrated, for values outside their range. Source: Eq. (8), (9), (A.1) and
+    (A.3) of the paper; coming to rest is described in `sim.kernel.rocking.run`.
     """
     check_options(tolerance, overturning_angle)
     run = _Run(specimen, Drive(excitation), state or State(), sample_times, peaks_from, tolerance, overturning_angle)
@@ -142,11 +147,12 @@ def simulate_many(
 ) -> list[Motion]:
     """`simulate` for many runs on all processors, in order.
 
-    A single specimen, excitation, state or window serves all runs. Everything is checked before the first run starts.
+    A single specimen, excitation, state or window applies to all runs. Everything is checked before the first run
+    starts.
 
     Raises InvalidInput when the sequences differ in length or a run is refused.
     """
-    import_module("sim.kernel.rocking")  # compiled once, before the threads start
+    import_module("sim.kernel.members")  # compiled once, before the threads start
 
     several = [len(item) for item in (specimens, excitations, states, peaks_from) if isinstance(item, Sequence)]
     runs = several[0] if several else 1
@@ -169,15 +175,24 @@ def simulate_many(
         )
         for i in range(runs)
     ]
-    return in_threads(_Run.motion, prepared)
+    # run members of equal order in parallel, in parts that occupy every processor and finish within a second
+    alike: dict[int, list[int]] = {}
+    for i, run in enumerate(prepared):
+        alike.setdefault(run.order, []).append(i)
+    share = -(-runs // processors())
+    size = min(share, max(SMALLEST_PART, min(-(-share // 4), LARGEST_PART)))
+    parts = [places[i : i + size] for places in alike.values() for i in range(0, len(places), size)]
+    motions = in_threads(lambda part: _side_by_side([prepared[i] for i in part]), parts)
+    ordered = dict(zip(chain(*parts), chain(*motions), strict=True))
+    return [ordered[i] for i in range(runs)]
 
 
 def series_order(tolerance: float, segment: float) -> int:
-    """Order of the Taylor series that reaches `tolerance` at the least cost, for segments of a typical length [s].
+    """Order of the Taylor series that reaches `tolerance` at minimum cost, for segments of a typical length [s].
 
-    Long segments: 1.6 orders per digit, measured. A record's samples end most steps, so a lower order that just
-    covers one is cheaper; the motion's radius of convergence is about 0.27 s. The step control keeps the tolerance
-    whatever the order.
+    Long segments: 1.6 orders per digit, measured. A record's samples end most steps, so a lower order that just spans
+    one interval is cheaper; the motion's radius of convergence is about 0.27 s. The step control meets the tolerance
+    with any order.
     """
     longest = ceil(-1.6 * log10(tolerance))
     covering = 3 + ceil(log(tolerance) / log(min(segment, 0.2) / 0.27))
@@ -185,7 +200,7 @@ def series_order(tolerance: float, segment: float) -> int:
 
 
 def check_options(tolerance: float, overturning_angle: float) -> None:
-    """Refuse, as InvalidInput, options outside their meaning."""
+    """Raise InvalidInput for options outside their range."""
     if not 1e-15 <= tolerance <= 1e-3:
         raise InvalidInput("tolerance", tolerance, "it must be between 1e-15 and 1e-3")
     if not 0.0 < overturning_angle <= pi / 2:
@@ -193,7 +208,7 @@ def check_options(tolerance: float, overturning_angle: float) -> None:
 
 
 def check_state(specimen: Specimen, state: State, overturning_angle: float) -> None:
-    """Refuse, as InvalidInput, a state in which a motion cannot start."""
+    """Raise InvalidInput for a state that is not a valid start."""
     x = state.as_array()
     if not np.isfinite(x).all():
         raise InvalidInput("state", state, "all of its components must be finite")
@@ -202,14 +217,14 @@ def check_state(specimen: Specimen, state: State, overturning_angle: float) -> N
     if abs(state.theta) >= overturning_angle:
         raise InvalidInput("theta", state.theta, f"the block must start below {overturning_angle:g} rad")
     if specimen.beta and abs(state.u1) >= specimen.d:
-        raise InvalidInput("u1", state.u1, f"the spring must keep a length: |u1| below d = {specimen.d:g} m")
+        raise InvalidInput("u1", state.u1, f"the spring's length must stay positive: |u1| below d = {specimen.d:g} m")
 
 
 def motion_of(
     report: NDArray[np.float64], x: NDArray[np.float64], samples: NDArray[np.float64] | None, *, watched: bool
 ) -> Motion:
-    """What the kernel's `report`, shape (8,), and end state `x`, shape (6,), say; `watched`: whether peaks were."""
-    from sim.kernel import rocking as kernel
+    """Result from the kernel's `report`, shape (8,), and end state `x`, shape (6,), with peaks if `watched`."""
+    from sim.kernel import steps as kernel
 
     names = {
         kernel.COMPLETED: Status.COMPLETED,
@@ -234,7 +249,7 @@ class Drive:
         segments = excitation.packed()
         if segments.ndim != 2 or segments.shape[0] < 1 or segments.shape[1] != ROW:
             raise InvalidInput("excitation", segments.shape, f"its table must have at least one row of {ROW} numbers")
-        # a finite sum has finite terms, and costs half of looking at each
+        # a finite sum implies finite terms, at half the cost of checking each
         if not np.isfinite(segments.sum()) and not np.isfinite(segments).all():
             raise InvalidInput("excitation", "a number that is not finite", "all of its numbers must be finite")
         lengths = segments[:, 0]
@@ -247,7 +262,7 @@ class Drive:
 
 @dataclass(frozen=True, eq=False)
 class _Run:
-    """One run, checked when it is made."""
+    """A run; its arguments are checked on construction."""
 
     specimen: Specimen
     drive: Drive
@@ -263,6 +278,10 @@ class _Run:
         if self.peaks_from is not None and not 0.0 <= self.peaks_from < duration:
             raise InvalidInput("peaks_from", self.peaks_from, f"it must lie within the {duration:g} s of the run")
 
+    @property
+    def order(self) -> int:
+        return series_order(self.tolerance, self.drive.typical)
+
     def motion(self) -> Motion:
         from sim.kernel import rocking as kernel
 
@@ -277,7 +296,7 @@ class _Run:
             times,
             0,
             samples,
-            series_order(self.tolerance, self.drive.typical),
+            self.order,
             self.tolerance,
             np.inf,
             self.overturning_angle,
@@ -290,10 +309,43 @@ class _Run:
         return motion_of(report, x, None if self.sample_times is None else samples, watched=self.peaks_from is not None)
 
 
+def _side_by_side(runs: list[_Run]) -> list[Motion]:
+    """Same as `_Run.motion`, bit for bit, for several runs at once, which have no samples and share order, tolerance
+    and overturning angle.
+    """
+    from sim.kernel import members as kernel
+
+    drives = list({id(run.drive): run.drive for run in runs}.values())
+    ends = np.cumsum([len(drive.segments) for drive in drives])
+    span = {id(drive): (end - len(drive.segments), end) for drive, end in zip(drives, ends, strict=True)}
+    models = list({id(run.specimen): run.specimen for run in runs}.values())
+    place = {id(specimen): i for i, specimen in enumerate(models)}
+    states = np.array([run.state.as_array() for run in runs])
+    reports = np.zeros((len(runs), kernel.REPORT))
+    kernel.advance_members(
+        np.array([specimen.packed() for specimen in models]),
+        np.array([place[id(run.specimen)] for run in runs]),
+        np.concatenate([drive.segments for drive in drives]),
+        np.array([span[id(run.drive)] for run in runs]),
+        states,
+        runs[0].order,
+        runs[0].tolerance,
+        runs[0].overturning_angle,
+        REST_ANGLE,
+        np.array([np.inf if run.peaks_from is None else run.peaks_from for run in runs]),
+        MOST_IMPACTS,
+        reports,
+    )
+    return [
+        motion_of(report, x, None, watched=run.peaks_from is not None)
+        for run, x, report in zip(runs, states, reports, strict=True)
+    ]
+
+
 def checked_times(sample_times: ArrayLike | None, duration: float) -> NDArray[np.float64]:
     times = np.ascontiguousarray([] if sample_times is None else sample_times, dtype=np.float64)
     if times.ndim != 1 or not np.isfinite(times).all() or (np.diff(times) < 0.0).any():
-        raise InvalidInput("sample_times", times.shape, "they must be finite ascending seconds in one row")
+        raise InvalidInput("sample_times", times.shape, "they must be one-dimensional, finite and ascending [s]")
     if times.size and not (times[0] >= 0.0 and times[-1] <= duration * (1.0 + 1e-12)):
         raise InvalidInput("sample_times", (times[0], times[-1]), f"they must lie within the {duration:g} s of the run")
     return np.clip(times, 0.0, duration)

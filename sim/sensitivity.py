@@ -1,9 +1,9 @@
-"""How the gain coefficients move with every parameter.
+"""Sensitivities of the gain coefficients to every parameter.
 
 The rocking orbit is a fixed point x = F(x, p) of the return map. Implicit function theorem: dx/dp = (I - F_x)^-1 F_p;
-F_x is the matrix whose eigenvalues are the Floquet multipliers. A peak is a stationary value u(t*), so it moves as u
-does at a fixed t* (envelope theorem): dP/dp = u_x dx/dp + u_p. The greatest |u| itself would not do: the motions to
-both sides are so nearly alike that a small step changes which of them is the greatest. alpha = P / P_bare then
+F_x is the matrix whose eigenvalues are the Floquet multipliers. A peak is a stationary value u(t*), so its derivative
+is that of u at a fixed t* (envelope theorem): dP/dp = u_x dx/dp + u_p. The larger of both peaks is unsuitable: the
+excursions to both sides are so similar that a small step changes which of them is larger. alpha = P / P_bare then
 follows by the quotient rule.
 """
 
@@ -27,10 +27,10 @@ STEP = 3e-5
 """Relative step of the differences, of fourth order; absolute for a parameter that is zero."""
 
 TOLERANCE = 1e-13
-"""Of the runs that are differenced."""
+"""Tolerance of the runs whose differences are taken."""
 
 SAMPLES, ZOOMS = 401, 2
-"""Samples in which a peak is sought, and how often the search is narrowed down to a few of them."""
+"""Samples of each search for a peak, and number of successive refinements."""
 
 Floats = NDArray[np.float64]
 
@@ -51,7 +51,7 @@ class _Point(NamedTuple):
 
 
 def parameter_values(specimen: Specimen, omega: float, amplitude: float) -> dict[str, float]:
-    """Every number that a prediction depends on, by name [SI]; h2 is not among them: no equation contains it."""
+    """Every parameter that a prediction depends on, by name [SI]; h2 is absent because no equation contains it."""
     frame, block = specimen.frame.model_dump(exclude={"h2"}), specimen.block.model_dump()
     others = {"beta": specimen.beta or 0.0, "d": specimen.d, "g": specimen.g}
     return {**frame, **block, **others, "omega": omega, "amplitude": amplitude}
@@ -66,11 +66,11 @@ def sensitivities(
 ) -> dict[str, Sensitivity]:
     """Derivatives of alpha_1 and alpha_2 with respect to every name of `parameter_values`.
 
-    `orbit`: the orbit there, if it is known already. The bare test moves with the parameters too: it has the same
-    frame, frequency [rad/s] and amplitude [m/s2]. beta is k_C / k1: a change of k1 alone takes k_C along. Where the
-    peaks to both sides are equal the derivative is that of one of them.
+    `orbit`: the orbit there, if already known. The bare test depends on the parameters too: it has the same frame,
+    frequency [rad/s] and amplitude [m/s2]. beta is k_C / k1: a change of k1 alone changes k_C too. Where the peaks to
+    both sides are equal, the derivative is that of one of them.
 
-    Raises InvalidInput as `rocking_orbit` does, NoOrbit when the layer does not exist.
+    Raises InvalidInput as `rocking_orbit` does, NoOrbit when the branch does not exist.
     """
     if orbit is None:
         known = rocking_orbit if layer == "rocking" else resting_state
@@ -113,7 +113,7 @@ def _along_branch(orbit: Orbit, moved: list[_Point], steps: Floats) -> Floats:
 
 
 def _peak_times(orbit: Orbit) -> Floats:
-    """When |u1| and |u2 - u1| are greatest [s], shape (2,), counted from the orbit's section within one period."""
+    """Times [s] at which |u1| and |u2 - u1| are greatest, shape (2,), from the orbit's section, within one period."""
     found = np.empty(2)
     here = _Point(orbit.specimen, orbit.omega, orbit.amplitude)
     for which in range(2):
@@ -123,7 +123,7 @@ def _peak_times(orbit: Orbit) -> Floats:
             step = float(times[1] - times[0])
             motion = _motion(here, orbit.section, times)
             at = int(np.abs(motion[1:-1, which]).argmax()) + 1
-            # a maximum is flat, so rounding hides where it is: the zero of the velocity is sharp
+            # a maximum is flat, so that rounding blurs its time: find the zero of the velocity
             before, rate, after = motion[at - 1 : at + 2, 2 + which]
             middle = float(times[at] - np.clip(2.0 * step * rate / (after - before), -step, step))
             width = 2.0 * step
@@ -161,7 +161,7 @@ def _slopes(values: Floats, steps: Floats) -> Floats:
 
 
 def _moved(specimen: Specimen, values: dict[str, float], name: str, change: float) -> _Point:
-    """The point with one parameter changed. Not validated: a step may go just below a parameter's limit of zero."""
+    """The point with one parameter changed. Not validated: a step may take a parameter just below its limit of zero."""
     new = {**values, name: values[name] + change}
 
     def part(names: Any) -> dict[str, Any]:
@@ -175,7 +175,7 @@ def _moved(specimen: Specimen, values: dict[str, float], name: str, change: floa
 
 @dataclass(frozen=True)
 class Budget:
-    """First-order standard uncertainties of alpha_1 and alpha_2, and by parameter what each alone would give."""
+    """First-order standard uncertainties of alpha_1 and alpha_2, and the contribution of each parameter."""
 
     alpha_1: float
     alpha_2: float
@@ -189,7 +189,7 @@ def budget(
 ) -> Budget:
     """Uncertainty of alpha_1 and alpha_2 from standard uncertainties [SI] of parameters, by name.
 
-    `correlation`: coefficients of pairs of names; pairs that are not named are independent. First order: JCGM 100:2008
+    `correlation`: coefficients of pairs of names; other pairs are independent. First order: JCGM 100:2008
     (GUM), Eq. (10) and (13). Raises InvalidInput for unknown names, negative uncertainties, impossible correlations.
     """
     names = list(standard_uncertainties)
@@ -206,7 +206,7 @@ def budget(
         i, j = names.index(one), names.index(other)
         matrix[i, j] = matrix[j, i] = coefficient
     if names and float(np.linalg.eigvalsh(matrix).min()) < -1e-12:
-        raise InvalidInput("correlation", dict(correlation or {}), "quantities cannot be correlated like this together")
+        raise InvalidInput("correlation", dict(correlation or {}), "these correlations contradict each other")
     rows = [(sensitivities[name].alpha_1, sensitivities[name].alpha_2) for name in names]
     parts = np.array(rows).reshape(-1, 2) * np.array(list(standard_uncertainties.values()))[:, None]
     alpha_1, alpha_2 = np.sqrt(np.maximum(np.einsum("ia,ij,ja->a", parts, matrix, parts), 0.0)).tolist()

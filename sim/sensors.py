@@ -1,12 +1,11 @@
-"""From motion to counts: lasers, accelerometer, displacement sensor, filter unit, converter.
+"""Models of the instruments from motion to counts: lasers, accelerometer, displacement sensor, converter.
 
-Each instrument is a group of parameters; `stream` starts it, and a stream is fed ticks in blocks of any size with
-the same samples as a result. Every stream draws from its own random generator, in order.
+Each instrument is a group of parameters; `stream` starts it. The samples do not depend on the size of the blocks of
+ticks passed to a stream. Every stream draws from its own random generator, in order.
 """
 
-from functools import lru_cache
-from math import floor, pi, sin, tan
-from typing import Any, Literal
+from math import floor
+from typing import Literal
 
 import numpy as np
 from numpy.random import Generator, SeedSequence
@@ -18,11 +17,11 @@ Array = NDArray[np.float64]
 
 
 class Laser(Parameters):
-    """A triangulation laser in the manner of the optoNCDT 1420, on its analogue output, at rest in mid range.
+    """A triangulation laser similar to the optoNCDT 1420, read at its analogue output; at rest in mid range.
 
-    The current goes from 4 mA at the start to 20 mA at the end of the measuring range with 1 % of reserve on either
+    The current is 4 mA at the start and 20 mA at the end of the measuring range, with a reserve of 1 % on either
     side (manual of the optoNCDT 1420 and of its family); the number of bits of the output and the error current
-    are not documented for certain and are therefore parameters.
+    are not clearly documented and therefore parameters.
     """
 
     measuring_range: float = quantity(0.200, "m", "measuring range; the storey rests in its middle", gt=0)
@@ -34,32 +33,32 @@ class Laser(Parameters):
     linearity: float = quantity(
         0.0008, "1", "amplitude of the smooth linearity error over the measuring range", ge=0, lt=0.1
     )
-    linearity_waves: float = quantity(1.5, "1", "waves of the linearity error within the measuring range", ge=0)
+    linearity_waves: float = quantity(1.5, "1", "periods of the linearity error within the measuring range", ge=0)
     scale_error: float = quantity(0.0, "1", "relative error of the sensitivity", gt=-0.5, lt=0.5)
-    load: float = quantity(500.0, "ohm", "resistor that turns the current into a voltage", gt=0)
-    error_current: float = quantity(0.0030, "A", "current when there is no valid measurement", ge=0)
+    load: float = quantity(500.0, "ohm", "load resistor that converts the current to a voltage", gt=0)
+    error_current: float = quantity(0.0030, "A", "current without a valid measurement", ge=0)
     reference: Literal["ground", "table"] = quantity(
-        "ground", "", "where the laser stands: on the ground it sees x + u, on the table it sees u"
+        "ground", "", "where the laser is mounted: on the ground it measures x + u, on the table u"
     )
 
     @property
     def nominal(self) -> tuple[float, float]:
-        """(m/V, m): displacement = volts * first + second, as the data sheet has it."""
+        """(m/V, m): displacement = volts * first + second, from the data sheet."""
         slope = self.measuring_range / (0.016 * self.load)
         return slope, -slope * 0.004 * self.load - 0.5 * self.measuring_range
 
     @property
     def valid_volts(self) -> tuple[float, float]:
-        """Voltages between which the output is a measurement: 3.8 to 20.2 mA, the reserve included."""
+        """Range of voltages of valid measurements: 3.8 to 20.2 mA, the reserve included."""
         return 0.0038 * self.load, 0.0202 * self.load
 
     def stream(self, sample_rate: float, seed: SeedSequence) -> "LaserStream":
-        """Start measuring, ticks coming at `sample_rate` [1/s]."""
+        """Start measuring with ticks at `sample_rate` [1/s]."""
         return LaserStream(self, sample_rate, seed)
 
 
 class LaserStream:
-    """A laser at work: fed with what it sees at the ticks, it gives its output at the ticks."""
+    """Running laser: converts the target's motion at the ticks to the output at the ticks."""
 
     def __init__(self, laser: Laser, sample_rate: float, seed: SeedSequence) -> None:
         from sim.kernel.laser import measure
@@ -86,12 +85,12 @@ class LaserStream:
         self._tick = 0
         self._following = floor(-self._phase) - laser.latency
         self._last = np.zeros(2)
-        self._shown = np.empty(laser.latency + 1)
+        self._taken = np.empty(laser.latency + 1)
 
     def read(self, displacement: Array, velocity: Array) -> Array:
-        """Output [V] at each tick, shape (n,), for what is seen there: shape (n,) [m] and [m/s]."""
+        """Output [V] at each tick, shape (n,), for the target's position and velocity, shape (n,) [m], [m/s]."""
         if self._tick == 0:
-            # what was shown before the first tick was measured on the same standing storey
+            # before the first tick, the output is a measurement of the storey at rest
             self._last[0] = displacement[0]
         newest = floor((self._tick + displacement.size - 1) * self._per_tick - self._phase)
         noise = self._noise * self._random.standard_normal(newest + 1 - self._following)
@@ -107,7 +106,7 @@ class LaserStream:
             displacement,
             velocity,
             self._last,
-            self._shown,
+            self._taken,
             volts,
         )
         self._tick += displacement.size
@@ -123,17 +122,20 @@ class LinearSensor(Parameters):
 
     @property
     def nominal(self) -> tuple[float, float]:
-        """(unit/V, unit): value = volts * first + second, as the calibration has it."""
+        """(unit/V, unit): value = volts * first + second, from the calibration."""
         return 1.0 / self.sensitivity, 0.0
 
     def volts(self, value: Array, sample_rate: float, random: Generator) -> Array:
         """Output [V] for values in the sensor's unit, same shape; the noise is white up to half the sample rate."""
-        noise = self.noise_density * (0.5 * sample_rate) ** 0.5 * random.standard_normal(value.size)
-        return self.sensitivity * (1.0 + self.scale_error) * (value + noise)
+        found = random.standard_normal(value.size)
+        found *= self.noise_density * (0.5 * sample_rate) ** 0.5
+        found += value
+        found *= self.sensitivity * (1.0 + self.scale_error)
+        return found
 
 
 class Accelerometer(LinearSensor):
-    """A servo or MEMS accelerometer on the table, good down to zero frequency."""
+    """Servo or MEMS accelerometer on the table, usable down to zero frequency."""
 
     sensitivity: float = quantity(1.0, "V s2/m", "volts per m/s2 as calibrated", gt=0)
     noise_density: float = quantity(2e-4, "m/s2/Hz^0.5", "spectral density of the white noise", ge=0)
@@ -152,12 +154,12 @@ SIMULATED = ("acceleration", "velocity", "displacement")
 
 
 class PlacedSensor(LinearSensor):
-    """A further sensor with a proportional voltage output: the motion of `place` against the ground."""
+    """A further sensor with a proportional voltage output, for the motion of `place` relative to the ground."""
 
     name: str = quantity(..., "", "name of its channel")
     measures: str = quantity(..., "", "one of SIMULATED")
     unit: str = quantity(..., "", "SI unit of the values")
-    place: Place = quantity(..., "", "what it is mounted on")
+    place: Place = quantity(..., "", "part that it is mounted on")
     sensitivity: float = quantity(..., "V/unit", "volts per unit as calibrated")
     zero: float = quantity(0.0, "V", "voltage at zero")
     noise_density: float = quantity(0.0, "unit/Hz^0.5", "spectral density of the white noise", ge=0)
@@ -170,59 +172,8 @@ class PlacedSensor(LinearSensor):
         return super().volts(value, sample_rate, random) + self.zero
 
 
-@lru_cache
-def _sections(order: int, share: float) -> tuple[Array, Array]:
-    """Second-order sections of the low-pass with cutoff `share` of the sample rate, and their settled state."""
-    from scipy import signal
-
-    sections: Any = signal.butter(order, share, fs=1.0, output="sos")
-    settled: Any = signal.sosfilt_zi(sections)
-    return sections, settled
-
-
-class FilterUnit(Parameters):
-    """The analogue low-pass before the converter: the same Butterworth card in every channel.
-
-    Simulated by the bilinear transform at the sample rate with the cutoff kept in place.
-    """
-
-    order: int = quantity(4, "1", "order of the Butterworth low-pass", ge=1, le=10)
-    cutoff: float = quantity(100.0, "Hz", "frequency at which the gain is -3 dB", gt=0)
-
-    def delay(self, sample_rate: float) -> float:
-        """Delay of slow signals [s], as simulated at `sample_rate` [1/s]: 1 / (omega_c sin(pi / 2n)).
-
-        The group delay of a Butterworth low-pass at zero frequency, from its poles; omega_c as the bilinear transform
-        bends it.
-        """
-        bent = 2.0 * sample_rate * tan(pi * self.cutoff / sample_rate)
-        return 1.0 / (bent * sin(pi / (2 * self.order)))
-
-    def stream(self, sample_rate: float) -> "FilterStream":
-        """Start filtering channels sampled at `sample_rate` [1/s]."""
-        return FilterStream(*_sections(self.order, self.cutoff / sample_rate))
-
-
-class FilterStream:
-    """The filter cards at work; they have been on long before the first sample."""
-
-    def __init__(self, sections: Array, settled: Array) -> None:
-        self._sections = sections
-        self._settled = settled
-        self._state: Array | None = None
-
-    def read(self, volts: Array) -> Array:
-        """Filtered voltages, shape (n_channels, n) as given."""
-        from scipy import signal
-
-        if self._state is None:
-            self._state = self._settled[:, None, :] * volts[None, :, :1]
-        filtered, self._state = signal.sosfilt(self._sections, volts, axis=1, zi=self._state)
-        return np.asarray(filtered)
-
-
 class Converter(Parameters):
-    """The analogue-to-digital converter; beyond its range it stays at its last code."""
+    """The analogue-to-digital converter; beyond its range it saturates."""
 
     bits: int = quantity(14, "1", "resolution", ge=8, le=16)
     range: float = quantity(10.0, "V", "largest magnitude of the input", gt=0)
@@ -240,5 +191,12 @@ class Converter(Parameters):
 
     def counts(self, volts: Array, random: Generator) -> NDArray[np.int16]:
         """Counts of the voltages of all channels, shape (n, n_channels) as given."""
-        noisy = volts + self.noise * random.standard_normal(volts.shape)
-        return np.clip(np.rint(noisy / self.lsb), *self.codes).astype(np.int16)
+        noisy = random.standard_normal(volts.shape)
+        noisy *= self.noise
+        noisy += volts
+        noisy /= self.lsb
+        np.rint(noisy, out=noisy)
+        lowest, highest = self.codes
+        np.maximum(noisy, lowest, out=noisy)
+        # each channel is contiguous in memory, as the following steps require
+        return np.minimum(noisy, highest, out=noisy).astype(np.int16, order="F")

@@ -25,7 +25,7 @@ class Shaker(Parameters):
     bl: float = quantity(50.0, "N/A", "force constant Bl of the moving coil", gt=0)
     resistance: float = quantity(0.8, "ohm", "resistance of the coil", gt=0)
     amplifier: Literal["voltage", "current"] = quantity(
-        "voltage", "", "what the amplifier holds: coil voltage or current"
+        "voltage", "", "controlled output of the amplifier: coil voltage or current"
     )
     gain: float = quantity(
         3.0, "1", "coil volts (voltage amplifier) or coil amperes (current amplifier) per volt of drive", gt=0
@@ -33,15 +33,15 @@ class Shaker(Parameters):
     amplifier_lag: float = quantity(
         0.0, "s", "time constant of a first-order lag of the amplifier; 0 for none", ge=0, usual=(1e-5, 0.02)
     )
-    voltage_limit: float = quantity(30.0, "V", "largest coil voltage the amplifier can give", gt=0)
-    current_limit: float = quantity(18.0, "A", "largest coil current the amplifier can give", gt=0)
+    voltage_limit: float = quantity(30.0, "V", "largest coil voltage of the amplifier", gt=0)
+    current_limit: float = quantity(18.0, "A", "largest coil current of the amplifier", gt=0)
     drive_range: float = quantity(10.0, "V", "largest magnitude of the drive at the amplifier's input", gt=0)
     friction: float = quantity(1.5, "N", "Coulomb friction F_c of the guides", ge=0)
-    friction_velocity: float = quantity(0.004, "m/s", "velocity v_c over which the friction turns round", gt=0)
-    half_stroke: float = quantity(0.075, "m", "displacement from mid stroke at which the end stops touch", gt=0)
+    friction_velocity: float = quantity(0.004, "m/s", "velocity v_c over which the friction reverses", gt=0)
+    half_stroke: float = quantity(0.075, "m", "distance from mid stroke to each end stop", gt=0)
     stop_stiffness: float = quantity(4.0e5, "N/m", "stiffness of an end stop", gt=0)
     stop_damping: float = quantity(
-        2.0, "s/m", "Hunt-Crossley damping of an end stop: its force grows by this share per m/s of approach", ge=0
+        2.0, "s/m", "Hunt-Crossley damping of an end stop: relative increase of force per m/s of approach", ge=0
     )
     force_noise: float = quantity(0.005, "N/Hz^0.5", "spectral density of the white force noise on the table", ge=0)
     band_low: float = quantity(1.0, "Hz", "lower end of the usable band", gt=0)
@@ -54,12 +54,12 @@ class Shaker(Parameters):
 
     @property
     def force_per_volt(self) -> float:
-        """Force on the blocked table per volt of drive [N/V]."""
+        """Blocked force per volt of drive [N/V]."""
         return self.gain * self.bl / (self.resistance if self.amplifier == "voltage" else 1.0)
 
     @property
     def shortest_time(self) -> float:
-        """Shortest time constant of the shaker itself [s]: amplifier lag, damped motion, or swing on an end stop."""
+        """Shortest time constant of the shaker [s]: amplifier lag, damped motion, or oscillation on an end stop."""
         motion = self.moving_mass / max(self.c_s + self.electric_damping, 1e-9)
         swing = (self.moving_mass / self.stop_stiffness) ** 0.5
         return min(motion, swing, self.amplifier_lag or motion)

@@ -14,7 +14,7 @@ from sim.errors import InvalidInput
 from sim.parameters import COUPLING, Parameters, quantity
 
 SLOWEST, FASTEST = 1e-3, 1e5
-"""Natural frequencies [rad/s] of any frame that stands on a table; beyond them a number was mistyped."""
+"""Plausible natural frequencies [rad/s] of a frame on a shake table; values beyond them are typing errors."""
 
 
 DAMPING = (0.001, 0.15)
@@ -42,7 +42,7 @@ class Frame(Parameters):
         except ArithmeticError:
             lower, upper = 0.0, 0.0
         if not (lower >= SLOWEST and upper <= FASTEST):
-            makes = f"with its masses and k2 it makes frequencies beyond {SLOWEST:g} to {FASTEST:g} rad/s"
+            makes = f"with its masses and k2 a frequency is outside {SLOWEST:g} to {FASTEST:g} rad/s"
             raise InvalidInput("k1", self.k1, makes)
         return self
 
@@ -73,23 +73,23 @@ class Frame(Parameters):
 
 
 class Block(Parameters):
-    """The rigid rocking block (Table 2). It neither slides nor flies free."""
+    """The rigid rocking block (Table 2). It neither slides nor lifts off both corners."""
 
     b: float = quantity(0.025, "m", "half width of the block", gt=0, usual=(0.005, 0.5))
     h_b: float = quantity(0.200, "m", "half height of the block", gt=0, usual=(0.02, 2.0))
     s: float = quantity(0.10, "m", "depth of the block, across the plane of motion", gt=0, usual=(0.01, 1.0))
     rho: float = quantity(2450.0, "kg/m3", "density of the block", gt=0, usual=(400.0, 12_000.0))
     restitution_factor: float = quantity(
-        1.0, "1", "measured over theoretical restitution r_exp/r_th (the paper measured 0.992)", ge=0, le=2
+        1.0, "1", "ratio of measured to theoretical restitution r_exp/r_th (the paper measured 0.992)", ge=0, le=2
     )
 
     @model_validator(mode="after")
     def _an_impact_gives_no_energy(self) -> "Block":
-        # below 0, as for a slab 1.42 times as wide as it is high, the impact would turn it back on the corner it left
+        # below 0, as for a slab 1.42 times as wide as high, the impact would return it to the previous corner
         if not 0.0 <= self.restitution <= 1.0:
             allowed = (
-                f"with b = {self.b:g} m and h_b = {self.h_b:g} m it gives r = {self.restitution:.4g}: an impact "
-                "neither adds speed nor turns it back, r is 0 to 1"
+                f"with b = {self.b:g} m and h_b = {self.h_b:g} m it gives r = {self.restitution:.4g}, outside 0 to 1: "
+                "an impact neither increases nor reverses the speed"
             )
             raise InvalidInput("restitution_factor", self.restitution_factor, allowed)
         return self
@@ -111,11 +111,11 @@ class Block(Parameters):
 
     @property
     def restitution(self) -> float:
-        """r = factor (J - 2b S_y) / J with S_y = M b: angular velocity after over before an impact (Housner)."""
+        """r = factor (J - 2b S_y) / J with S_y = M b: angular velocity after an impact over that before (Housner)."""
         return self.restitution_factor * (1.0 - 2.0 * self.b * self.mass * self.b / self.inertia)
 
     def restitution_on(self, table_mass: float) -> float:
-        """The same on a table of `table_mass` [kg], specimen not counted, that nothing holds during the impact.
+        """Restitution on a table of `table_mass` [kg] without specimen that moves freely during the impact.
 
         Housner's balance with the table's share of the horizontal momentum: (r J - mu) / (J - mu) with
         mu = (M h_b)^2 / (m_t + M).
@@ -127,17 +127,17 @@ class Block(Parameters):
 class Spring(Parameters):
     """A coupling spring whose stiffness has been measured."""
 
-    label: float = quantity(
-        ..., "1", "what is written on it: beta, its nominal stiffness over k1", gt=0, usual=COUPLING
-    )
+    label: float = quantity(..., "1", "label: beta, its nominal stiffness over k1", gt=0, usual=COUPLING)
     k_c: float = quantity(..., "N/m", "its stiffness", gt=0, usual=(5.0, 1100.0))
 
 
 class Specimen(Parameters):
-    """Frame, block and spring. `beta = None` is the bare frame: no block, no spring.
+    """Frame, block and spring.
 
-    Equations use `beta` and `k_c`. What people call a spring is its `label`, which stays when k1 or k_C turn out to be
-    other than they were taken to be.
+    `beta = None` is the bare frame: no block, no spring.
+
+    Equations use `beta` and `k_c`. The `label` identifies a spring to its users; it does not change when k1 or k_C are
+    measured.
     """
 
     frame: Frame = Frame()
@@ -145,13 +145,11 @@ class Specimen(Parameters):
     beta: float | None = quantity(
         None, "1", "stiffness ratio k_C/k1 of the spring; absent for the bare frame", ge=0, usual=COUPLING
     )
-    spring_label: float | None = quantity(
-        None, "1", "what is written on the mounted spring; absent: beta", ge=0, usual=COUPLING
-    )
+    spring_label: float | None = quantity(None, "1", "label of the mounted spring; absent: beta", ge=0, usual=COUPLING)
     spring_k1: float | None = quantity(
         None,
         "N/m",
-        "k1 that the labels of the springs refer to: nominal k_C = label times it; absent: k1",
+        "reference k1 of the springs' labels: nominal k_C = label times this value; absent: k1",
         gt=0,
         usual=(40.0, 1100.0),
         example=213.44,
@@ -164,10 +162,16 @@ class Specimen(Parameters):
     def _springs_can_be_told_apart(self) -> "Specimen":
         labels = [spring.label for spring in self.springs]
         if len(set(labels)) < len(labels):
-            raise InvalidInput("springs", labels, "each label may be there once")
+            raise InvalidInput("springs", labels, "each label may occur once")
         if self.spring_label is not None and self.beta is None:
-            raise InvalidInput("spring_label", self.spring_label, "the bare frame has no spring: leave it out")
+            raise InvalidInput("spring_label", self.spring_label, "the bare frame has no spring: omit it")
         return self
+
+    @property
+    def mass(self) -> float:
+        """Mass on the table [kg]: the frame's storeys, and the block unless the frame is bare."""
+        block = self.block.mass if self.beta is not None else 0.0
+        return self.frame.m1 + self.frame.m2 + block
 
     @property
     def k_c(self) -> float:
@@ -176,28 +180,28 @@ class Specimen(Parameters):
 
     @property
     def label(self) -> float | None:
-        """What the mounted spring is called in requests, results and figures; None for the bare frame."""
+        """Label of the mounted spring in requests, results and figures; None for the bare frame."""
         return self.beta if self.spring_label is None else self.spring_label
 
     @property
     def nominal_k_c(self) -> float:
-        """Stiffness that the label of the mounted spring promises [N/m]; 0 for the bare frame."""
+        """Nominal stiffness of the mounted spring by its label [N/m]; 0 for the bare frame."""
         return (self.label or 0.0) * (self.spring_k1 or self.frame.k1)
 
     @property
     def uplift_acceleration(self) -> float:
-        """g / lambda [m/s2]: base acceleration that lifts the stand-alone block (Eq. 9)."""
+        """g / lambda [m/s2]: base acceleration at which the stand-alone block lifts (Eq. 9)."""
         return self.g / self.block.slenderness
 
     def coupled(self, label: float) -> "Specimen":
-        """The same specimen with the spring labelled `label`: its measured stiffness, the nominal one without."""
+        """The same specimen with the spring labelled `label`, with its measured or else its nominal stiffness."""
         measured = next((each.k_c for each in self.springs if isclose(each.label, label)), None)
         if measured is not None:
             return self.with_spring(measured, label)
         return self._mounted(label) if self.spring_k1 is None else self.with_spring(label * self.spring_k1, label)
 
     def with_spring(self, k_c: float, label: float | None = None) -> "Specimen":
-        """The same specimen with a spring of `k_c` [N/m], whatever is written on it: `label`, or what it amounts to."""
+        """The same specimen with a spring of `k_c` [N/m], labelled `label` or, by default, by its stiffness ratio."""
         nominal = k_c / (self.spring_k1 or self.frame.k1)
         return self._mounted(k_c / self.frame.k1, nominal if label is None else label)
 
@@ -210,7 +214,7 @@ class Specimen(Parameters):
         return Specimen(**kept, beta=beta, spring_label=label if label != beta else None)
 
     def packed(self) -> NDArray[np.float64]:
-        """The parameters as `sim.kernel` takes them, shape (16,): see `sim.kernel.packing` for the order."""
+        """The parameters for `sim.kernel`, shape (16,), in the order of `sim.kernel.packing`."""
         f, k, (c1, c2) = self.frame, self.block, self.frame.dashpots
         frame = (f.m1, f.m2, f.k1, f.k2, c1, c2, f.h1, self.k_c, self.d)
         block = (k.b, k.h_b, k.mass, k.inertia, k.restitution, self.g, 0.0 if self.beta is None else 1.0)

@@ -1,8 +1,8 @@
-"""The steady response to a sine, solved for instead of waited for.
+"""The steady response to a sine, as the solution of a boundary-value problem.
 
 Two periodic motions exist: the block rocks with two impacts per period of the drive, or it never lifts. They can
 coexist. The rocking one is a fixed point of the return map of the section "just after the impact into theta > 0";
-the full period is taken, because the spring sits on one side and the model is not symmetric in theta.
+it covers the full period, because the spring is on one side and the model is not symmetric in theta.
 """
 
 from collections.abc import Sequence
@@ -22,10 +22,10 @@ from sim.rocking import Peaks, State, simulate
 from sim.specimen import Specimen
 
 SEED_SPECIMEN, SEED_OMEGA, SEED_AMPLITUDE = Specimen(beta=0.4), 16.0, 1.238512
-"""Where an orbit is known; from here it is followed to wherever it is asked for."""
+"""Parameters of a known orbit, from which continuation starts."""
 
 SEED_SECTION = (3.11068, -0.0010828, 0.00037455, 0.049398, -0.11073, 0.67994)
-"""The orbit there, to five digits, as a start for Newton: [phase, u1, u2, v1, v2, omega] on the section."""
+"""The known orbit to five digits, as a start for Newton's method: [phase, u1, u2, v1, v2, omega] on the section."""
 
 
 class NoOrbit(RockbenchError):
@@ -34,9 +34,15 @@ class NoOrbit(RockbenchError):
     error_code = "no_orbit"
 
 
+def slowest_of(multipliers: NDArray[np.complex128]) -> complex:
+    """The multiplier of greatest modulus; of a conjugate pair the one in the upper half plane."""
+    found = multipliers[int(np.argmax(np.abs(multipliers)))]
+    return complex(found.real, abs(found.imag))
+
+
 @dataclass(frozen=True, eq=False)
 class Orbit:
-    """One steady motion with the period of the drive.
+    """Steady motion with the period of the drive.
 
     `phase` [rad] of the base's sine and `start`: a point of the orbit. `peaks` over the period; `impacts` in it.
     `multipliers`: Floquet multipliers, complex, shape (6,) when rocking, (4,) when the block rests.
@@ -54,7 +60,7 @@ class Orbit:
 
     @property
     def section(self) -> NDArray[np.float64]:
-        """[phase, u1, u2, v1, v2, omega] at `start`, shape (6,): where the return map takes the orbit up."""
+        """[phase, u1, u2, v1, v2, omega] at `start`, shape (6,): the point of the orbit on the return map's section."""
         x = self.start.as_array()
         return np.array([self.phase, *x[:4], x[5]])
 
@@ -64,13 +70,18 @@ class Orbit:
         return tau / self.omega
 
     @cached_property
+    def slowest(self) -> complex:
+        """The multiplier of greatest modulus; of a conjugate pair the one in the upper half plane."""
+        return slowest_of(self.multipliers)
+
+    @cached_property
     def multiplier(self) -> float:
-        """Greatest |Floquet multiplier|: what is left of a disturbance after one period."""
+        """Greatest |Floquet multiplier|: the fraction of a disturbance that remains after one period."""
         return float(np.abs(self.multipliers).max())
 
     @property
     def stable(self) -> bool:
-        """Whether small disturbances die out."""
+        """Whether small disturbances decay."""
         return self.multiplier < 1.0
 
     def samples(self, n: int) -> NDArray[np.float64]:
@@ -81,7 +92,7 @@ class Orbit:
         if n < 1:
             raise InvalidInput("n", n, "at least one sample of the period")
         phases = np.arange(n) * (tau / n)
-        # start at the known point and wait for the base's sine to begin anew
+        # integrate from the known point to the start of the next period of the base's sine
         wait = -self.phase % tau
         drive = SineProgram([Sweep.dwell(2.0 * self.period, self.amplitude, self.omega)], phase=self.phase)
         motion = simulate(self.specimen, drive, state=self.start, sample_times=(wait + phases) / self.omega)
@@ -95,7 +106,7 @@ class Orbit:
 def rocking_orbit(specimen: Specimen, omega: float, amplitude: float, guess: Orbit | None = None) -> Orbit:
     """The rocking motion of period 2 pi / `omega` [rad/s] under `amplitude` [m/s2] sin(omega t).
 
-    It is followed from `guess`, or from a known orbit, through every parameter at once in steps that adapt.
+    Continuation from `guess`, or from a known orbit, in all parameters at once with adaptive steps.
     Raises InvalidInput for a bare frame or meaningless numbers, NoOrbit when it cannot be followed to the end.
     """
     check_steady(specimen, omega, amplitude)
@@ -107,7 +118,7 @@ def rocking_orbit(specimen: Specimen, omega: float, amplitude: float, guess: Orb
 
 
 def rocking_branch(specimen: Specimen, omegas: Sequence[float] | NDArray[np.float64], amplitude: float) -> list[Orbit]:
-    """`rocking_orbit` at each of `omegas`, in their order: each is predicted from those before it.
+    """`rocking_orbit` at each of `omegas`, in order: each is predicted from the previous ones.
 
     Raises as `rocking_orbit` does.
     """
@@ -117,7 +128,7 @@ def rocking_branch(specimen: Specimen, omegas: Sequence[float] | NDArray[np.floa
 
 
 def branch_solutions(specimen: Specimen, omegas: Sequence[float], amplitude: float) -> dict[float, Solution]:
-    """The fixed points of `rocking_branch`, with phases that do not jump by 2 pi, by frequency in the order given."""
+    """The fixed points of `rocking_branch`, phases without jumps by 2 pi, in the order of the frequencies."""
     known: dict[float, Solution] = {}
     origin, section = _seed()
     for omega in omegas:
@@ -140,8 +151,9 @@ def branch_solutions(specimen: Specimen, omegas: Sequence[float], amplitude: flo
 def resting_state(specimen: Specimen, omega: float, amplitude: float) -> Orbit | None:
     """The steady motion in which the block never lifts, in closed form; None where it does not exist.
 
-    It exists if and only if |h_b M A - k_C h1 U1| < b g M with U1 the complex amplitude of the frame with the spring
-    grounded (Eq. 9 and A.3 over a whole period). Always stable. Raises InvalidInput as `rocking_orbit` does.
+    It exists if and only if |h_b M A - k_C h1 U1| < b g M with U1 the complex amplitude of the frame whose spring is
+    attached to the resting block (Eq. 9 and A.3 over a whole period). Always stable. Raises InvalidInput as
+    `rocking_orbit` does.
     """
     check_steady(specimen, omega, amplitude)
     if not amplitude < resting_level(specimen, omega):
@@ -161,7 +173,7 @@ def resting_state(specimen: Specimen, omega: float, amplitude: float) -> Orbit |
 
 
 def resting_rates(specimen: Specimen) -> NDArray[np.complex128]:
-    """Rates [1/s] at which disturbances of the frame with its spring grounded go, complex, shape (4,)."""
+    """Complex decay rates [1/s] of the frame whose spring is attached to a resting block, shape (4,)."""
     mass, damping, stiffness = frame_matrices(specimen.frame)
     stiffness[0, 0] += specimen.k_c
     first_order = np.zeros((4, 4))
@@ -184,7 +196,7 @@ def resting_level(specimen: Specimen, omega: float) -> float:
 
 
 def check_steady(specimen: Specimen, omega: float, amplitude: float) -> None:
-    """Refuse (InvalidInput) a bare frame, and a frequency [rad/s] or an amplitude [m/s2] that is not positive."""
+    """Raise InvalidInput for a bare frame, and for a frequency [rad/s] or amplitude [m/s2] that is not positive."""
     if specimen.beta is None:
         raise InvalidInput("specimen", "bare frame", "a rocking or resting block needs beta, 0 or more")
     if not (isfinite(omega) and omega > 0.0):
@@ -204,7 +216,7 @@ def _followed(
     if solution is None:
         raise NoOrbit(
             f"no rocking orbit found at omega = {omega:g} rad/s, beta = {specimen.beta:g}, amplitude = "
-            f"{amplitude:g} m/s2: give a closer guess, or values nearer to ones that have an orbit"
+            f"{amplitude:g} m/s2: provide a closer guess, or values closer to those of a known orbit"
         )
     return solution
 

@@ -1,6 +1,6 @@
-"""The motion under a base acceleration that is handed over piece by piece, as a live bench does.
+"""Motion under a base acceleration that arrives in blocks, as from a live bench.
 
-How the samples are cut into blocks makes no difference, bit for bit: everything that a step depends on is carried over.
+The result is bit-identical for any division into blocks: all state that affects a step is carried over.
 """
 
 from math import isfinite, pi
@@ -26,17 +26,16 @@ from sim.specimen import Specimen
 
 
 class Stream:
-    """A specimen that moves on as its base acceleration becomes known.
+    """A specimen whose motion advances as its base acceleration arrives.
 
-    The acceleration comes as values `dt` [s] apart, joined by straight lines; the first value of all only says where
-    the lines begin. With `held`, each value instead stays for the `dt` after it, as a converter puts it out.
-    `divisions` states are read off each interval, at equal parts of it with its end among them: the drive's updates may
-    be far coarser than the samples wanted, because between two of them the motion is a polynomial. 0 reads off none.
+    The acceleration consists of values `dt` [s] apart, interpolated linearly; the very first value is only the start of
+    the first line. With `held`, each value instead stays for the `dt` after it, as at a converter's output. `divisions`
+    states are evaluated in each interval, at equal parts up to its end: the drive's updates may be far coarser than the
+    samples required, because the motion between them is a polynomial. 0 evaluates none. `peaks_from` [s] starts the
+    window of the running peaks, None requests none; the other arguments are those of `sim.rocking.simulate`, and the
+    motion is bit for bit the one that it returns for a `SampledRecord`.
 
-    `peaks_from` [s] starts the window of the running peaks, None watches none; the other arguments are those of
-    `sim.rocking.simulate`, and the motion is bit for bit the one that it gives for a `SampledRecord`.
-
-    Raises InvalidInput for values outside their meaning.
+    Raises InvalidInput for values outside their range.
     """
 
     def __init__(
@@ -78,7 +77,7 @@ class Stream:
 
     @property
     def state(self) -> State:
-        """The state now: at the end of the last interval, or where the run ended."""
+        """The state at the end of the last interval, or at the end of the run."""
         return State.from_array(self._x)
 
     @property
@@ -88,24 +87,24 @@ class Stream:
 
     @property
     def status(self) -> Status:
-        """COMPLETED as long as the run goes on."""
+        """COMPLETED while the run continues."""
         return self.motion().status
 
     def motion(self) -> Motion:
-        """What the specimen has done so far, with the running peaks; without samples, which `feed` gives."""
+        """Result so far, with the running peaks but without the samples that `feed` returns."""
         return motion_of(self._report, self._x, None, watched=self._watched)
 
     def feed(self, acceleration: ArrayLike) -> NDArray[np.float64]:
-        """Go on through the next values [m/s2], shape (n,), any n; the states read off, shape (m, 6).
+        """Advance through the next values [m/s2], shape (n,), any n; returns the states evaluated, shape (m, 6).
 
         m is `divisions` for each interval completed; columns as `State.as_array`. Rows after an overturning or a
-        failure are not there, and what is fed then is ignored: `status` says so.
+        failure are missing, and later input is ignored: see `status`.
 
-        Raises InvalidInput, and nothing has moved, for values that are not finite or not in one row.
+        Raises InvalidInput, without advancing, for values that are not finite or not one-dimensional.
         """
         values = np.asarray(acceleration, dtype=np.float64)
         if values.ndim != 1 or not np.isfinite(values).all():
-            raise InvalidInput("acceleration", values.shape, "it must be finite values in one row")
+            raise InvalidInput("acceleration", values.shape, "it must be a one-dimensional array of finite values")
         if self._report[self._kernel.STATUS] != self._kernel.COMPLETED:
             return np.empty((0, 6))
         if not self.held:

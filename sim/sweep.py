@@ -1,4 +1,4 @@
-"""One function over many items: on this machine's processors, or on those of a dask.distributed scheduler."""
+"""Parallel application of one function to many items, on this machine or through a dask.distributed scheduler."""
 
 import os
 from collections.abc import Callable, Generator, Iterable
@@ -16,25 +16,25 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 PATIENCE = 10.0
-"""Seconds to wait for a scheduler to answer."""
+"""Time-out for a scheduler's answer [s]."""
 
 STEP = 0.2
-"""Longest single wait for a thread [s]: on Windows, before Python 3.14, no signal ends one."""
+"""Longest single wait for a thread [s]: on Windows, before Python 3.14, signals do not interrupt a wait."""
 
 Done = Callable[[int, int], None]
-"""Called with how many of all items are done."""
+"""Called with the number of items done and the total."""
 
 
 class SchedulerUnavailable(RockbenchError):
-    """The work cannot go to a scheduler: nothing answers there."""
+    """The scheduler does not respond."""
 
     error_code = "scheduler_unavailable"
 
 
 def processors(scheduler: str | None = None) -> int:
-    """Processors that a sweep has: this machine's, or the threads of all workers of a `scheduler`.
+    """Number of processors of a sweep: this machine's, or the threads of all workers of a `scheduler`.
 
-    Without a worker yet, this machine's. Raises what `sweep` does for its scheduler.
+    That of this machine while the scheduler has no worker. Raises as `sweep` does for its scheduler.
     """
     here = os.cpu_count() or 1
     if scheduler is None:
@@ -54,15 +54,15 @@ def sweep(
     """`function` of each item, in order; the first exception that it raises is raised here.
 
     By default in as many threads as there are processors, see `in_threads`. With the address of a dask `scheduler`,
-    such as "tcp://10.0.0.5:8786", its workers do it; they need this package, and function and items must be picklable.
-    A task there carries `batch` items: make it last long against the milliseconds that its journey takes. `done` counts
-    tasks then.
+    such as "tcp://10.0.0.5:8786", its workers run it; they need this package, and function and items must be picklable.
+    A task has `batch` items: choose it so that a task takes much longer than the milliseconds of its transfer.
+    `done` then counts tasks.
 
-    Raises InvalidInput for batch < 1, MissingExtra without the extra "distributed", SchedulerUnavailable when nothing
-    answers.
+    Raises InvalidInput for batch < 1, MissingExtra without the extra "distributed", SchedulerUnavailable when the
+    scheduler does not answer.
     """
     if batch < 1:
-        raise InvalidInput("batch", batch, "a task carries at least one item")
+        raise InvalidInput("batch", batch, "a task has at least one item")
     todo = list(items)
     if scheduler is not None:
         return _distributed(function, todo, scheduler, batch, done)
@@ -73,10 +73,10 @@ def in_threads(
     function: Callable[[Item], Result], items: Iterable[Item], done: Done | None = None, *, threads: int | None = None
 ) -> list[Result]:
     """`function` of each item, in order, in as many `threads` as there are processors by default: right for work that
-    goes on in `sim.kernel`, which lets other threads run. `done` is called in this thread.
+    runs in `sim.kernel`, which releases the interpreter lock. `done` is called in this thread.
 
-    The first exception that it raises is raised here, as is KeyboardInterrupt: then no further item is begun, and
-    nobody waits for those that have.
+    The first exception that it raises is raised here, as is KeyboardInterrupt: then no further item starts, and items
+    in progress are not awaited.
     """
     pool = ThreadPoolExecutor(threads or processors())
     try:
@@ -97,7 +97,7 @@ def _distributed(
     function: Callable[[Item], Result], items: list[Item], scheduler: str, batch: int, done: Done | None
 ) -> list[Result]:
     with _connected(scheduler) as client:
-        # items are the same function's: equal ones may share a result, but never one of an earlier sweep
+        # pure=False: a result of an earlier sweep must not be reused
         groups = [items[i : i + batch] for i in range(0, len(items), batch)]
         futures: Any = client.map(_each, groups, function=function, pure=False)
         while not all(future.done() for future in futures):

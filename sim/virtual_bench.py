@@ -1,4 +1,4 @@
-"""The bench without the laboratory: shaker, specimen and instruments, from drive volts to counts."""
+"""Simulated bench: shaker, specimen and instruments, from drive voltage to counts."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from pydantic import model_validator
 
 from sim.arrangement import Arrangement, sights
-from sim.channel import Channel
+from sim.channel import STOREYS, TABLE_ACCELERATION, TABLE_DISPLACEMENT, Channel
 from sim.errors import InvalidInput
+from sim.filter_unit import FilterUnit
 from sim.parameters import Parameters, quantity
-from sim.sensors import Accelerometer, Converter, DisplacementSensor, FilterUnit, Laser, PlacedSensor
+from sim.sensors import Accelerometer, Converter, DisplacementSensor, Laser, PlacedSensor
 from sim.shaker import Shaker
 from sim.specimen import Specimen
 
@@ -22,14 +23,14 @@ Array = NDArray[np.float64]
 _LONGEST_STEP = 5.0e-4
 """Longest integration step [s]; its error in two seconds of violent rocking is below 1e-8 m."""
 _STEPS_PER_TIME_CONSTANT = 5
-"""Steps within the shortest time constant of the shaker, should that ask for more."""
+"""Least number of steps within the shaker's shortest time constant."""
 _PLACES = ("table", "storey 1", "storey 2")
 _LET_GO = 3.0, 5.0
-"""A hand that holds the block or the frame lets go so long after the rig is armed [s], earliest and latest."""
+"""Earliest and latest release of a hand-held block or frame after the rig is armed [s]."""
 
 
 class VirtualBenchParameters(Parameters):
-    """Everything on the bench but the specimen."""
+    """Parameters of everything on the bench except the specimen."""
 
     sample_rate: float = quantity(2000.0, "1/s", "samples per second of drive and inputs", gt=0, le=20_000)
     catch_angle: float = quantity(0.35, "rad", "rotation at which a strap catches the toppling block", gt=0, lt=1.0)
@@ -52,14 +53,14 @@ class VirtualBenchParameters(Parameters):
     @model_validator(mode="after")
     def _lasers_stand_together(self) -> "VirtualBenchParameters":
         if self.laser_1.reference != self.laser_2.reference:
-            allowed = f"the drift needs both lasers in one place, laser_1.reference = {self.laser_1.reference!r}"
+            allowed = f"the drift needs both lasers on one reference, laser_1.reference = {self.laser_1.reference!r}"
             raise InvalidInput("laser_2.reference", self.laser_2.reference, allowed)
         return self
 
 
 @dataclass(frozen=True)
 class Truth:
-    """What really happened at the ticks of the last block, arrays of shape (n,): for tests, not for users."""
+    """True motion at the ticks of the last block, arrays of shape (n,), for tests only."""
 
     x: Array
     v: Array
@@ -73,11 +74,12 @@ class Truth:
 
 
 class VirtualBench:
-    """A bench that turns drive volts into counts, tick by tick, without end.
+    """Bench that converts drive voltage to counts, tick by tick, indefinitely.
 
-    `further` sensors come after table and lasers. Everything random comes from `seed`; the same seed and drive give the
-    same counts, however the drive is cut into blocks. Tick i of a block is sampled just before its drive sample takes
-    effect. What is held by hand is let go between two ticks, without a push, a few seconds after `arm`.
+    Channels of `further` sensors follow those of table and lasers. All random numbers depend on `seed`; the same seed
+    and drive give the same counts, however the drive is divided into blocks. Tick i of a block is sampled just before
+    its drive sample takes effect. A part held by hand is released between two ticks, without a push, a few seconds
+    after `arm`.
     """
 
     def __init__(
@@ -88,7 +90,7 @@ class VirtualBench:
         self._kernel = table
         self.parameters = parameters
         self._further = tuple(further)
-        # the first ones are the same however many there are
+        # the first generators do not depend on the number of sensors
         sources = SeedSequence(seed).spawn(7 + len(self._further))
         rate = parameters.sample_rate
         self._force_random, self._displacement_random, self._accelerometer_random = (
@@ -112,33 +114,33 @@ class VirtualBench:
 
     @property
     def arrangement(self) -> Arrangement:
-        """What stands on the table, and what is clamped or held by hand at this moment."""
+        """The specimen on the table, with its present clamps and manual restraints."""
         return self._arrangement
 
     @property
     def specimen(self) -> Specimen:
-        """What stands on the table."""
+        """The specimen on the table."""
         return self._arrangement.specimen
 
     @property
     def fallen(self) -> bool:
-        """Whether the block hangs in its catch."""
+        """Whether the block is held by its catch."""
         return self._mode == self._kernel.FALLEN and self._arrangement.tilt == 0.0
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """The inputs in the order of the columns, with the nominal calibrations: scale errors are not known to it."""
+        """The input channels in column order with nominal calibrations, which ignore the simulated scale errors."""
         p, lsb = self.parameters, self.parameters.converter.lsb
         lowest, highest = (code + inward for code, inward in zip(p.converter.codes, (1, -1), strict=True))
         linear = (
-            ("table_displacement", "displacement", "m", p.displacement_sensor, "simulated displacement sensor"),
-            ("table_acceleration", "acceleration", "m/s2", p.accelerometer, "simulated accelerometer"),
+            (TABLE_DISPLACEMENT, "displacement", "m", p.displacement_sensor, "simulated displacement sensor"),
+            (TABLE_ACCELERATION, "acceleration", "m/s2", p.accelerometer, "simulated accelerometer"),
         )
         channels = [
             Channel(name, kind, unit, lsb * sensor.nominal[0], sensor.nominal[1], (lowest, highest), device)
             for name, kind, unit, sensor, device in linear
         ]
-        for name, laser in (("laser_1", p.laser_1), ("laser_2", p.laser_2)):
+        for name, laser in zip(STOREYS, (p.laser_1, p.laser_2), strict=True):
             slope, offset = laser.nominal
             low, high = (round(volts / lsb) for volts in laser.valid_volts)
             valid = max(low, lowest), min(high, highest)
@@ -158,13 +160,15 @@ class VirtualBench:
 
     @property
     def sights(self) -> Array:
-        """What the lasers saw at the ticks of the last `run` or `coast`, shape (4, n): see `sim.arrangement.sights`."""
-        # lasers stand together, see the parameters
-        on_ground = self.parameters.laser_1.reference == "ground"
-        return sights(np.ascontiguousarray(self._samples.T), self._arrangement, on_ground)
+        """True motion of the lasers' targets in the last `run` or `coast`, shape (4, n): `sim.arrangement.sights`."""
+        return self._seen(np.ascontiguousarray(self._samples.T))
+
+    def _seen(self, states: Array) -> Array:
+        # both lasers have the same reference, see the parameters
+        return sights(states, self._arrangement, self.parameters.laser_1.reference == "ground")
 
     def run(self, volts: Array) -> NDArray[np.int16]:
-        """Play `volts`, shape (n,) [V], and return the counts sampled meanwhile, shape (n, n_channels)."""
+        """Play `volts`, shape (n,) [V], and return the counts sampled at the same ticks, shape (n, n_channels)."""
         if volts.size == 0:
             return np.empty((0, 4 + len(self._further)), dtype=np.int16)
         self._move(volts)
@@ -172,14 +176,14 @@ class VirtualBench:
         return self.parameters.converter.counts(filtered.T, self._converter_random)
 
     def coast(self, seconds: float) -> None:
-        """Let the bench move at zero drive without sampling it."""
+        """Simulate the bench at zero drive without sampling."""
         self._move(np.zeros(max(1, round(seconds * self.parameters.sample_rate))))
 
     def mount(self, arrangement: Arrangement) -> None:
-        """Arrange it so on the table, standing still; a block that hung in its catch stands up.
+        """Set this arrangement with the specimen at rest; a block held by its catch is put upright.
 
-        The table is steadied where it is, or locked at mid stroke. Raises InvalidInput, and nothing has changed, for a
-        block held beyond its catch.
+        The table stops at its present position, or is locked at mid stroke. Raises InvalidInput, without a change, for
+        a block held beyond its catch.
         """
         catch = self.parameters.catch_angle
         if abs(arrangement.tilt) >= catch:
@@ -193,16 +197,16 @@ class VirtualBench:
         if arrangement.table_locked:
             self._state[0] = 0.0
         self._carried[:] = 0.0
-        # a block in somebody's hand moves no more than one in the catch
+        # a hand-held block moves no more than one in the catch
         self._mode = self._kernel.REST if arrangement.tilt == 0.0 else self._kernel.FALLEN
 
     def arm(self) -> None:
-        """Told that the rig is armed: a hand that holds something lets go 3 to 5 s later."""
+        """Arm the bench: a part held by hand is released 3 to 5 s later."""
         if self._arrangement.held:
             self._held_for = round(self._hand_random.uniform(*_LET_GO) * self.parameters.sample_rate)
 
     def disarm(self) -> None:
-        """Told that the rig is not armed any more: a hand that still holds something goes on holding it."""
+        """Disarm the bench: a part held by hand stays held."""
         self._held_for = None
 
     def _arrange(self, arrangement: Arrangement) -> None:
@@ -210,7 +214,7 @@ class VirtualBench:
         self._plant = arrangement.plant(self.parameters.shaker, self.parameters.catch_angle)
 
     def _let_go(self) -> None:
-        """Nobody's hand is on block and frame from here on; they are still."""
+        """Release block and frame, both at rest."""
         if self._arrangement.tilt != 0.0:
             self._mode = self._kernel.ROCK_A if self._arrangement.tilt > 0.0 else self._kernel.ROCK_B
         self._arrange(self._arrangement.let_go())
@@ -233,7 +237,7 @@ class VirtualBench:
             self._held_for -= n
 
     def _stream(self, ticks: slice, requests: Array, noise: Array) -> None:
-        """Move on through some of the ticks of a block."""
+        """Advance through some of the ticks of a block."""
         self._mode = self._kernel.stream(
             self._plant,
             1.0 / self.parameters.sample_rate,
@@ -252,7 +256,7 @@ class VirtualBench:
         volts = np.empty((4 + len(self._further), s.shape[1]))
         volts[0] = p.displacement_sensor.volts(s[0], p.sample_rate, self._displacement_random)
         volts[1] = p.accelerometer.volts(s[8], p.sample_rate, self._accelerometer_random)
-        seen = self.sights
+        seen = self._seen(s)
         volts[2] = self._laser_1.read(seen[0], seen[1])
         volts[3] = self._laser_2.read(seen[2], seen[3])
         if self._further:
@@ -263,9 +267,10 @@ class VirtualBench:
         return volts
 
     def _motion(self, s: Array) -> dict[str, Array]:
-        """Displacement, velocity and acceleration of table and storeys against the ground, each of shape (3, n).
+        """Displacement, velocity and acceleration of table and storeys relative to the ground, each of shape (3, n).
 
-        The acceleration of a storey is the mean since the tick before: the kernel integrates it and keeps its velocity.
+        The acceleration of a storey is the mean since the previous tick: the kernel integrates it and keeps its
+        velocity.
         """
         x, v, u1, u2, v1, v2, _, _, a = s
         velocity = np.stack((v, v + v1, v + v2))

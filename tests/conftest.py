@@ -1,14 +1,25 @@
-"""What every test shares."""
+"""Order, processes and real time of the whole suite."""
 
 import os
+import subprocess
+import sys
+from collections.abc import Generator
+from pathlib import Path
 from typing import Any
 
 import pytest
+
+from tests.lateness import Lateness
 
 # a test needs no screen; a person who wants to see the windows sets the variable himself
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 # sums of matrix products have the same last digits on every number of processors; read when numpy is imported
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+# a result that a test computes with replaced parts must not reach another one
+os.environ.setdefault("ROCKBENCH_RESULT_CACHE", "off")
+
+pytest.register_assert_rewrite("bench.testing.conformance")
 
 REAL_TIME = (
     "tests/drivers/daqmx/",
@@ -17,19 +28,35 @@ REAL_TIME = (
     "tests/drivers/optoncdt/",
     "tests/drivers/test_hardware_rig.py",
     "tests/faults/emulated/",
-    "tests/bench/test_devices.py",
-    "tests/bench/test_emulate.py",
-    "tests/bench/test_interrupts.py",
+    "tests/bench/app/cli/test_devices.py",
+    "tests/bench/app/cli/test_emulate.py",
+    "tests/bench/app/cli/test_interrupts.py",
     "tests/protocols/test_interrupt.py",
     "tests/protocols/check/",
-    "tests/link/",
-    "tests/gui/",
+    "tests/bench/app/ipc/",
+    "tests/bench/app/gui/",
 )
 """Tests that emulated instruments or a person's clock pace: one after the other, or they hold each other up."""
 
+LATENESS = pytest.StashKey[Lateness]()
 
 SPREAD = "tests/faults/test_matrix.py"
 """The longest file of all; its tests share nothing, so they fill every process at the end."""
+
+
+KERNELS = ("sim.kernel.members", "sim.kernel.table, sim.kernel.laser, sim.kernel.filter")
+"""Modules that compile all of the kernel when they are imported, divided between two processors."""
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """The kernel is compiled once, before several processes want it."""
+    if hasattr(config, "workerinput") or not config.getoption("numprocesses", 0) or config.option.collectonly:
+        return
+    compiling = [
+        subprocess.Popen([sys.executable, "-c", f"import {modules}"], cwd=config.rootpath) for modules in KERNELS
+    ]
+    for process in compiling:
+        process.wait()
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -59,6 +86,26 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
         _gives_way = True
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, Any, Any]:
+    """A test that needs milliseconds has the lateness of the machine measured beside it."""
+    if item.get_closest_marker("milliseconds") is None:
+        return (yield)
+    with Lateness() as item.stash[LATENESS]:
+        return (yield)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, Any, Any]:
+    """Its failure on a machine that does not keep time is a skip, with the figures."""
+    report: Any = yield
+    if report.failed and report.when == "call" and LATENESS in item.stash:
+        excuse = item.stash[LATENESS].excuse
+        if excuse is not None:
+            report.outcome, report.longrepr = "skipped", (str(item.path), 0, excuse)
+    return report
+
+
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> object:
     """A file stays in one process, so that what its fixtures made is made once; all of REAL_TIME stays in one too."""
@@ -71,3 +118,13 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> object:
             return "real time" if nodeid.startswith(REAL_TIME) else nodeid.split("::")[0]
 
     return Together(config, log)
+
+
+@pytest.fixture
+def result_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Folder of a cache of results of the test's own, which it fills."""
+    from sim.kernel import compiled
+
+    monkeypatch.delenv("ROCKBENCH_RESULT_CACHE", raising=False)
+    monkeypatch.setattr(compiled, "cache_folder", lambda: tmp_path)
+    return tmp_path / "results"

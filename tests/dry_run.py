@@ -12,8 +12,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-from bench.config.dump import as_toml
 from bench.config.model import BenchConfiguration
+from bench.config.toml import as_toml
 from tests.emulated import emulated
 
 SHORT = (

@@ -21,7 +21,7 @@ def emulated(*arguments: str) -> Iterator[BenchConfiguration]:
     """`rockbench emulate` with these arguments, and the configuration that it hands out."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "emulated.toml"
-        command = [sys.executable, "-m", "bench", "emulate", "--write", str(file), *arguments]
+        command = [sys.executable, "-m", "bench", "emulate", "--write", str(file), "--lead", "0.4", *arguments]
         process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         try:
             deadline = time.monotonic() + _PATIENCE

@@ -2,12 +2,16 @@
 
 import importlib
 import os
+import shutil
 import sys
+import tomllib
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+
+PLUGINS = Path(__file__).parent / "plugins"
 
 
 @contextmanager
@@ -31,3 +35,14 @@ def installed(folder: Path, name: str, entry_points: Mapping[str, Mapping[str, s
         importlib.invalidate_caches()
         yield
     importlib.invalidate_caches()
+
+
+@contextmanager
+def example(folder: Path, name: str) -> Generator[Path]:
+    """Within, the example package `name` of docs/extending.md is installed in `folder`; its one module."""
+    module = PLUGINS / name / f"{name}.py"
+    folder.mkdir(exist_ok=True)
+    shutil.copy(module, folder)
+    project = tomllib.loads((module.parent / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    with installed(folder, project["name"], project["entry-points"]):
+        yield module

@@ -3,7 +3,7 @@
     python -m tests.interrupts [--moments 200] [--seed 1] [--only NAME ...]
 
 prints the worst reaction of every command, with the phase that the command was in by its own words, and how late this
-machine was meanwhile. `tests/bench/test_interrupts.py` runs a few of the moments.
+machine was meanwhile. `tests/bench/app/cli/test_interrupts.py` runs a few of the moments.
 """
 
 import argparse
@@ -21,6 +21,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from math import inf
 from pathlib import Path
+
+from tests.lateness import Lateness
 
 ANSWERED = 0.5
 """Longest time to the answer [s]."""
@@ -68,6 +70,7 @@ COMMANDS = (
     Command("predict map: band", "predict map --band", 20.0),
     Command("predict history", f"predict history {_POINT}", 3.0),
     Command("predict seismic", "predict seismic synthetic:kobe --beta 0.4", 8.0),
+    Command("predict stability", "predict stability", 6.0),
     Command("predict modes", "predict modes", 1.5),
     Command("paper", "paper --html NEW.html", 18.0),
     Command("benchmark", "benchmark --quick", 40.0),
@@ -116,29 +119,6 @@ class Reaction:
     code: int
     faults: list[str] = field(default_factory=list[str])
     driving: bool = False
-
-
-class Lateness:
-    """Measures how late a thread wakes up that sleeps for 5 ms."""
-
-    def __init__(self) -> None:
-        self.worst = 0.0
-        self._over = threading.Event()
-        self._thread = threading.Thread(target=self._measure)
-
-    def __enter__(self) -> "Lateness":
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._over.set()
-        self._thread.join()
-
-    def _measure(self) -> None:
-        while not self._over.is_set():
-            before = time.monotonic()
-            time.sleep(0.005)
-            self.worst = max(self.worst, time.monotonic() - before - 0.005)
 
 
 class Bed:

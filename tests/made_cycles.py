@@ -9,4 +9,5 @@ from bench.analysis.cycles import Cycle
 def pure_cycle(index: int, amplitudes: NDArray[np.complex128], noise: float = 0.0, samples: int = 600) -> Cycle:
     """A cycle of pure sines with the complex `amplitudes` of its signals."""
     coefficients = np.stack((np.zeros(amplitudes.size), amplitudes.real, amplitudes.imag))
-    return Cycle(index, samples, coefficients, amplitudes, np.abs(amplitudes), np.full(amplitudes.size, noise))
+    peak = np.abs(amplitudes)
+    return Cycle(index, samples, coefficients, amplitudes, peak, peak, np.full(amplitudes.size, noise))

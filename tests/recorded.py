@@ -3,18 +3,13 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from bench.analysis.signals import SignalMap
 from bench.config.model import BenchConfiguration
-from bench.engine.ending import Ending
-from bench.engine.engine import Engine
-from bench.engine.operator import Operator, Unattended
-from bench.engine.requests import Requests
+from bench.datafile.recorder import Recorder
+from bench.engine.engine import configured_engine
+from bench.engine.interface import Ending, EventStream, Operator, Requests, Unattended
 from bench.engine.steps import Plan
-from bench.engine.stream import Stream
 from bench.events import Event, Subscriber
-from bench.guard.guard import Guard
-from bench.record.recorder import Recorder
-from bench.twin.beside import twin_beside
+from bench.twin.live import live_twin
 from drivers.rig import Rig
 from sim.parameters import Parameters
 
@@ -40,19 +35,11 @@ def recorded(
         metadata={"configuration": configuration.model_dump_json(), **(metadata or {})},
         hold_up=60.0,
     )
-    stream, requests = Stream(rig.clock, [recorder, *subscribers]), requests or Requests()
-    signals = SignalMap(rig.channels, configuration.laser_reference)
-    engine = Engine(
-        rig,
-        Guard(rig, configuration.limits, configuration.ramps, configuration.mover, signals, configuration.channels),
-        stream,
-        requests,
-        operator or Unattended(),
-        configuration.block_samples,
-    )
+    stream, requests = EventStream(rig.clock, [recorder, *subscribers]), requests or Requests()
+    engine = configured_engine(rig, configuration, stream, requests, operator or Unattended())
     for event in first:
         stream.publish(event)
-    with twin_beside(stream, rig, configuration, requests, patient=True):
+    with live_twin(stream, rig, configuration, requests, patient=True):
         ending = engine.run(plan)
     recorder.close(ending.status, ending.reason)
     return ending

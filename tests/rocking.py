@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.analysis.free_rocking.swings import Seen
+from bench.analysis.free_rocking.swings import Recording
 from sim import block_face
 from sim.free_rocking import FreeRocking, critical_angle, frequency_parameter, theoretical_restitution
 from sim.specimen import Block, Specimen
@@ -35,7 +35,7 @@ def motion(
     return FreeRocking(alpha, p, factor * R_TH, share * alpha, start, trend, 0.5)
 
 
-def recording(of: FreeRocking, shown: Shown | None = None, seed: int = 1, *, settle: float = 3.0) -> Seen:
+def recording(of: FreeRocking, shown: Shown | None = None, seed: int = 1, *, settle: float = 3.0) -> Recording:
     """The whole motion and some seconds of rest."""
     shown = shown or Shown()
     times = np.arange(0.0, of.rest_time + settle, 1.0 / RATE)
@@ -44,4 +44,4 @@ def recording(of: FreeRocking, shown: Shown | None = None, seed: int = 1, *, set
     seen = seen + shown.noise * np.random.default_rng(seed).standard_normal(seen.size)
     if shown.step > 0.0:
         seen = shown.step * np.rint(seen / shown.step)
-    return Seen(seen, RATE, BLOCK, HEIGHT)
+    return Recording(seen, RATE, BLOCK, HEIGHT)

@@ -23,17 +23,17 @@ from typing import Any
 import tomlkit
 
 from bench.accelerograms.reference import RecordReference, seconds_of
-from bench.catalogue import all_protocols
-from bench.cli.emulate import _at_rate, _ratios
-from bench.cli.flags import flag
-from bench.cli.inputs import configuration_from, parameters_from
-from bench.cli.main import main as command_line
-from bench.cli.predict_inputs import request_from, specimen_from
-from bench.cli.replay import _clock
+from bench.app.catalogue import all_protocols
+from bench.app.cli.emulate import _at_rate, _ratios
+from bench.app.cli.inputs import configuration_from, parameters_from, request_from, specimen_from
+from bench.app.cli.main import main as command_line
+from bench.app.cli.options import flag
+from bench.app.cli.replay import _clock
 from bench.config.declared import Declared, at, declared
 from bench.config.model import BenchConfiguration
-from bench.config.review import notices_of, review, specimen_notices
+from bench.config.review import review
 from bench.config.toml import problems_of, read_configuration
+from bench.config.usual import notices_of, specimen_notices
 from bench.prediction import requests
 from bench.prediction.seismic import band_of
 from sim.errors import InvalidInput

@@ -1,26 +1,24 @@
 """The examples of docs/extending.md, each in a package of its own beside the project, used as their readers would."""
 
 import json
-import shutil
+import re
 import subprocess
 import sys
-import tomllib
 from collections.abc import Generator
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
 import pytest
-from pytestqt.qtbot import QtBot
 
-from bench.catalogue import PROTOCOLS, all_protocols, load_format, load_protocol
-from bench.cli.main import main
-from bench.cli.scene import Scene
+from bench.app.catalogue import PROTOCOLS, all_protocols, load_protocol
+from bench.app.cli.main import main
+from bench.app.export.format import load_format
+from bench.app.formatting import measurement
 from bench.config.declared import declared
-from bench.events import LiveValue
-from bench.record.reader import open_record
-from tests.installed import installed
+from bench.datafile.reader import open_datafile
+from tests.installed import PLUGINS, example, installed
 
-PLUGINS = Path(__file__).parent / "plugins"
 SWEEP = PLUGINS / "tone_sweep" / "tone_sweep.py"
 Said = pytest.CaptureFixture[str]
 
@@ -28,11 +26,7 @@ Said = pytest.CaptureFixture[str]
 @pytest.fixture(scope="module")
 def plugged(tmp_path_factory: pytest.TempPathFactory) -> Generator[None]:
     """The package of the example protocol, as an installer leaves it."""
-    folder = tmp_path_factory.mktemp("plugin") / "site"
-    folder.mkdir()
-    shutil.copy(SWEEP, folder)
-    project = tomllib.loads((SWEEP.parent / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    with installed(folder, project["name"], project["entry-points"]):
+    with example(tmp_path_factory.mktemp("plugin") / "site", "tone_sweep"):
         yield
 
 
@@ -81,7 +75,7 @@ def test_its_run_leaves_table_figure_and_live_numbers(done: Path) -> None:
     assert {"campaign.h5", "summary.json", "gain.png"} <= {path.name for path in done.iterdir()}
     summary = json.loads((done / "summary.json").read_text(encoding="utf-8"))
     gains = {point["omega_rad_s"]: point["gain_m_s2_v"] for point in summary["points"]}
-    with open_record(done / "campaign.h5") as record:
+    with open_datafile(done / "campaign.h5") as record:
         predicted = dict(zip(*(record.tables["prediction"][name].values for name in ("omega", "gain")), strict=True))
         rows = record.tables["planned_drive"]
         assert set(rows["omega"].values) == {10.0, 40.0}
@@ -90,10 +84,26 @@ def test_its_run_leaves_table_figure_and_live_numbers(done: Path) -> None:
         assert 0.7 * predicted[omega] < gain < 1.02 * predicted[omega]
 
 
-def test_its_live_number_is_shown_as_it_is_measured() -> None:
-    scene = Scene()
-    scene.update(LiveValue("gain of the table", 1.03, "m/s2/V", 0.01, 1.05))
-    assert any("gain of the table" in str(value) for value in vars(scene).values())
+class Terminal(StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.mark.usefixtures("plugged")
+def test_its_live_number_is_on_the_terminal_while_it_runs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    for name in ("NO_COLOR", "FORCE_COLOR", "TTY_COMPATIBLE", "TTY_INTERACTIVE"):
+        monkeypatch.delenv(name, raising=False)
+    for name, value in {"TERM": "xterm", "COLUMNS": "110", "LINES": "40"}.items():
+        monkeypatch.setenv(name, value)
+    terminal = Terminal()
+    monkeypatch.setattr("sys.stderr", terminal)
+    # paced by the clock, so that the number stands while the drive is taken back
+    command = ["run", "tone-sweep", "--omega", "40", "--cycles", "4", "--volts", "0.1", "--realtime"]
+    assert main([*command, "--out", str(tmp_path / "run")]) == 0
+    (point,) = json.loads((tmp_path / "run" / "summary.json").read_text(encoding="utf-8"))["points"]
+    shown = measurement(point["gain_m_s2_v"], point["gain_uncertainty"], "m/s2/V")
+    (line,) = {line.strip() for line in re.findall(r"gain of the table[^\r\n\x1b]*", terminal.getvalue())}
+    assert line.startswith(f"gain of the table  {shown}, predicted ")
 
 
 def test_its_file_replays_bit_for_bit_and_is_reported(done: Path, capsys: Said) -> None:
@@ -104,7 +114,10 @@ def test_its_file_replays_bit_for_bit_and_is_reported(done: Path, capsys: Said) 
     assert "2 live values" in shown
     page = done / "report.html"
     assert main(["report", file, "--html", str(page)]) == 0
-    assert "Tone sweep" in page.read_text(encoding="utf-8")
+    text = page.read_text(encoding="utf-8")
+    assert "Tone sweep" in text
+    # its own section is a figure: the points stand in the table that every protocol has
+    assert 'id="points"' in text
 
 
 def test_a_plug_in_that_fails_to_load_is_named_and_hinders_nothing_else(tmp_path: Path, capsys: Said) -> None:
@@ -119,7 +132,7 @@ def test_a_plug_in_that_fails_to_load_is_named_and_hinders_nothing_else(tmp_path
         broken, gone, text = failed
         assert "half_written:PROTOCOL of rockbench-broken 1.0 cannot be loaded (ZeroDivisionError" in broken
         assert "ModuleNotFoundError: No module named 'nowhere'" in gone
-        assert "is no bench.protocol.Protocol" in text
+        assert "is not a bench.protocol.Protocol" in text
         assert main(["run", "--help"]) == 0
         assert "Not available" in capsys.readouterr().out
         assert main(["run", "broken"]) == 2
@@ -129,32 +142,17 @@ def test_a_plug_in_that_fails_to_load_is_named_and_hinders_nothing_else(tmp_path
 
 
 def test_an_export_format_is_found_and_has_every_sample(done: Path, tmp_path: Path) -> None:
-    example = PLUGINS / "numpy_archive" / "numpy_archive.py"
-    assert len(example.read_text(encoding="utf-8").splitlines()) <= 60
-    folder = tmp_path / "site"
-    folder.mkdir()
-    shutil.copy(example, folder)
-    project = tomllib.loads((example.parent / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     file, out = done / "campaign.h5", tmp_path / "arrays"
-    with installed(folder, project["name"], project["entry-points"]):
+    with example(tmp_path / "site", "numpy_archive") as module:
+        assert len(module.read_text(encoding="utf-8").splitlines()) <= 60
         assert load_format("npz").title == "NumPy"
         command = [sys.executable, "-m", "bench", "export", str(file), "--to", "npz", "--out", str(out)]
         ran = subprocess.run(command, capture_output=True, text=True, check=False)
         assert ran.returncode == 0, ran.stderr
-    with open_record(file) as record, np.load(out / "run-1.npz") as arrays:
+    with open_datafile(file) as record, np.load(out / "run-1.npz") as arrays:
         run = record.runs[0]
         np.testing.assert_array_equal(arrays["table_acceleration"], run.channels["table_acceleration"])
         assert arrays["time"].shape == arrays["drive"].shape
     with np.load(out / "points.npz") as points:
         assert points["omega_rad_s"].tolist() == [10.0, 40.0]
     assert json.loads((out / "units.json").read_text(encoding="utf-8"))["table_acceleration"] == "m/s2"
-
-
-@pytest.mark.usefixtures("plugged")
-def test_its_form_is_made_for_the_window(qtbot: QtBot) -> None:
-    from bench.gui.form import Form
-
-    form = Form(load_protocol("tone-sweep").parameters)
-    qtbot.addWidget(form)
-    assert list(form.fields) == ["omega", "volts", "cycles"]
-    assert form.parameters().model_dump() == {"omega": (10.0, 20.0, 40.0), "volts": 0.05, "cycles": 8}

@@ -22,7 +22,7 @@ class Absent:
             raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
 
 sys.meta_path.insert(0, Absent())
-from bench.cli.main import main
+from bench.app.cli.main import main
 sys.exit(main({argv!r}))
 """
 

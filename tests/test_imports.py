@@ -22,12 +22,12 @@ def test_a_specimen_is_described_without_a_compiler() -> None:
 
 
 def test_a_headless_run_needs_no_window_no_driver_and_no_plot_until_its_end() -> None:
-    loaded = _run("import sys; import bench.session, protocols.harmonic.campaign; print(*sys.modules)").split()
+    loaded = _run("import sys; import bench.app.session, protocols.harmonic.campaign; print(*sys.modules)").split()
     assert not {"PySide6", "pyqtgraph", "nidaqmx", "grpc", "serial", "matplotlib"} & {
         name.split(".")[0] for name in loaded
     }
 
 
 def test_the_command_line_starts_without_the_window() -> None:
-    loaded = _run("import sys; import bench.cli.main; print(*sys.modules)").split()
+    loaded = _run("import sys; import bench.app.cli.main; print(*sys.modules)").split()
     assert not {"PySide6", "pyqtgraph"} & {name.split(".")[0] for name in loaded}

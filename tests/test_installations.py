@@ -223,7 +223,7 @@ def test_other_user(place: Path, installed: tuple[Path, Path], right: tuple[floa
     number, said = ask(python, theirs)
     (kernel / "__pycache__").unlink()
     assert number == right[0]
-    assert "belongs to another user" in said
+    assert "is owned by another user" in said
     assert IN_MEMORY in said
     assert sorted(theirs.rglob("*")) == before
 

@@ -1,1 +1,1 @@
-"""Earthquake records: read from files of every usual format, measured, or made synthetically."""
+"""Earthquake records: readers for all common file formats, intensity measures, synthetic records."""

@@ -1,4 +1,4 @@
-"""One horizontal component of a ground motion, as its source gives it."""
+"""One horizontal component of a ground motion, unprocessed."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,12 +13,13 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Accelerogram:
-    """Ground acceleration [m/s2], shape (n,), at a constant step `dt` [s]; nothing was filtered or scaled.
+    """Ground acceleration [m/s2], shape (n,), at a constant step `dt` [s].
 
-    Nothing was shifted either, except that the offset of K-NET's recorders is taken away; `header` then says so.
-    `name` is short, for tables and legends. `source` is the file's path, or says that the motion is synthetic; `format`
-    names the spelling of the file, `unit` what its numbers were in, `sha256` is the hash of its bytes (of the samples
-    where there is no file). `header` is what the source says of itself, by name.
+    It is not filtered, scaled or shifted, except that the offset of K-NET's recorders is removed; `header` then
+    states it. `name` is short, for tables and legends.
+    `source` is the file's path, or states that the motion is synthetic; `format` is the file format, `unit` the unit in
+    the file, `sha256` the hash of its bytes (of the samples for a synthetic motion). `header` holds the statements of
+    the source, by name.
     """
 
     name: str
@@ -33,7 +34,7 @@ class Accelerogram:
 
     @property
     def duration(self) -> float:
-        """From the first to the last sample [s]."""
+        """Time from the first to the last sample [s]."""
         return (self.acceleration.size - 1) * self.dt
 
     @property
@@ -43,5 +44,5 @@ class Accelerogram:
 
     @property
     def sampled(self) -> SampledRecord:
-        """As an excitation of the model."""
+        """The record as an excitation of the model."""
         return SampledRecord(self.acceleration, self.dt)

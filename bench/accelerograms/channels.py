@@ -1,4 +1,4 @@
-"""The channels of a file that holds several, and the choice of one by its number or its name."""
+"""Channels of a multi-channel file, and selection of one by number or name."""
 
 import re
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from sim.errors import InvalidInput
 
 @dataclass(frozen=True)
 class Channel:
-    """A channel: its header begins at line `first`, its accelerations stand below line `data` up to `last` - 1."""
+    """Channel of a file: its header begins at line `first`, its accelerations follow line `data`, up to `last` - 1."""
 
     number: int
     name: str
@@ -21,21 +21,21 @@ class Channel:
 
 
 def chosen(text: RecordText, channels: Sequence[Channel], choices: Choices) -> Channel:
-    """The channel whose number or name was given; the only one, if there is one. Raises InvalidInput."""
+    """The channel with the given number or name; by default the only one. Raises InvalidInput."""
     offered = ", ".join(
         f"{channel.number} ({channel.name})" if channel.name else f"{channel.number}" for channel in channels
     )
     item, wanted = f"channel of {text.path.name}", choices.channel
     if wanted is None:
         if len(channels) > 1:
-            raise InvalidInput(item, None, f"the file has several; give one as @channel=NUMBER: {offered}")
+            raise InvalidInput(item, None, f"the file has several; select one with @channel=NUMBER: {offered}")
         return channels[0]
     number = re.fullmatch(r"\s*(\d+)\s*", wanted)
     found = [channel for channel in channels if number is not None and channel.number == int(number[1])]
     if not found:
         found = [channel for channel in channels if _bare(channel.name) == _bare(wanted)]
     if len(found) != 1:
-        raise InvalidInput(item, wanted, f"the file has {offered}; give one number")
+        raise InvalidInput(item, wanted, f"the file has {offered}; select one number")
     return found[0]
 
 

@@ -1,4 +1,4 @@
-"""What a user says of a file, and what its reader found: brought together, and refused where they disagree."""
+"""Merge of the user's choices for a file with the contents read from it; conflicts are refused."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -13,12 +13,12 @@ from bench.accelerograms.units import UNITS, unit_of
 from sim.errors import InvalidInput
 
 _SAME_STEP = 1e-6
-"""Relative difference up to which two steps are one, written with different digits."""
+"""Relative difference up to which two steps count as equal, written with different digits."""
 
 
 @dataclass(frozen=True)
 class Choices:
-    """Step [s], unit, channel and column as given for a file; None where nothing was given."""
+    """Step [s], unit, channel and column specified for a file; None where not specified."""
 
     dt: float | None = None
     unit: str | None = None
@@ -28,7 +28,7 @@ class Choices:
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """What a reader found: `values`, shape (n,), in `unit`, with the step `dt` [s]; None where the file says nothing.
+    """Contents read from a file: `values`, shape (n,), in `unit`, with the step `dt` [s]; None if not stated.
 
     `part` names the channel or column when the file has several.
     """
@@ -43,23 +43,23 @@ class Reading:
 
 def refuse_choice(text: RecordText, choices: Choices, *names: str) -> None:
     """Refuse the choice of a part that a file does not have."""
-    remedies = {"channel": "this format has no channels", "column": "only plain columns are chosen by column"}
+    remedies = {"channel": "this format has no channels", "column": "a column can be chosen only in plain columns"}
     for name in names:
         value = getattr(choices, name)
         if value is not None:
-            raise InvalidInput(f"{name} of {text.path.name}", value, f"{remedies[name]}; leave it out")
+            raise InvalidInput(f"{name} of {text.path.name}", value, f"{remedies[name]}; omit it")
 
 
 def combine(text: RecordText, choices: Choices, reading: Reading) -> Accelerogram:
-    """The record in m/s2. Raises InvalidInput where choice and file disagree, or neither says it."""
+    """The record in m/s2. Raises InvalidInput where choice and file disagree, or neither states a value."""
     name = text.path.name
     dt = _step(name, choices.dt, reading.dt)
     unit = _unit(name, choices.unit, reading.unit)
     values = UNITS[unit] * reading.values
     if values.size < 2 or not np.isfinite(values).all():
-        raise InvalidInput("record", name, "it must hold two finite samples or more")
+        raise InvalidInput("record", name, "it must have at least two finite samples")
     if not values.any():
-        raise InvalidInput("record", name, "every sample is zero: there is no motion in it")
+        raise InvalidInput("record", name, "every sample is zero: it contains no motion")
     return Accelerogram(
         name=text.path.stem + (f"-{reading.part}" if reading.part else ""),
         acceleration=values,
@@ -82,8 +82,8 @@ def _step(name: str, given: float | None, stated: float | None) -> float:
     if given is None and stated is None:
         raise InvalidInput(f"dt of {name}", None, "the file does not state its time step; give it as @dt=SECONDS")
     if given is not None and stated is not None and not isclose(given, stated, rel_tol=_SAME_STEP):
-        raise InvalidInput(f"dt of {name}", given, f"the file states {stated:g} s; leave dt out")
-    # the file's own digits, when it has any
+        raise InvalidInput(f"dt of {name}", given, f"the file states {stated:g} s; omit dt")
+    # the digits of the file, if any
     return stated if stated is not None else float(given or 0.0)
 
 
@@ -93,5 +93,5 @@ def _unit(name: str, given: str | None, stated: str | None) -> str:
         allowed = f"the file does not state its unit; give it as @unit=UNIT, one of {', '.join(UNITS)}"
         raise InvalidInput(f"unit of {name}", None, allowed)
     if chosen is not None and stated is not None and UNITS[chosen] != UNITS[stated]:
-        raise InvalidInput(f"unit of {name}", chosen, f"the file states {stated}; leave the unit out")
+        raise InvalidInput(f"unit of {name}", chosen, f"the file states {stated}; omit the unit")
     return stated or chosen or ""

@@ -1,8 +1,8 @@
-"""Plain columns, apart by commas, semicolons, tabs or blanks: `t,a`, `a`, or several components side by side.
+"""Plain columns separated by commas, semicolons, tabs or blanks: `t,a`, `a`, or several components.
 
-Above them may stand comments, lines that begin with % or #, and one line of headings like `t [s], NS [cm/s2]`. A first
-column that rises all the way is the time [s] and gives the step. Nothing else is concluded: comments are kept as the
-header, and the unit, the step of columns without time and the column among several must be given.
+They may follow comments, lines that begin with % or #, and one line of headings like `t [s], NS [cm/s2]`. A first
+column that rises throughout is the time [s] and determines the step. Nothing else is inferred: comments are kept as the
+header; the unit, the step of columns without time and the column among several must be specified.
 """
 
 import re
@@ -30,17 +30,17 @@ def check_comments(text: RecordText, count: int, choices: Choices) -> None:
     for index, line in enumerate(text.lines[:count]):
         step, unit = _STEP.search(line), _UNIT.search(line)
         if step is not None and choices.dt is not None and not isclose(value_of(step[1]), choices.dt, rel_tol=1e-6):
-            raise text.refusal(index, f"it says {step[0]}, and dt={choices.dt:g} was given; correct one of them")
+            raise text.refusal(index, f"it states {step[0]}, but dt={choices.dt:g} was specified; correct one of them")
         stated = None if unit is None else spelled(unit[0])
         given = None if choices.unit is None else spelled(choices.unit)
         if stated is not None and given is not None and UNITS[stated] != UNITS[given]:
-            raise text.refusal(index, f"it says {stated}, and unit={given} was given; correct one of them")
+            raise text.refusal(index, f"it states {stated}, but unit={given} was specified; correct one of them")
 
 
 _COMMENT = ("%", "#")
 _HEADING = re.compile(r"^(?P<name>.*?)\s*[\[(]\s*(?P<unit>[^\])]+?)\s*[\])]\s*$")
 _RISING = 0.9
-"""Of the steps of a first column: from there on it is a time, and must be one without a fault."""
+"""Fraction of rising steps above which a first column is a time, which must then be free of errors."""
 
 _EQUAL = 1e-6
 """Relative difference of numbers that were written as equal."""
@@ -57,13 +57,13 @@ class _Table:
 
 
 def recognise(text: RecordText) -> bool:
-    """Whether numbers begin below comments and at most one line of headings."""
+    """Whether numbers begin after comments and at most one line of headings."""
     first = _first_row(text)
     return first is not None and first - _comments(text) <= 1
 
 
 def read(text: RecordText, choices: Choices) -> Reading:
-    """Raises InvalidInput."""
+    """Read plain columns. Raises InvalidInput."""
     refuse_choice(text, choices, "channel")
     table = _table(text)
     check_comments(text, table.first - bool(table.headings), choices)
@@ -72,7 +72,7 @@ def read(text: RecordText, choices: Choices) -> Reading:
     column = _column(text, choices, table, time)
     name, unit = _heading(table.headings[column]) if table.headings else ("", None)
     if unit is not None and spelled(unit) is None:
-        raise text.refusal(table.first - 1, f"column {column + 1} is in {unit}, no unit of acceleration that is known")
+        raise text.refusal(table.first - 1, f"column {column + 1} is in {unit}, an unknown unit of acceleration")
     comments = {f"line {k}": line.strip() for k, line in enumerate(text.lines[: table.first], 1)}
     return Reading(
         format="columns" if count > 1 else "one column",
@@ -85,12 +85,12 @@ def read(text: RecordText, choices: Choices) -> Reading:
 
 
 def _comments(text: RecordText) -> int:
-    """Lines of comment, or empty, at the top."""
+    """Number of comment or empty lines at the top."""
     return next((k for k, line in enumerate(text.lines) if line.strip() and not line.startswith(_COMMENT)), 0)
 
 
 def _first_row(text: RecordText) -> int | None:
-    """The first line that begins with a number and has nothing but numbers, comments passed over."""
+    """The first line after the comments that consists of numbers only."""
     row = re.compile(rf"\s*{NUMBER}(?:[\s,;]+{NUMBER})*[\s,;]*")
     start = _comments(text)
     return next((k for k in range(start, min(start + 2, len(text.lines))) if row.fullmatch(text.lines[k])), None)
@@ -103,7 +103,7 @@ def _table(text: RecordText) -> _Table:
     separator = ";" if ";" in line else "," if "," in line else None
     lines = text.lines[first:]
     if separator == "," and not any("." in line for line in lines):
-        raise text.refusal(first, "its commas may be those of decimals; write decimals with a point")
+        raise text.refusal(first, "its commas may be decimal commas; write decimals with a point")
     values = _parsed(text, first, separator)
     above = text.lines[first - 1] if first > _comments(text) else ""
     headings = [
@@ -113,7 +113,7 @@ def _table(text: RecordText) -> _Table:
 
 
 def _parsed(text: RecordText, first: int, separator: str | None) -> Array:
-    """The rows, shape (rows, columns). Raises InvalidInput naming the first line that is not like the others."""
+    """The rows, shape (rows, columns). Raises InvalidInput naming the first line of another form."""
     lines = text.lines[first:]
     try:
         if "" not in lines:
@@ -121,7 +121,7 @@ def _parsed(text: RecordText, first: int, separator: str | None) -> Array:
             if len(values) == len(lines) and np.isfinite(values).all():
                 return values
     except ValueError:
-        # numpy does not tell the line in a form to rely on: it is looked for below
+        # numpy does not report the line reliably: the loop below finds it
         pass
     width = len(text.lines[first].split(separator))
     for index, line in enumerate(lines, first):
@@ -129,7 +129,7 @@ def _parsed(text: RecordText, first: int, separator: str | None) -> Array:
         if not line.strip():
             raise text.refusal(index, "it is empty, and samples follow: the record has a gap")
         if len(cells) != width:
-            raise text.refusal(index, f"it has {len(cells)} columns, those before {width}")
+            raise text.refusal(index, f"it has {len(cells)} columns, the lines before {width}")
         for cell in cells:
             if re.fullmatch(NUMBER, cell.strip()) is None or not np.isfinite(value_of(cell.strip())):
                 raise text.refusal(index, f"{cell.strip()!r} is not a finite decimal number")
@@ -137,7 +137,7 @@ def _parsed(text: RecordText, first: int, separator: str | None) -> Array:
 
 
 def _is_time(values: Array) -> bool:
-    """Whether the first of several columns rises like time; no ground acceleration does."""
+    """Whether the first of several columns rises like time; unlike ground acceleration."""
     if values.shape[1] < 2 or len(values) < 3:
         return False
     steps = np.diff(values[:, 0])
@@ -155,7 +155,7 @@ def _step(text: RecordText, table: _Table) -> float:
     usual = float(np.median(steps))
     ends = (table.first, table.first + 1, table.first + steps.size)
     digit = max(place(text.lines[k].split(table.separator)[0].strip()) for k in ends)
-    # rounded to their last digit, two times may each be half of it off; more than half a step hides a gap
+    # two rounded times may each be off by half a digit; more than half a step could hide a gap
     rounding = digit * (1.0 + _EQUAL) if digit <= 0.5 * usual else _EQUAL * usual
     dt = float(time[-1] - time[0]) / steps.size
     wrong = np.flatnonzero(np.abs(steps - usual) > rounding)
@@ -164,7 +164,7 @@ def _step(text: RecordText, table: _Table) -> float:
         at = int(wrong[0]) + 1 if wrong.size else int(drift.argmax())
         problem = f"its time does not follow the one above by the step of the others, {usual:g} s"
         raise text.refusal(table.first + at, f"{problem}: there is a gap, or the times have too few digits")
-    # the digits of a step that was meant: 0.01 and not 0.00999999999
+    # the digits of the intended step: 0.01 instead of 0.00999999999
     meant = float(f"{dt:.9g}")
     return meant if abs(meant - dt) * steps.size <= digit else dt
 
@@ -177,7 +177,7 @@ def _column(text: RecordText, choices: Choices, table: _Table, time: bool) -> in
     item, wanted = f"column of {text.path.name}", choices.column
     if wanted is None:
         if len(offered) > 1:
-            raise InvalidInput(item, None, f"the file has several; give one as @column=NUMBER: {', '.join(offered)}")
+            raise InvalidInput(item, None, f"the file has several; select @column=NUMBER: {', '.join(offered)}")
         return int(time)
     found = [k for k, name in enumerate(names) if name == wanted]
     if re.fullmatch(r"\d{1,6}", wanted):

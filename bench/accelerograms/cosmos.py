@@ -1,8 +1,8 @@
 """COSMOS files, version 1.20 (`.V1c`, `.V2c`): text, integers, reals and comments, then one quantity of one channel.
 
-Each part says how many lines or numbers follow, and their columns. Real 34 is the time step. A file may hold several
-channels, and the velocity and displacement of each.
-Source: COSMOS Strong Motion Programs Board, "COSMOS strong motion data format", version 1.20, August 15, 2001.
+Each part states the number of lines or numbers that follow, and their columns. Real 34 is the time step. A file may
+contain several channels, with the velocity and displacement of each. Source: COSMOS Strong Motion Programs Board,
+"COSMOS strong motion data format", version 1.20, August 15, 2001.
 """
 
 import re
@@ -46,7 +46,7 @@ def recognise(text: RecordText) -> bool:
 
 
 def read(text: RecordText, choices: Choices) -> Reading:
-    """Raises InvalidInput."""
+    """Read a COSMOS file. Raises InvalidInput."""
     refuse_choice(text, choices, "column")
     channels = _channels(text)
     channel = chosen(text, channels, choices)
@@ -82,12 +82,12 @@ def _step(text: RecordText, channel: Channel) -> float:
             values = numbers(text, index + 1, index + 1 + int(reals[2]), int(reals[1]), int(reals[3])).values
             if values.size >= _STEP and values[_STEP - 1] > 0.0:
                 return float(values[_STEP - 1])
-            raise text.refusal(index, f"number {_STEP} of these, the time step, is not known")
+            raise text.refusal(index, f"number {_STEP} of these, the time step, is unknown")
     raise text.refusal(channel.first, "no real header follows, which holds the time step; the file is damaged")
 
 
 def _channels(text: RecordText) -> list[Channel]:
-    """The channels that have an acceleration."""
+    """The channels with an acceleration."""
     found: list[Channel] = []
     for block in _blocks(text):
         head = _DATA.match(text.lines[block.data])
@@ -97,7 +97,7 @@ def _channels(text: RecordText) -> list[Channel]:
         number, name = (int(named[0][1]), named[0][2]) if named else (len(found) + 1, "")
         found.append(Channel(number, name, block.first, block.data, block.last))
     if not found:
-        raise text.refusal(0, "no acceleration is in this file; give the one that has it")
+        raise text.refusal(0, "this file has no acceleration; use the file of the acceleration")
     return found
 
 

@@ -1,8 +1,8 @@
 """CSMIP's volume 2 (`.V2`): for each channel 25 lines of text, integers and reals, then acceleration, velocity and
-displacement, eight columns of 10 that may touch.
+displacement, eight columns of width 10 that may touch.
 
 Source: California Strong Motion Instrumentation Program, "Standard tape format for CSMIP strong-motion data tapes",
-OSMS 85-03 (1985); its later releases state the columns, like (8f10.6), where they state the count.
+OSMS 85-03 (1985); its later releases state the columns, like (8f10.6), next to the count.
 """
 
 import re
@@ -25,12 +25,12 @@ _PEAK = re.compile(rf"^\s*PEAK ACCELERATION\s*=\s*({NUMBER})\s+(\S+)", re.IGNORE
 
 
 def recognise(text: RecordText) -> bool:
-    """Whether it begins with a corrected accelerogram and its channel."""
+    """Whether the file begins with a corrected accelerogram and its channel."""
     return _START.match(text.lines[0]) is not None
 
 
 def read(text: RecordText, choices: Choices) -> Reading:
-    """Raises InvalidInput."""
+    """Read a CSMIP file. Raises InvalidInput."""
     refuse_choice(text, choices, "column")
     channels = _channels(text)
     channel = chosen(text, channels, choices)

@@ -13,12 +13,12 @@ _COUNT, _STEP, _UNIT, _TYPE = "NDATA", "SAMPLING_INTERVAL_S", "UNITS", "DATA_TYP
 
 
 def recognise(text: RecordText) -> bool:
-    """Whether it begins with EVENT_NAME and states NDATA."""
+    """Whether the file begins with EVENT_NAME and states NDATA."""
     return text.lines[0].startswith("EVENT_NAME:") and _COUNT in _keys(text)
 
 
 def read(text: RecordText, choices: Choices) -> Reading:
-    """Raises InvalidInput."""
+    """Read an ESM file. Raises InvalidInput."""
     refuse_choice(text, choices, "channel", "column")
     where = _keys(text)
     values = {key: text.lines[index].partition(":")[2].strip() for key, index in where.items()}
@@ -44,7 +44,7 @@ def read(text: RecordText, choices: Choices) -> Reading:
 
 
 def _keys(text: RecordText) -> dict[str, int]:
-    """The lines of the header by their keys: those from the first on that have one."""
+    """The header lines by their keys."""
     found: dict[str, int] = {}
     for index, line in enumerate(text.lines[:_LONGEST_HEADER]):
         key, colon, _ = line.partition(":")

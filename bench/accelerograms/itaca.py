@@ -1,6 +1,6 @@
 """ITACA's older `.acc` files: ten lines of header, then five columns of 14 characters that may touch.
 
-The header states the peak, which the samples are checked against. Source: ITACA 1.x (Luzi et al. 2008).
+The samples are checked against the peak stated in the header. Source: ITACA 1.x (Luzi et al. 2008).
 """
 
 from bench.accelerograms.choices import Choices, Reading, refuse_choice
@@ -13,12 +13,12 @@ _COUNT, _STEP = "Number of Data", "Time Increment (s)"
 
 
 def recognise(text: RecordText) -> bool:
-    """Whether it begins with the event's date and states the number of data."""
+    """Whether the file begins with the event's date and states the number of data."""
     return text.lines[0].startswith("Event Date & Time") and _COUNT in _keys(text)
 
 
 def read(text: RecordText, choices: Choices) -> Reading:
-    """Raises InvalidInput."""
+    """Read an ITACA file. Raises InvalidInput."""
     refuse_choice(text, choices, "channel", "column")
     where = _keys(text)
     values = {key: text.lines[index].partition(":")[2].strip() for key, index in where.items()}

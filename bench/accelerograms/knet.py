@@ -1,7 +1,7 @@
 """Files of K-NET and KiK-net (`.NS`, `.EW1`, ...): 17 lines of header, then counts of the digitizer.
 
-A sample is its count times the scale factor, less the mean of all: the recorders have an offset of their own, and
-the peak that the header states is counted from the mean.
+A sample is its count times the scale factor, minus the mean of all: the recorders have an offset, and the peak in the
+header is relative to the mean.
 Source: NIED, "About K-NET ASCII format" and K-NET/KiK-net FAQ 2.
 """
 
@@ -21,12 +21,12 @@ _CHANNELS = {"1": "NS1", "2": "EW1", "3": "UD1", "4": "NS2", "5": "EW2", "6": "U
 
 
 def recognise(text: RecordText) -> bool:
-    """Whether it begins with the origin time and has a scale factor."""
+    """Whether the file begins with the origin time and has a scale factor."""
     return text.lines[0].startswith("Origin Time") and "Scale Factor" in _keys(text)
 
 
 def read(text: RecordText, choices: Choices) -> Reading:
-    """Raises InvalidInput."""
+    """Read a K-NET or KiK-net file. Raises InvalidInput."""
     refuse_choice(text, choices, "channel", "column")
     where = _keys(text)
     values = {key: text.lines[index][_KEY:].strip() for key, index in where.items()}

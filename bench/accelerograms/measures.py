@@ -1,7 +1,7 @@
-"""What a record is told apart by: peaks of acceleration, velocity and displacement, energy and duration.
+"""Intensity measures of a record: peaks of acceleration, velocity and displacement, energy and duration.
 
-The samples are joined by straight lines, as everywhere in this software, and the motion starts from rest. No baseline
-is removed and nothing is filtered: velocity and displacement at the end say how far a record drifts.
+The samples are interpolated linearly, as everywhere in this software, and the motion starts from rest. Without baseline
+correction or filter, the final velocity and displacement show the drift of a record.
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from bench.analysis.table_motion import table_motion
 Array = NDArray[np.float64]
 
 DRIFTING = 0.05
-"""Velocity at the end, of the greatest: beyond it the record's velocity and displacement are those of its drift."""
+"""Ratio of final to peak velocity above which drift dominates a record's velocity and displacement."""
 
 
 @dataclass(frozen=True)
@@ -42,12 +42,12 @@ class Measures:
 
     @property
     def drifts(self) -> bool:
-        """Whether `pgv` and `pgd` are rather those of a baseline that is off than of the ground."""
+        """Whether `pgv` and `pgd` are due to a baseline error rather than to the ground."""
         return abs(self.final_velocity) > DRIFTING * self.pgv
 
 
 def measures(record: Accelerogram) -> Measures:
-    """The measures of a record."""
+    """Intensity measures of a record."""
     a, dt = record.acceleration, record.dt
     velocity, displacement = table_motion(a, dt)
     energy = husid(a, dt)
@@ -66,14 +66,14 @@ def measures(record: Accelerogram) -> Measures:
 
 
 def husid(acceleration: Array, dt: float) -> Array:
-    """Arias intensity [m/s] up to each sample, shape (n,): Husid's curve, exact for straight lines between samples."""
+    """Arias intensity [m/s] up to each sample, shape (n,): the Husid curve, exact for linear interpolation."""
     before, after = acceleration[:-1], acceleration[1:]
     grown = np.cumsum((before**2 + before * after + after**2) * (dt / 3.0))
     return pi / (2.0 * STANDARD_GRAVITY) * np.concatenate(([0.0], grown))
 
 
 def _reached(energy: Array, share: float, dt: float) -> float:
-    """When a share of the energy has come [s], on a straight line between samples."""
+    """Time [s] at which a fraction of the energy is reached, interpolated between samples."""
     level = share * float(energy[-1])
     k = int(np.searchsorted(energy, level))
     before, after = float(energy[k - 1]), float(energy[k])
@@ -81,7 +81,7 @@ def _reached(energy: Array, share: float, dt: float) -> float:
 
 
 def _peaks(velocity: Array, displacement: Array, acceleration: Array, dt: float) -> tuple[float, float]:
-    """Largest |v| and |d|: between samples velocity is a parabola and displacement a cubic, which may turn there."""
+    """Largest |v| and |d|: between samples velocity is a parabola and displacement a cubic, with possible extrema."""
     from scipy.interpolate import CubicHermiteSpline, PPoly
 
     time = dt * np.arange(velocity.size)
@@ -92,8 +92,8 @@ def _peaks(velocity: Array, displacement: Array, acceleration: Array, dt: float)
 
 
 def _largest(samples: Array, curve: Any) -> float:
-    """Largest magnitude of a piecewise polynomial: at its knots, where it has the values `samples`, or turning."""
+    """Largest magnitude of a piecewise polynomial: at its knots, with the values `samples`, or at an extremum."""
     turns = curve.derivative().roots(extrapolate=False)
-    # NaN follows the beginning of an interval in which the slope is zero throughout
+    # an interval of zero slope yields NaN, which is ignored
     turns = turns[np.isfinite(turns)]
     return max(float(np.abs(samples).max()), float(np.abs(curve(turns)).max(initial=0.0)))

@@ -1,4 +1,4 @@
-"""The numbers of a block of lines, apart by blanks or, where they run together, by the width of their columns."""
+"""Numbers in a block of lines, separated by blanks or, where they touch, by the width of their columns."""
 
 import re
 from collections.abc import Sequence
@@ -12,24 +12,24 @@ from bench.accelerograms.text import RecordText
 Array = NDArray[np.float64]
 
 NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][+-]?\d+)?"
-"""A decimal number as Fortran and C write it; neither NaN nor infinity is one."""
+"""A decimal number in Fortran or C format; neither NaN nor infinity."""
 
 _FOREIGN = re.compile(r"[^0-9EeDd+\-.\s]")
 
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Numbers in the order of the file, shape (n,), and how each was written."""
+    """Numbers in the order of the file, shape (n,), and the text of each."""
 
     values: Array
     texts: Sequence[str]
 
 
 def numbers(text: RecordText, first: int, last: int, count: int, width: int | None = None) -> Samples:
-    """The `count` numbers in the lines `first` to `last` - 1, every row but the last one equally long.
+    """The `count` numbers in the lines `first` to `last` - 1, with all rows but the last of equal length.
 
-    `width` is that of a column, where the format fixes it; without it a width is looked for at which the numbers come
-    apart. Raises InvalidInput naming the line that holds something else, or the count.
+    `width` is that of a column if fixed by the format; otherwise the width that separates the numbers is determined.
+    Raises InvalidInput naming the line with other content, or the count.
     """
     lines = [line.rstrip() for line in text.lines[first:last]]
     while lines and not lines[-1]:
@@ -48,17 +48,17 @@ def numbers(text: RecordText, first: int, last: int, count: int, width: int | No
     _refuse_junk(text, first, lines, width)
     there = sum(len(re.findall(NUMBER, line)) for line in lines)
     cause = "the file is cut off: fetch it again" if there < count else "the file is damaged or numbers were added"
-    allowed = f"the header states {count} samples and {there} numbers are there up to this line; {cause}"
+    allowed = f"the header states {count} samples, but {there} numbers precede this line; {cause}"
     raise text.refusal(first + max(len(lines) - 1, 0), allowed)
 
 
 def value_of(word: str) -> float:
-    """The value of a number that matches `NUMBER`; Fortran's exponents may begin with D."""
+    """Value of a text that matches `NUMBER`; Fortran's exponents may begin with D."""
     return float(word.replace("D", "E").replace("d", "e"))
 
 
 def place(word: str) -> float:
-    """What one unit in the last digit of a number, as it is written, is worth."""
+    """Value of one unit in the last written digit of a number."""
     mantissa, _, exponent = re.sub("[dD]", "e", word.lower()).partition("e")
     decimals = len(mantissa.partition(".")[2])
     return 10.0 ** (int(exponent or 0) - decimals)
@@ -75,13 +75,13 @@ def _as_samples(fields: list[str]) -> Samples | None:
 
 
 def _columns(lines: list[str], count: int, width: int | None) -> Samples | None:
-    """The numbers of columns that may touch: of the one width, or of the widest at which all are numbers."""
+    """The numbers of columns that may touch: of the given width, or of the widest at which all are numbers."""
     full = len(lines[0]) if lines else 0
     for candidate in range(full, 1, -1) if width is None else (width,):
         if full % candidate or any(len(line) % candidate for line in lines):
             continue
         fields = [line[k : k + candidate].strip() for line in lines for k in range(0, len(line), candidate)]
-        # one decimal point in each, at one place: a cut through a number has none, or another
+        # one decimal point in each, at the same position: a number cut in two has none, or at another position
         decimals = {len(field.partition(".")[2]) if "." in field else None for field in fields}
         found = _as_samples(fields) if len(fields) == count and len(decimals) == 1 and None not in decimals else None
         if found is not None:
@@ -96,20 +96,20 @@ def _refuse_empty(text: RecordText, first: int, lines: list[str]) -> None:
 
 
 def _refuse_gaps(text: RecordText, first: int, lengths: list[int]) -> None:
-    """Every row but the last must be as long as the first."""
+    """Refuse rows, other than the last, of another length than the first."""
     for index, length in enumerate(lengths[1:], 1):
         if length != lengths[0] and (index < len(lengths) - 1 or length > lengths[0]):
             raise text.refusal(first + index, "its row differs in length from those before: samples are missing")
 
 
 def _refuse_junk(text: RecordText, first: int, lines: list[str], width: int | None) -> None:
-    """Name the first line that is anything but numbers, apart by blanks, by their signs or by the width."""
+    """Refuse the first line with anything but numbers, separated by blanks, signs or width."""
     run = re.compile(rf"(?:\s*{NUMBER}(?=[\s+-]|$))+")
     for index, line in enumerate(lines):
         fields = [] if width is None else [line[k : k + width].strip() for k in range(0, len(line), width)]
         in_columns = bool(fields) and all(re.fullmatch(NUMBER, field) for field in fields)
         if run.fullmatch(line) is None and not in_columns:
-            raise text.refusal(first + index, "it must hold numbers and nothing else; the file is damaged")
+            raise text.refusal(first + index, "it must contain only numbers; the file is damaged")
         for word in re.findall(NUMBER, line):
             if not np.isfinite(value_of(word)):
                 raise text.refusal(first + index, f"{word} is too large to be a number here; the file is damaged")

@@ -1,8 +1,8 @@
 """PEER's `.AT2` files: a header of four lines or more, the last with NPTS and DT, then rows of samples.
 
-Spellings of that line: `NPTS=  4000, DT= .01000 SEC` (1999 to today, with and without a comma behind it) and
-`4000 0.0100 NPTS, DT` (Pacific Engineering and Analysis). Spectrum-compatible files carry the headers of earlier
-stages above the one that counts. Samples come in 4 to 8 columns, the last row may be partial.
+Variants of that line: `NPTS=  4000, DT= .01000 SEC` (1999 to today, with or without a trailing comma) and
+`4000 0.0100 NPTS, DT` (Pacific Engineering and Analysis). Spectrum-compatible files have the headers of earlier
+processing stages above the valid one. Samples come in 4 to 8 columns, the last row may be partial.
 Source: PEER Strong Motion Database, "Data files"; PEER NGA-West2 (2013).
 """
 
@@ -28,7 +28,7 @@ def recognise(text: RecordText) -> bool:
 
 
 def read(text: RecordText, choices: Choices) -> Reading:
-    """Raises InvalidInput."""
+    """Read a PEER file. Raises InvalidInput."""
     refuse_choice(text, choices, "channel", "column")
     last = _size_line(text)
     assert last is not None
@@ -36,7 +36,7 @@ def read(text: RecordText, choices: Choices) -> Reading:
     assert size is not None
     stated = [index for index in range(last) if _QUANTITY.search(text.lines[index])]
     if not stated:
-        raise text.refusal(last, "no line above it says ACCELERATION; give the .AT2 file as PEER sends it")
+        raise text.refusal(last, "no line above it states ACCELERATION; use the .AT2 file as downloaded from PEER")
     about = stated[-1]
     quantity = str(_QUANTITY.findall(text.lines[about])[0])
     if quantity.upper() != "ACCELERATION":
@@ -54,7 +54,7 @@ def read(text: RecordText, choices: Choices) -> Reading:
 
 
 def _size_line(text: RecordText) -> int | None:
-    """The last line of the header; above it may be those of earlier stages of processing."""
+    """The last header line; those of earlier processing stages may precede it."""
     found = [k for k, line in enumerate(text.lines[:_LONGEST_HEADER]) if _sizes(line) is not None]
     return found[-1] if found else None
 

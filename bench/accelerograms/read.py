@@ -1,4 +1,4 @@
-"""Reads an earthquake record, whichever of the usual formats it is in."""
+"""Reader of earthquake records in all common formats."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -18,7 +18,7 @@ class _Format(NamedTuple):
 _FORMATS = tuple(
     _Format(module.recognise, module.read) for module in (esm, itaca, csmip, cosmos, knet, smc, peer, columns)
 )
-"""Told apart by what the files hold, in this order; columns of numbers come last because they say least."""
+"""Formats in the order of detection; plain columns are the least specific and come last."""
 
 KNOWN = "PEER .AT2, ESM and ITACA .ASC, ITACA .acc, CSMIP .V2, COSMOS, K-NET and KiK-net, USGS .smc, plain columns"
 
@@ -31,17 +31,16 @@ def read_accelerogram(
     channel: str | None = None,
     column: str | None = None,
 ) -> Accelerogram:
-    """Every sample of a record, in m/s2; `format` and `unit` of the result say what the file was recognised as.
+    """Read all samples of a record, in m/s2; the result has the detected `format` and `unit`.
 
-    `dt` [s] and `unit` (see `bench.accelerograms.units.UNITS`) are needed where the file does not state them, and may
-    not contradict it where it does. `channel`, a number or a name, chooses in files of several channels, `column`,
-    counted from 1 or a heading, among plain columns.
-
-    Raises InvalidInput, naming the line where there is one, for anything that is not a whole, finite acceleration.
+    `dt` [s] and `unit` (see `bench.accelerograms.units.UNITS`) are required where the file does not state them, and
+    must not contradict it. `channel`, a number or a name, selects from several channels, `column`, a number from 1 or a
+    heading, from plain columns. Raises InvalidInput, naming the line if possible, for anything but a complete, finite
+    acceleration.
     """
     text = load(path)
     choices = Choices(dt, unit, channel, column)
     for known in _FORMATS:
         if known.recognise(text):
             return combine(text, choices, known.read(text, choices))
-    raise text.refusal(0, f"the file begins like no format that is known here: {KNOWN}")
+    raise text.refusal(0, f"unrecognised file format; supported: {KNOWN}")

@@ -1,6 +1,6 @@
-"""How a record is named on a command line: `FILE`, `FILE@KEY=VALUE,...` or `synthetic:NAME[:SEED]`.
+"""Reference to a record on a command line: `FILE`, `FILE@KEY=VALUE,...` or `synthetic:NAME[:SEED]`.
 
-The options follow the last @, because a colon or a comma may stand in a path (`C:\\records\\a.AT2@dt=0.005`).
+The options follow the last @, because a path may contain a colon or a comma (`C:\\records\\a.AT2@dt=0.005`).
 """
 
 import re
@@ -17,7 +17,7 @@ from sim.errors import InvalidInput
 GRAMMAR = "FILE[@KEY=VALUE,...] with the keys unit, dt, channel, column and name, or synthetic:NAME[:SEED]"
 
 SHORTEST_STEP, LONGEST_STEP = 1e-4, 0.5
-"""Time steps [s] that are typed for a record: strong motion is sampled at 50 to 1000 Hz, old film at 10 Hz and more."""
+"""Plausible time steps [s] of a record: strong motion is sampled at 50 to 1000 Hz, old film at 10 Hz or more."""
 
 _SYNTHETIC = "synthetic:"
 _KEYS = ("unit", "dt", "channel", "column", "name")
@@ -26,9 +26,9 @@ _OPTIONS = re.compile(r"\w+=[^=]*(,\w+=[^=]*)*")
 
 @dataclass(frozen=True)
 class RecordReference:
-    """A record that was asked for: a file, or a synthetic motion and its seed, and what was said of it.
+    """A requested record: a file, or a synthetic motion with its seed, and options.
 
-    `text` is how it was written; `seed` is None for the default one.
+    `text` is the original text; `seed` is None for the default.
     """
 
     text: str
@@ -43,7 +43,7 @@ class RecordReference:
 
     @staticmethod
     def parse(text: str) -> "RecordReference":
-        """Take a reference apart; nothing is read. Raises InvalidInput."""
+        """Parse a reference without reading the file. Raises InvalidInput."""
         place, at, tail = text.rpartition("@")
         if not at or _OPTIONS.fullmatch(tail) is None:
             place, tail = text, ""
@@ -65,14 +65,14 @@ class RecordReference:
             raise InvalidInput("record", text, "a synthetic motion takes no option but name")
         name, colon, seed = place.removeprefix(_SYNTHETIC).partition(":")
         if colon and re.fullmatch(r"[0-9]{1,9}", seed) is None:
-            raise InvalidInput(f"seed in {text}", seed, "it must be a whole number of at most nine digits")
+            raise InvalidInput(f"seed in {text}", seed, "it must be an integer of at most nine digits")
         _check_synthetic(text, name)
         return replace(found, synthetic=name, seed=int(seed) if colon else None)
 
     def or_else(
         self, *, unit: str | None, dt: float | None, channel: str | None, column: str | None
     ) -> "RecordReference":
-        """With these where the reference says nothing itself; a synthetic motion needs none of them."""
+        """The reference with these defaults for options not specified; a synthetic motion has none of them."""
         if self.path is None:
             return self
         return replace(
@@ -95,15 +95,15 @@ class RecordReference:
 
 
 def read_records(references: Sequence[RecordReference]) -> tuple[Accelerogram, ...]:
-    """The records of a campaign, every one before anything starts. Raises InvalidInput where two share a name."""
+    """Read all records of a campaign, before it starts. Raises InvalidInput where two share a name."""
     records: list[Accelerogram] = []
     owners: dict[str, str] = {}
     for reference in references:
         record = reference.read()
-        # names become names of groups and files, and some file systems take A and a for one
+        # the names are used for groups and files, and some file systems ignore case
         key = record.name.lower()
         if key in owners:
-            allowed = f"its name, {record.name}, is taken by {owners[key]}; leave one out, or add name=ANOTHER behind @"
+            allowed = f"its name, {record.name}, is also that of {owners[key]}; omit one, or add name=ANOTHER after @"
             raise InvalidInput("record", reference.text, allowed)
         owners[key] = reference.text
         records.append(record)
@@ -121,13 +121,13 @@ def _options(text: str, tail: str) -> dict[str, str]:
         if key not in _KEYS:
             raise InvalidInput("record", text, f"{key} is not one of {', '.join(_KEYS)}, which may follow @")
         if key in options or not value.strip():
-            raise InvalidInput("record", text, f"{key} must be given once and have a value")
+            raise InvalidInput("record", text, f"{key} must occur once and have a value")
         options[key] = value.strip()
     return options
 
 
 def seconds_of(item: str, value: str) -> float:
-    """A time step as it was typed [s]. Raises InvalidInput."""
+    """A time step [s] from its text. Raises InvalidInput."""
     try:
         seconds = read_number(value, "s")
     except ValueError as error:

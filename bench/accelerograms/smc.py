@@ -1,7 +1,7 @@
 """The U.S. Geological Survey's `.smc` files: 11 lines of text, 48 integers, 50 reals, comments, then samples in cm/s2.
 
 Integer 16 is the number of comment lines, 17 that of samples; real 2 is the sampling rate, 30 and 32 are the largest
-and smallest sample. Columns are 10 wide and touch. Source: USGS National Strong-Motion Program, "SMC-format data
+and smallest sample. Columns are 10 wide and may touch. Source: USGS National Strong-Motion Program, "SMC-format data
 files", sections 3 and 4.
 """
 
@@ -13,25 +13,25 @@ from bench.accelerograms.stated import check_peak, count_in, not_acceleration
 from bench.accelerograms.text import RecordText
 
 _TEXT, _INTEGERS, _REALS, _COMMENTS = 11, 17, 27, 27
-"""Lines before the integers, the reals, the comments."""
+"""Number of lines before the integers, the reals, the comments."""
 
 _WIDTH, _REAL_WIDTH = 10, 15
 _TYPE = re.compile(r"^\s*([0-6])\s+([A-Z][A-Z ]+)")
 _UNKNOWN = 1e30
-"""Reals above it stand for an unknown value (1.7e38)."""
+"""Reals above this limit denote unknown values (1.7e38)."""
 
 _KINDS = {"1": "uncorrected accelerogram", "2": "corrected accelerogram"}
 
 
 def recognise(text: RecordText) -> bool:
-    """Whether it begins with a type of SMC, and 48 integers stand where they should."""
+    """Whether the file begins with an SMC type and has the 48 integers."""
     if _TYPE.match(text.lines[0]) is None or len(text.lines) <= _COMMENTS:
         return False
     return all(re.fullmatch(r"[\s\d-]{80}\s*", line.ljust(80)) for line in text.lines[_TEXT:_INTEGERS])
 
 
 def read(text: RecordText, choices: Choices) -> Reading:
-    """Raises InvalidInput."""
+    """Read an SMC file. Raises InvalidInput."""
     refuse_choice(text, choices, "channel", "column")
     kind = _TYPE.match(text.lines[0])
     assert kind is not None
@@ -46,7 +46,7 @@ def read(text: RecordText, choices: Choices) -> Reading:
     reals = numbers(text, _INTEGERS, _REALS, 50, _REAL_WIDTH)
     rate = float(reals.values[1])
     if not 0.0 < rate < _UNKNOWN:
-        raise text.refusal(_INTEGERS, "the second number, the sampling rate, is unknown: the steps may differ")
+        raise text.refusal(_INTEGERS, "the second number, the sampling rate, is unknown: the step may vary")
     samples = numbers(text, first, len(text.lines), count, _WIDTH)
     known = [k for k in (29, 31) if abs(reals.values[k]) < _UNKNOWN]
     if len(known) == 2:
@@ -63,7 +63,7 @@ def read(text: RecordText, choices: Choices) -> Reading:
 
 
 def _comments(text: RecordText) -> int:
-    """Integer 16; an unknown one is refused."""
+    """Number of comment lines, integer 16; an unknown one is refused."""
     word = _field(text, _TEXT, 16).strip()
     if re.fullmatch(r"\d+", word) is None:
         raise text.refusal(_TEXT + 1, "its last number, the lines of comment, must not be negative; fetch it again")

@@ -1,4 +1,4 @@
-"""Checks of what a header states against the samples."""
+"""Checks of a header's statements against the samples."""
 
 import re
 
@@ -11,10 +11,10 @@ from sim.errors import InvalidInput
 
 
 def check_peak(text: RecordText, index: int, stated: str, samples: Samples, resolution: float | None = None) -> None:
-    """Refuse samples whose largest magnitude is not the one that line `index` states, in the unit of the samples.
+    """Refuse samples whose largest magnitude differs from that stated in line `index`, in the unit of the samples.
 
-    Both may be wrong by one in the last digit that is written of them; `resolution` stands for that of the samples
-    where they were not written in this unit.
+    Both may be off by one in their last digit; `resolution` replaces that of the samples if they were written in
+    another unit.
     """
     at = int(np.abs(samples.values).argmax())
     found = abs(float(samples.values[at]))
@@ -26,7 +26,7 @@ def check_peak(text: RecordText, index: int, stated: str, samples: Samples, reso
 
 
 def number_in(text: RecordText, index: int, stated: str, item: str) -> float:
-    """A number that the header states on line `index`. Raises InvalidInput naming `item` and the line."""
+    """A number stated in header line `index`. Raises InvalidInput naming `item` and the line."""
     word = stated.strip()
     if re.fullmatch(NUMBER, word) is None:
         raise text.refusal(index, f"{item} must be a number; the header is damaged")
@@ -34,23 +34,21 @@ def number_in(text: RecordText, index: int, stated: str, item: str) -> float:
 
 
 def count_in(text: RecordText, index: int, stated: str, item: str = "the number of samples") -> int:
-    """A whole number above 1 that the header states on line `index`."""
+    """An integer above 1 stated in header line `index`."""
     word = stated.strip()
     if re.fullmatch(r"\d+", word) is None or int(word) < 2:
-        raise text.refusal(index, f"{item} must be a whole number of at least 2; the header is damaged")
+        raise text.refusal(index, f"{item} must be an integer of at least 2; the header is damaged")
     return int(word)
 
 
 def acceleration_unit(text: RecordText, index: int, stated: str) -> str:
-    """The unit that line `index` states. Raises InvalidInput when it is none of acceleration."""
+    """The unit stated in line `index`. Raises InvalidInput for a unit that is not of acceleration."""
     unit = spelled(stated)
     if unit is None:
-        raise text.refusal(index, f"{stated.strip()!r} is not a unit of acceleration that is known here")
+        raise text.refusal(index, f"{stated.strip()!r} is not a known unit of acceleration")
     return unit
 
 
 def not_acceleration(text: RecordText, index: int, quantity: str) -> InvalidInput:
-    """The refusal of a file that holds another quantity, as line `index` says."""
-    return text.refusal(
-        index, f"it is a {quantity.lower()} file; give the acceleration of the same record (of PEER: .AT2)"
-    )
+    """Refusal of a file of another quantity, stated in line `index`."""
+    return text.refusal(index, f"it is a {quantity.lower()} file; use the acceleration of the same record (PEER: .AT2)")

@@ -1,16 +1,16 @@
-"""Synthetic ground motions with the main numbers of the paper's seven records, for machines that have no records.
+"""Synthetic ground motions with the main parameters of the paper's seven records, for use without record files.
 
-Filtered shot noise of the ground, and the velocity pulse of a fault that is near. The envelope of the noise is that of
-Saragoni and Hart (Earthquake Eng. Struct. Dyn. 2, 1974) with an exponent of 1, e(t) = c t exp(1 - c t). The filters are
-those of Kanai (1957) and Tajimi (1960), the ground as an oscillator, with the high-pass of Clough and Penzien (Dynamics
-of Structures, 1975), which brings velocity and displacement back to zero. Noise that is modulated first and filtered
-then: Amin and Ang, J. Eng. Mech. Div. ASCE 94, 1968.
+They consist of filtered shot noise and a near-fault velocity pulse. The envelope of the noise is that of Saragoni and
+Hart (Earthquake Eng. Struct. Dyn. 2, 1974) with an exponent of 1, e(t) = c t exp(1 - c t). The filters are those of
+Kanai (1957) and Tajimi (1960), the ground as an oscillator, with the high-pass of Clough and Penzien (Dynamics of
+Structures, 1975), which brings velocity and displacement back to zero. Noise modulated before filtering: Amin and Ang,
+J. Eng. Mech. Div. ASCE 94, 1968.
 
 Peaks, durations and bands of six were measured on the records themselves. Parkfield's peak is that of its database,
 its pulse, ten inches of displacement within one and a half seconds, that of Housner and Trifunac (Bull. Seism. Soc.
-Am. 57, 1967); its duration and band are estimates. The periods and amplitudes of the other pulses are our choice,
-near the velocity pulses that the records show by eye; they were not fitted. Frequencies of the filters and durations
-of the noise were found so that the mean over seeds has the declared numbers.
+Am. 57, 1967); its duration and band are estimates. Periods and amplitudes of the other pulses were chosen by eye from
+the velocity pulses of the records, not fitted. Filter frequencies and noise durations were adjusted so that the mean
+over seeds has the declared values.
 """
 
 from dataclasses import dataclass
@@ -40,8 +40,8 @@ class Pulse:
 
 @dataclass(frozen=True)
 class Shape:
-    """`peak` [g]; `duration` [s] between 5 and 95 % of the Arias intensity; `band` [Hz] that holds the middle 68 % of
-    the acceleration's energy. `ground`: frequency and damping ratio of the ground and frequency of the high-pass;
+    """`peak` [g]; `duration` [s] between 5 and 95 % of the Arias intensity; `band` [Hz] that contains the middle 68 %
+    of the acceleration's energy. `ground`: frequency and damping ratio of the ground and frequency of the high-pass;
     `significant` [s]: duration of the noise alone.
     """
 
@@ -64,14 +64,14 @@ SHAPES: dict[str, Shape] = {
 }
 
 NAMES = tuple(SHAPES)
-"""In the paper's order."""
+"""The records, in the paper's order."""
 
 
 SIGNIFICANT = 2.73905
 """c times the time between 5 and 95 % of the envelope's energy: e^2 is a gamma distribution of shape 3."""
 
 DECAYED = 6.5
-"""c t at which the noise ends: 2.7 % of its greatest are left, and the filters let them die away."""
+"""c t at which the noise ends, at 2.7 % of its maximum; the filters smooth the end."""
 
 HIGH_PASS_DAMPING = 0.6
 """Damping ratio of Clough and Penzien's second filter, their usual value."""
@@ -80,17 +80,18 @@ HIGH_PASS_DAMPING = 0.6
 def shot_noise(
     seed: int, member: int, n: int, dt: float, significant: float, ground: tuple[float, float, float]
 ) -> Array:
-    """A sample of the noise, shape (n,), of any size, from rest.
+    """A realisation of the noise, shape (n,), of arbitrary scale, from rest.
 
     `significant` [s] is the duration between 5 and 95 % of its energy; `ground` are frequency [Hz] and damping ratio of
-    the ground and frequency [Hz] of the high-pass. The same `seed` and `member` give the same noise everywhere.
+    the ground and frequency [Hz] of the high-pass. The same `seed` and `member` produce the same noise on every
+    machine.
     """
     from scipy.fft import next_fast_len
 
     rate = SIGNIFICANT / significant
     time = np.arange(n) * dt
     white = _white(seed, member, n) * np.where(rate * time < DECAYED, rate * time * np.exp(1.0 - rate * time), 0.0)
-    # as long again, so that the filters' ringing does not come round to the beginning
+    # twice the length, so that the filters' ringing does not wrap around to the beginning
     length = next_fast_len(2 * n, real=True)
     frequency = np.fft.rfftfreq(length, dt).astype(np.float64)
     filtered = np.fft.irfft(np.fft.rfft(white, length) * _response(frequency, *ground), length)
@@ -98,7 +99,7 @@ def shot_noise(
 
 
 def _white(seed: int, member: int, n: int) -> Array:
-    """White noise between -1 and 1: numpy promises that the generator's own integers stay what they are."""
+    """White noise between -1 and 1, from the generator's integers, which numpy guarantees not to change."""
     raw = np.random.PCG64(np.random.SeedSequence((seed, member))).random_raw(n)
     return 2.0 * (raw >> np.uint64(11)).astype(np.float64) * 2.0**-53 - 1.0
 
@@ -116,22 +117,23 @@ DT = 0.01
 DEFAULT_SEED = 1
 
 HASHED = 1e-6
-"""Acceleration [m/s2] to which a record is rounded for its hash: beyond it, machines may differ."""
+"""Resolution [m/s2] to which a record is rounded before hashing, since rounding errors may differ between machines."""
 
 FADING = 1.5
 """Time for the filters to fade after the noise, in periods of the high-pass."""
 
 
 def synthetic_record(name: str, seed: int = DEFAULT_SEED) -> Accelerogram:
-    """A ground motion with the main numbers of the record `name`, one of NAMES; made, not measured.
+    """A synthetic ground motion with the main parameters of the record `name`, one of NAMES.
 
-    Peak exact, duration and band as declared in the mean over seeds; it begins and ends at rest, velocity and
-    displacement included. The same seed gives the same record everywhere, to rounding. Raises InvalidInput.
+    The peak is exact, duration and band are as declared in the mean over seeds; it begins and ends at rest, with zero
+    velocity and displacement. The same seed produces the same record on every machine, to rounding. Raises
+    InvalidInput.
     """
     if name not in SHAPES:
         raise InvalidInput("synthetic record", name, f"there are {', '.join(NAMES)}")
     if seed < 0:
-        raise InvalidInput("seed", seed, "it must be a whole number, at least 0")
+        raise InvalidInput("seed", seed, "it must be an integer, at least 0")
     shape = SHAPES[name]
     acceleration = _motion(shape, seed, NAMES.index(name))
     rounded = np.round(acceleration / HASHED).astype("<i8")
@@ -162,7 +164,7 @@ def synthetic_record(name: str, seed: int = DEFAULT_SEED) -> Accelerogram:
 
 
 def _motion(shape: Shape, seed: int, member: int) -> Array:
-    """The noise is as strong as gives the declared peak together with the pulse."""
+    """The motion with the noise scaled so that noise and pulse together have the declared peak."""
     from scipy.optimize import brentq
 
     rate = SIGNIFICANT / shape.significant
@@ -185,8 +187,8 @@ def _motion(shape: Shape, seed: int, member: int) -> Array:
 def pulse_acceleration(pulse: Pulse, time: Array) -> Array:
     """Acceleration [m/s2] of the pulse at `time` [s] from its middle, same shape.
 
-    v = V/2 (1 + cos(2 pi t / (gamma T))) cos(2 pi t / T + nu) for |t| < gamma T / 2; a whole gamma leaves no
-    displacement behind. Source: Mavroeidis and Papageorgiou, Bull. Seism. Soc. Am. 93, 2003.
+    v = V/2 (1 + cos(2 pi t / (gamma T))) cos(2 pi t / T + nu) for |t| < gamma T / 2; for integer gamma above
+    1 the residual displacement is zero. Source: Mavroeidis and Papageorgiou, Bull. Seism. Soc. Am. 93, 2003.
     """
     omega = 2.0 * np.pi / pulse.period
     slow, fast = omega / pulse.gamma * time, omega * time + pulse.phase

@@ -1,26 +1,27 @@
-"""A record's file as numbered lines, whatever ends them."""
+"""Text of a record's file as numbered lines, with any line endings."""
 
 import re
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
+from bench.bounded import read_bounded
 from sim.errors import InvalidInput
 
 _CONTROL_Z = "\x1a"
-"""DOS fills the end of a text file with it."""
+"""DOS padding at the end of a text file."""
 
 
 @dataclass(frozen=True)
 class RecordText:
-    """The lines of a file, without what ended them (LF, CR LF, CR CR LF, CR), and the hash of its bytes."""
+    """Lines of a file without line endings (LF, CR LF, CR CR LF, CR), and the hash of its bytes."""
 
     path: Path
     lines: tuple[str, ...]
     sha256: str
 
     def where(self, index: int) -> str:
-        """How a refusal names the line `index`, counted from 0."""
+        """Name of the line `index`, counted from 0, in a refusal."""
         return f"{self.path.name}, line {index + 1}"
 
     def refusal(self, index: int, allowed: str) -> InvalidInput:
@@ -32,14 +33,16 @@ class RecordText:
 def load(path: Path) -> RecordText:
     """Read a file. Raises InvalidInput when it cannot be read or is not text."""
     try:
-        content = path.read_bytes()
+        content = read_bounded(path)
     except FileNotFoundError:
         raise InvalidInput("record", str(path), "there is no such file") from None
     except OSError as error:
         raise InvalidInput("record", str(path), f"it cannot be read: {error.strerror}") from None
+    except ValueError as error:
+        raise InvalidInput("record", str(path), str(error)) from None
     if b"\0" in content:
         raise InvalidInput("record", str(path), "it is not a text file of one byte per character; export it as text")
-    # headers hold names of places in any encoding, numbers are ASCII: Latin-1 takes every byte
+    # headers contain place names in any encoding, numbers are ASCII: Latin-1 decodes every byte
     text = content.removeprefix(b"\xef\xbb\xbf").decode("latin-1").rstrip(_CONTROL_Z + " \t\r\n")
     if not text:
         raise InvalidInput("record", str(path), "it is empty")

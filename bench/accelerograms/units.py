@@ -1,4 +1,4 @@
-"""Units of acceleration, as files and people spell them."""
+"""Units of acceleration and their spellings."""
 
 import re
 
@@ -8,20 +8,20 @@ STANDARD_GRAVITY = 9.80665
 """1 g [m/s2], exact. Source: 3rd General Conference on Weights and Measures, 1901."""
 
 UNITS = {"m/s2": 1.0, "cm/s2": 0.01, "mm/s2": 0.001, "gal": 0.01, "g": STANDARD_GRAVITY}
-"""m/s2 in one of each."""
+"""Value of each unit in m/s2."""
 
 _SPELLINGS = {"g's": "g", "gals": "gal"}
 
 
 def spelled(text: str) -> str | None:
-    """The unit of `UNITS` that `text` means (`cm/sec/sec`, `CM/S^2`, `m/s**2`), or None."""
+    """The unit of `UNITS` denoted by `text` (`cm/sec/sec`, `CM/S^2`, `m/s**2`), or None."""
     word = re.sub(r"\s+|\*\*|\^|[.,;]$", "", text.strip().lower()).replace("sec", "s").replace("/s/s", "/s2")
     word = _SPELLINGS.get(word, word)
     return word if word in UNITS else None
 
 
 def unit_of(text: str, item: str) -> str:
-    """The unit that a user gave. Raises InvalidInput naming `item`."""
+    """The unit specified by a user. Raises InvalidInput naming `item`."""
     unit = spelled(text)
     if unit is None:
         raise InvalidInput(item, text, f"it must be one of {', '.join(UNITS)}")

@@ -1,1 +1,1 @@
-"""Analysis: what the signals say, while they come in and afterwards."""
+"""Analysis of the signals, during and after a run."""

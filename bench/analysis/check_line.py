@@ -1,4 +1,4 @@
-"""One line of the check: what was measured, what is allowed, and what to do when it is not so."""
+"""One line of the check: measured value, tolerance and remedy."""
 
 from enum import StrEnum
 from math import isfinite
@@ -7,32 +7,32 @@ from sim.parameters import Parameters, quantity
 
 
 class Verdict(StrEnum):
-    """What became of a line."""
+    """Verdict of a line."""
 
     PASSED = "passed"
     FAILED = "failed"
     STATED = "stated"
-    """There is nothing to compare it with."""
+    """Verdict of a line without tolerance."""
     UNTESTED = "untested"
 
 
 _OWN_UNIT = "any"
-"""Each row names its own unit."""
+"""Every line states its unit."""
 
 
 class CheckLine(Parameters):
-    """One line; numbers are in the unit that the line names. What does not exist is absent (None)."""
+    """One line of the check; numbers are in its unit. Missing values are None."""
 
     subject: str = quantity(..., "", "channel or part of the bench")
-    what: str = quantity(..., "", "what was measured of it")
-    verdict: Verdict = quantity(..., "", "whether it passed")
+    what: str = quantity(..., "", "measured property")
+    verdict: Verdict = quantity(..., "", "verdict of the line")
     measured: float | None = quantity(None, _OWN_UNIT, "measured value, in `unit`")
     uncertainty: float | None = quantity(None, _OWN_UNIT, "expanded uncertainty (k = 2), in `unit`")
     expected: float | None = quantity(None, _OWN_UNIT, "expected value, in `unit`")
     lowest: float | None = quantity(None, _OWN_UNIT, "lowest value that passes, in `unit`")
     highest: float | None = quantity(None, _OWN_UNIT, "highest value that passes, in `unit`")
     unit: str = quantity("1", "", "unit of the numbers of this line")
-    remedy: str = quantity("", "", "what to do when it has not passed")
+    remedy: str = quantity("", "", "remedy if it has not passed")
 
 
 def judged(
@@ -64,7 +64,7 @@ def judged(
 
 
 def stated(subject: str, what: str, measured: float, unit: str, *, uncertainty: float | None = None) -> CheckLine:
-    """A line that only says what was measured."""
+    """A line with a measured value and no tolerance."""
     return CheckLine(
         subject=subject,
         what=what,

@@ -1,11 +1,12 @@
 """Each cycle of a dwell as Fourier coefficients: least squares on a known frequency (IEEE 1057, joint harmonics).
 
-A fit over one cycle needs no whole number of samples, averages the noise of hundreds of samples, and gives the peak
-of the motion without the upward bias of picking the largest noisy sample.
+A fit over one cycle does not require an integer number of samples, averages the noise of hundreds of samples, and
+yields the peak of the motion without the upward bias of the largest noisy sample.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from math import ceil, tau
 
 import numpy as np
@@ -15,7 +16,7 @@ HARMONICS = 10
 """Harmonics fitted jointly: the drift of a rocking frame has less than 1e-5 of its peak above them."""
 
 COMPLETE = 0.98
-"""Share of a cycle's samples that must be there: a laser that leaves its range at every peak would bias the fit."""
+"""Least fraction of valid samples in a cycle: a laser that leaves its range at every peak would bias the fit."""
 
 _GRID = 256
 _ANGLES: NDArray[np.float64] = np.arange(_GRID, dtype=np.float64) * (tau / _GRID)
@@ -31,13 +32,20 @@ def _basis(phase: NDArray[np.float64], harmonics: int) -> NDArray[np.float64]:
     return basis
 
 
+@lru_cache(maxsize=HARMONICS)
+def _period(harmonics: int) -> NDArray[np.float64]:
+    """The basis over one period."""
+    return _basis(_ANGLES, harmonics)
+
+
 @dataclass(frozen=True)
 class Cycle:
     """One cycle of the drive's period. The last column of every array is the drive [V], the others the signals.
 
     `coefficients`, shape (1 + 2 H, m): mean, cosines and sines of the harmonics of phase = omega (sample index) / rate.
     `fundamental` are complex amplitudes c with signal = Re(c exp(-i phase)); `peak` is the largest magnitude of the
-    fitted motion, its mean included; `noise` the residual's rms; shape (m,) each.
+    fitted motion, its mean included; `noise` the residual's rms; shape (m,) each. `extreme`, shape (m,), is the largest
+    magnitude of the samples: the fit overshoots a motion that differs at both ends of the cycle.
     """
 
     index: int
@@ -45,12 +53,13 @@ class Cycle:
     coefficients: NDArray[np.float64]
     fundamental: NDArray[np.complex128]
     peak: NDArray[np.float64]
+    extreme: NDArray[np.float64]
     noise: NDArray[np.float64]
 
     def harmonics(self, column: int) -> NDArray[np.complex128]:
         """Complex amplitudes z_k of one signal, shape (HARMONICS,): it is Im(sum of z_k exp(i k phase)) and its mean.
 
-        Harmonics that were not fitted are zero, higher ones are left out.
+        Harmonics without a fit are zero, higher ones are omitted.
         """
         fitted = (self.coefficients.shape[0] - 1) // 2
         found = np.zeros(HARMONICS, dtype=np.complex128)
@@ -62,28 +71,58 @@ class Cycle:
 def fit_cycle(
     index: int, phase: NDArray[np.float64], values: NDArray[np.float64], highest: int = HARMONICS
 ) -> Cycle | None:
-    """Fit samples `values`, shape (n, m), at `phase` [rad] up to harmonic `highest`, as far as they tell it apart.
-
+    """Fit samples `values`, shape (n, m), at `phase` [rad] up to harmonic `highest`, or fewer if there are few samples.
     None where too many samples are missing (NaN).
     """
-    valid = np.isfinite(values).all(axis=1)
-    if not valid.all():
-        phase, values = phase[valid], values[valid]
+    finite = np.isfinite(values)
+    share = 1.0
+    if not finite.all():
+        valid = finite.all(axis=1)
+        phase, values, share = phase[valid], values[valid], valid.mean()
     harmonics = min(highest, (phase.size - 1) // 4)
-    if valid.mean() < COMPLETE or harmonics < 1:
+    if share < COMPLETE or harmonics < 1:
         return None
     basis = _basis(phase, harmonics)
     coefficients: NDArray[np.float64] = np.linalg.solve(basis.T @ basis, basis.T @ values).astype(np.float64)
     residual = values - basis @ coefficients
-    waveform = _basis(_ANGLES, harmonics) @ coefficients
+    waveform = _period(harmonics) @ coefficients
     return Cycle(
         index=index,
         samples=phase.size,
         coefficients=coefficients,
         fundamental=coefficients[1] + 1j * coefficients[harmonics + 1],
         peak=_peak(waveform),
+        extreme=_extreme(values),
         noise=np.sqrt(np.mean(residual**2, axis=0)),
     )
+
+
+_SHARE = 16
+"""A peak is the vertex of a parabola fitted to a sixteenth of the cycle, which averages the noise; the error of the
+vertex is 5e-6 for a sine and 3e-3 for a fifth harmonic.
+"""
+
+
+@lru_cache(maxsize=8)
+def _parabola(points: int) -> NDArray[np.float64]:
+    """Least squares of a parabola through `points` samples at -h..h: rows for 1, x, x^2."""
+    x = np.arange(points, dtype=np.float64) - points // 2
+    return np.linalg.pinv(np.stack([np.ones_like(x), x, x**2], axis=1)).astype(np.float64)
+
+
+def _extreme(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Largest magnitude of each column of samples, shape (n, m), smoothed by a parabola around it."""
+    magnitude = np.abs(values)
+    half = max(len(values) // (2 * _SHARE), 1)
+    top: NDArray[np.intp] = np.argmax(magnitude, axis=0)
+    rows = np.arange(-half, half + 1)[:, None] + np.clip(top, half, len(values) - 1 - half)
+    fit: NDArray[np.float64] = _parabola(2 * half + 1) @ np.take_along_axis(magnitude, rows, axis=0)
+    level, slope, bend = fit[0], fit[1], fit[2]
+    # a vertex beyond the window is clipped to its end
+    ends: NDArray[np.float64] = half * np.sign(slope)
+    vertex: NDArray[np.float64] = np.where(bend < 0.0, -0.5 * slope / np.where(bend < 0.0, bend, -1.0), ends)
+    x = np.clip(vertex, -float(half), float(half))
+    return level + slope * x + bend * x**2
 
 
 def mean_amplitude(cycles: Sequence[Cycle], column: int) -> float:
@@ -96,8 +135,8 @@ class Waves:
     """The mean of many cycles.
 
     `waveform` and its `rates` [per rad of phase], shape (k, m), over one period; `peaks`, shape (m,), are the largest
-    magnitudes, in row `at` of the waveform; `there`, (n, m), is each cycle's magnitude at it. `harmonics`, (m,), are
-    the rms of all above the fundamental over the fundamental.
+    magnitudes, in row `at` of the waveform; `there`, (n, m), is each cycle's magnitude at that point. `harmonics`,
+    (m,), are the rms of all above the fundamental over the fundamental.
     """
 
     waveform: NDArray[np.float64]
@@ -109,9 +148,9 @@ class Waves:
 
 
 def mean_waves(cycles: Sequence[Cycle], bound: Mapping[int, int] | None = None) -> Waves:
-    """The mean is taken of the coefficients, so that noise does not raise the peak as a mean of peaks would.
+    """Mean of the coefficients, which unlike a mean of peaks is not biased by noise.
 
-    `bound` tells for a column that its signal has no mean and no harmonics above the given one.
+    `bound` is the highest harmonic of each column whose signal has no mean and no higher harmonics.
     """
     all_coefficients = np.array([cycle.coefficients for cycle in cycles])
     harmonics = (all_coefficients.shape[1] - 1) // 2
@@ -120,7 +159,7 @@ def mean_waves(cycles: Sequence[Cycle], bound: Mapping[int, int] | None = None) 
         all_coefficients[:, np.concatenate(([0.0], orders, orders)) > highest, column] = 0.0
         all_coefficients[:, 0, column] = 0.0
     mean = all_coefficients.mean(axis=0)
-    basis = _basis(_ANGLES, harmonics)
+    basis = _period(harmonics)
     waveform = basis @ mean
     at = np.argmax(np.abs(waveform), axis=0)
     sign = np.sign(np.take_along_axis(waveform, at[None, :], axis=0)[0])
@@ -152,7 +191,7 @@ def _peak(waveform: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 class CycleAnalyser:
-    """Cuts a stream of samples into cycles of `omega` [rad/s] and fits each as soon as it is complete."""
+    """Splits a stream of samples into cycles of `omega` [rad/s] and fits each completed one."""
 
     def __init__(self, omega: float, sample_rate: float, first: int, highest: int = HARMONICS) -> None:
         self._highest = highest
@@ -165,11 +204,11 @@ class CycleAnalyser:
 
     @property
     def completed(self) -> int:
-        """Cycles cut so far, those without a fit included."""
+        """Cycles so far, including those without a fit."""
         return self._count
 
     def push(self, values: NDArray[np.float64]) -> list[Cycle]:
-        """Take the next samples, shape (n, m); return the cycles that they complete."""
+        """Process the next samples, shape (n, m); returns the cycles that they complete."""
         self._pending.append(values)
         self._held += values.shape[0]
         if self._start + self._held < self._end():

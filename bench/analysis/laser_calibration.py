@@ -1,7 +1,7 @@
-"""What a calibration found of the two lasers, and of the table's sensors against them: applied to what they say.
+"""Calibration of the two lasers and of the table's sensors against them, and its application to readings.
 
-A laser's error is a Chebyshev polynomial of its reading over the readings that were covered; beyond them it is held at
-its value there. The table's sensors are told by one factor each: true = factor times shown.
+A laser's error is a Chebyshev polynomial of its reading over the covered readings; beyond them it is constant. The
+table's sensors have one factor each: true = factor times reading.
 """
 
 from collections.abc import Mapping
@@ -19,24 +19,24 @@ Array = NDArray[np.float64]
 
 
 class LaserCurve(Parameters):
-    """What one laser says too much, by its reading [m] from the middle of its range."""
+    """Error of one laser as a function of its reading [m] from the middle of its range."""
 
-    sensor: str = quantity(..., "", "the laser, as the data file of its calibration names it")
-    lowest: float = quantity(..., "m", "least reading that was covered", usual=(1e-3, 1.0))
-    highest: float = quantity(..., "m", "greatest reading that was covered", usual=(1e-3, 1.0))
+    sensor: str = quantity(..., "", "description of the laser in the data file of its calibration")
+    lowest: float = quantity(..., "m", "least reading covered", usual=(1e-3, 1.0))
+    highest: float = quantity(..., "m", "greatest reading covered", usual=(1e-3, 1.0))
     rest: float = quantity(..., "m", "reading with the storey at rest", usual=(1e-6, 0.1))
     error: tuple[float, ...] = quantity(
         ...,
         "m",
-        "Chebyshev coefficients, over the covered readings, of what the laser says too much",
+        "Chebyshev coefficients, over the covered readings, of the laser's error",
         min_length=2,
         usual=(0.0, 2e-3),
     )
     uncertainty: float = quantity(
         ..., "m", "standard uncertainty of that error at one reading", ge=0, usual=(1e-6, 1e-3)
     )
-    scale: float = quantity(..., "1", "span of its readings over that of the motion, the mean of both lasers' being 1")
-    delay: float = quantity(..., "s", "by how much later than the table's displacement it was", usual=(1e-5, 0.05))
+    scale: float = quantity(..., "1", "relative span of its readings, normalised to a mean of 1 over both lasers")
+    delay: float = quantity(..., "s", "delay after the table's displacement sensor", usual=(1e-5, 0.05))
     delay_uncertainty: float = quantity(..., "s", "standard uncertainty of the delay", ge=0, usual=(1e-7, 1e-3))
 
     @model_validator(mode="after")
@@ -54,43 +54,45 @@ class LaserCurve(Parameters):
 class LaserCalibration(Parameters):
     """Both lasers calibrated against one motion. Standard uncertainties throughout."""
 
-    date: AwareDatetime = quantity(..., "", "when it was measured")
-    valid_days: float = quantity(..., "d", "how long it is good for", gt=0, usual=(7.0, 1100.0))
+    date: AwareDatetime = quantity(..., "", "date of the measurement")
+    valid_days: float = quantity(..., "d", "period of validity", gt=0, usual=(7.0, 1100.0))
     laser_1: LaserCurve
     laser_2: LaserCurve
-    differential_scale: float = quantity(..., "1", "scale of laser 2 over that of laser 1, before the correction")
-    differential_uncertainty: float = quantity(..., "1", "what the correction leaves open of it", ge=0)
+    differential_scale: float = quantity(..., "1", "ratio of the scales of laser 2 and laser 1, before the correction")
+    differential_uncertainty: float = quantity(
+        ..., "1", "standard uncertainty of that ratio after the correction", ge=0
+    )
     common_linearity: float = quantity(
         ...,
         "m",
-        "largest smooth error that both corrected lasers may share: that of the sensor they were held against",
+        "largest smooth error common to both corrected lasers: that of the reference sensor",
         usual=(1e-6, 1e-3),
     )
-    table_displacement: float = quantity(..., "1", "true over shown displacement of the table", gt=0)
-    table_acceleration: float = quantity(..., "1", "true over shown acceleration of the table", gt=0)
-    table_uncertainty: float = quantity(..., "1", "standard uncertainty of both factors, which share it", ge=0)
+    table_displacement: float = quantity(..., "1", "ratio of true to measured displacement of the table", gt=0)
+    table_acceleration: float = quantity(..., "1", "ratio of true to measured acceleration of the table", gt=0)
+    table_uncertainty: float = quantity(..., "1", "standard uncertainty common to both factors", ge=0)
 
     @property
     def lasers(self) -> tuple[LaserCurve, LaserCurve]:
-        """Those of storey 1 and storey 2."""
+        """The curves of storey 1 and storey 2."""
         return self.laser_1, self.laser_2
 
     @property
     def expires(self) -> datetime:
-        """When it is no longer good."""
+        """End of validity."""
         return self.date + timedelta(days=self.valid_days)
 
     def expired(self, now: datetime) -> str | None:
-        """What is to be said of its age at `now`, which has a time zone; None while it is good."""
+        """Warning if the calibration has expired at `now`, which must have a time zone; None while it is valid."""
         if now <= self.expires:
             return None
         return (
-            f"the laser calibration of {self.date:%Y-%m-%d} was good until {self.expires:%Y-%m-%d}, and is applied "
-            "all the same: calibrate again with `rockbench run laser-calibration`"
+            f"the laser calibration of {self.date:%Y-%m-%d} expired on {self.expires:%Y-%m-%d} and is still "
+            "applied: calibrate again with `rockbench run laser-calibration`"
         )
 
     def strange(self, devices: Mapping[str, str]) -> tuple[str, ...]:
-        """What is to be said where `devices`, by channel, are not those that were calibrated."""
+        """Warnings where `devices`, by channel, differ from the calibrated ones."""
         return tuple(
             f"the laser calibration is for {name} = {curve.sensor}, this one is {devices[name]}: "
             "calibrate again with `rockbench run laser-calibration`"

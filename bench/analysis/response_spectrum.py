@@ -1,9 +1,9 @@
-"""The pseudo-acceleration response spectrum of a base motion.
+"""Pseudo-acceleration response spectrum of a base motion.
 
-A damped oscillator u'' + 2 zeta omega u' + omega^2 u = -a_g under a record whose samples are joined by straight lines
-is stepped without error (Nigam and Jennings, Bull. Seism. Soc. Am. 59, 1969). Here their 2 x 2 recursion is diagonal:
-with lambda = omega (-zeta + i sqrt(1 - zeta^2)) one complex number z' = lambda z + a_g holds the whole state,
-u = -Im z / omega_d and u' = -Im(lambda z) / omega_d.
+A damped oscillator u'' + 2 zeta omega u' + omega^2 u = -a_g under a linearly interpolated record is integrated exactly
+(Nigam and Jennings, Bull. Seism. Soc. Am. 59, 1969). Here their 2 x 2 recursion is diagonalised: with lambda = omega
+(-zeta + i sqrt(1 - zeta^2)) the state is one complex number, z' = lambda z + a_g, u = -Im z / omega_d and u' =
+-Im(lambda z) / omega_d.
 """
 
 from typing import Any
@@ -16,22 +16,25 @@ from sim.errors import InvalidInput
 Array = NDArray[np.float64]
 
 DAMPING = 0.05
-"""Damping ratio of a response spectrum unless it says otherwise."""
+"""Damping ratio of a response spectrum unless stated otherwise."""
 
 _COARSEST_STEP = 0.25
-"""Largest omega dt [rad]. A turning point lies between two samples: the cubic through displacement and velocity at
-both misses it by less than (omega dt)^4 / 384 of the amplitude, 1e-5."""
+"""Largest omega dt [rad].
+
+A turning point lies between two samples: the error of the cubic through displacement and velocity at both is below
+(omega dt)^4 / 384 of the amplitude, 1e-5.
+"""
 
 
 def pseudo_acceleration(acceleration: Array, dt: float, periods: Array, damping: float = DAMPING) -> Array:
     """omega^2 max |u| [m/s2] at each of `periods` [s], shape (n_periods,).
 
-    `acceleration` [m/s2], shape (n,), has the step `dt` [s]; the oscillators start at rest and the base stands still
-    after the last sample: the free vibration that follows counts. Raises InvalidInput.
+    `acceleration` [m/s2], shape (n,), has the step `dt` [s]; the oscillators start at rest, and the free vibration
+    after the last sample, on a resting base, is included. Raises InvalidInput.
     """
     record = np.ascontiguousarray(acceleration, dtype=np.float64)
     if record.ndim != 1 or record.size < 2 or not np.isfinite(record).all():
-        raise InvalidInput("record", record.shape, "it must be at least two finite samples in one row")
+        raise InvalidInput("record", record.shape, "it must be one-dimensional with at least two finite samples")
     if not dt > 0.0:
         raise InvalidInput("dt", dt, "it must be positive seconds")
     if not 0.0 <= damping < 1.0:
@@ -42,13 +45,13 @@ def pseudo_acceleration(acceleration: Array, dt: float, periods: Array, damping:
 
 
 def logarithmic_periods(shortest: float, longest: float, per_octave: int = 6) -> Array:
-    """Periods [s] from `shortest` to `longest`, both included, about `per_octave` of them to an octave."""
+    """Periods [s] from `shortest` to `longest`, both included, about `per_octave` of them per octave."""
     count = max(round(per_octave * float(np.log2(longest / shortest))), 1) + 1
     return np.geomspace(shortest, longest, count)
 
 
 def _peak(record: Array, dt: float, omega: float, damping: float) -> float:
-    """omega^2 max |u|."""
+    """Peak of omega^2 |u| [m/s2] of one oscillator."""
     from scipy import signal
 
     parts = int(np.ceil(omega * dt / _COARSEST_STEP))
@@ -60,11 +63,11 @@ def _peak(record: Array, dt: float, omega: float, damping: float) -> float:
     x = eigenvalue * dt
     first = np.expm1(x) / x
     second = (np.expm1(x) - x) / x**2
-    # `Any`: scipy's stubs leave the type of a filtered array open
+    # `Any`: scipy's stubs do not declare the type of a filtered array
     states: Any = signal.lfilter(
         [dt * second, dt * (first - second)], [1.0, -np.exp(x)], record, zi=np.array([-dt * second * record[0]])
     )[0]
-    # half a damped swing after the record holds the largest displacement that is still to come
+    # half a damped cycle after the record contains the largest later displacement
     after = states[-1] * np.exp(x * np.arange(1, int(np.ceil(np.pi / (damped * dt))) + 2))
     z: NDArray[np.complex128] = np.concatenate((states, after))
     u, v = -z.imag / damped, -(eigenvalue * z).imag / damped

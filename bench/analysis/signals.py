@@ -1,4 +1,4 @@
-"""The signals of the experiment, and their map from the channels of a rig."""
+"""The signals of the experiment, and their computation from the channels of a rig."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,24 +9,22 @@ from numpy.typing import NDArray
 
 from bench.analysis.laser_calibration import LaserCalibration
 from drivers.rig import Channel
+from sim.channel import STOREYS, TABLE_ACCELERATION, TABLE_DISPLACEMENT
 from sim.errors import InvalidInput
 
-LASERS = ("laser_1", "laser_2")
-"""Channels of the lasers on the first and the second storey."""
-
-SIGNALS = ("acceleration", "displacement", "u1", "drift", *LASERS)
+SIGNALS = ("acceleration", "displacement", "u1", "drift", *STOREYS)
 """First columns of a signal array: table acceleration [m/s2], table displacement [m], first storey relative to the
-table [m], drift u2 - u1 [m], and what the two lasers see [m]."""
+table [m], drift u2 - u1 [m], and the readings of the two lasers [m]."""
 
 ACCELERATION, DISPLACEMENT, U1, DRIFT, LASER_1, LASER_2 = range(6)
 
-MEASURED_BY = ("table_acceleration", "table_displacement", *LASERS)
-"""The channels that the signals are made of."""
+MEASURED_BY = (TABLE_ACCELERATION, TABLE_DISPLACEMENT, *STOREYS)
+"""The channels from which the signals are computed."""
 
 
 @dataclass(frozen=True)
 class Further:
-    """A signal that is a channel's own values, besides those of the experiment."""
+    """An additional signal: the values of one channel."""
 
     name: str
     unit: str
@@ -34,16 +32,16 @@ class Further:
 
 
 def further_of(channels: Sequence[Channel]) -> tuple[Further, ...]:
-    """The further signals of a rig with these channels, in their order."""
+    """The additional signals of a rig with these channels, in channel order."""
     return tuple(Further(each.name, each.unit, each.quantity) for each in channels if each.name not in MEASURED_BY)
 
 
 class SignalMap:
-    """Turns channel values into signals, counted from the zero taken at rest; one for a run, with the guard.
+    """Converts channel values to signals relative to the zero taken at rest; one instance per run, owned by the guard.
 
-    Lasers beside the table see x_g + u; lasers on it see u. The drift is free of x_g either way. A `calibration`
-    corrects lasers and table sensors for the errors that it found. Channels that no signal of the experiment is made of
-    are `further` columns after those of SIGNALS. Raises InvalidInput where a channel is missing.
+    Lasers on the ground measure x_g + u; lasers on the table measure u. The drift does not depend on x_g in either
+    case. A `calibration` corrects lasers and table sensors for their identified errors. All other channels are
+    `further` columns after those of SIGNALS. Raises InvalidInput where a channel is missing.
     """
 
     def __init__(
@@ -63,7 +61,7 @@ class SignalMap:
         self._calibration = calibration
         self._zero = np.zeros(len(SIGNALS) + len(self.further))
         self.taken = np.zeros(self._zero.size, dtype=np.bool_)
-        """Which signals had a value when the zero was taken, shape (n_signals,)."""
+        """Mask of the signals with a value when the zero was taken, shape (n_signals,)."""
 
     def tare(self, values: NDArray[np.float64]) -> None:
         """Take the mean of channel values at rest, shape (n, n_channels), as the zero of every signal.
@@ -76,8 +74,10 @@ class SignalMap:
         self.taken = valid > 0
 
     def of(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Signals, shape (n, n_signals), of channel values, shape (n, n_channels); NaN where a sensor gave none."""
-        return self._raw(values) - self._zero
+        """Signals, shape (n, n_signals), of channel values, shape (n, n_channels); NaN where a sensor has no value."""
+        signals = self._raw(values)
+        signals -= self._zero
+        return signals
 
     def _raw(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         acceleration, displacement, first, second = (values[:, column] for column in self._columns)
@@ -94,7 +94,8 @@ class SignalMap:
         signals[:, DRIFT] = second - first
         signals[:, LASER_1] = first
         signals[:, LASER_2] = second
-        signals[:, len(SIGNALS) :] = values[:, self._others]
+        if self._others:
+            signals[:, len(SIGNALS) :] = values[:, self._others]
         return signals
 
 

@@ -1,4 +1,4 @@
-"""When a dwell has become steady, judged cycle by cycle on every signal."""
+"""Detection of a steady state, cycle by cycle on every signal."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -10,20 +10,21 @@ from numpy.typing import NDArray
 from bench.analysis.cycles import Cycle
 
 WINDOW = 12
-"""Cycles in one window; two of them are compared."""
+"""Cycles per window; two windows are compared."""
 
 LONGEST_SUBHARMONIC = 6
 
 SPREAD = 5.0
-"""Tolerances by which a cycle of a steady motion may differ from the mean of its window."""
+"""Largest deviation of a cycle of a steady motion from the mean of its window [tolerances]."""
 
 KIN_SHARE = 0.25
-"""A storey that happens to stand almost still is judged on a quarter of the other's motion, not on its own."""
+"""A storey that hardly moves is assessed relative to a quarter of the other's motion."""
 
 
 @dataclass(frozen=True)
 class Steadiness:
-    """The state of a dwell. `spread` and `drift` are relative to each signal's mean amplitude, largest first met.
+    """Steadiness of a dwell. `spread` and `drift` are relative to each signal's mean amplitude, the largest over the
+    signals.
 
     `repeats` is the number of cycles after which the motion repeats: 1 when it is steady, 2..6 for a
     subharmonic, 0 when it does not repeat.
@@ -38,12 +39,12 @@ class Steadiness:
 class SteadyDetector:
     """Compares the complex amplitudes of every signal over the last two windows of cycles.
 
-    Steady means: the means of the two windows differ by less than a third of the tolerance, which bounds what a
-    transient that decays by 2 % a cycle still has to go (0.98^12 / (1 - 0.98^12) / 3 = 1.2 tolerances); and within the
-    last window no cycle is farther from the mean than `SPREAD` tolerances. A weakly damped orbit that noise keeps
-    shaking, or a transient that turns from cycle to cycle, spreads more than it moves the mean; what is left of it is
-    in the scatter of the measured cycles. A noise floor of four standard deviations of a fitted amplitude,
-    sigma sqrt(2 / N), is granted to every signal, and to every phase the jitter of a sensor that runs free.
+    Steady means: the means of the two windows differ by less than a third of the tolerance, which bounds the remainder
+    of a transient that decays by 2 % per cycle (0.98^12 / (1 - 0.98^12) / 3 = 1.2 tolerances); and within the last
+    window no cycle deviates from the mean by more than `SPREAD` tolerances. A weakly damped orbit excited by noise, or
+    a transient that rotates from cycle to cycle, spreads more than it shifts the mean; its remainder is in the scatter
+    of the measured cycles. Every signal is allowed a noise floor of four standard deviations of a fitted amplitude,
+    sigma sqrt(2 / N), and every phase the jitter of a sensor with a free clock.
     """
 
     def __init__(
@@ -52,38 +53,37 @@ class SteadyDetector:
         columns: Sequence[int] | None = None,
         kin: Sequence[int] = (),
         jitter: float = 0.0,
-        beside: Sequence[int] = (),
+        reference: Sequence[int] = (),
     ) -> None:
-        """`columns` are the signals that are judged, all of them when absent; `kin` the places, among them, of signals
-        of one kind: none is held to less than `KIN_SHARE` of the largest.
-
-        `beside` are signals that are not judged, and on `KIN_SHARE` of whose motion every other is judged at least.
-        `jitter` [rad] is how far a phase may wander because a sensor runs on its own clock.
+        """`columns` are the signals assessed, by default all; `kin` the indices among them of signals of the same kind,
+        each assessed relative to at least `KIN_SHARE` of the largest. `reference` are signals not assessed; every other
+        one is assessed relative to at least `KIN_SHARE` of them. `jitter` [rad] is the wander of a phase due to a
+        sensor's free clock.
         """
         self._tolerance = tolerance
         self._columns = slice(None) if columns is None else list(columns)
         self._kin = list(kin)
         self._jitter = jitter
-        self._beside, self._floor = list(beside), 1e-12
+        self._reference, self._floor = list(reference), 1e-12
         self._cycles: deque[Cycle] = deque(maxlen=2 * WINDOW)
 
     def push(self, cycle: Cycle) -> None:
-        """Take the next cycle."""
+        """Process the next cycle."""
         self._cycles.append(cycle)
 
     def restart(self) -> None:
-        """Forget everything: the drive was changed, and what came before says nothing about what follows."""
+        """Discard all cycles, after a change of the drive."""
         self._cycles.clear()
 
     def judge(self, allowance: float = 1.0) -> Steadiness:
-        """Where the dwell stands, at `allowance` times the tolerance; never steady before two windows are full."""
+        """Steadiness of the dwell at `allowance` times the tolerance; never steady before two windows are full."""
         if len(self._cycles) < 2 * WINDOW:
             return Steadiness(False, float("nan"), float("nan"), 0)
         cycles = list(self._cycles)
         amplitudes = np.array([cycle.fundamental[self._columns] for cycle in cycles])
         peaks = np.array([cycle.peak[self._columns] for cycle in cycles])
-        if self._beside:
-            others = np.mean([cycle.fundamental[self._beside] for cycle in cycles[WINDOW:]], axis=0)
+        if self._reference:
+            others = np.mean([cycle.fundamental[self._reference] for cycle in cycles[WINDOW:]], axis=0)
             self._floor = max(KIN_SHARE * float(np.abs(others).max()), 1e-12)
         noise = [cycle.noise[self._columns] * np.sqrt(2.0 / cycle.samples) for cycle in cycles]
         sigma = np.array(noise).mean(axis=0)
@@ -108,7 +108,7 @@ class SteadyDetector:
         these: NDArray[np.complex128] | NDArray[np.float64],
         those: NDArray[np.complex128] | NDArray[np.float64],
     ) -> NDArray[np.float64]:
-        """How far amplitudes are apart: in size, or in phase as far as that is beyond the jitter."""
+        """Distance of amplitudes: in magnitude, or in phase beyond the jitter."""
         size = np.abs(those)
         turned = np.abs(np.angle(these * np.conj(those))) * size
         return np.maximum(np.abs(np.abs(these) - size), turned - self._jitter * size)

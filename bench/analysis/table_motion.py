@@ -1,4 +1,4 @@
-"""The table's motion under sampled accelerations: exact where straight lines join the samples (first-order hold).
+"""The table's motion under sampled accelerations, exact for linear interpolation (first-order hold).
 
 v += (a0 + a1) dt / 2,    d += v dt + (2 a0 + a1) dt^2 / 6
 """
@@ -38,10 +38,11 @@ def table_motion(acceleration: Array, dt: float) -> TableMotion:
 
 
 def at_rest_in_the_end(acceleration: Array, dt: float) -> Array:
-    """`acceleration` less the two lowest sines over its length, sized so that the table ends at rest where it began.
+    """`acceleration` minus the two lowest sines over its length, so that the table ends at rest where it began.
 
-    Velocity and displacement at the end are linear in the two sizes, so this is exact but for rounding; the second
-    turn takes back what the first one rounded. The sines vanish at both ends: the record begins and ends as it did.
+    The final velocity and displacement are linear in the two amplitudes, so this is exact except for
+    rounding; the second iteration corrects the rounding of the first. The sines vanish at both ends: the record's end
+    values are unchanged.
     """
     place = np.linspace(0.0, np.pi, acceleration.size)
     shapes = np.array([np.sin(place), np.sin(2.0 * place)])

@@ -1,17 +1,18 @@
-"""How the table moved, from both of its sensors: the base motion that a prediction for a transient starts from.
+"""Base motion of a transient from both table sensors, as the input of its prediction.
 
-At low frequencies a displacement sensor knows the acceleration far better than an accelerometer does, at high ones far
-worse: its noise counts omega^2. Each frequency takes both, weighted by their noise as it was at rest,
+At low frequencies a displacement sensor measures the acceleration far more precisely than an accelerometer, at high
+ones far less: its noise grows with omega^2. At each frequency both are combined, weighted by their noise at rest,
 
     A = w (-omega^2 X) + (1 - w) A_a,    w = S_a / (S_a + omega^4 S_x),
 
-with X brought to the accelerometer's delay first, over the frequencies at which both show the motion. The ratio of
-their scales comes out of that as well. It is a check and not a correction: calibrations know the scales better than one
-motion does. The noise that is left has the density S_a omega^4 S_x / (S_a + omega^4 S_x).
+after X has been aligned with the accelerometer's delay at the frequencies where both measure the motion. The ratio of
+their scales serves as a check, not a correction: calibrations determine the scales more precisely than one motion. The
+remaining noise has the density S_a omega^4 S_x / (S_a + omega^4 S_x).
 
-A sensor quieter than its steps shows nothing at rest, and yet is off by up to half a step as soon as it moves. Its
-error has the variance step^2 / 12, spread over as many frequencies as steps are passed in a second, at most up to half
-the rate (Bennett, Bell Syst. Tech. J. 27, 1948): slow motions leave it at low ones. No sensor counts for more.
+A sensor whose noise is below its resolution is constant at rest and has an error of up to half a step in motion. That
+error has the variance step^2 / 12, spread over frequencies up to the number of steps passed per second, at most half
+the rate (Bennett, Bell Syst. Tech. J. 27, 1948): for slow motions it is at low frequencies. It limits the weight of a
+sensor.
 """
 
 from dataclasses import dataclass
@@ -39,26 +40,26 @@ def noise_density(rest: Array, sample_rate: float) -> tuple[Array, Array]:
 
 
 MODEL_RATE = 1000.0
-"""Samples per second that a model is given [1/s], or the bench's own where that is less."""
+"""Sample rate of the model's input [1/s], at most the bench's."""
 
 _TOP = 0.4
-"""Share of that rate up to which the motion is kept."""
+"""Fraction of that rate up to which the motion is retained."""
 _NOISE_BAND = (2.0, 60.0)
 """Frequencies [Hz] between which the sensors' noise is white."""
 _PASSING = 0.05
-"""Time over which the passed steps of a sensor are counted [s]: a fraction of the periods that matter."""
+"""Interval in which a sensor's resolution steps are counted [s]: a fraction of the relevant periods."""
 _CLEAR = 100.0
-"""Power over its noise at which a sensor shows the motion."""
+"""Ratio of power to noise above which a sensor measures the motion."""
 ALIKE = 0.02
-"""Relative difference of the two sensors' scales from which on one is wrong: the accelerometer is used alone."""
+"""Relative difference of the two sensors' scales above which one is wrong: the accelerometer is used alone."""
 
 
 @dataclass(frozen=True, eq=False)
 class BaseMotion:
-    """Acceleration of the table [m/s2], shape (n,), every `dt` [s]; its errors are drawn by `draw`.
+    """Acceleration of the table [m/s2], shape (n,), every `dt` [s]; `draw` adds random errors.
 
     `agreement` is the displacement sensor's scale over the accelerometer's, from the motion itself; None where the
-    motion is too small to tell. Where it is not 1 the accelerometer is used alone. `noise` is the spectral density of
+    motion is too small. Where it is not 1 the accelerometer is used alone. `noise` is the spectral density of
     the error [(m/s2)^2/Hz] at the frequencies of `numpy.fft.rfft` of so many samples.
     """
 
@@ -69,7 +70,7 @@ class BaseMotion:
 
     @property
     def record(self) -> SampledRecord:
-        """As an excitation of the model."""
+        """The motion as an excitation of the model."""
         return SampledRecord(self.acceleration, self.dt)
 
     @property
@@ -78,7 +79,7 @@ class BaseMotion:
         return float(np.abs(self.acceleration).max())
 
     def draw(self, random: Generator, scale: float = 1.0) -> SampledRecord:
-        """A motion that this one may really be: `scale` times as strong, its noise drawn once more."""
+        """A possible true motion: scaled by `scale`, with a random realisation of the noise."""
         lines = self.noise.size
         waves = random.standard_normal(lines) + 1j * random.standard_normal(lines)
         spectrum = np.sqrt(self.noise * self.acceleration.size / (4.0 * self.dt)) * waves
@@ -107,7 +108,7 @@ def base_motion(signals: Array, rest: Array, sample_rate: float) -> BaseMotion:
         share = noise_a / (noise_a + noise_x)
     every = max(round(sample_rate / MODEL_RATE), 1)
     dt = every / sample_rate
-    # what lies above is noise, and would fold into the motion
+    # higher frequencies are noise, and would alias
     kept = 1.0 / np.sqrt(1.0 + (frequency * dt / _TOP) ** 16)
     whole = np.fft.irfft(kept * (share * x + (1.0 - share) * a), size)[::every]
     lines = np.fft.rfftfreq(whole.size, dt)
@@ -116,14 +117,14 @@ def base_motion(signals: Array, rest: Array, sample_rate: float) -> BaseMotion:
 
 
 def _density(rest: Array, values: Array, sample_rate: float) -> float:
-    """Spectral density of a sensor's white noise [unit^2/Hz]: as at `rest`, or that of the steps of its `values`."""
+    """Spectral density of a sensor's white noise [unit^2/Hz]: at `rest`, or of the steps of its `values`."""
     frequency, power = noise_density(rest, sample_rate)
     inside = (frequency >= _NOISE_BAND[0]) & (frequency <= _NOISE_BAND[1])
     return max(float(np.mean(power[inside])), _of_steps(values, sample_rate), 1e-30)
 
 
 def _of_steps(values: Array, sample_rate: float) -> float:
-    """Density [unit^2/Hz] of the rounding of `values` to the steps that they show; none of steps without motion."""
+    """Density [unit^2/Hz] of the rounding of `values` to their resolution; zero without motion."""
     apart: Array = np.diff(np.unique(values))
     if not apart.size:
         return 0.0
@@ -135,13 +136,13 @@ def _of_steps(values: Array, sample_rate: float) -> float:
 
 
 def _levelled(values: Array, still: int) -> Array:
-    """Without the line through its means at rest: a sensor's offset drifts."""
+    """Values minus the line through their means at rest: a sensor's offset drifts."""
     begin, end = float(values[:still].mean()), float(values[-still:].mean())
     return values - np.linspace(begin, end, values.size)
 
 
 def _closed(values: Array, still: int) -> Array:
-    """Led back from where it ended to where it began, slowly: friction leaves a table somewhere else."""
+    """Values with the final offset removed smoothly: friction may stop a table at another position."""
     begin, end = float(values[:still].mean()), float(values[-still:].mean())
     x = np.linspace(0.0, 1.0, values.size)
     return values - begin - (end - begin) * x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
@@ -155,13 +156,13 @@ def _alignment(
     noise_x: Array,
     duration: float,
 ) -> tuple[float | None, float]:
-    """Scale of the displacement sensor over the accelerometer's, None where it cannot be told, and its lead [s]."""
+    """Ratio of the scales of displacement sensor and accelerometer, None where not measurable, and its lead [s]."""
     # a density and the spectrum of n samples at rate f: |S|^2 = density n f / 2
     to_power = 0.5 * duration * (2.0 * frequency[-1]) ** 2
     clear = (np.abs(a) ** 2 > _CLEAR * noise_a * to_power) & (np.abs(x) ** 2 > _CLEAR * noise_x * to_power)
     if np.count_nonzero(clear) < 8:
         return None, 0.0
-    # each line counts by what is known of its ratio
+    # each line is weighted by the precision of its ratio
     weight, omega = 1.0 / (noise_a[clear] + noise_x[clear]), 2.0 * np.pi * frequency[clear]
     cross = weight * np.conj(a[clear]) * x[clear]
     side = 1.0 if np.sum(cross.real) >= 0.0 else -1.0

@@ -1,10 +1,10 @@
-"""The peak of a noisy transient, without the bias of picking the largest sample.
+"""Peak of a noisy transient, without the bias of the largest sample.
 
-The largest of many noisy samples is too large by some standard deviations, and the smaller the motion, the more it
-matters. Here a polynomial of degree four is fitted by least squares around each maximum that may be the greatest, and
-its turning point is the peak. The window follows from the signal's bandwidth: of the terms that the polynomial leaves
-out, the sixth derivative is the first that shifts the middle of the window. The residual of x^6 over a window of half
-width h is the monic Legendre polynomial P_6 there, so the shift is
+The largest of many noisy samples is too large by several standard deviations, the more so the smaller the motion. Here
+a polynomial of degree four is fitted by least squares around each maximum that may be the greatest, and its extremum is
+the peak. The window follows from the signal's bandwidth: of the terms missing in the polynomial, the sixth derivative
+is the first that shifts the centre of the window. The residual of x^6 over a window of half width h is the monic
+Legendre polynomial P_6 there, so the shift is
 
     (5 / 231) h^6 s^(6) / 720,    s^(6) ~ A omega_6^6,    omega_6^12 = sum omega^12 |S|^2 / sum |S|^2,
 
@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 
 class RunningPeak:
-    """Takes a signal in blocks of any size; samples without a value say nothing."""
+    """Running peak of a signal in blocks of any size; missing samples are ignored."""
 
     def __init__(self) -> None:
         self._largest = np.nan
@@ -33,11 +33,11 @@ class RunningPeak:
 
     @property
     def samples(self) -> int:
-        """How many samples were taken."""
+        """Number of samples processed."""
         return self._seen
 
     def push(self, block: Array) -> float:
-        """The largest magnitude up to the end of `block`, shape (n,); NaN until there is a value."""
+        """The largest magnitude up to the end of `block`, shape (n,); NaN before the first value."""
         self._seen += block.size
         self._largest = float(np.fmax.reduce(np.abs(block), initial=self._largest))
         return self._largest
@@ -50,32 +50,32 @@ def running_peak(signal: Array) -> Array:
 
 DEGREE = 4
 _REMAINDER = 5.0 / 231.0 / 720.0
-"""Shift of the fitted value in the middle per h^6 s^(6)."""
+"""Shift of the fitted value at the centre per h^6 s^(6)."""
 _VARIANCE = 225.0 / 64.0
-"""Variance of the fitted value in the middle, over sigma^2 / samples."""
+"""Variance of the fitted value at the centre, relative to sigma^2 / samples."""
 _NARROWEST = 6
 """Least half width of the window in samples."""
 _WIDEST = 0.5 * pi
 """Largest omega_6 h: a quarter of a period to either side."""
 _BAND = (4.0, 50.0)
-"""Frequencies [Hz] at which the noise of a fit is looked at: below them a frame may still swing at rest."""
+"""Frequencies [Hz] at which the noise of a fit is evaluated: below them a frame may still vibrate at rest."""
 _STANDS_OUT, _SMOOTHED = 4.0, 0.5
-"""Power over that of the noise from which a frequency counts as signal; width over which it is averaged before [Hz]."""
+"""Power relative to the noise above which a frequency counts as signal; width of the preceding average [Hz]."""
 _RIVALS = 6.0
-"""Standard deviations below the greatest maximum within which another one may really be the greatest."""
+"""Standard deviations below the greatest maximum within which another one may be the true greatest."""
 _RAISED = 0.5
 _DRAWS, _SEED, _HALVINGS = 2000, 20, 30
 _MISSING = 0.25
-"""Share of a window's samples that may be missing."""
+"""Largest fraction of missing samples in a window."""
 
 
 @dataclass(frozen=True)
 class TransientPeak:
     """The greatest magnitude of a signal, in its unit.
 
-    `value` is free of the bias of choosing the greatest; `uncertainty` is standard and of noise alone; `bias` is the
-    largest shift that the fit's degree may leave. `time` [s] since the first sample is that of the greatest maximum,
-    `sign` its side, `window` [s] the half width of the fit, and `rivals` how many other maxima may be the greatest.
+    `value` is corrected for the selection of the greatest; `uncertainty` is standard and due to noise alone; `bias` is
+    the largest shift due to the fit's degree. `time` [s] since the first sample is that of the greatest maximum, `sign`
+    its side, `window` [s] the half width of the fit, and `rivals` the number of other maxima that may be the greatest.
     """
 
     value: float
@@ -88,16 +88,16 @@ class TransientPeak:
 
 
 def transient_peak(signal: Array, rest: Array, sample_rate: float) -> TransientPeak:
-    """The peak of |`signal`|, shape (n,), zero at rest; `rest`, shape (m,), shows its noise without motion.
+    """The peak of |`signal`|, shape (n,), zero at rest; `rest`, shape (m,), is its noise without motion.
 
     NaN stands for a missing sample. Raises InvalidInput when there is no motion above the noise, or when samples are
     missing where it is greatest.
     """
     known = np.isfinite(signal)
     if rest.size < 16 * _NARROWEST or not np.isfinite(rest).all():
-        raise InvalidInput("rest before the transient", rest.size, "it must have samples, and all of them")
+        raise InvalidInput("rest before the transient", rest.size, "it must have samples, none of them missing")
     if not known.any():
-        raise InvalidInput("transient", signal.size, "no sample of it has a value")
+        raise InvalidInput("transient", signal.size, "it has no valid sample")
     whole = np.interp(np.arange(signal.size), np.flatnonzero(known), signal[known])
     density = noise_density(rest, sample_rate)
     sigma = _equivalent_noise(density, sample_rate)
@@ -106,7 +106,7 @@ def transient_peak(signal: Array, rest: Array, sample_rate: float) -> TransientP
     smooth = _smoothed(whole, half)
     spread = sigma * sqrt(_VARIANCE / (2.0 * half))
     if not np.abs(smooth).max() > _RIVALS * max(spread, 1e-300):
-        raise InvalidInput("transient", float(np.abs(smooth).max()), "it does not stand out of the noise")
+        raise InvalidInput("transient", float(np.abs(smooth).max()), "it does not exceed the noise")
     found = [_maximum(whole, known, int(place), half, sigma) for place in _candidates(smooth, _RIVALS * spread)]
     greatest = max(found, key=lambda each: each.value)
     value, uncertainty = _greatest(np.array([[each.value, each.uncertainty] for each in found]))
@@ -132,7 +132,7 @@ class _Maximum:
 def _equivalent_noise(density: tuple[Array, Array], sample_rate: float) -> float:
     """Standard deviation of the white noise that has the density of the slow part of the true one.
 
-    A fit sees that part alone; behind a filter the samples themselves scatter less, but are not independent.
+    Only that part affects a fit; filtered samples scatter less but are not independent.
     """
     frequency, power = density
     slow = (frequency > _BAND[0]) & (frequency < _BAND[1])
@@ -140,10 +140,10 @@ def _equivalent_noise(density: tuple[Array, Array], sample_rate: float) -> float
 
 
 def _sixth_moment(signal: Array, density: tuple[Array, Array], sample_rate: float) -> float:
-    """omega_6 [rad/s] of what stands out of the noise."""
+    """omega_6 [rad/s]: sixth-moment frequency of the part above the noise."""
     from scipy.signal.windows import tukey
 
-    # a transient begins at rest, but may still swing at its end: without a taper its step there is at all frequencies
+    # a transient begins at rest but may still vibrate at its end: without a taper that step would have all frequencies
     taper: Any = tukey(signal.size, 0.1)
     frequency = np.fft.rfftfreq(signal.size, 1.0 / sample_rate)
     power = np.abs(np.fft.rfft(signal * taper)) ** 2 * (2.0 / (sample_rate * signal.size))
@@ -178,11 +178,11 @@ def _candidates(smooth: Array, near: float) -> NDArray[np.intp]:
 
 
 def _maximum(signal: Array, known: NDArray[np.bool_], place: int, half: int, sigma: float) -> _Maximum:
-    """The turning point of the polynomial that is fitted around sample `place`."""
+    """Extremum of the polynomial fitted around sample `place`."""
     low, high = max(place - half, 0), min(place + half + 1, signal.size)
     used = known[low:high]
     if np.count_nonzero(used) < (1.0 - _MISSING) * (2 * half + 1):
-        raise InvalidInput("transient", f"sample {place}", "too few samples around its peak have a value")
+        raise InvalidInput("transient", f"sample {place}", "too few valid samples around its peak")
     powers = np.vander((np.arange(low, high)[used] - place) / half, DEGREE + 1, increasing=True)
     inverse = np.linalg.pinv(powers)
     polynomial = np.polynomial.Polynomial(inverse @ signal[low:high][used])
@@ -196,19 +196,19 @@ def _maximum(signal: Array, known: NDArray[np.bool_], place: int, half: int, sig
     at, along = top**order @ inverse, (order * top ** np.maximum(order - 1, 0)) @ inverse
     value = sign * float(polynomial(top))
     if bend(top) * sign < 0.0:
-        # a turning point that noise has moved is higher than the true one
+        # an extremum shifted by noise is higher than the true one
         value -= 0.5 * sigma**2 * float(along @ along) / abs(float(bend(top)))
     return _Maximum(value, sigma * float(np.linalg.norm(at)), place + top * half, sign)
 
 
 def _greatest(maxima: Array) -> tuple[float, float]:
-    """The greatest of maxima that are known but for their noise, and its standard uncertainty.
+    """The greatest of noisy maxima and its standard uncertainty.
 
-    `maxima`: (value, uncertainty), shape (n, 2). The largest of several noisy values is too large. The true greatest mu
-    is the one at which what was seen is what is expected, no true value being above it. The others are taken half a
-    standard deviation higher than measured: near mu they look lower than they are because the greatest was chosen.
-    Of a bias of 2 standard deviations, for 24 equal maxima, less than a half of one is left, as of any fewer. The
-    uncertainty is that of one maximum: rivals do not make it better known.
+    `maxima`: (value, uncertainty), shape (n, 2). The largest of several noisy values is too large. The estimate mu is
+    the value for which the expected maximum equals the observed one, with no true value above mu. The others are raised
+    by half a standard deviation: near mu they appear too low because the greatest was selected. The bias, 2 standard
+    deviations for 24 equal maxima, falls below a half, also for fewer maxima. The uncertainty is that of one maximum:
+    rivals do not reduce it.
     """
     values, spreads = maxima.T
     top, widest = float(values.max()), float(spreads.max())

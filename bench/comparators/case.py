@@ -1,9 +1,9 @@
-"""The standard case: 120 s of steady rocking with 649 impacts, and what is known about it from elsewhere.
+"""The standard case: 120 s of steady rocking with 649 impacts, and its independently known values.
 
-START and PHASE are the periodic orbit at beta 0.64, Omega 17 rad/s to ten digits: from there on they define the case
-and are exact. END and PEAKS are its solution by heyoka in 80-bit arithmetic at tolerance 1e-19, an integrator and
-equations that share nothing with ours; `tests/benchmarks/reference.py` computes them anew and checks their beginning
-with mpmath at 30 digits.
+START and PHASE are the periodic orbit at beta 0.64, Omega 17 rad/s to ten digits: they define the case and count as
+exact. END and PEAKS are its solution by heyoka in 80-bit arithmetic at tolerance 1e-19, with an integrator and
+equations independent of ours; `tests/benchmarks/reference.py` recomputes them and checks their beginning with mpmath at
+30 digits.
 """
 
 import numpy as np
@@ -15,7 +15,7 @@ from sim.specimen import Specimen
 
 SPECIMEN = Specimen(beta=0.64)
 OMEGA, AMPLITUDE, PHASE, DURATION = 17.0, 1.01 * 9.81 / 8.0, 3.106701049, 120.0
-"""[rad/s], [m/s2], [rad], [s] of the base's sine."""
+"""Circular frequency [rad/s], amplitude [m/s2], phase [rad] and duration [s] of the base's sine."""
 
 START = State(-0.0005206767388, 0.0002474257154, 0.01109507688, -0.09173639983, 0.0, 0.6525443109)
 
@@ -38,7 +38,7 @@ PEAKS = (0.00082052486744979255383, 0.0060632412081126333043, 0.0336116212243269
 
 
 def drive(duration: float = DURATION) -> SineProgram:
-    """The sine of the base."""
+    """The base excitation."""
     return SineProgram([Sweep.dwell(duration, AMPLITUDE, OMEGA)], phase=PHASE)
 
 

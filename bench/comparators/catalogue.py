@@ -1,6 +1,6 @@
-"""The solvers by name, the one call that runs any of them, and the gain of a long run by one of them.
+"""Catalogue of solvers with a common call, and the steady-state gain by any of them.
 
-All share the equations of `sim.kernel.equations`; they differ in how they go through time and find events.
+All use the equations of `sim.kernel.equations`; they differ in time integration and event location.
 """
 
 from collections.abc import Callable, Mapping
@@ -24,15 +24,20 @@ PAPER_STEP = 1e-3
 """Time step [s] of the paper, section 3.3."""
 
 SEISMIC_PARTS = 10
-"""Into how many parts a step with an impact is divided under a record. The paper says "a further subdivision" only."""
+"""Number of parts into which a step with an impact is divided under a record. The paper states only "a further
+subdivision".
+"""
 
 
 def paper(problem: Problem, step: float) -> Motion:
-    """Section 3.3 literally. Under a sampled record the step with an impact is repeated in SEISMIC_PARTS parts."""
+    """Section 3.3 of the paper, literally.
+
+    Under a sampled record a step with an impact is repeated in SEISMIC_PARTS parts.
+    """
     from bench.comparators.kernel.fixed_step import run_paper
 
     x, samples, report = _outputs(problem)
-    # a record has straight lines and no sines
+    # a record is piecewise linear, without sines
     seismic = not problem.segments[:, 1:5].any()
     run_paper(
         problem.parameters,
@@ -50,7 +55,7 @@ def paper(problem: Problem, step: float) -> Motion:
 
 
 def rk4_located(problem: Problem, step: float) -> Motion:
-    """Steps of at most `step` that end at events, found by steps of other lengths: order 4 through impacts."""
+    """RK4, steps of at most `step` that end at events, located by steps of other lengths: order 4 across impacts."""
     from bench.comparators.kernel.located_step import run_located
 
     x, samples, report = _outputs(problem)
@@ -71,16 +76,16 @@ def rk4_located(problem: Problem, step: float) -> Motion:
 
 
 def _outputs(problem: Problem) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    from sim.kernel.rocking import REPORT
+    from sim.kernel.steps import REPORT
 
     return problem.start.copy(), np.empty((problem.times.size, 6)), np.empty(REPORT)
 
 
 @dataclass(frozen=True)
 class Solver:
-    """A way to integrate. `knob` is what sets its accuracy, `default` and `limits` are of that.
+    """An integration method.
 
-    `run` is None for the engine itself, `sim.rocking.simulate`.
+    `knob` names its accuracy parameter, with `default` and `limits`. `run` is None for `sim.rocking.simulate` itself.
     """
 
     name: str
@@ -104,7 +109,7 @@ SOLVERS: Mapping[str, Solver] = MappingProxyType(
         )
     }
 )
-"""By name; the first is the one to use, the others are for comparison."""
+"""Solvers by name; the first is for use, the others are for comparison."""
 
 
 def solve(
@@ -121,9 +126,9 @@ def solve(
 ) -> Motion:
     """`sim.rocking.simulate` by the solver `name`; its knob, `tolerance` or `step` [s], has a default.
 
-    `paper` never lets the block come back to rest, takes impacts at ends of steps and peaks among steps. The others
-    agree with `taylor` within their order.
-    Raises InvalidInput for an unknown name, the other solver's knob, and values outside their meaning.
+    With `paper` the block never returns to rest, impacts occur at ends of steps and peaks are sampled at steps. The
+    others agree with `taylor` within their order.
+    Raises InvalidInput for an unknown name, another solver's knob, and values outside their range.
     """
     solver = SOLVERS.get(name)
     if solver is None:
@@ -131,12 +136,12 @@ def solve(
     given = {"tolerance": tolerance, "step": step}
     for knob, number in given.items():
         if knob != solver.knob and number is not None:
-            raise InvalidInput(knob, number, f"the solver {name} takes {solver.knob} instead")
+            raise InvalidInput(knob, number, f"use {solver.knob} with the solver {name}")
     chosen = given[solver.knob]
     value = solver.default if chosen is None else chosen
     least, most = solver.limits
     if not least <= value <= most:
-        raise InvalidInput(solver.knob, value, f"for the solver {name} it must be between {least:g} and {most:g}")
+        raise InvalidInput(solver.knob, value, f"it must be between {least:g} and {most:g} for the solver {name}")
     if solver.run is None:
         return simulate(
             specimen,
@@ -153,14 +158,15 @@ def solve(
 LAST_PERIODS = 60
 """Periods of the drive at the end of a run over which its peaks are taken.
 
-A solver that does not locate impacts wanders about its steady state: a short window misses its excursions, and what it
-gives depends on the window (docs/benchmarks.md has the spread). One that locates them gives the same over any.
+A solver that does not locate impacts wanders about its steady state: a short window misses its excursions, and its
+result depends on the window (docs/benchmarks.md has the spread). One that locates them has the same result for any
+window.
 """
 
 
 @dataclass(frozen=True, eq=False)
 class TimedGain:
-    """alpha_1 and alpha_2 over the last periods of `motion`; of a run that ended early they mean nothing."""
+    """alpha_1 and alpha_2 over the last periods of `motion`; meaningless for a run that ended early."""
 
     alpha_1: float
     alpha_2: float
@@ -181,8 +187,8 @@ def steady_gain_by_time(
 ) -> TimedGain:
     """Gain coefficients of the last LAST_PERIODS periods of a run of `duration` [s] by the solver `name`.
 
-    Without `state` the run starts on the exact rocking orbit, at the phase [rad] of the base's sine that belongs to it,
-    and settles on what the solver takes for the steady state: from rest the transient decides, which is chaotic. The
+    Without `state` the run starts on the exact rocking orbit, at its phase [rad] of the base's sine,
+    and settles on the solver's steady state: from rest the outcome would depend on a chaotic transient. The
     bare frame's peaks are exact. Raises as `bench.comparators.catalogue.solve` and `sim.steady.rocking_orbit` do, and
     InvalidInput for a run shorter than those periods. Source: Eq. (10).
     """

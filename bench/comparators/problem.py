@@ -1,4 +1,4 @@
-"""What every solver is given, checked once for all of them."""
+"""Validated input of every solver."""
 
 from dataclasses import dataclass
 from math import inf
@@ -24,8 +24,8 @@ class Problem:
     """An initial value problem ready for a solver.
 
     `parameters`: `Specimen.packed()`, shape (16,). `segments`: packed excitation, shape (n, 10). `start`, shape (6,).
-    `times`: of the samples, shape (m,) [s]. `sampled`: whether samples were asked for. `peaks_from` [s]: infinite when
-    no peaks are watched.
+    `times`: of the samples, shape (m,) [s]. `sampled`: whether samples are requested. `peaks_from` [s]: infinite when
+    no peaks are requested.
     """
 
     parameters: NDArray[np.float64]
@@ -38,7 +38,7 @@ class Problem:
 
     @property
     def watched(self) -> bool:
-        """Whether peaks were asked for."""
+        """Whether peaks are requested."""
         return self.peaks_from < inf
 
     @staticmethod
@@ -50,7 +50,7 @@ class Problem:
         peaks_from: float | None,
         overturning_angle: float,
     ) -> "Problem":
-        """The problem as `sim.rocking.simulate` takes it. Raises InvalidInput as that does."""
+        """The problem from the arguments of `sim.rocking.simulate`. Raises InvalidInput as that does."""
         check_options(TOLERANCE, overturning_angle)
         drive, start = Drive(excitation), state or State()
         check_state(specimen, start, overturning_angle)

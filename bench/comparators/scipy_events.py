@@ -1,8 +1,8 @@
 # pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false
-"""scipy's integrators with their own events, one call for each phase and each segment of the excitation.
+"""scipy's integrators with their own events, one call for each phase and segment of the excitation.
 
-scipy's result has no types, hence the first line. At each event and breakpoint the integrator starts anew: its error
-estimate does not hold across one.
+The first line is needed because scipy's result has no types. The integrator restarts at each event and breakpoint,
+across which its error estimate is invalid.
 """
 
 from collections.abc import Callable
@@ -37,8 +37,8 @@ def dop853(problem: Problem, tolerance: float) -> Motion:
 def integrate(method: Method, problem: Problem, tolerance: float, equations: DrivenRates | None = None) -> Motion:
     """`problem` by the `method` of `scipy.integrate.solve_ivp`; the absolute tolerance is a hundredth of `tolerance`.
 
-    The root theta = 0 at the start of a phase is divided out of the impact event. Peaks and samples cost only when
-    asked for: each needs the dense output. `equations` are the compiled ones unless given.
+    The root theta = 0 at the start of a phase is divided out of the impact event. Peaks and samples cost time only when
+    requested: each requires the dense output. `equations` are the compiled ones by default.
     """
     from scipy.integrate import solve_ivp
 
@@ -117,7 +117,7 @@ def integrate(method: Method, problem: Problem, tolerance: float, equations: Dri
 
 
 def python_rates(p: Vector, sg: float, row: Vector, t: float, x: Vector, out: Vector) -> None:
-    """`bench.comparators.kernel.fixed_step.driven_rates` as Python runs it: what scipy is mostly given."""
+    """`bench.comparators.kernel.fixed_step.driven_rates` uncompiled, as usual with scipy."""
     from bench.comparators.kernel import fixed_step
 
     plain_base, plain_rates = _python(fixed_step.base), _python(fixed_step.rates)
@@ -138,7 +138,7 @@ def _events(
     holding: float,
     moment: Callable[[Vector, float, Vector], float],
 ) -> list[Function]:
-    """What ends the phase: impact and overturning while rocking, uplift at rest, nothing for the bare frame."""
+    """Events that end the phase: impact and overturning while rocking, uplift at rest, none for the bare frame."""
     from sim.kernel.equations import COUPLED
 
     limit = problem.overturning_angle
@@ -158,7 +158,7 @@ def _events(
     elif problem.parameters[COUPLED] != 0.0:
         events = [uplift]
     for event in events:
-        event.terminal = True  # pyright: ignore[reportFunctionMemberAccess]  # scipy's way to say it
+        event.terminal = True  # pyright: ignore[reportFunctionMemberAccess]  # scipy's convention
         event.direction = -1.0  # pyright: ignore[reportFunctionMemberAccess]
     return events
 

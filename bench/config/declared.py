@@ -1,6 +1,6 @@
-"""A declared parameter in words: what it is, in which unit, between which limits.
+"""Description of a declared parameter: meaning, unit and limits.
 
-File, command line and error messages all describe a parameter through this module, so they cannot disagree.
+File, command line and error messages describe parameters through this module and therefore agree.
 """
 
 from collections.abc import Iterator, Sequence
@@ -31,8 +31,8 @@ _COUNT = {0: "any number of", 1: "one or more", 2: "two or more", 3: "three or m
 class Declared:
     """One field of a group of parameters.
 
-    `kind` is the type of a value, or of each of `many` values; `constraints` are the limits of each value and
-    `lengths` those of their number; `optional` says whether the value may be absent.
+    `kind` is the type of a value, or of each of `many` values; `constraints` are the limits of each value and `lengths`
+    those of the number of values; `optional`: the value may be absent.
     """
 
     name: str
@@ -45,23 +45,23 @@ class Declared:
     constraints: tuple[object, ...]
     lengths: tuple[object, ...]
     usual: tuple[float, float] | None
-    """Lowest and highest magnitude that call for no notice, see `sim.parameters.usual_of`."""
+    """Lowest and highest magnitude without a notice, see `sim.parameters.usual_of`."""
     example: Any
-    """What a person may give where the default is absence, see `sim.parameters.example_of`."""
+    """Example of valid input for a parameter absent by default, see `sim.parameters.example_of`."""
 
     @property
     def group(self) -> type[Parameters] | None:
-        """The nested group that this field holds, or None for a value or a list."""
+        """The nested group of this field, or None for a value or a list."""
         return None if self.many else self.element
 
     @property
     def element(self) -> type[Parameters] | None:
-        """The nested group that this field holds, one or many, or None for values."""
+        """The nested group of this field, one or many, or None for values."""
         return self.kind if isinstance(self.kind, type) and issubclass(self.kind, Parameters) else None
 
     @property
     def choices(self) -> tuple[str, ...]:
-        """The words that are allowed, or () when the value is not a choice."""
+        """The allowed words, or () when the value is not a choice."""
         if get_origin(self.kind) is Literal:
             return tuple(str(choice) for choice in get_args(self.kind))
         if isinstance(self.kind, type) and issubclass(self.kind, Enum):
@@ -79,7 +79,7 @@ class Declared:
 
     @property
     def allowed(self) -> str:
-        """What the value may be, such as "one or more numbers, each above 0 and at most 60"."""
+        """Valid values in words, such as "one or more numbers, each above 0 and at most 60"."""
         if self.group is not None:
             return "a table of keys"
         if self.choices:
@@ -101,12 +101,12 @@ class Declared:
 
 
 def declared(model: type[Parameters]) -> Iterator[Declared]:
-    """The fields of a group of parameters, in their order."""
+    """The fields of a group of parameters, in order."""
     yield from _fields(model).values()
 
 
 def at(model: type[Parameters], path: Sequence[str | int]) -> Declared | None:
-    """The field that `path` leads to, one of its values where the path ends with an index; None if there is none."""
+    """The field at `path`, or one of its values if the path ends with an index; None if there is none."""
     found: Declared | None = None
     group: type[Parameters] | None = model
     for key in path:

@@ -1,78 +1,58 @@
-"""The configuration of a bench: what stands in the laboratory, as opposed to what a protocol asks for."""
+"""The configuration of a bench: the laboratory's equipment, without the parameters of protocols."""
 
-from typing import Literal
+from typing import Any, Literal, cast
 
-from pydantic import model_validator
+from pydantic import SerializeAsAny, ValidationInfo, field_validator, model_validator
 
 from bench.analysis.laser_calibration import LaserCalibration
-from bench.analysis.sensor_accuracy import SensorAccuracy, SensorDoubt
-from bench.config.twin import Twin
+from bench.analysis.sensor_accuracy import SensorAccuracy, SensorUncertainty
+from bench.config.backend import RigSettings, load_backend
+from bench.config.sections import Acquisition, Simulation, Twin
+from bench.config.validation import validated
 from bench.guard.limits import Limits, Ramps
-from bench.guard.quantities import Mover
+from bench.guard.shaker import ShakerModel
 from drivers.further import FurtherChannel
 from drivers.hardware.parameters import Hardware
 from sim.errors import InvalidInput
 from sim.identified import Identified
-from sim.knowledge import SpecimenKnowledge
+from sim.knowledge import SpecimenKnowledge, SpecimenUncertainty
 from sim.parameters import Parameters, quantity
+from sim.shaker import Shaker
 from sim.specimen import Specimen
-from sim.uncertainty import SpecimenUncertainty
-from sim.virtual_bench import VirtualBenchParameters
 
 _BLOCKS_OF_WATCHDOG = 3
-"""How many blocks a device's watchdog must outlast: one that is late is no dead program."""
+"""Least time-out of a device's watchdog in blocks: a single late block must not trip it."""
 _BLOCKS_OF_HEARTBEAT = 4
-"""How many blocks the relay of a heartbeat must outlast: two of its periods."""
+"""Least time-out of a heartbeat relay in blocks: two heartbeat periods."""
 _SHORTEST_WITH_SERIAL_LASERS = 0.02
-"""Shortest block with lasers whose values come in bursts of some milliseconds [s]."""
+"""Shortest block with serial lasers, whose values arrive in bursts of a few milliseconds [s]."""
 
 
-class Acquisition(Parameters):
-    """How the samples travel."""
-
-    block_duration: float = quantity(
-        0.1, "s", "length of a block of samples: one turn of the loop that reads, guards and drives", ge=0.01, le=0.2
-    )
-
-    lead: float = quantity(
-        0.1,
-        "s",
-        "drive that waits in the output ahead of what is read: covers the time a turn of the loop takes",
-        ge=0.0,
-        le=2.0,
-    )
-
-
-class Simulation(Parameters):
-    """The virtual bench that the simulated backend runs on."""
-
-    seed: int = quantity(1, "", "seed of every random number of the virtual bench", ge=0, lt=2**32)
-    bench: VirtualBenchParameters = VirtualBenchParameters()
-    specimen: Specimen | None = quantity(None, "", "the true specimen; absent when it is as assumed")
-    spring_factor: float = quantity(
-        1.0, "1", "true over nominal stiffness of every spring that is mounted", gt=0, le=10
-    )
+_TABLES: dict[str, Literal["simulation", "hardware"]] = {"simulated": "simulation", "hardware": "hardware"}
+"""Configuration tables of the built-in backends; any other backend uses `rig`."""
 
 
 class BenchConfiguration(Parameters):
-    """Everything that describes a bench. The defaults are the paper's specimen on the simulated bench."""
+    """Complete description of a bench. The defaults are the paper's specimen on the simulated bench."""
 
-    backend: Literal["simulated", "hardware"] = quantity("simulated", "", "what drives and reads the bench")
+    backend: str = quantity(
+        "simulated", "", 'driver of the bench: "simulated", "hardware", or a backend of another package'
+    )
     specimen: Specimen = Specimen()
     uncertainty: SpecimenUncertainty = SpecimenUncertainty()
     specimen_file: str | None = quantity(
         None,
         "",
-        "JSON file of what has been identified of the specimen, read beside this file; absent: nothing has",
+        "JSON file of identified properties of the specimen, relative to this file; absent: none",
         example="specimen.json",
     )
     identified: Identified | None = quantity(
-        None, "", "what has been identified of the specimen, in place of a specimen_file; goes before what is assumed"
+        None, "", "identified properties of the specimen, in place of a specimen_file; they replace assumed values"
     )
     laser_calibration: str | None = quantity(
         None,
         "",
-        "JSON file of a calibration of the lasers, read beside this file; absent: their data sheets hold",
+        "JSON file of a calibration of the lasers, relative to this file; absent: their data sheets apply",
         example="laser_calibration.json",
     )
     calibrated: LaserCalibration | None = quantity(
@@ -91,24 +71,27 @@ class BenchConfiguration(Parameters):
     twin: Twin = Twin()
     simulation: Simulation = Simulation()
     hardware: Hardware = Hardware()
-    channels: tuple[FurtherChannel, ...] = quantity((), "", "further analogue sensors, one table each")
+    rig: SerializeAsAny[Parameters] | None = quantity(
+        None, "", "settings of a backend of another package, which declares the keys", validate_default=True
+    )
+    channels: tuple[FurtherChannel, ...] = quantity((), "", "additional analogue sensors, one table each")
 
     @property
     def known_specimen(self) -> Specimen:
-        """The specimen as it is known best, for every prediction: identified where it was, assumed elsewhere."""
+        """Best estimate of the specimen for every prediction: identified where possible, assumed elsewhere."""
         return self.specimen if self.identified is None else self.identified.applied(self.specimen)
 
     @property
     def known(self) -> SpecimenKnowledge:
-        """How well `known_specimen` is known."""
+        """Uncertainty of `known_specimen`."""
         return SpecimenKnowledge(**dict(self.uncertainty), identified=self.identified or Identified())
 
     @property
     def known_on_table(self) -> SpecimenKnowledge:
-        """The same for a steady motion on this table, which may give way at the block's impacts.
+        """Uncertainty of `known_specimen` in a steady motion on this table, which recoils at the block's impacts.
 
-        Its control gives the lost momentum back over the period, so predictions are for fixed ground; all that a table
-        left to itself would take of the restitution is taken as a half width.
+        The control restores the lost momentum within a period, so predictions are for fixed ground; the full effect of
+        an uncontrolled table on the restitution is added as a half width.
         """
         block, mass = self.known_specimen.block, self.table_mass
         if mass is None or block.restitution == 0.0:
@@ -117,94 +100,153 @@ class BenchConfiguration(Parameters):
         return self.known.model_copy(update={"give": give})
 
     @property
-    def sensors(self) -> SensorDoubt:
-        """All that is left open of the sensors."""
-        return SensorDoubt(self.analysis, self.laser_ranges, self.calibrated)
+    def sensors(self) -> SensorUncertainty:
+        """Uncertainty of the sensors."""
+        return SensorUncertainty(self.analysis, self.laser_ranges, self.calibrated)
+
+    @property
+    def table(self) -> Literal["simulation", "hardware", "rig"]:
+        """Name of the TOML table with the settings of the configured backend."""
+        return _TABLES.get(self.backend, "rig")
+
+    @property
+    def settings(self) -> Simulation | Hardware | RigSettings:
+        """Settings of the configured backend."""
+        if self.backend == "simulated":
+            return self.simulation
+        if self.backend == "hardware":
+            return self.hardware
+        return self.rig if isinstance(self.rig, RigSettings) else RigSettings()
 
     @property
     def seed(self) -> int | None:
-        """Seed of every random number of the bench; a real one has none."""
+        """Random seed of the bench; None for a real bench."""
         return self.simulation.seed if self.backend == "simulated" else None
 
     @property
     def sample_rate(self) -> float:
-        """Samples per second of drive and inputs that the configured backend is asked for [1/s]."""
-        return self.simulation.bench.sample_rate if self.backend == "simulated" else self.hardware.sample_rate
+        """Samples per second of drive and inputs requested from the configured backend [1/s]."""
+        return self.settings.sample_rate
 
     @property
     def block_samples(self) -> int:
-        """Samples in one turn of the acquisition loop."""
+        """Samples in one iteration of the acquisition loop."""
         return max(round(self.acquisition.block_duration * self.sample_rate), 1)
 
     @property
     def lead_samples(self) -> int:
-        """Drive samples that wait ahead of the sample that is read."""
+        """Drive samples queued ahead of the newest input."""
         return round(self.acquisition.lead * self.sample_rate)
 
     @property
     def half_stroke(self) -> float:
-        """Displacement of the table from mid stroke at which the end stops touch [m]."""
-        simulated = self.backend == "simulated"
-        return self.simulation.bench.shaker.half_stroke if simulated else self.hardware.half_stroke
+        """Distance from mid stroke to each end stop of the table [m]."""
+        return self.settings.half_stroke
 
     @property
     def table_band(self) -> tuple[float, float]:
-        """The band that the table can make [Hz]: records are limited to it before they are scaled."""
-        table = self.simulation.bench.shaker if self.backend == "simulated" else self.hardware
-        return table.band_low, table.band_high
+        """The usable band of the table [Hz], to which records are limited before scaling."""
+        return self.settings.band_low, self.settings.band_high
 
     @property
-    def mover(self) -> Mover | None:
-        """What force and current are estimated from, with the known specimen on the table; None when unknown."""
+    def shaker_model(self) -> ShakerModel | None:
+        """Model of the shaker loaded with the known specimen; None without its data."""
         specimen, mass = self.known_specimen, self.table_mass
         payload = specimen.frame.m1 + specimen.frame.m2 + specimen.block.mass
-        if self.backend == "simulated":
-            shaker = self.simulation.bench.shaker
-            return Mover(shaker.moving_mass + payload, shaker.k_s, shaker.bl)
-        constant = self.hardware.force_constant
-        return None if mass is None or constant is None else Mover(mass + payload, 0.0, constant)
+        constant = self.settings.force_constant
+        return (
+            None
+            if mass is None or constant is None
+            else ShakerModel(mass + payload, self.settings.suspension, constant)
+        )
+
+    @property
+    def simulated_shaker(self) -> Shaker | None:
+        """The shaker of the simulated bench; None with hardware, whose amplifier and friction are not known."""
+        return self.simulation.bench.shaker if self.backend == "simulated" else None
 
     @property
     def table_mass(self) -> float | None:
         """Mass that moves with the table, without the specimen [kg]; None when unknown."""
-        return self.simulation.bench.shaker.moving_mass if self.backend == "simulated" else self.hardware.moving_mass
+        return self.settings.moving_mass
 
     @property
     def laser_reference(self) -> Literal["ground", "table"]:
-        """Where the lasers stand."""
-        simulated = self.backend == "simulated"
-        return self.simulation.bench.laser_1.reference if simulated else self.hardware.lasers.reference
+        """Mounting of the lasers."""
+        return self.settings.laser_reference
 
     @property
     def laser_ranges(self) -> tuple[float, float]:
         """Measuring ranges of the lasers on the first and the second storey [m]."""
-        lasers = self.simulation.bench if self.backend == "simulated" else self.hardware
-        return lasers.laser_1.measuring_range, lasers.laser_2.measuring_range
+        return self.settings.laser_ranges
+
+    @property
+    def laser_half_ranges(self) -> tuple[float, float]:
+        """Largest displacement from mid range that the lasers on the first and the second storey measure [m]."""
+        first, second = self.laser_ranges
+        return 0.5 * first, 0.5 * second
 
     def at_pace(self, *, realtime: bool) -> "BenchConfiguration":
-        """The same, with what depends on the pace of its time decided: hardware knows real time only."""
+        """The configuration with settings that depend on virtual or real time resolved."""
         if self.twin.enabled is not None:
             return self
-        twin = self.twin.model_copy(update={"enabled": realtime or self.backend == "hardware"})
+        twin = self.twin.model_copy(update={"enabled": realtime or self.real_time_only})
         return self.model_copy(update={"twin": twin})
 
     @property
+    def real_time_only(self) -> bool:
+        """Whether the backend has no virtual time."""
+        return load_backend(self.backend).real_time_only
+
+    @property
     def serves_itself(self) -> bool:
-        """Whether no person is needed for the work between two tests: the bench is simulated or emulated."""
-        return self.backend == "simulated" or self.hardware.hands is not None
+        """Whether tasks between two tests need no operator: the bench is simulated or emulated."""
+        if self.backend == "hardware":
+            return self.hardware.hands is not None
+        return not load_backend(self.backend).operator
+
+    @field_validator("backend")
+    @classmethod
+    def _installed_backend(cls, name: str) -> str:
+        # built-in backends are loaded when a rig is opened
+        if name not in _TABLES:
+            try:
+                load_backend(name)
+            except InvalidInput as refused:
+                raise ValueError(refused.allowed) from refused
+        return name
+
+    @field_validator("rig", mode="plain")
+    @classmethod
+    def _settings_of_the_backend(cls, given: Any, info: ValidationInfo) -> RigSettings | None:
+        name = info.data.get("backend")
+        if name is None:
+            return None
+        if name in _TABLES:
+            if given is not None:
+                raise ValueError(f'the settings of the backend "{name}" are in [{_TABLES[name]}]; remove [rig]')
+            return None
+        settings = load_backend(name).settings
+        if not issubclass(settings, RigSettings):
+            raise ValueError(f'the settings of the backend "{name}" are not a {RigSettings.__module__}.RigSettings')
+        if isinstance(given, settings):
+            return given
+        if not isinstance(given, dict | None):
+            raise ValueError("it must be a table of keys")
+        return validated(settings, cast(dict[str, Any], given or {}))
 
     @model_validator(mode="after")
     def _springs_belong_to_the_protocol(self) -> "BenchConfiguration":
         for name, specimen in (("specimen", self.specimen), ("simulation.specimen", self.simulation.specimen)):
             if specimen is not None and specimen.beta is not None:
-                allowed = "the protocol says which springs are mounted; leave it out (see simulation.spring_factor)"
+                allowed = "the protocol selects the springs; remove it (see simulation.spring_factor)"
                 raise InvalidInput(f"{name}.beta", specimen.beta, allowed)
         return self
 
     @model_validator(mode="after")
     def _what_is_identified_can_be(self) -> "BenchConfiguration":
         if self.specimen_file is not None and self.identified is not None:
-            raise InvalidInput("specimen_file", self.specimen_file, "identified is there too; leave one of them out")
+            raise InvalidInput("specimen_file", self.specimen_file, "identified is present too; remove one of them")
         try:
             _ = self.known_specimen
         except InvalidInput as refusal:
@@ -219,21 +261,23 @@ class BenchConfiguration(Parameters):
         for number, channel in enumerate(self.channels):
             item = f"channels[{number}]"
             if channel.name in names:
-                raise InvalidInput(f"{item}.name", channel.name, "another channel has this name; give it its own")
+                raise InvalidInput(f"{item}.name", channel.name, "another channel has this name; choose another")
             names.add(channel.name)
             if self.backend == "simulated":
                 try:
                     _ = channel.simulated
                 except InvalidInput as refusal:
                     raise InvalidInput(f"{item}.{refusal.item}", refusal.value, refusal.allowed) from None
-            elif (other := terminals.setdefault(channel.terminal.lower(), channel.name)) != channel.name:
-                raise InvalidInput(f"{item}.terminal", channel.terminal, f"{other} has this terminal already")
+            if self.backend != "hardware":
+                continue
+            if (other := terminals.setdefault(channel.terminal.lower(), channel.name)) != channel.name:
+                raise InvalidInput(f"{item}.terminal", channel.terminal, f"{other} uses this terminal already")
         return self
 
     @model_validator(mode="after")
     def _one_calibration(self) -> "BenchConfiguration":
         if self.laser_calibration is not None and self.calibrated is not None:
-            allowed = "calibrated is there too; leave one of them out"
+            allowed = "calibrated is present too; remove one of them"
             raise InvalidInput("laser_calibration", self.laser_calibration, allowed)
         return self
 
@@ -243,15 +287,15 @@ class BenchConfiguration(Parameters):
         if self.backend != "hardware":
             return self
         if watchdog is not None and watchdog < _BLOCKS_OF_WATCHDOG * block:
-            allowed = f"it is told once in a block of {block:g} s: give it at least {_BLOCKS_OF_WATCHDOG} blocks"
+            allowed = f"it is reset once per block of {block:g} s: use at least {_BLOCKS_OF_WATCHDOG} blocks"
             raise InvalidInput("hardware.daq.watchdog", watchdog, allowed)
         heartbeat = self.hardware.daq.heartbeat
         if heartbeat is not None and heartbeat.timeout < _BLOCKS_OF_HEARTBEAT * block:
-            allowed = (
-                f"it rises every other block of {block:g} s: give its relay at least {_BLOCKS_OF_HEARTBEAT} blocks"
-            )
+            allowed = f"it rises every other block of {block:g} s: use at least {_BLOCKS_OF_HEARTBEAT} blocks"
             raise InvalidInput("hardware.daq.heartbeat.timeout", heartbeat.timeout, allowed)
         if self.hardware.lasers.connection == "serial" and block < _SHORTEST_WITH_SERIAL_LASERS:
-            allowed = f"serial lasers come in bursts: at least {_SHORTEST_WITH_SERIAL_LASERS:g} s, or analogue lasers"
+            allowed = (
+                f"serial lasers send in bursts: use at least {_SHORTEST_WITH_SERIAL_LASERS:g} s, or analogue lasers"
+            )
             raise InvalidInput("acquisition.block_duration", block, allowed)
         return self

@@ -1,20 +1,93 @@
-"""The grammar of numbers that a person types: numbers, lists and ranges, each with a unit if wanted.
+"""The grammar of typed numbers: numbers, lists and ranges, each with an optional unit.
 
     number   12   -0.25   1e-3   60 mm   2.5Hz
     list     12.5 15 17.5          separated by spaces
-    range    12:21:4   2:4:5Hz     start:stop:count, ascending, decimal ends taken exactly
+    range    12:21:4   2:4:5Hz     start:stop:count, ascending, decimal ends exact
 
-Command line, form, configuration and protocol files read every number through this module, so that none of them
-understands a text that another refuses. A comma never separates anything: 0,25 would otherwise be 0 and 25.
+Command line, form, configuration and protocol files read every number through this module and therefore accept the same
+texts. A comma is never a separator: 0,25 would otherwise be 0 and 25.
+
+pint converts units, except between frequencies in Hz and angular frequencies, which are converted explicitly with 2 pi:
+pint treats the radian as a pure number.
 """
 
 import re
 from collections.abc import Sequence
+from decimal import Decimal
 from fractions import Fraction
-from math import isfinite
+from functools import cache
+from math import isfinite, tau
+from typing import Any, cast
+
+
+def converted(digits: str, typed: str, unit: str) -> float:
+    """Convert the decimal number `digits` from the unit `typed` to the declared `unit` ("1" for a pure number).
+
+    Raises ValueError naming both for an unknown unit or another dimension.
+    """
+    if unit == "":
+        raise ValueError(f"it has no unit: remove {typed!r}")
+    factor = _factor(typed, unit)
+    # in decimal arithmetic, so that 57 mm is exactly 0.057
+    value = float(Decimal(digits) * Decimal(repr(factor)))
+    if not isfinite(value):
+        raise ValueError("it exceeds the range of a number")
+    return value
+
+
+@cache
+def _factor(typed: str, unit: str) -> float:
+    factor, root = _root(typed)
+    wanted, base = _root(unit)
+    if root == base:
+        return factor / wanted
+    cycles, angular = {"1 / second"}, {"radian / second"}
+    if root in cycles and base in angular and _in_hertz(typed):
+        return factor * tau / wanted
+    if root in angular and base in cycles and _in_hertz(unit):
+        return factor / tau / wanted
+    hint = {("gram", "m/s2"): " (g is the gram; the acceleration of gravity is g_0)"}.get((_name(typed), unit), "")
+    what = "a pure number, or in %" if unit == "1" else f"in {unit}, or in a unit of its dimension"
+    raise ValueError(f"{typed} ({root or '1'}) is not of the dimension of {unit} ({base or '1'}): use {what}{hint}")
+
+
+def _root(unit: str) -> tuple[float, str]:
+    """Factor to base units, and the base units as text; the radian counts as a base unit."""
+    import pint
+
+    try:
+        factor, root = _registry().get_root_units(_registry().parse_units(_as_pint(unit)))
+    except (pint.PintError, ValueError, TypeError, ArithmeticError, AttributeError):
+        raise ValueError(f"{unit!r} is an unknown unit: write it as mm, N/mm, m/s^2, Hz or deg") from None
+    # pint's base unit of mass is the gram; SI users expect the kilogram, and the factor cancels
+    text = str(root).replace("gram", "kilogram")
+    return float(factor), "" if text == "dimensionless" else text
+
+
+def _name(unit: str) -> str:
+    return str(_registry().parse_units(_as_pint(unit)))
+
+
+def _in_hertz(unit: str) -> bool:
+    return "hertz" in _name(unit)
+
+
+def _as_pint(unit: str) -> str:
+    """A declared or typed unit in pint's notation: V s2/m is V*s**2/m."""
+    text = "" if unit == "1" else unit.strip().replace("Ω", "ohm").replace("°", "degree").replace("^", "**")
+    text = re.sub(r"(?<=[A-Za-zµμ])(\d)", r"**\1", text)
+    return re.sub(r"(?<=[\w)])\s+(?=[A-Za-zµμ])", "*", text)
+
+
+@cache
+def _registry() -> Any:
+    import pint
+
+    return cast(Any, pint.UnitRegistry())
+
 
 MOST_VALUES = 10_000
-"""Values of a range: more is a slip of the finger."""
+"""Largest number of values of a range: more is taken as a typing error."""
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?(?![\d.])", re.ASCII)
 _WHOLE = re.compile(r"[+-]?\d+", re.ASCII)
@@ -25,18 +98,18 @@ _RANGE = f"a range is start:stop:count, two different numbers and a count of 2 t
 
 
 def spaced(start: str, stop: str, count: int) -> tuple[float, ...]:
-    """`count` (2 or more) equally spaced numbers; decimal ends are taken exactly, so 0.1 to 1.2 has 0.3 in it.
+    """`count` (2 or more) equally spaced numbers; decimal ends are exact, so 0.1 to 1.2 can contain exactly 0.3.
 
-    Raises ValueError for text that is no finite number.
+    Raises ValueError for text that is not a finite number.
     """
     first, last = Fraction(start), Fraction(stop)
     return tuple(float(first + (last - first) * k / (count - 1)) for k in range(count))
 
 
 def read_number(text: str, unit: str = "1", *, whole: bool = False) -> float:
-    """One number in the SI `unit`, converted where the text carries another; an int when `whole`.
+    """One number in the SI `unit`, converted if the text has another; an int if `whole`.
 
-    Raises ValueError that says what to write instead; without a message where the text is nothing like a number.
+    Raises ValueError with the correct spelling; without a message where the text does not resemble a number.
     """
     digits, typed = _parted(text)
     value = _plain(digits) if not typed else _converted(digits, typed, unit)
@@ -50,14 +123,14 @@ def read_number(text: str, unit: str = "1", *, whole: bool = False) -> float:
 
 
 def read_values(text: str, unit: str = "1", *, whole: bool = False) -> list[float]:
-    """The values of one item of a list, in the SI `unit`: a number, or those of a range. Raises ValueError likewise."""
+    """The values of one list item, a number or a range, in the SI `unit`. Raises ValueError likewise."""
     if ":" not in text:
         return [read_number(text, unit, whole=whole)]
     start, stop, count, *more = (*(part.strip() for part in text.split(":")), "", "")
     count, typed = _parted(count) if _NUMBER.match(count) else (count, "")
     ends = start, stop
     if any((found := _NUMBER.match(end)) and _UNIT.fullmatch(end[found.end() :].strip()) for end in ends):
-        raise ValueError(f"{_RANGE}; its unit stands at the end: 2:4:5Hz")
+        raise ValueError(f"{_RANGE}; its unit is at the end: 2:4:5Hz")
     if any(more) or any(_NUMBER.fullmatch(end) is None for end in ends) or _WHOLE.fullmatch(count) is None:
         for part in (start, stop, count):
             _refuse_comma(part)
@@ -72,15 +145,15 @@ def read_values(text: str, unit: str = "1", *, whole: bool = False) -> list[floa
     values = list(spaced(start, stop, n))
     if whole:
         if any(value != round(value) for value in values):
-            raise ValueError("not all values of this range are whole numbers")
+            raise ValueError("not all values of this range are integers")
         return [round(value) for value in values]
     return values
 
 
 def items_of(tokens: Sequence[str]) -> list[str]:
-    """The items of a list as it was typed, each a number or a range with its unit; an empty token is an empty item.
+    """The items of a typed list, each a number or a range with its unit; an empty token is an empty item.
 
-    Spaces separate items within a token too, except in front of a unit: "2.5 Hz 3 Hz" has two.
+    Spaces also separate items within a token, except before a unit: "2.5 Hz 3 Hz" has two items.
     """
     items: list[str] = []
     for token in tokens:
@@ -95,14 +168,14 @@ def items_of(tokens: Sequence[str]) -> list[str]:
 
 
 def require_units_alike(items: Sequence[str]) -> None:
-    """Raise ValueError when some items of a list carry a unit and others do not."""
+    """Raise ValueError when some items of a list have a unit and others do not."""
     given = [carries_unit(item) for item in items if _NUMBER.match(item)]
     if any(given) and not all(given):
-        raise ValueError("give every value its unit, or none of them")
+        raise ValueError("add a unit to every value, or to none")
 
 
 def read_band(text: str, unit: str = "Hz") -> tuple[float, float]:
-    """Two ascending positive numbers LOW:HIGH in `unit`, with a unit at the end if wanted. Raises ValueError."""
+    """Two ascending positive numbers LOW:HIGH in `unit`, with an optional unit at the end. Raises ValueError."""
     low, colon, high = text.partition(":")
     digits, typed = _parted(high.strip())
     for part in (low, digits):
@@ -114,22 +187,22 @@ def read_band(text: str, unit: str = "Hz") -> tuple[float, float]:
 
 
 def carries_unit(text: str) -> bool:
-    """Whether a text is a number, or a range, with a unit behind it."""
+    """Whether a text is a number or a range followed by a unit."""
     last = text.rpartition(":")[2].strip()
     return (found := _NUMBER.match(last)) is not None and _UNIT.fullmatch(last[found.end() :].strip()) is not None
 
 
 def _parted(text: str) -> tuple[str, str]:
-    """Digits and unit of a text. Raises ValueError, with what to write instead where that can be told."""
+    """Digits and unit of a text. Raises ValueError, with the correct spelling if known."""
     text = text.strip()
     if not text:
-        raise ValueError("there is no value: leave it out, or give a number")
+        raise ValueError("there is no value: remove the item, or enter a number")
     _refuse_comma(text)
     if (found := _NUMBER.match(text)) is None:
         raise ValueError
     unit = text[found.end() :].strip()
     if re.fullmatch(r"[eE][+-]?\d+", unit):
-        raise ValueError("it is beyond what a number can be")
+        raise ValueError("it exceeds the range of a number")
     if re.fullmatch(r"[+-]?(0[xXbBoO]\w+|\d+([_ ]\d\w*)+)", text, re.ASCII):
         raise ValueError("write a decimal number: digits, a point, and an exponent such as e-3")
     if unit and _UNIT.fullmatch(unit) is None:
@@ -142,21 +215,20 @@ def _refuse_comma(text: str) -> None:
         return
     found = _COMMA.match(text.strip())
     if found is None:
-        raise ValueError("a comma separates nothing here: separate values by spaces")
+        raise ValueError("a comma is not a separator: separate values by spaces")
     raise ValueError(f"write {found[1] or '0'}.{found[2]}{found[3]}; separate values by spaces")
 
 
 def _plain(digits: str) -> float:
     value = float(digits)
     if not isfinite(value):
-        raise ValueError("it is beyond what a number can be")
+        raise ValueError("it exceeds the range of a number")
     return value
 
 
 def _converted(digits: str, typed: str, unit: str) -> float:
     if typed == unit:
         return _plain(digits)
-    # pint takes most of a second to load: only for a value that carries another unit than its own
-    from bench.config.units import converted
+    # pint takes most of a second to load: import it only for a value in another unit
 
     return converted(digits, typed, unit)

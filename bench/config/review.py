@@ -1,30 +1,30 @@
-"""Cross-checks of a whole configuration: what its parts, each valid by itself, say of each other.
+"""Cross-checks of a whole configuration whose parts are valid.
 
-`rockbench config check`, `--dry-run`, a run and the window all ask this one function, so that they answer alike.
-A limit that nothing on the bench could show never trips: it is refused unless `limits.confirmed` names it, and every
-run says so then.
+`rockbench config check`, `--dry-run`, a run and the window all use the same function. A limit beyond the capabilities
+of the bench never trips: it is refused unless `limits.confirmed` names it, which every run then reports.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import inf, sqrt, tau
+from math import inf, sqrt
 
+from bench.config.backend import RigSettings
 from bench.config.model import BenchConfiguration
-from bench.config.usual import in_hertz, off_resonance, unusual
+from bench.config.usual import specimen_notices, unusual
 from bench.guard.limits import ramp_refusal
 from sim.errors import InvalidInput
 from sim.parameters import Parameters
 from sim.specimen import Specimen
 
 _ESTIMATE = 2.0
-"""An estimated force or current may be limited up to so many times what the accelerometer's range comes to: such a
-limit is a last resort, one beyond it a slip."""
+"""Largest ratio of the limit of an estimated force or current to its value at the accelerometer's range: larger limits
+are taken as typing errors."""
 _LONGEST_WAIT, _LONGEST_DEBOUNCE, _WORST_CLOCK = 60.0, 1.0, 0.1
-"""What the guard may wait for a sensor or a block at most, and for a limit that is exceeded [s]: at full velocity the
-table passes its stroke in a quarter of a second; and a relative error of a clock that no quartz has.
+"""Longest delays of the guard for a missing sensor or block, and for an exceeded limit [s]: at full velocity the
+table passes its stroke in a quarter of a second; and a relative clock error beyond that of any quartz.
 """
 _LEAST_ERROR = 1e-7
-"""A triangulation laser that is true to less [m] over its range does not exist: the optoNCDT 1420 resolves 8 um."""
+"""Smallest plausible linearity error of a triangulation laser [m]: the optoNCDT 1420 resolves 8 um."""
 _REACH = {
     "acceleration": (0.5, 5000.0),
     "velocity": (0.02, 50.0),
@@ -33,16 +33,17 @@ _REACH = {
     "strain": (1e-5, 0.05),
     "current": (0.02, 1000.0),
 }
-"""What sensors of each kind measure on benches of this size, in SI units, from the data sheets of the usual makers."""
+"""Usual measuring ranges of each kind of sensor on benches of this size, in SI units, from common data sheets."""
 _LEAST_SHARE = 0.01
-"""A limit, or a noise over one hertz, that is unusual as a share of what a channel measures."""
-_SPRING_OFF = 2.0
-"""A measured spring further than this factor from its label is unusual."""
+"""Share of a channel's range below which a limit is unusual."""
+_NOISE = (1e-7, 1e-4)
+"""Usual spectral density of a channel's noise relative to its range [1/Hz^0.5]: from a 16-bit converter's to 0.3 % of
+the range in a band of 1 kHz."""
 
 
 @dataclass(frozen=True)
 class Review:
-    """What was found: `refusals`, each naming key, value and remedy, and `notices` of what is merely unusual."""
+    """Findings: `refusals`, each naming key, value and remedy, and `notices` of unusual values."""
 
     refusals: tuple[InvalidInput, ...]
     notices: tuple[str, ...]
@@ -55,7 +56,7 @@ class Review:
 
 @dataclass(frozen=True)
 class _Reach:
-    """The largest value of a limited quantity that the bench can show, and what sets it."""
+    """The largest value of a limited quantity that the bench can reach, and its cause."""
 
     limit: str
     most: float
@@ -64,13 +65,13 @@ class _Reach:
 
 
 def review(configuration: BenchConfiguration) -> Review:
-    """All that can be said of a configuration without a protocol."""
+    """Review of a configuration without a protocol."""
     confirmed, refusals, notices = configuration.limits.confirmed, list[InvalidInput](), list[str]()
     for reach in _reaches(configuration):
         value = float(getattr(configuration.limits, reach.limit))
         if value <= reach.most:
             continue
-        why = f"it could never trip: {reach.owner} ends at {reach.most:.4g} {reach.unit}".rstrip()
+        why = f"it can never trip: {reach.owner} ends at {reach.most:.4g} {reach.unit}".rstrip()
         if reach.limit in confirmed:
             notices.append(f"limits.{reach.limit} = {value:g}: {why}; limits.confirmed names it")
         else:
@@ -82,43 +83,9 @@ def review(configuration: BenchConfiguration) -> Review:
     return Review(tuple(refusals), tuple(notices))
 
 
-def notices_of(parameters: Parameters, specimen: Specimen) -> tuple[str, ...]:
-    """Notices of what a protocol or a prediction is asked for, with this specimen on the table."""
-    found = (*unusual(parameters), *off_resonance(parameters, specimen.frame.natural_frequencies))
-    # one notice for each key: the one that names the modes says more
-    return tuple({notice.partition(" = ")[0].partition("[")[0]: notice for notice in found}.values())
-
-
-def scales_of(parameters: Parameters, specimen: Specimen) -> tuple[str, ...]:
-    """Circular frequencies that are asked for in Hz too, beside the natural frequencies of the bare frame."""
-    lines = tuple(in_hertz(parameters))
-    if not lines:
-        return ()
-    modes = " and ".join(f"{mode:.4g} rad/s = {mode / tau:.4g} Hz" for mode in specimen.frame.natural_frequencies)
-    return (*lines, f"modes of the bare frame: {modes}")
-
-
-def specimen_notices(specimen: Specimen, prefix: str = "specimen.") -> Iterator[str]:
-    """Notices of what is assumed of a specimen."""
-    yield from unusual(specimen, prefix)
-    frame = specimen.frame
-    for number, dashpot in enumerate(frame.dashpots, 1):
-        if dashpot < 0.0:
-            ratios = f"{prefix}frame.xi1 = {frame.xi1:g}, xi2 = {frame.xi2:g}"
-            yield f"{ratios} make dashpot c{number} = {dashpot:.3g} N s/m: a negative one feeds energy in"
-    nominal = specimen.spring_k1 or frame.k1
-    if not 1.0 / _SPRING_OFF <= nominal / frame.k1 <= _SPRING_OFF:
-        yield f"{prefix}spring_k1 = {nominal:g} N/m is {nominal / frame.k1:.3g} times frame.k1 = {frame.k1:g} N/m"
-    for place, spring in enumerate(specimen.springs):
-        ratio = spring.k_c / (spring.label * nominal)
-        if not 1.0 / _SPRING_OFF <= ratio <= _SPRING_OFF:
-            item, promised = f"{prefix}springs[{place}].k_c = {spring.k_c:g} N/m", spring.label * nominal
-            yield f"{item} is {ratio:.3g} times what its label {spring.label:g} promises, {promised:.4g} N/m"
-
-
 def _reaches(configuration: BenchConfiguration) -> Iterator[_Reach]:
     limits, rate = configuration.limits, configuration.sample_rate
-    bench = "simulation.bench" if configuration.backend == "simulated" else "hardware"
+    bench = "simulation.bench" if configuration.backend == "simulated" else configuration.table
     position, acceleration, output = _ranges(configuration)
     yield _Reach("drive_voltage", *output)
     step = f"a step between the limits of the drive (limits.drive_voltage = {limits.drive_voltage:g} V"
@@ -134,33 +101,35 @@ def _reaches(configuration: BenchConfiguration) -> Iterator[_Reach]:
     yield _Reach("acceleration", *acceleration)
     yield from _loads(configuration, acceleration[0])
     yield _Reach("laser_range", 1.0, "", "the laser's range")
-    ranges = f"the range of the lasers ({bench}.laser_1.measuring_range and laser_2)"
-    yield _Reach("drift", 0.5 * sum(configuration.laser_ranges), "m", ranges)
+    keys = "rig.laser_1_range" if bench == "rig" else f"{bench}.laser_1.measuring_range"
+    ranges = f"the range of the lasers ({keys} and laser_2)"
+    yield _Reach("drift", sum(configuration.laser_half_ranges), "m", ranges)
     if configuration.backend == "hardware":
         yield _Reach("late", configuration.hardware.daq.buffer, "s", "the input buffer (hardware.daq.buffer)")
 
 
 def _loads(configuration: BenchConfiguration, acceleration: float) -> Iterator[_Reach]:
-    """Force and current: what the shaker can give, what a channel measures, or else the estimate from the motion."""
+    """Force and current: capacity of the shaker, range of a channel, or the estimate from the motion."""
     found: dict[str, _Reach] = {}
-    mover, hardware = configuration.mover, configuration.hardware
+    shaker_model, hardware, settings = configuration.shaker_model, configuration.hardware, configuration.settings
     if configuration.backend == "simulated":
         shaker, key = configuration.simulation.bench.shaker, "simulation.bench.shaker"
         current = f"current_limit = {shaker.current_limit:g} A"
-        owner = f"what the shaker can give ({key}.bl = {shaker.bl:g} N/A times {current})"
+        owner = f"the shaker's capacity ({key}.bl = {shaker.bl:g} N/A times {current})"
         found["force"] = _Reach("force", shaker.bl * shaker.current_limit, "N", owner)
-        owner = f"what the amplifier can give ({key}.{current})"
+        owner = f"the amplifier's capacity ({key}.{current})"
         found["current"] = _Reach("current", shaker.current_limit, "A", owner)
     else:
-        if mover is not None:
-            force = _ESTIMATE * mover.mass * acceleration
-            masses = f"hardware.moving_mass = {hardware.moving_mass:g} kg" if hardware.moving_mass else ""
-            owner = f"twice the estimate from the range of the accelerometer ({masses}, hardware.force_constant = "
-            owner += f"{mover.force_constant:g} N/A)"
+        if shaker_model is not None:
+            force = _ESTIMATE * shaker_model.force(acceleration)
+            table = configuration.table
+            masses = f"{table}.moving_mass = {settings.moving_mass:g} kg" if settings.moving_mass else ""
+            owner = f"twice the estimate from the range of the accelerometer ({masses}, {table}.force_constant = "
+            owner += f"{shaker_model.force_constant:g} N/A)"
             found["force"] = _Reach("force", force, "N", owner)
-            found["current"] = _Reach("current", force / mover.force_constant, "A", owner)
+            found["current"] = _Reach("current", force / shaker_model.force_constant, "A", owner)
         for name, unit, sensor in (("force", "N", hardware.table_force), ("current", "A", hardware.coil_current)):
-            if sensor is not None:
+            if sensor is not None and configuration.backend == "hardware":
                 key = "hardware.table_force" if name == "force" else "hardware.coil_current"
                 found[name] = _Reach(name, *_range_of(key, unit, sensor.range, sensor.sensitivity, sensor.zero))
     yield from found.values()
@@ -169,11 +138,11 @@ def _loads(configuration: BenchConfiguration, acceleration: float) -> Iterator[_
 
 
 _Range = tuple[float, str, str]
-"""Value, unit, and what sets it."""
+"""Value, unit and cause."""
 
 
 def _ranges(configuration: BenchConfiguration) -> tuple[_Range, _Range, _Range]:
-    """What displacement sensor and accelerometer show at most, and the range of the drive."""
+    """Ranges of displacement sensor, accelerometer and drive."""
     if configuration.backend == "simulated":
         bench, key = configuration.simulation.bench, "simulation.bench"
         volts = bench.converter.range
@@ -181,6 +150,13 @@ def _ranges(configuration: BenchConfiguration) -> tuple[_Range, _Range, _Range]:
             _range_of(f"{key}.displacement_sensor", "m", volts, bench.displacement_sensor.sensitivity),
             _range_of(f"{key}.accelerometer", "m/s2", volts, bench.accelerometer.sensitivity),
             (bench.shaker.drive_range, "V", f"the range of the drive ({key}.shaker.drive_range)"),
+        )
+    if isinstance(rig := configuration.settings, RigSettings):
+        acceleration = inf if rig.acceleration_range is None else rig.acceleration_range
+        return (
+            (inf, "m", "the range of the displacement sensor"),
+            (acceleration, "m/s2", "the range of the accelerometer (rig.acceleration_range)"),
+            (rig.drive_range, "V", "the range of the drive (rig.drive_range)"),
         )
     hardware = configuration.hardware
     x, a = hardware.table_displacement, hardware.table_acceleration
@@ -202,8 +178,8 @@ def _contradictions(configuration: BenchConfiguration) -> Iterator[InvalidInput]
         yield refused
     for key, (value, most, unit) in _waits(configuration).items():
         if value > most:
-            yield InvalidInput(f"limits.{key}", value, f"it guards nothing beyond {most:g}{unit}")
-    table = "simulation.bench.shaker" if simulated else "hardware"
+            yield InvalidInput(f"limits.{key}", value, f"it must not exceed {most:g}{unit} to be effective")
+    table = "simulation.bench.shaker" if simulated else configuration.table
     low, high = configuration.table_band
     if low >= high:
         yield InvalidInput(f"{table}.band_low", low, f"it must be below band_high = {high:g} Hz")
@@ -212,13 +188,13 @@ def _contradictions(configuration: BenchConfiguration) -> Iterator[InvalidInput]
         yield InvalidInput(f"{table}.band_high", high, f"it must not be above {half}")
     if simulated:
         shaker, specimen = configuration.simulation.bench.shaker, configuration.known_specimen
-        mover = configuration.mover
-        needed = mover.mass * specimen.uplift_acceleration if mover is not None else 0.0
+        model = configuration.shaker_model
+        needed = model.force(specimen.uplift_acceleration) if model is not None else 0.0
         if needed > (most := shaker.bl * shaker.current_limit):
             frame, block = specimen.frame, specimen.block
             allowed = (
-                f"the uplift acceleration takes {needed:.4g} N, the shaker gives {most:.4g} N: are the masses in kg, "
-                f"the density in kg/m3 (m1 = {frame.m1:g}, m2 = {frame.m2:g}, specimen.block.rho = {block.rho:g}, "
+                f"the uplift acceleration requires {needed:.4g} N, the shaker provides {most:.4g} N: are the masses in "
+                f"kg, the density in kg/m3 (m1 = {frame.m1:g}, m2 = {frame.m2:g}, specimen.block.rho = {block.rho:g}, "
                 f"s = {block.s:g}, specimen.g = {specimen.g:g}, "
                 f"simulation.bench.shaker.moving_mass = {shaker.moving_mass:g})?"
             )
@@ -226,7 +202,7 @@ def _contradictions(configuration: BenchConfiguration) -> Iterator[InvalidInput]
 
 
 def _waits(configuration: BenchConfiguration) -> dict[str, tuple[float, float, str]]:
-    """How long the guard waits before a limit counts [s], or which clock it believes, and what it may be at most."""
+    """Delays of the guard before a limit trips [s], its clock, and their upper bounds."""
     limits = configuration.limits
     found = {key: (float(getattr(limits, key)), _LONGEST_WAIT, " s") for key in ("sensor_loss", "stuck", "late")}
     found["clock"] = limits.clock, _WORST_CLOCK, ""
@@ -237,13 +213,13 @@ def _waits(configuration: BenchConfiguration) -> dict[str, tuple[float, float, s
 
 
 def _unusual(configuration: BenchConfiguration) -> Iterator[str]:
-    """Notices of every part that the backend uses."""
-    unused = "hardware" if configuration.backend == "simulated" else "simulation"
+    """Notices about every part that the backend uses."""
+    unused = {"simulation", "hardware", "rig"} - {configuration.table}
     for name in type(configuration).model_fields:
         part = getattr(configuration, name)
         if name == "specimen":
             yield from specimen_notices(part)
-        elif isinstance(part, Parameters) and name != unused:
+        elif isinstance(part, Parameters) and name not in unused:
             yield from unusual(part, f"{name}.")
     true = configuration.simulation.specimen if configuration.backend == "simulated" else None
     if true is not None:
@@ -255,7 +231,7 @@ def _unusual(configuration: BenchConfiguration) -> Iterator[str]:
 
 
 def _channels(configuration: BenchConfiguration) -> Iterator[str]:
-    """Further sensors that measure much more or less than sensors of their kind do, or are limited far inside that."""
+    """Notices about additional sensors with an unusual measuring range, or a limit or noise unusual for it."""
     for place, channel in enumerate(configuration.channels):
         item = f"channels[{place}] ({channel.name})"
         yield from unusual(channel, f"channels[{place}].")
@@ -263,16 +239,18 @@ def _channels(configuration: BenchConfiguration) -> Iterator[str]:
         low, high = _REACH.get(channel.measures, (0.0, inf))
         if not low <= reach <= high:
             scale = f"sensitivity = {channel.sensitivity:g} and range = {channel.range:g} V"
-            yield f"{item}: with {scale} it measures up to {reach:.3g} {channel.unit}, usual are {low:g} to {high:g}"
+            yield f"{item}: with {scale} its range is {reach:.3g} {channel.unit}; usual: {low:g} to {high:g}"
         if channel.limit is not None and channel.limit < _LEAST_SHARE * reach:
-            yield f"{item}: limit = {channel.limit:g} {channel.unit} is below 1 % of what it measures, {reach:.3g}"
-        if channel.noise_density > _LEAST_SHARE * reach:
+            yield f"{item}: limit = {channel.limit:g} {channel.unit} is below 1 % of its range, {reach:.3g}"
+        quietest, loudest = (share * reach for share in _NOISE)
+        if channel.noise_density and not quietest <= channel.noise_density <= loudest:
             noise = f"noise_density = {channel.noise_density:g} {channel.unit}/Hz^0.5"
-            yield f"{item}: {noise} is above 1 % of what it measures, {reach:.3g} {channel.unit}"
+            usual = f"usual: {quietest:.2g} to {loudest:.2g}"
+            yield f"{item}: {noise} with a range of {reach:.3g} {channel.unit}, {usual}"
 
 
 def _findings(configuration: BenchConfiguration) -> Iterator[str]:
-    """Findings far from what is assumed, or with an uncertainty that none has."""
+    """Identified values far from the assumed ones, or with an implausible uncertainty."""
     for place, finding in enumerate(configuration.identified.findings if configuration.identified else ()):
         item = f"identified.findings[{place}] ({finding.name})"
         relative = finding.standard_uncertainty / finding.value if finding.value else 0.0
@@ -281,11 +259,11 @@ def _findings(configuration: BenchConfiguration) -> Iterator[str]:
         assumed = _assumed(configuration.specimen, finding.name)
         if assumed and finding.value and not 0.2 <= finding.value / assumed <= 5.0:
             ratio = finding.value / assumed
-            yield f"{item}: value = {finding.value:g} is {ratio:.3g} times what is assumed, {assumed:g}"
+            yield f"{item}: value = {finding.value:g} is {ratio:.3g} times the assumed value, {assumed:g}"
 
 
 def _curves(configuration: BenchConfiguration) -> Iterator[str]:
-    """Calibrations whose whole error is too small for a laser."""
+    """Notices about calibrations with an implausibly small error of a laser."""
     if configuration.calibrated is not None:
         for number, curve in enumerate(configuration.calibrated.lasers, 1):
             largest = max(abs(each) for each in curve.error)

@@ -1,30 +1,42 @@
-"""Configuration files: TOML in SI units, checked completely before anything starts."""
+"""Configuration files: TOML in SI units, fully validated before anything starts; and their templates.
+
+Templates have every key, the essential ones, or a bench with NI and optoNCDT devices. They are written from the
+declarations, so that keys, units, limits and defaults are those of the program. Every commented-out line is
+complete: removing its # sets the key.
+"""
 
 import re
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
+from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
-from bench.config.calibration_file import read_calibration
+import tomlkit
+
+from bench.bounded import read_bounded, require_shallow
+from bench.config.backend import RigSettings, load_backend
+from bench.config.declared import Declared, at, declared, summary
 from bench.config.model import BenchConfiguration
+from bench.config.result_files import read_calibration, read_specimen
 from bench.config.review import review
-from bench.config.specimen_file import read_specimen
 from bench.config.validation import dotted, problems, validated
 from sim.errors import InvalidInput
 from sim.identified import Identified
+from sim.parameters import Parameters
 
 _NO_DECIMAL = re.compile(r"""^[ \t]*([\w.-]+)[ \t]*=[^"'#\n]*?(\b0[xob]\w+|\b\d+_\w+)""", re.MULTILINE)
-"""A number in a file, hexadecimal, octal, binary or with underscores: its key and itself."""
+"""A hexadecimal, octal, binary or underscored number in a file, with its key."""
 
 
 def read_table(path: Path, item: str) -> dict[str, Any]:
-    """The keys of a TOML file, unchecked. `item` names the file in an error: InvalidInput, one line."""
+    """The contents of a TOML file, unvalidated. `item` names the file in the one-line InvalidInput."""
     text = ""
     try:
-        # Windows editors put a byte-order mark in front, which TOML does not allow
-        text = path.read_text(encoding="utf-8-sig")
+        # Windows editors add a byte-order mark, which TOML does not allow
+        text = read_bounded(path).decode("utf-8-sig").replace("\r\n", "\n")
         table = tomllib.loads(text)
+        require_shallow(table)
     except FileNotFoundError:
         raise InvalidInput(item, str(path), "there is no such file") from None
     except OSError as error:
@@ -35,14 +47,16 @@ def read_table(path: Path, item: str) -> dict[str, Any]:
         raise InvalidInput(item, str(path), "it is nested too deeply") from None
     except tomllib.TOMLDecodeError as error:
         raise InvalidInput(item, str(path), f"it is not TOML: {error}{_hint(text, str(error))}") from None
-    # legal in TOML, and refused all the same: numbers are typed in one way everywhere
+    except ValueError as error:
+        raise InvalidInput(item, str(path), str(error)) from None
+    # legal in TOML but refused: numbers have the same grammar everywhere
     if found := _NO_DECIMAL.search(text):
         raise InvalidInput(f"{path.name}: {found[1]}", found[2], "write a decimal number without underscores")
     return table
 
 
 def _hint(text: str, error: str) -> str:
-    """The line that is no TOML, and what to write where it has a decimal comma."""
+    """Hint for an invalid line, with the correction of a decimal comma."""
     line = re.search(r"at line (\d+)", error)
     lines = text.splitlines()
     if line is None or not 0 < int(line[1]) <= len(lines):
@@ -52,21 +66,21 @@ def _hint(text: str, error: str) -> str:
     return f": {wrong}" if found is None else f": {wrong}; a decimal comma? write {found[1]} = {found[2]}.{found[3]}"
 
 
-def read_configuration(path: Path) -> BenchConfiguration:
-    """The configuration in a file, with what its files hold in their place, cross-checked as a whole.
+def read_configuration(path: str | PathLike[str]) -> BenchConfiguration:
+    """The configuration in a file, with the contents of the files that it names, cross-checked.
 
-    InvalidInput names file and key.
+    Raises InvalidInput naming file and key.
     """
-    configuration = _read(path)
-    for refusal in _refusals(configuration, path):
+    configuration = _read(Path(path))
+    for refusal in _refusals(configuration, Path(path)):
         raise refusal
     return configuration
 
 
 def problems_of(path: Path) -> list[InvalidInput]:
-    """Every key of a configuration file that is refused, by itself or beside others; empty when the file is good.
+    """All refused keys of a configuration file, alone or in combination; empty for a valid file.
 
-    Raises InvalidInput when it is not TOML at all.
+    Raises InvalidInput when it is not TOML.
     """
     found = problems(BenchConfiguration, read_table(path, "configuration file"), _within(path))
     if found:
@@ -88,7 +102,7 @@ def _refusals(configuration: BenchConfiguration, path: Path) -> list[InvalidInpu
 
 
 def _with_specimen_file(configuration: BenchConfiguration, path: Path) -> BenchConfiguration:
-    """What is identified in place of the name of a file with it, which is sought from the folder of `path` on.
+    """Identified properties in place of the name of their file, which is relative to the folder of `path`.
 
     Raises InvalidInput when it cannot be read.
     """
@@ -98,7 +112,10 @@ def _with_specimen_file(configuration: BenchConfiguration, path: Path) -> BenchC
 
 
 def _with_calibration_file(configuration: BenchConfiguration, path: Path) -> BenchConfiguration:
-    """The calibration in place of the name of its file, sought likewise. Raises InvalidInput when it cannot be read."""
+    """The calibration in place of the name of its file, relative to the same folder.
+
+    Raises InvalidInput when it cannot be read.
+    """
     if configuration.laser_calibration is None:
         return configuration
     found = read_calibration(path.parent / configuration.laser_calibration)
@@ -106,10 +123,170 @@ def _with_calibration_file(configuration: BenchConfiguration, path: Path) -> Ben
 
 
 def with_identified(configuration: BenchConfiguration, identified: Identified) -> BenchConfiguration:
-    """With other findings than it had. Raises InvalidInput when such a specimen cannot be."""
+    """The configuration with other identified properties. Raises InvalidInput when the specimen is impossible."""
     identified.applied(configuration.specimen)
     return configuration.model_copy(update={"specimen_file": None, "identified": identified})
 
 
 def _within(path: Path) -> Callable[[tuple[str | int, ...]], str]:
     return lambda where: f"{path.name}: {dotted(where)}"
+
+
+def as_toml(configuration: BenchConfiguration) -> str:
+    """All keys with a value, without the simulation and hardware tables that the backend does not use."""
+    unused = {"rig": {"hardware", "simulation"}, "hardware": {"simulation"}}.get(configuration.table, set[str]())
+    plain: dict[str, Any] = configuration.model_dump(mode="json", exclude_none=True, exclude=unused)
+    return tomlkit.dumps(plain)
+
+
+Kind = Literal["all", "minimal", "hardware"]
+
+_HEADING = """\
+# Configuration of a shake-table bench for rockbench. SI units; a value in another is a text with its unit: "60 mm".
+# Every key is optional; above it: meaning [unit] and valid values. `rockbench config check` validates the file."""
+
+_ALL = """\
+# Every key with its default. A line that begins with #, without a space, is absent by default and shows an example:
+# remove the # to set it; each works by itself."""
+
+_MINIMAL = """\
+# The keys to check before the first run; every other key has its default (`rockbench config init` writes them all)."""
+
+_HARDWARE = """\
+# A bench with an NI device and two optoNCDT 1420 lasers: replace terminals, lines, ports and calibrations with yours,
+# and remove parts that are not wired. `rockbench devices` finds the devices, `rockbench check` checks the loop."""
+
+_FRAME_AND_BLOCK = [
+    *(f"specimen.frame.{key}" for key in ("h1", "h2", "m1", "m2", "k1", "k2", "xi1", "xi2")),
+    *(f"specimen.block.{key}" for key in ("b", "h_b", "s", "rho")),
+]
+_LIMITS = [
+    f"limits.{key}"
+    for key in ("drive_voltage", "displacement", "velocity", "acceleration", "force", "current", "heating", "drift")
+]
+_WIRED = {
+    "hardware.moving_mass": 50.0,
+    "hardware.force_constant": 50.0,
+    "hardware.daq.watchdog": 1.0,
+    "hardware.daq.amplifier_ready.delay": 1.0,
+    "hardware.laser_1.port": "COM5",
+    "hardware.laser_2.port": "COM6",
+}
+"""Keys without a usable default."""
+
+_DEVICES = [
+    *(f"hardware.{key}" for key in ("sample_rate", "half_stroke", "band_low", "band_high")),
+    *("hardware.moving_mass", "hardware.force_constant"),
+    *(f"hardware.daq.{key}" for key in ("output", "output_range", "enable_line", "watchdog")),
+    *("hardware.daq.emergency_stop.line", "hardware.daq.emergency_stop.good"),
+    *("hardware.daq.over_travel.line", "hardware.daq.over_travel.good"),
+    *("hardware.daq.amplifier_ready.line", "hardware.daq.amplifier_ready.good", "hardware.daq.amplifier_ready.delay"),
+    *(f"hardware.table_displacement.{key}" for key in ("terminal", "wiring", "range", "sensitivity", "zero")),
+    *(f"hardware.table_acceleration.{key}" for key in ("terminal", "wiring", "range", "sensitivity", "zero")),
+    *(f"hardware.lasers.{key}" for key in ("connection", "reference", "rate", "delay")),
+    *(f"hardware.laser_1.{key}" for key in ("port", "measuring_range", "polarity")),
+    *(f"hardware.laser_2.{key}" for key in ("port", "measuring_range", "polarity")),
+]
+
+
+def write_template(path: Path, kind: Kind = "all", backend: str | None = None) -> None:
+    """Write a template of this kind, or for the `backend` of another package.
+
+    Raises InvalidInput when there is no such backend, or `path` exists or cannot be written.
+    """
+    if backend is not None:
+        settings = load_backend(backend).settings
+        if not issubclass(settings, RigSettings):
+            raise InvalidInput("--backend", backend, "it is built in: omit it, or use --hardware")
+        lines = [*_chosen(["backend", *_FRAME_AND_BLOCK, *_LIMITS], {"backend": backend}), "", "[rig]"]
+        lines += _lines(settings, ("rig",))
+    elif kind == "all":
+        lines = [_ALL, "", *_lines(BenchConfiguration, ())]
+    elif kind == "minimal":
+        lines = [_MINIMAL, "", *_chosen(["backend", *_FRAME_AND_BLOCK, "specimen.d", *_LIMITS], {})]
+    else:
+        given = {"backend": "hardware", **_WIRED}
+        lines = [_HARDWARE, "", *_chosen(["backend", *_FRAME_AND_BLOCK, *_LIMITS, *_DEVICES], given)]
+    text = "\n".join([_HEADING, *lines]) + "\n"
+    try:
+        with path.open("x", encoding="utf-8", newline="\n") as file:
+            file.write(text)
+    except FileExistsError:
+        raise InvalidInput("configuration file", str(path), "it exists already; it is never overwritten") from None
+    except OSError as error:
+        raise InvalidInput("configuration file", str(path), f"it cannot be written: {error.strerror}") from None
+
+
+def _lines(model: type[Parameters], path: tuple[str, ...]) -> Iterator[str]:
+    """The lines of a table: its values, groups absent by default, then nested tables."""
+    entries = list(declared(model))
+    for entry in entries:
+        if entry.group is None:
+            yield from _value_lines(entry)
+    for entry in entries:
+        if entry.group is Parameters:
+            yield ""
+            yield f"# [{entry.name}]: {entry.description}"
+        elif entry.group is not None and entry.optional:
+            yield ""
+            yield from _absent(entry.group, entry, entry.name)
+    for entry in entries:
+        if entry.group is not None and not entry.optional:
+            yield ""
+            if entry.description:
+                yield f"# {entry.description}"
+            yield f"# {summary(entry.group)}"
+            yield f"[{'.'.join((*path, entry.name))}]"
+            yield from _lines(entry.group, (*path, entry.name))
+
+
+def _absent(group: type[Parameters], of: Declared, prefix: str) -> Iterator[str]:
+    """The lines of an absent group, with dotted keys so that each stays in its table."""
+    yield f"# {prefix}: {of.description or summary(group)}"
+    required = any(field.is_required() for field in group.model_fields.values())
+    for entry in declared(group):
+        if entry.group is not None:
+            yield from _absent(entry.group, entry, f"{prefix}.{entry.name}")
+        elif required:
+            yield f"# {prefix}.{entry.name}, which a run writes: {_meaning(entry)}"
+        else:
+            yield from _value_lines(entry, f"{prefix}.", "#")
+
+
+def _value_lines(entry: Declared, prefix: str = "", mark: str = "") -> Iterator[str]:
+    if entry.default is None and entry.example is None:
+        yield f"# {prefix}{entry.name}, not to be set here: {_meaning(entry)}"
+        return
+    yield f"# {_meaning(entry)}"
+    if entry.default is None:
+        yield f"#{prefix}{entry.name} = {_as_toml(entry.example)}  # example"
+    else:
+        yield f"{mark}{prefix}{entry.name} = {_as_toml(list(entry.default) if entry.many else entry.default)}"
+
+
+def _chosen(keys: list[str], given: Mapping[str, Any]) -> Iterator[str]:
+    """The lines of selected keys, by table, with the `given` value or the default."""
+    table = ""
+    # keys of a table before those of its nested tables, tables in the order of their first key
+    for key in sorted(keys, key=lambda key: [other.rpartition(".")[0] for other in keys].index(key.rpartition(".")[0])):
+        parent, _, name = key.rpartition(".")
+        entry = at(BenchConfiguration, key.split("."))
+        if entry is None:
+            raise KeyError(key)
+        if parent != table:
+            table, group = parent, at(BenchConfiguration, parent.split("."))
+            yield ""
+            if group is not None and group.group is not None:
+                yield f"# {group.description or summary(group.group)}"
+            yield f"[{parent}]"
+        yield f"# {_meaning(entry)}"
+        yield f"{name} = {_as_toml(given.get(key, entry.default))}"
+
+
+def _meaning(entry: Declared) -> str:
+    unit = f" [{entry.unit}]" if entry.unit else ""
+    return f"{entry.description}{unit}; {entry.allowed}"
+
+
+def _as_toml(value: Any) -> str:
+    return str(tomlkit.item(value).as_string())  # pyright: ignore[reportUnknownMemberType, reportUnknownArgumentType]

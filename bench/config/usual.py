@@ -1,4 +1,4 @@
-"""Notices of values that are valid but unusual: outside the usual range that their declaration states."""
+"""Notices of valid but unusual values: outside the usual range of their declaration."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
@@ -7,12 +7,17 @@ from typing import Any, NamedTuple
 
 from bench.config.declared import declared
 from sim.parameters import Parameters
+from sim.specimen import Specimen
 
 ANGULAR = "rad/s"
-"""The unit of circular frequencies: said in Hz too wherever one looks unusual."""
+"""The unit of circular frequencies; unusual values are shown in Hz too."""
 
 _SLOW, _FAST = 0.6, 2.5
-"""Shares of the first and of the second natural frequency of the bare frame outside which a frequency is unusual."""
+"""Multiples of the bare frame's first and second natural frequency outside which a frequency is unusual."""
+
+
+_SPRING_OFF = 2.0
+"""Ratio of a measured spring to its label beyond which it is unusual."""
 
 
 class _Watched(NamedTuple):
@@ -24,7 +29,7 @@ class _Watched(NamedTuple):
 def unusual(parameters: Parameters, prefix: str = "") -> Iterator[str]:
     """A notice for each key with a value outside its usual range, naming both; keys begin with `prefix`.
 
-    Zero is no slip where it is allowed. Of a list the first such value is named.
+    Zero, where allowed, causes no notice. For a list the first such value is named.
     """
     values, groups = _watched(type(parameters))
     for watched in values:
@@ -61,17 +66,51 @@ def off_resonance(parameters: Parameters, modes: tuple[float, float]) -> Iterato
             natural = " and ".join(f"{mode:.3g}" for mode in modes)
             yield (
                 f"{said} lies far {where} the modes of the bare frame, {natural} rad/s: "
-                "was Hz meant? write it with its unit"
+                "if Hz is intended, write it with its unit"
             )
 
 
 def in_hertz(parameters: Parameters) -> Iterator[str]:
-    """A line for each circular frequency or list of them, in both units."""
+    """One line for each circular frequency or list of them, in both units."""
     for watched in _watched(type(parameters))[0]:
         values = [value for _, value in _numbers("", getattr(parameters, watched.name))]
         if watched.unit == ANGULAR and values:
             angular, cycles = (" ".join(f"{value * k:.4g}" for value in values) for k in (1.0, 1.0 / tau))
             yield f"{watched.name} = {angular} rad/s = {cycles} Hz"
+
+
+def notices_of(parameters: Parameters, specimen: Specimen) -> tuple[str, ...]:
+    """Notices about the parameters of a protocol or prediction, with this specimen on the table."""
+    found = (*unusual(parameters), *off_resonance(parameters, specimen.frame.natural_frequencies))
+    # one notice per key: the later one, with the natural frequencies, is more specific
+    return tuple({notice.partition(" = ")[0].partition("[")[0]: notice for notice in found}.values())
+
+
+def scales_of(parameters: Parameters, specimen: Specimen) -> tuple[str, ...]:
+    """Notice of the requested circular frequencies in Hz and the natural frequencies of the bare frame."""
+    lines = tuple(in_hertz(parameters))
+    if not lines:
+        return ()
+    modes = " and ".join(f"{mode:.4g} rad/s = {mode / tau:.4g} Hz" for mode in specimen.frame.natural_frequencies)
+    return (*lines, f"modes of the bare frame: {modes}")
+
+
+def specimen_notices(specimen: Specimen, prefix: str = "specimen.") -> Iterator[str]:
+    """Notices about the assumed properties of a specimen."""
+    yield from unusual(specimen, prefix)
+    frame = specimen.frame
+    for number, dashpot in enumerate(frame.dashpots, 1):
+        if dashpot < 0.0:
+            ratios = f"{prefix}frame.xi1 = {frame.xi1:g}, xi2 = {frame.xi2:g}"
+            yield f"{ratios} yield dashpot c{number} = {dashpot:.3g} N s/m: a negative one adds energy"
+    nominal = specimen.spring_k1 or frame.k1
+    if not 1.0 / _SPRING_OFF <= nominal / frame.k1 <= _SPRING_OFF:
+        yield f"{prefix}spring_k1 = {nominal:g} N/m is {nominal / frame.k1:.3g} times frame.k1 = {frame.k1:g} N/m"
+    for place, spring in enumerate(specimen.springs):
+        ratio = spring.k_c / (spring.label * nominal)
+        if not 1.0 / _SPRING_OFF <= ratio <= _SPRING_OFF:
+            item, promised = f"{prefix}springs[{place}].k_c = {spring.k_c:g} N/m", spring.label * nominal
+            yield f"{item} is {ratio:.3g} times the nominal value of its label {spring.label:g}, {promised:.4g} N/m"
 
 
 def _others(outside: Sequence[object]) -> str:

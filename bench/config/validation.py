@@ -1,4 +1,4 @@
-"""Validates values from outside; what is refused is said in one plain line per value."""
+"""Validation of external values, with a one-line message for each refusal."""
 
 from collections.abc import Callable, Mapping, Sequence
 from difflib import get_close_matches
@@ -14,7 +14,7 @@ from sim.errors import InvalidInput
 from sim.parameters import Parameters
 
 Path = tuple[str | int, ...]
-"""Where a value is: keys, and indices into lists."""
+"""Path of a value: keys and indices into lists."""
 
 P = TypeVar("P", bound=Parameters)
 
@@ -22,15 +22,15 @@ _NUMBERS = (int, float)
 
 
 def dotted(path: Path) -> str:
-    """A path as a person writes it: `specimen.frame.k1`, `omega[2]`."""
+    """A path in written form: `specimen.frame.k1`, `omega[2]`."""
     text = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in path)
     return text.removeprefix(".")
 
 
 def validated(model: type[P], data: Mapping[str, Any], named: Callable[[Path], str] = dotted) -> P:
-    """An instance of `model` from plain data as a file holds it; `named` tells a person where a value is.
+    """An instance of `model` from plain data such as a file's; `named` formats the place of a value for the user.
 
-    Raises InvalidInput for the first value that is refused, saying how many more there are.
+    Raises InvalidInput for the first refused value, with the number of further ones.
     """
     try:
         return _parsed(model, data)
@@ -45,7 +45,7 @@ def validated(model: type[P], data: Mapping[str, Any], named: Callable[[Path], s
 def problems(
     model: type[Parameters], data: Mapping[str, Any], named: Callable[[Path], str] = dotted
 ) -> list[InvalidInput]:
-    """Every value of `data` that is refused, in the order of the declaration; empty when all is well."""
+    """Every refused value of `data`, in the order of the declaration; empty if all are valid."""
     try:
         _parsed(model, data)
     except ValidationError as error:
@@ -54,9 +54,9 @@ def problems(
 
 
 def read_typed(entry: Declared, typed: Any) -> Any:
-    """What a person typed for a field, a text or the tokens of a list, as plain data: numbers where it holds numbers.
+    """Plain data from typed text or the tokens of a list, with numbers for numeric fields.
 
-    What is refused is left as the text that it is, for the validation to say why.
+    Invalid text is returned unchanged for the validation to refuse.
     """
     if entry.kind not in _NUMBERS or isinstance(typed, bool):
         return typed
@@ -70,13 +70,22 @@ def read_typed(entry: Declared, typed: Any) -> Any:
     return [value for item in items for value in _values_or_text(entry, item)]
 
 
+def read_fields(model: type[Parameters], typed: Mapping[str, Any]) -> dict[str, Any]:
+    """The typed fields of `model`, from flags or a form, as plain data for `validated`; None means "not specified"."""
+    return {
+        entry.name: read_typed(entry, typed[entry.name])
+        for entry in declared(model)
+        if typed.get(entry.name) is not None
+    }
+
+
 def _parsed(model: type[P], data: Mapping[str, Any]) -> P:
-    # By way of JSON, strictly: a list may stand for a tuple, a word for a choice, but "12" or true is no number.
+    # strict JSON validation: accepts a list for a tuple and a word for a choice, but not "12" or true for a number
     return model.model_validate_json(dumps(_in_si(model, data), default=str), strict=True)
 
 
 def _in_si(model: type[Parameters], data: Mapping[str, Any]) -> dict[str, Any]:
-    """The data of a file with its texts that carry a unit, and its lists and ranges as texts, as numbers."""
+    """The data of a file with texts of numbers with units, lists and ranges converted to numbers."""
     found = dict(data)
     for entry in declared(model):
         value = found.get(entry.name)
@@ -115,7 +124,7 @@ def _values_or_text(entry: Declared, text: str) -> Sequence[Any]:
 
 
 def _remedy(entry: Declared, text: str, listed: bool) -> str:
-    """What to write in place of a text that was given for a number; empty when nothing more can be told."""
+    """Suggested spelling of a number for an invalid text; empty without a suggestion."""
     try:
         if listed:
             items = items_of([text])
@@ -132,7 +141,7 @@ def _remedy(entry: Declared, text: str, listed: bool) -> str:
 def _refusals(model: type[Parameters], error: ValidationError, named: Callable[[Path], str]) -> list[InvalidInput]:
     details = error.errors(include_url=False)
     paths = [detail["loc"] for detail in details]
-    # a list with a bad value is also reported as too short by that value: one of the two is enough
+    # a list with an invalid value is also reported as too short: one message suffices
     inner = [not any(other[: len(path)] == path and other != path for other in paths) for path in paths]
     return [_refusal(model, detail, named) for detail, most in zip(details, inner, strict=True) if most]
 
@@ -161,7 +170,7 @@ def _refusal(model: type[Parameters], detail: Any, named: Callable[[Path], str])
 
 
 def _as_meant(entry: Declared, value: Any) -> str:
-    """How to write what was probably meant by a number beyond its limits: a percentage, or degrees."""
+    """Suggestion for a number above its limit that may be a percentage or an angle in degrees."""
     if not isinstance(value, float | int) or entry.kind is not float or not 1.0 < value <= 360.0:
         return ""
     if entry.unit == "rad":
@@ -171,7 +180,7 @@ def _as_meant(entry: Declared, value: Any) -> str:
 
 
 def _suggestion(model: type[Parameters], path: Path) -> str:
-    """The known key that was probably meant: beside the unknown one first, then anywhere."""
+    """The most similar known key: at the same level first, then anywhere."""
     parent, name = path[:-1], str(path[-1])
     entry = at(model, parent)
     group = model if not parent else entry.group if entry is not None else None
@@ -181,7 +190,7 @@ def _suggestion(model: type[Parameters], path: Path) -> str:
         return f"; the nearest is {dotted((*parent, close[0]))}"
     everywhere = list(keys(model))
     elsewhere = [key for key in everywhere if key.rpartition(".")[2] == name] or get_close_matches(
-        # paths of one group are half alike to begin with
+        # paths of the same group are similar in any case
         dotted(path),
         everywhere,
         n=1,

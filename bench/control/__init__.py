@@ -1,1 +1,1 @@
-"""Control: the table does what the protocol asks."""
+"""Control of the table: calibration, sine control, waveform replication, and preparation of records."""

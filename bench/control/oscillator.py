@@ -1,47 +1,104 @@
-"""The phase-continuous waveform that drives the table: a sine, and the harmonics that make its motion one.
+"""Phase-continuous drive waveform: a sine with harmonics that make the table's motion sinusoidal.
 
-It follows sweeps of target acceleration (`sim.excitation.Sweep`) and holds the last amplitude and frequency until told
-otherwise. With its phase phi, the amplitude A asked, shares c_k and the calibrated response H, the drive is
-
-    sum over k of Im(A c_k / H(k omega) exp(i k phi)):
-
-a table that answers as calibrated moves with the acceleration A sin(phi) when the shares are (1, 0, 0, ...).
+It follows sweeps of target acceleration (`sim.excitation.Sweep`) and holds the last amplitude and frequency until the
+next command. With the phase phi, requested amplitude A, shares c_k and calibrated response H, the drive is sum over k
+of Im(A c_k / H(k omega) exp(i k phi)): a table that responds as calibrated has the acceleration A sin(phi) for the
+shares (1, 0, 0, ...).
 """
 
 from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
 from math import tau
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bench.analysis.cycles import HARMONICS
-from bench.control.calibration import DriveCalibration
-from sim.excitation import Sweep
+from sim.excitation import SineProgram, Sweep
+
+
+@dataclass(frozen=True)
+class DriveCalibration:
+    """Response of the table to the drive, `response` [m/s2 per V] at `omega` [rad/s], ascending, shape (n,).
+
+    Complex with the convention exp(+i omega t), as measured: it includes the delay of the filter before the converter.
+    Real and imaginary part are interpolated linearly between the points and constant outside.
+    """
+
+    omega: tuple[float, ...]
+    response: tuple[complex, ...]
+
+    @staticmethod
+    def flat(response: complex) -> "DriveCalibration":
+        """The same response at every frequency, as the start of a calibration."""
+        return DriveCalibration((1.0,), (response,))
+
+    def at(self, omega: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """Response at `omega` [rad/s], same shape."""
+        return np.asarray(np.interp(omega, self.omega, np.asarray(self.response, dtype=np.complex128)), np.complex128)
+
+    def beyond(self, other: "DriveCalibration") -> "DriveCalibration":
+        """This calibration, extended above its last frequency by `other`."""
+        above = [(omega, response) for omega, response in other.points if omega > self.omega[-1]]
+        return DriveCalibration(
+            (*self.omega, *(omega for omega, _ in above)), (*self.response, *(response for _, response in above))
+        )
+
+    @property
+    def points(self) -> list[tuple[float, complex]]:
+        """Frequencies [rad/s] with their responses."""
+        return list(zip(self.omega, self.response, strict=True))
+
+
+@dataclass(frozen=True)
+class Leg:
+    """A program segment that reaches a table acceleration `amplitude` [m/s2] at `omega` [rad/s] in `duration` [s]."""
+
+    duration: float
+    amplitude: float
+    omega: float
+
+
+def sweeps(legs: Sequence[Leg], amplitude: float, omega: float) -> list[Sweep]:
+    """The segments as sweeps from `amplitude` and `omega`; from zero drive one begins at its own frequency."""
+    found: list[Sweep] = []
+    for leg in legs:
+        begin = omega if amplitude > 0.0 else leg.omega
+        found.append(Sweep(leg.duration, (amplitude, leg.amplitude), (begin, leg.omega)))
+        amplitude, omega = leg.amplitude, leg.omega
+    return found
+
+
+def program(legs: Sequence[Leg], phase: float = 0.0) -> SineProgram:
+    """The base motion of the segments from rest."""
+    return SineProgram(sweeps(legs, 0.0, legs[0].omega), phase)
+
 
 Array = NDArray[np.float64]
 
 
-class Glide:
-    """Share k belongs to harmonic k + 1. They begin as a pure sine, (1, 0, 0, ...), and change along a smoothstep."""
+class ShareRamp:
+    """Shares of the harmonics, the fundamental first: a pure sine, (1, 0, 0, ...), then changes along a smoothstep."""
 
     def __init__(self) -> None:
         self._from = self._to = _pure()
         self._length, self._done = 1, 1
 
     def to(self, shares: tuple[complex, ...], samples: int) -> None:
-        """Be at `shares` after `samples` more samples; harmonics that are not named go to zero."""
+        """Reach `shares` after `samples` more samples; other harmonics go to zero."""
         target = np.zeros(HARMONICS, dtype=np.complex128)
         target[: len(shares)] = shares
         self._from, self._to = self._at(np.array([self._done]))[0], target
         self._length, self._done = max(samples, 1), 0
 
     def to_pure(self, samples: int) -> None:
-        """Be a pure sine after `samples` more samples."""
+        """Reach a pure sine after `samples` more samples."""
         if not np.array_equal(self._to, _pure()):
             self.to((1.0,), samples)
 
     def next(self, n: int) -> NDArray[np.complex128]:
-        """Shares at the next `n` samples, shape (n, HARMONICS), or (1, HARMONICS) while they rest."""
+        """Shares at the next `n` samples, shape (n, HARMONICS), or (1, HARMONICS) while constant."""
         if self._done >= self._length:
             return self._to[None, :]
         found = self._at(self._done + np.arange(1, n + 1))
@@ -60,19 +117,20 @@ def _pure() -> NDArray[np.complex128]:
 
 
 class Oscillator:
-    """Turns target acceleration into volts, block by block."""
+    """Converts target acceleration to drive voltage, block by block."""
 
     def __init__(self, sample_rate: float) -> None:
         self._rate = sample_rate
         self._calibration: DriveCalibration | None = None
+        self._constant: tuple[object, list[tuple[int, NDArray[np.complex128]]]] = (None, [])
         self.reset()
 
     def reset(self) -> None:
-        """Back to silence; the calibration stays."""
+        """Reset to zero drive; keeps the calibration."""
         self._sweeps: deque[Sweep] = deque()
         self._into = 0  # samples played of the first sweep
         self._amplitude, self._omega, self._phase = 0.0, tau, 0.0
-        self._shares = Glide()
+        self._shares = ShareRamp()
 
     def use(self, calibration: DriveCalibration) -> None:
         """Divide by the response of `calibration` from now on."""
@@ -80,26 +138,26 @@ class Oscillator:
 
     @property
     def amplitude(self) -> float:
-        """Amplitude [m/s2] at the end of what has been asked."""
+        """Amplitude [m/s2] at the end of the last sweep."""
         return self._sweeps[-1].amplitude[1] if self._sweeps else self._amplitude
 
     @property
     def omega(self) -> float:
-        """Circular frequency [rad/s] at the end of what has been asked."""
+        """Circular frequency [rad/s] at the end of the last sweep."""
         return self._sweeps[-1].omega[1] if self._sweeps else self._omega
 
     def follow(self, sweep: Sweep) -> None:
-        """Append a sweep; shares found for the sine that is left are given up over one cycle."""
+        """Append a sweep; the harmonics of the previous sine fade out over one cycle."""
         self._shares.to_pure(self._cycle)
         self._sweeps.append(sweep)
 
     def trim(self, shares: tuple[complex, ...]) -> None:
-        """Go to `shares` of fundamental, second harmonic and so on, over one cycle of the present frequency."""
+        """Change to `shares` of fundamental, second harmonic and so on, over one cycle of the present frequency."""
         self._shares.to(shares, self._cycle)
 
     @property
     def remaining(self) -> int:
-        """Samples until the last sweep has been played."""
+        """Number of samples until the last sweep has been played."""
         return sum(self._length(sweep) for sweep in self._sweeps) - self._into
 
     def next(self, n: int) -> Array:
@@ -141,14 +199,32 @@ class Oscillator:
         return self._drive(np.array(self._amplitude), np.array(self._omega), phase)
 
     def _drive(self, amplitude: Array, omega: Array, phase: Array) -> Array:
-        """Drive [V] at `phase` [rad], shape (n,); `amplitude` and `omega` have that shape or none."""
+        """Drive [V] at `phase` [rad], shape (n,); `amplitude` and `omega` have that shape or are scalars."""
         if self._calibration is None:
-            raise RuntimeError("the oscillator was asked to move the table before the drive was calibrated")
+            raise RuntimeError("the drive must be calibrated before the oscillator moves the table")
         shares = self._shares.next(phase.size)
-        turn = np.exp(1j * phase)
-        power, volts = np.ones_like(turn), np.zeros(phase.size)
-        for k, share in enumerate(shares.T, 1):
-            power = power * turn
-            if share.any():
-                volts += np.imag(amplitude * share / self._calibration.at(k * omega) * power)
+        power = turn = np.exp(1j * phase)
+        volts, order = np.zeros(phase.size), 1
+        for k, factor in self._factors(self._calibration, amplitude, omega, shares):
+            for _ in range(k - order):
+                power = power * turn
+            order = k
+            volts += (factor * power).imag
         return volts
+
+    def _factors(
+        self, calibration: DriveCalibration, amplitude: Array, omega: Array, shares: NDArray[np.complex128]
+    ) -> list[tuple[int, NDArray[np.complex128]]]:
+        """Orders of the harmonics that are driven, ascending, and their complex amplitudes [V]: shape (n,), or (1,)
+        where amplitude, frequency and shares are constant; these are computed once.
+        """
+        if amplitude.ndim or len(shares) > 1:
+            key = None
+        else:
+            key = calibration, float(amplitude), float(omega), shares.tobytes()
+            if key == self._constant[0]:
+                return self._constant[1]
+        driven = [int(k) + 1 for k in np.flatnonzero(np.abs(shares).max(axis=0))]
+        found = [(k, amplitude * shares[:, k - 1] / calibration.at(k * omega)) for k in driven]
+        self._constant = key, found
+        return found

@@ -1,28 +1,91 @@
-"""What a pass of a replication achieved."""
+"""Passes of a replication: errors relative to the target, and the margin to the limits."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bench.analysis.response_spectrum import DAMPING, logarithmic_periods, pseudo_acceleration
-from bench.control.envelope import Verdict
+from bench.control.target import integrated
+from bench.guard.limits import Limits
 
 Array = NDArray[np.float64]
 
+UNITS = {"drive_voltage": "V", "drive_slew": "V/s", "displacement": "m", "velocity": "m/s", "acceleration": "m/s2"}
+
+
+@dataclass(frozen=True)
+class Envelope:
+    """Motion and drive of one pass: a series, shape (n,), for each name of `UNITS`; the names are those of `Limits`."""
+
+    series: Mapping[str, Array]
+
+    @staticmethod
+    def of(volts: Array, acceleration: Array, displacement: Array | None, sample_rate: float) -> "Envelope":
+        """Envelope of volts and table acceleration [m/s2]; the mean acceleration is excluded from the integrals.
+
+        `displacement` [m] is the measured one; without it the acceleration is integrated twice.
+        """
+        velocity, integral = integrated(acceleration, sample_rate)
+        displacement = integral if displacement is None else displacement
+        slew = np.diff(volts, prepend=0.0) * sample_rate
+        return Envelope(dict(zip(UNITS, (volts, slew, displacement, velocity, acceleration), strict=True)))
+
+    @property
+    def peaks(self) -> dict[str, float]:
+        """Largest magnitude of each series, in its unit."""
+        return {name: float(np.abs(values).max()) for name, values in self.series.items()}
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Fraction of a change that fits, 0 to 1, and the limit that `binds` if it is less than 1."""
+
+    share: float
+    binds: str | None
+    wanted: float
+    allowed: float
+
+    def __str__(self) -> str:
+        if self.binds is None:
+            return "within every limit"
+        unit = UNITS[self.binds]
+        return (
+            f"{self.binds} of {self.wanted:.4g} {unit} exceeds the {self.allowed:.4g} {unit} allowed by its limit;"
+            f" {self.share:.1%} of it fits"
+        )
+
+
+def fitting(present: Envelope, change: Envelope, limits: Limits, margin: float) -> Verdict:
+    """Largest fraction of `change`, added to `present`, with all quantities below their limits over `margin`."""
+    share, binds, wanted, allowed = 1.0, None, 0.0, 0.0
+    for name in UNITS:
+        base, step = present.series[name], change.series[name]
+        limit = float(getattr(limits, name)) / margin
+        # margin in the direction of the step; without margin no part of the step fits
+        room = limit - np.sign(step) * base
+        moving = np.abs(step) > 1e-12 * limit
+        fits = float(np.min(room[moving] / np.abs(step[moving]), initial=np.inf))
+        if fits < share:
+            share, binds = max(fits, 0.0), name
+            wanted, allowed = float(np.abs(base + step).max()), limit
+    return Verdict(share, binds, wanted, allowed)
+
+
 CLEAR = 2.0
-"""How many times what noise makes of it a deviation of the response spectrum must be to count."""
+"""Ratio to its standard deviation due to noise above which a deviation of the response spectrum is significant."""
 
 
 @dataclass(frozen=True)
 class Pass:
-    """One pass; errors are relative to the target [1], both seen through the target's window.
+    """One pass; errors are relative to the target [1], both filtered by the target's window.
 
-    `error` is the root mean square as measured; `floor` is the part of it that does not repeat: measurement noise,
-    and after a drive was played twice all that differed. `repeatable` is what is left, and what a correction can take
-    away. `peak_error` is the largest error over the target's peak, `spectrum_error` the largest deviation of the
-    response spectrum. A pass is `accepted` when its error is the smallest so far; otherwise the drive goes back.
-    `replayed` says that the best drive was played again; `gain` and `verdict` belong to the correction that led here.
+    `error` is the measured root mean square; `floor` is its non-repeatable part: measurement noise, and after a second
+    play of a drive every difference. `repeatable` is the rest, which a correction can remove. `peak_error` is the
+    largest error over the target's peak, `spectrum_error` the largest deviation of the response spectrum. A pass is
+    `accepted` when its error is the smallest so far; otherwise the drive is rolled back. `replayed`: the best drive was
+    played again; `gain` and `verdict` are those of the preceding correction.
     """
 
     number: int
@@ -66,11 +129,11 @@ class SpectrumCheck:
         return float(np.abs(self._spectrum(achieved) / self._wanted - 1.0).max())
 
     def clear_error(self, achieved: Array, frequency: Array, noise: Array) -> tuple[float, float]:
-        """Largest relative deviation that noise does not explain, and its period [s]; zero where there is none.
+        """Largest relative deviation not explained by noise, and its period [s]; zero if none.
 
-        `noise`, shape (n_lines,), is the expected |numpy.fft.rfft|^2 of what does not repeat in `achieved`, at
-        `frequency` [Hz], above zero. A peak is moved by about the noise of the oscillator's answer: a deviation of more
-        than `CLEAR` times its standard deviation counts, and in full.
+        `noise`, shape (n_lines,), is the expected |numpy.fft.rfft|^2 of the non-repeatable part of `achieved`, at
+        `frequency` [Hz], above zero. Noise shifts a peak by about the noise of the oscillator's response: a deviation
+        of more than `CLEAR` times its standard deviation counts in full.
         """
         natural = 1.0 / self._periods[:, None]
         answer = natural**2 / np.abs(natural**2 - frequency**2 + 2j * DAMPING * natural * frequency)

@@ -1,40 +1,72 @@
-"""From a record to the motion that the table is to make: trimmed, within the band, scaled, within the stroke.
+"""Preparation of a record as a table motion: trimming, band limitation, scaling, stroke fit.
 
-Prediction and test take the same motion from here, so that they can be compared. The order matters: what the band
-takes away may hold the record's peak, so the record is scaled after it; the stroke is needed by the scaled motion.
+Prediction and test use the same prepared motion and are therefore comparable. The order matters: band limitation may
+remove the record's peak, so scaling follows it; the stroke applies to the scaled motion.
 """
 
 from dataclasses import dataclass
+from math import ceil, isfinite, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
 from bench.analysis.table_motion import Array, TableMotion, at_rest_in_the_end, table_motion
-from bench.control.similitude import resampled, scaled
-from bench.control.stroke.fit import NOT_BOTH, PERIODS, Method, StrokeFit, fit_stroke
-from bench.control.stroke.reach import Reach
-from bench.control.target import ORDER, REST, Target, band_gain, check_band, windowed
+from bench.control.stroke_fit import NOT_BOTH, PERIODS, Method, StrokeFit, fit_stroke
+from bench.control.target import ORDER, REST, Reach, Target, band_gain, check_band, windowed
 from sim.errors import InvalidInput
 from sim.excitation import SampledRecord
 
+ROUNDING = 1e-9
+"""Relative tolerance of a ratio of two steps."""
+
+
+def scaled(record: SampledRecord, length_ratio: float) -> SampledRecord:
+    """`record` for a model of lambda_L = `length_ratio`: the same accelerations, the step times lambda_L^(1/2).
+
+    Raises InvalidInput unless the ratio is positive.
+    """
+    if not (isfinite(length_ratio) and length_ratio > 0.0):
+        raise InvalidInput("length_ratio", length_ratio, "model over prototype length must be a positive number")
+    return SampledRecord(record.acceleration, record.dt * sqrt(length_ratio))
+
+
+def resampled(record: SampledRecord, dt: float) -> SampledRecord:
+    """`record` at a step of `dt` [s], not longer than its own, by linear interpolation.
+
+    If `dt` divides the record's step the motion is unchanged; otherwise the corners of the motion are cut. If it does
+    not divide the duration, a final sample of zero is added. Raises InvalidInput for a longer step, which would lose
+    content or alias it to lower frequencies.
+    """
+    if not 0.0 < dt <= record.dt * (1.0 + ROUNDING):
+        raise InvalidInput("dt", dt, f"it must be above 0 and at most the record's step, {record.dt:g} s")
+    steps = record.duration / dt
+    count = ceil(steps * (1.0 - ROUNDING))
+    # in steps of the record: an integer number of new steps ends exactly on its last sample
+    place = np.arange(count + 1) * (dt / record.dt)
+    if abs(count - steps) <= ROUNDING * steps:
+        place[-1] = record.acceleration.size - 1
+    values = np.interp(place, np.arange(record.acceleration.size), record.acceleration, right=0.0)
+    return SampledRecord(values, dt)
+
+
 TRIM = 0.0005
-"""Share of the Arias intensity that may be left out at either end of a record."""
+"""Largest fraction of the Arias intensity that may be trimmed at each end of a record."""
 
 TAPER = 0.5
-"""Time [s] over which a trimmed record is let down to zero, outside of what is kept: half a cosine."""
+"""Duration [s] of the half-cosine taper of a trimmed record, outside the part kept."""
 
 BETWEEN = 0.02
-"""Share of the reach by which a motion may pass it between the samples of its record: `reach.SHARE` leaves more."""
+"""Fraction of the reach by which a motion may exceed it between samples; `reach.SHARE` reserves more."""
 
 
 @dataclass(frozen=True, eq=False)
 class PreparedMotion:
-    """A motion of the table, and how it came from its record.
+    """A motion of the table with its derivation from a record.
 
-    `record` begins `begin` [s] on the clock of the record that was given; before that the table rests. All of its
-    accelerations were multiplied by `factor`. `peak_before` and `peak` are the greatest accelerations [m/s2] of the
-    given record and of the motion; `motion` is the table's velocity and displacement. `band` [Hz] is None where no
-    filter was asked for, `reach` and `fit` None where no stroke was; `steps` says in words what was done, in order.
+    `record` begins `begin` [s] on the original record's clock; before that the table is at rest. All accelerations were
+    multiplied by `factor`. `peak_before` and `peak` are the greatest accelerations [m/s2] of the original record and of
+    the motion; `motion` is the table's velocity and displacement. `band` [Hz] is None without a filter, `reach` and
+    `fit` are None without a stroke; `steps` describes the processing, in order.
     """
 
     record: SampledRecord
@@ -51,14 +83,14 @@ class PreparedMotion:
     def target(self, sample_rate: float) -> Target:
         """The motion at `sample_rate` [1/s], for its replication on the table.
 
-        Raises InvalidInput without a band, for one that goes beyond the rate, a rate below the record's own, and a
-        motion that would leave `reach` by more than `BETWEEN`.
+        Raises InvalidInput without a band, for one beyond the rate, a rate below the record's own, and a motion that
+        exceeds `reach` by more than `BETWEEN`.
         """
         if self.band is None:
-            raise InvalidInput("band", None, "a table has one: name its ends")
+            raise InvalidInput("band", None, "it is required for a table: specify its ends")
         check_band(self.band, sample_rate)
         wave = resampled(self.record, 1.0 / sample_rate).acceleration
-        # the straight lines between the record's samples have a trace above the band
+        # linear interpolation between the record's samples has slight content above the band
         within = windowed(wave, 1.0 / sample_rate, self.band)
         target = Target(within, sample_rate, self.band, round(REST / self.band[0] * sample_rate))
         if self.reach is not None:
@@ -82,15 +114,15 @@ def prepare(
 ) -> PreparedMotion:
     """The motion of the table for `record`: similitude, then `trim`, `band`, `peak` and `reach`, in this order.
 
-    `length_ratio`: model over prototype length, acceleration kept. `trim`: from where the Arias intensity passes this
-    share of its whole to where it passes the whole less the share; None keeps everything. `band` [Hz]: -6 dB points of
-    zero-phase filters, with rest before and after; the table then ends at rest where it began. `peak` [m/s2]: of the
-    trimmed and filtered record. `reach`: what the table may do; the fit by `method`, which keeps the response spectrum
-    at `periods` [s], then changes the peak a little. Raises InvalidInput.
+    `length_ratio`: model over prototype length, acceleration kept. `trim`: keep the part between this fraction of the
+    Arias intensity and its complement; None keeps everything. `band` [Hz]: -6 dB points of zero-phase filters, with
+    rest before and after; the table then ends at rest where it began. `peak` [m/s2]: of the trimmed and filtered
+    record. `reach`: limits of the table's motion; the fit by `method`, which keeps the response spectrum at `periods`
+    [s], then changes the peak a little. Raises InvalidInput.
     """
     peak_before = float(np.abs(record.acceleration).max())
     if not peak_before > 0.0:
-        raise InvalidInput("record", "no motion", "a record must have samples that are not zero")
+        raise InvalidInput("record", "no motion", "a record must have non-zero samples")
     steps: list[str] = []
     made = scaled(record, length_ratio)
     if length_ratio != 1.0:
@@ -135,7 +167,7 @@ class _Trimmed(NamedTuple):
 
 def _trimmed(record: SampledRecord, share: float) -> _Trimmed:
     if not 0.0 < share < 0.5:
-        raise InvalidInput("trim", share, "a share of the Arias intensity is left out at either end: 0 to 0.5")
+        raise InvalidInput("trim", share, "the fraction of the Arias intensity trimmed at each end must be 0 to 0.5")
     intensity: Array = np.cumsum(record.acceleration**2)
     whole = float(intensity[-1])
     first, last = (int(np.searchsorted(intensity, part * whole)) for part in (share, 1.0 - share))
@@ -150,13 +182,13 @@ def _trimmed(record: SampledRecord, share: float) -> _Trimmed:
 
 
 def _filtered(record: SampledRecord, band: tuple[float, float]) -> tuple[SampledRecord, float]:
-    """The record within the band, and the rest put before it [s]; a corner above what its step holds takes nothing."""
+    """The band-limited record, and the rest added before it [s]; a corner above its Nyquist frequency has no effect."""
     from scipy.fft import next_fast_len
 
     low, high = band
     most = 0.5 / record.dt
     if not 0.0 < low < min(high, most):
-        raise InvalidInput("band", band, f"it must go up from above 0, and begin below the {most:g} Hz of the record")
+        raise InvalidInput("band", band, f"it must ascend from above 0, and begin below the {most:g} Hz of the record")
     rest = round(REST / low / record.dt)
     padded = np.zeros(next_fast_len(record.acceleration.size + 2 * rest, real=True))
     padded[rest : rest + record.acceleration.size] = record.acceleration
@@ -166,10 +198,10 @@ def _filtered(record: SampledRecord, band: tuple[float, float]) -> tuple[Sampled
 
 
 def _factor(record: SampledRecord, peak: float) -> float:
-    """What gives the record its peak."""
+    """Scale factor for the requested peak."""
     if not (np.isfinite(peak) and peak > 0.0):
         raise InvalidInput("peak", peak, "it must be a positive acceleration")
     there = float(np.abs(record.acceleration).max())
     if not there > 0.0:
-        raise InvalidInput("band", "no motion", "nothing of the record lies within it: widen it")
+        raise InvalidInput("band", "no motion", "the record has no content within it: widen it")
     return peak / there

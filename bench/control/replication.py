@@ -1,17 +1,14 @@
-"""Waveform replication: the drive that makes the table follow a record, found by playing it again and again.
+"""Waveform replication: iterative learning of the drive that makes the table follow a record.
 
-A pass plays the drive u and measures the table. What is missing, E, goes through the inverse of the table:
+A pass plays the drive u and measures the table. The error E is corrected through the inverse of the table: u <- u + Q
+IFFT{ W K conj(H) / (|H|^2 + eps^2 max|H|^2) E }, where K contains the coherence and the fraction of E that is not
+noise. It converges where |1 - Q H_true / H| < 1. After a pass with a large error, H is corrected by its measurement. A
+pass worse than the best one is rolled back; the best drive is played once more to measure the non-repeatable part, and
+the correction is halved. So the accepted error never grows, and neither noise nor non-repeatable motion is learned (De
+Cuyper, Linear feedback control for durability test rigs in the automotive industry, thesis, KU Leuven 2006).
 
-    u <- u + Q IFFT{ W K conj(H) / (|H|^2 + eps^2 max|H|^2) E },
-
-with the coherence and the share of E that is not noise in K. It converges where |1 - Q H_true / H| < 1. After a pass
-that is far off, H is corrected by what that pass has shown. A pass that comes out worse than the best one is rolled
-back; the best drive is played once more, which tells what does not repeat, and the correction is halved. So the
-accepted error never grows, and neither noise nor a motion that is different every time is learned
-(De Cuyper, Linear feedback control for durability test rigs in the automotive industry, thesis, KU Leuven 2006).
-
-The passes end when the error that repeats is small enough both as root mean square and in the response spectrum: the
-first is that of the whole record, the second sees the few cycles that a structure answers.
+The passes end when the repeatable error is small enough both as root mean square, over the whole record, and in the
+response spectrum, which is sensitive to the few cycles that excite a structure.
 """
 
 from typing import Literal
@@ -19,11 +16,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.control.envelope import Envelope, Verdict, fitting
-from bench.control.inverse import TableInverse
-from bench.control.octaves import octave_mean
-from bench.control.passes import Pass, SpectrumCheck
-from bench.control.table_model import TableModel
+from bench.control.passes import Envelope, Pass, SpectrumCheck, Verdict, fitting
+from bench.control.table_model import TableInverse, TableModel, octave_mean
 from bench.control.target import Target
 from bench.guard.limits import Limits
 from sim.errors import InvalidInput
@@ -35,42 +29,40 @@ Complex = NDArray[np.complex128]
 Status = Literal["running", "converged", "out of passes", "limited"]
 
 _REFINE_ABOVE, _REFINE_ON_ABOVE = 0.05, 0.01
-"""Error above which a pass says more about the response than about friction and noise; and once it has, until when."""
+"""Error above which a pass starts to refine the response, and error down to which refinement then continues."""
 _LEAST_SHARE = 0.02
-"""A correction of which less than this fits within the limits is not worth a pass."""
+"""Fraction of a correction within the limits below which no further pass is made."""
 
 
 class ReplicationParameters(Parameters):
-    """How a record is replicated."""
+    """Parameters of the replication of a record."""
 
     passes: int = quantity(8, "1", "passes at most", ge=1, le=50)
-    tolerance: float = quantity(
-        0.003, "1", "root mean square error over that of the target, without its noise, that is good enough", gt=0, lt=1
-    )
+    tolerance: float = quantity(0.003, "1", "acceptable relative root mean square error, without noise", gt=0, lt=1)
     spectrum_tolerance: float = quantity(
-        0.01, "1", "deviation of the response spectrum that is good enough, where noise does not explain it", gt=0, lt=1
+        0.01, "1", "acceptable deviation of the response spectrum in excess of noise", gt=0, lt=1
     )
     gains: tuple[float, ...] = quantity(
         (1.0, 1.0, 1.0, 0.7),
         "1",
-        "share Q of each correction, that from rest included; the last one holds on",
+        "gain Q of each correction, including the first from rest; the last value applies to all later ones",
         min_length=1,
     )
     replay_first: bool = quantity(
-        False, "", "play the first drive twice before it is corrected: for a block that rocks, different every time"
+        False, "", "play the first drive twice before its correction: for a rocking block, whose motion does not repeat"
     )
-    margin: float = quantity(1.1, "1", "limits over what drive and motion are predicted to reach at most", ge=1, le=3)
+    margin: float = quantity(1.1, "1", "ratio of the limits to the greatest predicted drive and motion", ge=1, le=3)
     beyond: Literal["refuse", "scale"] = quantity(
-        "refuse", "", "what becomes of a drive beyond a limit: refuse it, or scale it down until it fits"
+        "refuse", "", "treatment of a drive beyond a limit: refuse it, or scale it down to fit"
     )
     spectrum_band: tuple[float, float] = quantity(
         (0.1, 1.0), "s", "periods between which the response spectrum is compared"
     )
-    spectrum_periods: tuple[float, ...] = quantity((), "s", "further periods, such as those of the specimen")
+    spectrum_periods: tuple[float, ...] = quantity((), "s", "additional periods, such as those of the specimen")
 
 
 class Replication:
-    """Finds the drive for `target`. Play `drive`, give what was measured to `learn`, until `finished`.
+    """Finds the drive for `target`: play `drive` and pass the measurement to `learn`, until `finished`.
 
     ::
 
@@ -80,7 +72,7 @@ class Replication:
         volts = replication.best
 
     The rig is at rest before each pass; sample i was taken when drive sample i began to act. Raises InvalidInput when
-    the model does not cover the target, or when the first drive is beyond a limit and is not to be scaled.
+    the model does not cover the target, or when the first drive exceeds a limit and scaling is not allowed.
     """
 
     def __init__(
@@ -92,7 +84,7 @@ class Replication:
         self._wanted = self._table.spectrum(target.acceleration)
         self._norm = self._size(np.abs(self._wanted) ** 2)
         if self._norm == 0.0:
-            raise InvalidInput("target", "all zero", "there is nothing to replicate")
+            raise InvalidInput("target", "all zero", "it contains no motion to replicate")
         seen = self._table.record(self._table.window * self._wanted)
         self._peak = float(np.abs(seen).max())
         self._spectrum = SpectrumCheck(seen, target.sample_rate, p.spectrum_band, p.spectrum_periods)
@@ -103,7 +95,7 @@ class Replication:
         self._passes: list[Pass] = []
         self._least = np.inf
         self._status: Status = "running"
-        # before the first pass: nothing was played, nothing moved, all is missing
+        # before the first pass: no drive, no motion, the error is the whole target
         still = np.zeros(target.acceleration.size)
         self._best, self._missing = still, self._wanted
         self._present = Envelope.of(still, still, still, target.sample_rate)
@@ -128,25 +120,25 @@ class Replication:
 
     @property
     def status(self) -> Status:
-        """Running, or why no further pass is asked for."""
+        """Running, or the reason for the end of the passes."""
         return self._status
 
     @property
     def verdict(self) -> Verdict:
-        """What the limits say of `drive`; where the status is "limited", of the correction that is not played."""
+        """Limits applied to `drive` or, with the status "limited", to the correction not played."""
         return self._verdict
 
     @property
     def repeatable(self) -> float:
-        """Root mean square error of the best drive over that of the target, without its noise; 1 before any pass."""
+        """Relative root mean square error of the best drive, without noise; 1 before any pass."""
         power = self._size(np.abs(self._missing) ** 2) ** 2 - self._size(self._noise) ** 2 / self._plays
         return max(power, 0.0) ** 0.5 / self._norm
 
     @property
     def spectrum_error(self) -> tuple[float, float]:
-        """Largest deviation of the response spectrum with the best drive that noise does not explain; its period [s].
+        """Largest deviation of the response spectrum with the best drive in excess of noise; its period [s].
 
-        Zero where there is none.
+        Zero if none.
         """
         table = self._table
         seen = table.record(table.window * (self._wanted - self._missing))
@@ -154,18 +146,18 @@ class Replication:
 
     @property
     def finished(self) -> bool:
-        """Whether no further pass is asked for."""
+        """Whether the passes have ended."""
         return self._status != "running"
 
     def learn(self, acceleration: Array, displacement: Array | None = None) -> Pass:
-        """Take what the table did while `drive` was played: acceleration [m/s2] and displacement [m], shape (n,).
+        """Evaluate the pass of `drive`: measured acceleration [m/s2] and displacement [m] of the table, shape (n,).
 
-        The displacement says how much stroke is left; without it the acceleration is integrated. Raises InvalidInput
+        The displacement determines the remaining stroke; without it the acceleration is integrated. Raises InvalidInput
         when samples are missing.
         """
         for name, values in (("acceleration", acceleration), ("displacement", displacement)):
             if values is not None and (values.shape != self._drive.shape or not np.isfinite(values).all()):
-                raise InvalidInput(f"measured {name}", values.shape, "every sample of the pass is needed; repeat it")
+                raise InvalidInput(f"measured {name}", values.shape, "every sample of the pass is required; repeat it")
         measured = self._table.spectrum(acceleration)
         missing = self._wanted - measured
         error = self._size(np.abs(missing) ** 2) / self._norm
@@ -195,15 +187,15 @@ class Replication:
         self._present = Envelope.of(self._drive, acceleration, displacement, rate)
 
     def _compare(self, missing: Complex) -> None:
-        """The best drive was played twice: what differs is no use to learn, and the mean is better known."""
+        """Update noise and mean error by the second play of the best drive."""
         difference = 0.5 * octave_mean(np.abs(missing - self._missing) ** 2, self._table.frequency)
-        # two plays may agree by chance: what was seen to scatter once stays known
+        # two plays may agree by chance: use the largest scatter so far
         self._noise = np.maximum(self._noise, difference)
         self._missing = 0.5 * (self._missing + missing)
         self._plays = 2
 
     def _scatter_explains(self, rejected: float) -> bool:
-        """Whether a `rejected` error is no worse than what learning one scatter and meeting another makes."""
+        """Whether a `rejected` error is within the scatter of two plays."""
         repeatable = self._size(np.abs(self._missing) ** 2)
         return (rejected * self._norm) ** 2 <= repeatable**2 + 2.0 * self._size(self._noise) ** 2
 
@@ -238,11 +230,11 @@ class Replication:
             if refused or self._verdict.share < _LEAST_SHARE:
                 self._status = "limited"
             elif np.array_equal(self._drive, self._best):
-                # no line is left whose error stands out of what does not repeat
+                # no line has an error above the non-repeatable part
                 self._status = "converged"
 
     def _next(self) -> tuple[Array, float, Verdict]:
-        """The best drive with its correction, as far as the limits allow; the gain; and what the limits said."""
+        """The best drive with the correction permitted by the limits, the gain, and the verdict of the limits."""
         gains, rate = self.parameters.gains, self._target.sample_rate
         gain = gains[min(self._corrections, len(gains) - 1)] * 0.5**self._halvings
         self._corrections += 1
@@ -252,7 +244,7 @@ class Replication:
         return self._best + verdict.share * step, gain, verdict
 
     def _ends(self) -> Array:
-        """A factor that leads the drive from zero and back to it within the rest before and after the record."""
+        """A factor that ramps the drive from and to zero within the rest before and after the record."""
         n = max(self._target.rest // 4, 2)
         ramp = 0.5 * (1.0 - np.cos(np.pi * np.arange(n) / n))
         ends = np.ones(self._target.acceleration.size)
@@ -260,5 +252,5 @@ class Replication:
         return ends
 
     def _size(self, power: Array) -> float:
-        """Root of the power of a spectrum as seen through the window."""
+        """Root of the power of a spectrum, filtered by the window."""
         return float(np.sqrt(np.sum(self._table.window**2 * power)))

@@ -1,51 +1,123 @@
-"""How to bring the block onto its steady rocking motion: planned with the model before anything moves.
+"""Start-ups that bring the block to its steady rocking motion, planned with the model before the test.
 
-Switching the sine on topples the block at many points, and near high frequencies it leaves it at rest. The transient
-is chaotic and the specimen is known so well only, so each candidate is simulated with specimens drawn from what the
-identification leaves open, and with the drive a little off. A few draws sift the candidates, fresh ones rate those
-that are left: the chance that is stated is not the luck of the draws that chose them.
+Switching the sine on topples the block at many points, and at high frequencies leaves it at rest. The transient is
+chaotic and the specimen is uncertain, so each candidate is simulated with specimens drawn from the identification's
+uncertainty and with slightly different drives. A few draws select the candidates, new ones rate the remaining ones, so
+the stated probability is not biased by the selection. The sieves take the short candidates first and end once enough of
+them have succeeded with every draw: no longer one could displace them.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
+from itertools import product
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from bench.control.candidates import Candidate, candidates
-from bench.control.legs import Leg, program
+from bench.control.oscillator import Leg, program
+from bench.result_cache import cached
 from sim.knowledge import SpecimenKnowledge
 from sim.rocking import Motion, Status, simulate_many
 from sim.specimen import Specimen
 from sim.steady import NoOrbit, Orbit, rocking_orbit
 
+Counts = NDArray[np.float64]
+
+TOPS = (22.0, 24.0, 26.0, 28.0)
+"""Frequencies [rad/s] of the soft ramp, at which the block rocks little and the frame is far from resonance."""
+
+RAMPS = ((6.0, 0.0), (12.0, 0.0), (6.0, 10.0))
+"""Duration of the soft ramp, and of the wait before the chirp [s]."""
+
+CHIRPS = (0.5, 1.0)
+"""Rates of the downward frequency sweep [rad/s per s]."""
+
+DIRECT_RAMPS = (8.0, 16.0)
+"""Durations of a ramp at the requested frequency [s]."""
+
+OVERSHOOTS = (1.0, 1.2)
+"""Ratio of the amplitude of ramp and chirp to the requested one: a larger one lifts a block that would stay at rest."""
+
+EASE = 6.0
+"""Time in which an overshoot is removed at the requested frequency [s]."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A candidate start: its sweeps end at the requested amplitude and frequency."""
+
+    name: str
+    legs: tuple[Leg, ...]
+
+    @property
+    def duration(self) -> float:
+        """Length [s]."""
+        return sum(leg.duration for leg in self.legs)
+
+
+def candidates(omega: float, amplitude: float) -> list[Candidate]:
+    """All candidate start-ups to `amplitude` [m/s2] at `omega` [rad/s], each once."""
+    found = [_direct(omega, amplitude, *values) for values in product(DIRECT_RAMPS, OVERSHOOTS)]
+    above = [top for top in TOPS if top > omega]
+    found += [_from_above(omega, amplitude, *values) for values in product(above, RAMPS, CHIRPS, OVERSHOOTS)]
+    return found
+
+
+def _direct(omega: float, amplitude: float, ramp: float, overshoot: float) -> Candidate:
+    legs = [Leg(ramp, overshoot * amplitude, omega)]
+    return _eased(f"ramp {ramp:g} s at {omega:g} rad/s", legs, amplitude, overshoot)
+
+
+def _from_above(
+    omega: float, amplitude: float, top: float, ramp: tuple[float, float], rate: float, overshoot: float
+) -> Candidate:
+    rise, wait = ramp
+    high = overshoot * amplitude
+    legs = [Leg(rise, high, top)]
+    name = f"ramp {rise:g} s at {top:g} rad/s"
+    if wait > 0.0:
+        legs.append(Leg(wait, high, top))
+        name += f", wait {wait:g} s"
+    legs.append(Leg((top - omega) / rate, high, omega))
+    return _eased(f"{name}, chirp {rate:g} rad/s per s", legs, amplitude, overshoot)
+
+
+def _eased(name: str, legs: list[Leg], amplitude: float, overshoot: float) -> Candidate:
+    if overshoot != 1.0:
+        legs = [*legs, Leg(EASE, amplitude, legs[-1].omega)]
+        name += f", {overshoot:g} x amplitude"
+    return Candidate(name, tuple(legs))
+
+
 DRIVE = 0.03
-"""Relative half width of the table's amplitude during a start, before the amplitude's control has closed on it."""
+"""Relative half width of the table's amplitude during a start-up, before amplitude control takes effect."""
 
 SIEVES = ((5, 2.0), (10, 1.0))
-"""Draws of each sifting, and how many candidates it leaves for each start that is asked for."""
+"""Draws of each selection round, and the number of candidates it keeps per requested start-up."""
 
 RATING = 32
-"""Draws that rate the candidates that are left."""
+"""Draws that rate the remaining candidates."""
 
 SEED = 1
-"""Of the draws: the same question has the same answer."""
+"""Random seed of the draws, for reproducible results."""
 
 DWELL, WINDOW = 40.0, 4.0
-"""Time that is simulated at the asked frequency, and its last part that is judged [s]."""
+"""Simulated time at the requested frequency, and the evaluated last part of it [s]."""
 
 TOLERANCE = 1e-7
-"""Of the simulations."""
+"""Relative tolerance of the simulations."""
 
 CATCH_ANGLE = 0.35
-"""Tilt [rad] that counts as fallen: beyond it no spring of the campaign brings the block back."""
+"""Tilt [rad] that counts as fallen: beyond it no spring of the campaign returns the block."""
 
 CLOSE = 0.10
-"""Relative distance of the peaks of drift and tilt at which a motion counts as on its way to the orbit."""
+"""Relative difference of the peaks of drift and tilt below which a motion counts as converging to the orbit."""
 
 
 @dataclass(frozen=True)
 class Start:
-    """A way to the steady state: its legs end at the asked amplitude and frequency.
+    """A start to the steady state: its sweeps end at the requested amplitude and frequency.
 
     `chance`, between 0 and 1, is estimated from s successes of n draws as (s + 1) / (n + 2) (rule of succession).
     """
@@ -62,7 +134,7 @@ class Start:
 
 @dataclass(frozen=True, eq=False)
 class _Case:
-    """A specimen as it may be, the drive's relative amplitude, and the specimen's own orbit under that drive."""
+    """A drawn specimen, the drive's relative amplitude, and the specimen's orbit under that drive."""
 
     specimen: Specimen
     drive: float
@@ -77,27 +149,68 @@ def plan_starts(
     count: int,
     uncertainty: SpecimenKnowledge | None = None,
 ) -> list[Start]:
-    """The `count` most robust starts to `amplitude` [m/s2] at `omega` [rad/s], best first, the shorter one of equals.
+    """The `count` most robust starts to `amplitude` [m/s2] at `omega` [rad/s], best first, shorter first among equals.
 
-    `orbit` is the rocking orbit of `specimen`, None where there is none. A start succeeds with a drawn specimen when
-    the simulated motion ends close to that specimen's own stable orbit; where it has none, when the block stands.
-    Raises InvalidInput for a bare frame or meaningless numbers.
+    `orbit` is the rocking orbit of `specimen`, None if it does not exist. A start succeeds with a drawn specimen when
+    the simulated motion ends close to that specimen's own stable orbit; without one, when the block stands. Raises
+    InvalidInput for a bare frame or meaningless numbers. A later question with the same numbers is answered from the
+    cache of results.
     """
-    random = np.random.default_rng(SEED)
     allowed = uncertainty or SpecimenKnowledge()
+    aim = None if orbit is None else [*orbit.section.tolist(), orbit.peaks.drift, orbit.peaks.theta, orbit.stable]
+    inputs = [specimen.model_dump(mode="json"), omega, amplitude, aim, count, allowed.model_dump(mode="json")]
+
+    def search() -> list[Any]:
+        found = _search(specimen, omega, amplitude, orbit, count, allowed)
+        return [[start.name, [[*astuple(leg)] for leg in start.legs], start.chance] for start in found]
+
+    stored = cached("starts", inputs, search)
+    return [Start(name, tuple(Leg(*leg) for leg in legs), chance) for name, legs, chance in stored]
+
+
+def _search(
+    specimen: Specimen,
+    omega: float,
+    amplitude: float,
+    orbit: Orbit | None,
+    count: int,
+    allowed: SpecimenKnowledge,
+) -> list[Start]:
+    random = np.random.default_rng(SEED)
 
     def cases(n: int) -> list[_Case]:
         return _cases(allowed.draws(specimen, n, random), omega, amplitude, orbit, random)
 
     left = candidates(omega, amplitude)
     won = np.zeros(len(left))
+    most = 0
     for draws, keep in SIEVES:
-        won = won + _successes(left, cases(draws))
-        order = _best_first(left, won)[: round(keep * count)]
-        left, won = [left[i] for i in order], won[order]
+        most += draws
+        left, won = _sifted(left, won, cases(draws), round(keep * count), most)
     won = _successes(left, cases(RATING))
     chances = (won + 1.0) / (RATING + 2.0)
     return [Start(left[i].name, left[i].legs, float(chances[i])) for i in _best_first(left, won)]
+
+
+def _sifted(
+    ways: list[Candidate], won: Counts, cases: Sequence[_Case], keep: int, most: int
+) -> tuple[list[Candidate], Counts]:
+    """The `keep` best candidates after these cases too, best first, and in how many cases each has succeeded.
+
+    `most` is the number of all cases so far. The candidates are simulated in the order in which equals are preferred;
+    once `keep` of them have succeeded in every case, the others are omitted without simulation.
+    """
+    order = _best_first(ways, won)
+    total = won.copy()
+    simulated: list[int] = []
+    while len(simulated) < len(order) and np.count_nonzero(total[simulated] == most) < keep:
+        batch = order[len(simulated) : len(simulated) + max(keep - np.count_nonzero(total[simulated] == most), 1)]
+        total[batch] += _successes([ways[i] for i in batch], cases)
+        simulated += batch
+    # in the order in which they were given, as equals of one length keep it
+    simulated.sort()
+    best = [simulated[k] for k in _best_first([ways[i] for i in simulated], total[simulated])][:keep]
+    return [ways[i] for i in best], total[best]
 
 
 def _cases(
@@ -118,8 +231,8 @@ def _own_orbit(specimen: Specimen, omega: float, amplitude: float, guess: Orbit)
         return None
 
 
-def _successes(ways: Sequence[Candidate], cases: Sequence[_Case]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    """In how many of the cases each candidate succeeds, shape (n,)."""
+def _successes(ways: Sequence[Candidate], cases: Sequence[_Case]) -> Counts:
+    """Number of cases in which each candidate succeeds, shape (n,)."""
     runs = [(way, case) for way in ways for case in cases]
     motions = simulate_many(
         [case.specimen for _, case in runs],
@@ -132,7 +245,7 @@ def _successes(ways: Sequence[Candidate], cases: Sequence[_Case]) -> np.ndarray[
     return np.array(good, dtype=np.float64).reshape(len(ways), len(cases)).sum(axis=1)
 
 
-def _best_first(ways: Sequence[Candidate], won: np.ndarray[tuple[int], np.dtype[np.float64]]) -> list[int]:
+def _best_first(ways: Sequence[Candidate], won: Counts) -> list[int]:
     return sorted(range(len(ways)), key=lambda i: (-won[i], ways[i].duration))
 
 

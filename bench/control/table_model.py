@@ -1,43 +1,61 @@
-"""What has been identified of the table: its response to the drive, how certain, where, when and at what level."""
+"""Identified model of the table: its response to the drive with uncertainty, and its inverse for corrections."""
 
 import json
 from datetime import datetime, timedelta
+from math import exp2
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import AwareDatetime, model_validator
 
+from bench.bounded import read_bounded, require_shallow
 from bench.config.validation import validated
+from bench.control.target import Target
 from sim.errors import InvalidInput
 from sim.parameters import Parameters, quantity
+
+Number = TypeVar("Number", np.float64, np.complex128)
+
+_REACH = exp2(1.0 / 6.0)
+"""Ratio of the outermost frequency of the mean to the centre: a sixth of an octave to either side."""
+
+
+def octave_mean(values: NDArray[Number], frequency: NDArray[np.float64]) -> NDArray[Number]:
+    """Mean of `values` within a third of an octave around each `frequency`, positive and ascending, same shape."""
+    total: NDArray[Number] = np.concatenate((np.zeros(1, values.dtype), np.cumsum(values)))
+    first = np.searchsorted(frequency, frequency / _REACH)
+    last = np.searchsorted(frequency, frequency * _REACH, side="right")
+    # numpy's stubs lose the type of the elements in a division
+    return cast(NDArray[Number], (total[last] - total[first]) / (last - first))
+
 
 Array = NDArray[np.float64]
 
 Values = tuple[float, ...]
 
 LONGEST_AGE = timedelta(hours=12)
-"""Age after which a model is refused unless a protocol says otherwise: coil and guides have another temperature."""
+"""Default age after which a model is refused, because the temperature of coil and guides changes."""
 
 
 class TableModel(Parameters):
     """Table acceleration per drive [m/s2/V] at ascending frequencies, everything of shape (n_lines,).
 
-    The response holds what lies between a drive sample and the sample of the channel: hold, amplifier, table,
+    The response covers everything between a drive sample and the sample of the channel: hold, amplifier, table,
     specimen, filter card. Convention exp(+i omega t).
     """
 
     date: AwareDatetime = quantity(..., "", "when the table was identified")
-    specimen: str = quantity(..., "", "what stood on the table")
+    specimen: str = quantity(..., "", "specimen on the table")
     sample_rate: float = quantity(..., "1/s", "samples per second of drive and channels", gt=0)
     level: float = quantity(..., "m/s2", "root mean square of the table acceleration during the identification", gt=0)
-    frequency: Values = quantity(..., "Hz", "lines of the identification, ascending", min_length=2)
+    frequency: Values = quantity(..., "Hz", "frequencies of the lines, ascending", min_length=2)
     real: Values = quantity(..., "m/s2/V", "real part of the response")
     imaginary: Values = quantity(..., "m/s2/V", "imaginary part of the response")
     uncertainty: Values = quantity(..., "m/s2/V", "standard uncertainty of the response, noise and distortion together")
     distortion: Values = quantity(..., "m/s2/V", "standard deviation of the response by nonlinear distortion alone")
-    coherence: Values = quantity(..., "1", "share of the acceleration's power that the drive explains")
+    coherence: Values = quantity(..., "1", "fraction of the acceleration's power explained by the drive")
     noise: Values = quantity(..., "m/s2/Hz^0.5", "spectral density of the noise in the acceleration")
 
     @model_validator(mode="after")
@@ -45,14 +63,14 @@ class TableModel(Parameters):
         n = len(self.frequency)
         for name in ("real", "imaginary", "uncertainty", "distortion", "coherence", "noise"):
             if len(getattr(self, name)) != n:
-                raise InvalidInput(name, len(getattr(self, name)), f"there are {n} frequencies: as many values belong")
+                raise InvalidInput(name, len(getattr(self, name)), f"it must have {n} values, one per frequency")
         if not np.all(np.diff(self.frequency) > 0.0) or self.frequency[0] <= 0.0:
             raise InvalidInput("frequency", self.frequency[0], "the frequencies must be positive and ascend")
         return self
 
     @property
     def band(self) -> tuple[float, float]:
-        """Lowest and highest frequency [Hz] for which the model holds."""
+        """Lowest and highest frequency [Hz] of the model."""
         return self.frequency[0], self.frequency[-1]
 
     def response(self, frequency: Array) -> NDArray[np.complex128]:
@@ -71,7 +89,7 @@ class TableModel(Parameters):
         return np.interp(frequency, self.frequency, self.noise)
 
     def require_fresh(self, now: datetime, longest: timedelta = LONGEST_AGE) -> None:
-        """Raise InvalidInput when the model is older than `longest`, or not from the past."""
+        """Raise InvalidInput when the model is older than `longest`, or dated in the future."""
         age = now - self.date
         if not timedelta(0) <= age <= longest:
             hours = longest.total_seconds() / 3600.0
@@ -92,7 +110,7 @@ class TableModel(Parameters):
             with path.open("x", encoding="utf-8", newline="\n") as file:
                 file.write(self.model_dump_json(indent=1) + "\n")
         except FileExistsError:
-            raise InvalidInput("table model", str(path), "it exists already; it is never overwritten") from None
+            raise InvalidInput("table model", str(path), "it exists and is never overwritten") from None
         except OSError as error:
             raise InvalidInput("table model", str(path), f"it cannot be written: {error.strerror}") from None
 
@@ -100,12 +118,13 @@ class TableModel(Parameters):
     def read(path: Path) -> "TableModel":
         """The model in a JSON file. Raises InvalidInput naming file and key."""
         try:
-            data: Any = json.loads(path.read_text(encoding="utf-8"))
+            data: Any = json.loads(read_bounded(path).decode())
+            require_shallow(data)
         except FileNotFoundError:
             raise InvalidInput("table model", str(path), "there is no such file") from None
         except OSError as error:
             raise InvalidInput("table model", str(path), f"it cannot be read: {error.strerror}") from None
-        except ValueError as error:
+        except (ValueError, RecursionError) as error:
             raise InvalidInput("table model", str(path), f"it is not JSON: {error}") from None
         return validated(TableModel, data)
 
@@ -117,5 +136,72 @@ class TableModel(Parameters):
         low, high = self.band
         outside = frequency[(frequency < low) | (frequency > high)]
         if outside.size:
-            allowed = f"the table model holds from {low:g} to {high:g} Hz; identify the table in a wider band"
+            allowed = f"the table model is valid from {low:g} to {high:g} Hz; identify the table in a wider band"
             raise InvalidInput("frequency", float(outside[0]), allowed)
+
+
+Complex = NDArray[np.complex128]
+
+REGULARISATION = 1e-3
+"""eps: lines whose response is below this fraction of the largest receive less than half of the required drive."""
+
+_TINY = 1e-12
+"""Fraction of the largest power below which a line contains only rounding errors."""
+
+
+class TableInverse:
+    """Converts between drive and acceleration on the lines of a target's transform within its support.
+
+    Spectra are `numpy.fft.rfft` of whole records at those lines, shape (n_lines,).
+    """
+
+    def __init__(self, model: TableModel, target: Target) -> None:
+        """Raises InvalidInput where the model does not cover the target's support or has another sample rate."""
+        model.require_rate(target.sample_rate)
+        low, high = target.support
+        self._size = target.acceleration.size
+        self._inside = (target.frequency > low) & (target.frequency < high)
+        self.frequency = target.frequency[self._inside]
+        self.window = target.window[self._inside]
+        self._response = model.response(self.frequency)
+        self._coherence = model.coherence_at(self.frequency)
+        density = octave_mean(model.noise_at(self.frequency) ** 2, self.frequency)
+        self.noise: Array = density * (0.5 * target.sample_rate * self._size)
+        """Expected |spectrum|^2 of the measurement noise [(m/s2)^2], shape (n_lines,)."""
+
+    def spectrum(self, record: Array) -> Complex:
+        """The lines within the support of a record."""
+        return np.fft.rfft(record)[self._inside]
+
+    def record(self, spectrum: Complex) -> Array:
+        """The record of a spectrum that is zero outside the support."""
+        whole = np.zeros(self._inside.size, dtype=np.complex128)
+        whole[self._inside] = spectrum
+        return np.fft.irfft(whole, self._size)
+
+    def predicted(self, volts: Array) -> Array:
+        """Table acceleration [m/s2] predicted for a drive, within the support."""
+        return self.record(self._response * self.spectrum(volts))
+
+    def correction(self, missing: Complex, noise: Array) -> Array:
+        """Drive [V] for the spectrum of a `missing` acceleration, at unit gain.
+
+        Every line is weighted by its coherence and by the fraction of its power that is not `noise`, so noise is not
+        learned.
+        """
+        power = octave_mean(np.abs(missing) ** 2, self.frequency)
+        real_share = np.maximum(1.0 - noise / np.maximum(power, _TINY * power.max(initial=1e-300)), 0.0)
+        size = np.abs(self._response) ** 2
+        inverse = np.conj(self._response) / (size + REGULARISATION**2 * size.max())
+        return self.record(self.window * self._coherence * real_share * inverse * missing)
+
+    def refine(self, volts: Array, measured: Complex) -> None:
+        """Correct the response by the smooth, coherent part of the measured response of a pass."""
+        predicted = self._response * self.spectrum(volts)
+        cross = octave_mean(np.conj(predicted) * measured, self.frequency)
+        input_power = octave_mean(np.abs(predicted) ** 2, self.frequency)
+        output_power = octave_mean(np.abs(measured) ** 2, self.frequency)
+        input_power = np.maximum(input_power, _TINY * input_power.max())
+        output_power = np.maximum(output_power, _TINY * output_power.max())
+        coherence = np.abs(cross) ** 2 / (input_power * output_power)
+        self._response = self._response * (1.0 + coherence * (cross / input_power - 1.0))

@@ -1,10 +1,13 @@
-"""The motion that the table is asked for: a record within the table's band, at rest at both ends."""
+"""Target motion of the table: a record within the table's band, at rest at both ends; and the table's reach."""
 
 from dataclasses import dataclass, replace
+from math import isfinite
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.analysis.table_motion import TableMotion
+from bench.config.model import BenchConfiguration
 from sim.errors import InvalidInput
 
 Array = NDArray[np.float64]
@@ -13,10 +16,10 @@ ORDER = 4
 """Order of the Butterworth filters, applied forwards and backwards, that limit a record to the band."""
 
 FLAT, REACH = 1.6, 2.0
-"""Factors on the ends of the band: up to the first everything counts in full, beyond the second nothing."""
+"""Factors on the ends of the band: the weight is 1 up to the first and 0 beyond the second."""
 
 REST = 4.0
-"""Rest before and after the record, in periods of the band's lower end: the filters have rung out by then."""
+"""Rest before and after the record, in periods of the band's lower end, in which the filters settle."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +36,7 @@ class Target:
 
     @property
     def support(self) -> tuple[float, float]:
-        """Lowest and highest frequency [Hz] that is compared and corrected."""
+        """Lowest and highest frequency [Hz] compared and corrected."""
         return self.band[0] / REACH, self.band[1] * REACH
 
     @property
@@ -55,16 +58,16 @@ class Target:
 
     @property
     def duration(self) -> float:
-        """Length [s], the rest included."""
+        """Duration [s], including the rest."""
         return self.acceleration.size / self.sample_rate
 
     def scaled(self, factor: float) -> "Target":
-        """The same motion, `factor` times as strong."""
+        """The same motion, multiplied by `factor`."""
         return replace(self, acceleration=factor * self.acceleration)
 
 
 def windowed(acceleration: Array, dt: float, band: tuple[float, float]) -> Array:
-    """`acceleration`, shape (n,), through the window of `band` [Hz] and without phase; zeros are put after it."""
+    """`acceleration`, shape (n,), filtered by the zero-phase window of `band` [Hz] after zero padding."""
     from scipy.fft import next_fast_len
 
     size = int(next_fast_len(acceleration.size, real=True))
@@ -73,15 +76,15 @@ def windowed(acceleration: Array, dt: float, band: tuple[float, float]) -> Array
 
 
 def check_band(band: tuple[float, float], sample_rate: float) -> None:
-    """Raise InvalidInput unless `sample_rate` [1/s] holds all of `band` [Hz] and what lies beside it."""
+    """Raise InvalidInput unless `sample_rate` [1/s] covers `band` [Hz] and its transition bands."""
     low, high = band
     if not 0.0 < low < high or REACH * high > 0.5 * sample_rate:
-        allowed = f"it must go up from above 0 to {0.5 * sample_rate / REACH:g} Hz at most"
+        allowed = f"it must ascend from above 0 to at most {0.5 * sample_rate / REACH:g} Hz"
         raise InvalidInput("band", band, allowed)
 
 
 def band_gain(frequency: Array, band: tuple[float, float]) -> Array:
-    """What the filters of `band` leave of each of the ascending frequencies [Hz], without phase; 0 to 1, same shape."""
+    """Gain of the zero-phase filters of `band` at ascending frequencies [Hz]; 0 to 1, same shape."""
     low, high = band
     gain = band_window(frequency, band)
     inside = gain > 0.0
@@ -108,3 +111,30 @@ def band_window(frequency: Array, band: tuple[float, float]) -> Array:
     beyond[inside] = np.maximum(low / frequency[inside], frequency[inside] / high)
     over = np.log(np.maximum(beyond, FLAT) / FLAT) / np.log(REACH / FLAT)
     return np.where(inside, 0.5 * (1.0 + np.cos(np.pi * over)), 0.0)
+
+
+SHARE = 0.9
+"""Fraction of stroke and limits that a record may use, because the table does not follow it exactly."""
+
+
+@dataclass(frozen=True)
+class Reach:
+    """Largest |displacement| [m] and |velocity| [m/s] of the table. Raises InvalidInput unless both are positive."""
+
+    displacement: float
+    velocity: float
+
+    def __post_init__(self) -> None:
+        for name, value in (("displacement", self.displacement), ("velocity", self.velocity)):
+            if not (isfinite(value) and value > 0.0):
+                raise InvalidInput(name, value, "the limits of the table must be positive numbers")
+
+    @staticmethod
+    def of(configuration: BenchConfiguration, share: float = SHARE) -> "Reach":
+        """The fraction `share` of a bench's stroke and limits."""
+        limits = configuration.limits
+        return Reach(share * min(configuration.half_stroke, limits.displacement), share * limits.velocity)
+
+    def holds(self, motion: TableMotion) -> bool:
+        """Whether the motion stays within the reach."""
+        return motion.peak_displacement <= self.displacement and motion.peak_velocity <= self.velocity

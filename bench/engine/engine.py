@@ -1,151 +1,158 @@
-"""Runs a plan on a rig, through the guard, block by block."""
+"""Engine: runs a plan on a rig through the guard, block by block."""
 
-from bench.engine.ending import Ended, Ending
-from bench.engine.operator import Operator
+from bench.analysis.signals import SignalMap
+from bench.config.model import BenchConfiguration
+from bench.engine.interface import Ended, Ending, EventStream, Operator, Requests
+from bench.engine.loop import AtRest, Loop, PreparedDrive, SineDrive
 from bench.engine.output import Output
-from bench.engine.player import Player
-from bench.engine.requests import Requests
-from bench.engine.rest import Rest
-from bench.engine.sines import Sines
 from bench.engine.steps import (
+    AcquireAtRest,
     Arm,
     Calibrate,
     Done,
     Dwell,
     Fallen,
-    Follow,
-    Handle,
-    Listen,
+    OperatorAction,
     Outcome,
     Plan,
     Play,
+    Publish,
     RampOut,
-    Say,
+    SetHarmonics,
     Step,
-    Trim,
+    Sweep,
 )
-from bench.engine.stream import Stream
-from bench.engine.turns import Turns
 from bench.events import OperatorAnswered, OperatorAsked, SpecimenMounted, State
 from bench.guard.guard import Guard
-from drivers.rig import Handwork, Rig
+from drivers.rig import OperatorTask, Rig
 from sim.errors import Cause, CauseCode
 from sim.specimen import Specimen
 
 
 class Engine:
-    """Owns the loop: drive from its source, through the guard, signals back to the plan.
+    """Runs the acquisition loop: sends the drive through the guard and returns the signals to the plan.
 
-    `block` is the number of samples of one turn; `guard` has the map of the signals. Whatever happens, `run` leaves the
-    output at zero. A halt that is asked for cuts the enable line in the thread that asks, also while the loop waits for
-    a block.
+    `block` is the number of samples per iteration; `guard` must have a signal map. `run` leaves the output at zero
+    on every path. A request to halt cuts the enable line in the requesting thread, even while the loop waits.
     """
 
     def __init__(
         self,
         rig: Rig,
         guard: Guard,
-        stream: Stream,
+        stream: EventStream,
         requests: Requests,
         operator: Operator,
         block: int,
     ) -> None:
         self._rig, self._stream, self._operator, self._requests = rig, stream, operator, requests
         self._output = Output(rig, guard, stream, requests, block)
-        self._turns = Turns(self._output, guard, stream, requests)
-        self._rest = Rest(self._turns, rig, guard, stream)
-        self._sines = Sines(self._turns, rig.sample_rate)
-        self._player = Player(self._turns, guard, stream)
+        self._loop = Loop(self._output, guard, stream, requests)
+        self._rest = AtRest(self._loop, rig, guard, stream)
+        self._sines = SineDrive(self._loop, rig.sample_rate)
+        self._prepared = PreparedDrive(self._loop, guard, stream)
         self._specimen: Specimen | None = None
         self.returned: object = None
-        """What the plan returned; None where it broke off."""
+        """Value returned by the plan; None if it was interrupted."""
         requests.cut_by(rig.halt)
 
     @property
     def state(self) -> State:
-        """What the bench is doing."""
+        """State of the bench."""
         return self._output.state
 
     def run(self, plan: Plan) -> Ending:
-        """Carry out `plan` to its end, or to the first reason to end it.
+        """Run `plan` to its end, or to the first cause of an earlier end.
 
-        An error of rig, record, plan or analysis is an ending. Any other exception is raised, the output cut before.
+        Returns an ending for an error of rig, data file, plan or analysis; cuts the output and raises any other.
         """
         ending_of = self._output.ending_of
         try:
             ending = self._until_ended(plan)
-            # whatever the plan came to, nothing stays armed
+            # disarm the rig after every ending
             for last in (self._rig.stop, plan.close):
                 ending = ending.then(ending_of(last))
-            return ending.then(ending_of(lambda: self._output.machine.go(State.CLOSED, ending.reason)))
+            return ending.then(ending_of(lambda: self._output.machine.go(State.CLOSED, ending.reason, ending.cause)))
         except BaseException as error:
             self._output.rescue(error, (self._rig.stop, plan.close))
             raise
 
     def _until_ended(self, plan: Plan) -> Ending:
-        """The ending of a plan, with the output brought to zero along a ramp wherever the rig still works."""
+        """Run a plan, ramp the output to zero if the rig still works, and return the ending."""
         output = self._output
         ending = output.ending_of(lambda: self._carry_out(plan)) or Ending("completed", "the plan was carried out")
         if output.driven:
-            # the record, the plan or an analysis gave up: no reason to jerk the table
-            ending = ending.then(output.ending_of(lambda: self._turns.ramp_out(State.ABORTING, ending.reason)))
+            # the rig still works where data file, plan or analysis failed: stop smoothly
+            ending = ending.then(
+                output.ending_of(lambda: self._loop.ramp_out(State.ABORTING, ending.reason, ending.cause))
+            )
         return output.cut(ending) if output.driven else ending
 
     def _carry_out(self, plan: Plan) -> None:
         outcome: Outcome | None = None
         try:
             while True:
-                # what the plan computes between its steps may take long, and looks at no request
-                with self._requests.breakable(self._asked_to_end):
+                # the plan may compute for a long time between steps without polling requests
+                with self._requests.breakable(self._requested_end):
                     if self._requests.interrupted:
-                        raise self._asked_to_end()
+                        raise self._requested_end()
                     step = next(plan) if outcome is None else plan.send(outcome)
                 outcome = self._do(step)
         except StopIteration as end:
             self.returned = end.value
 
-    def _asked_to_end(self) -> Ended:
+    def _requested_end(self) -> Ended:
         return Ended(Ending("aborted", self._requests.reason, self._requests.cause))
 
     def _do(self, step: Step) -> Outcome:
         match step:
-            case Follow():
-                return self._sines.follow(step)
+            case Sweep():
+                return self._sines.sweep(step)
             case Dwell():
                 return self._sines.dwell(step)
             case Play():
-                self._sines.forget()
-                return self._player.play(step)
-            case Say():
+                self._sines.restart()
+                return self._prepared.play(step)
+            case Publish():
                 self._stream.publish(step.event)
-            case Trim():
-                self._sines.trim(step)
+            case SetHarmonics():
+                self._sines.set_harmonics(step)
             case Calibrate():
                 self._output.source.oscillator.use(step.calibration)
             case Arm():
-                self._sines.forget()
+                self._sines.restart()
                 self._rest.arm(step, self._specimen)
-            case Listen():
-                return self._rest.listen(step)
+            case AcquireAtRest():
+                return self._rest.acquire(step)
             case RampOut():
-                return Fallen() if self._turns.end_test(fast=step.fast) else Done()
-            case Handle():
-                self._handle(step)
+                return Fallen() if self._loop.end_test(fast=step.fast) else Done()
+            case OperatorAction():
+                self._act(step)
         return Done()
 
-    def _handle(self, step: Handle) -> None:
+    def _act(self, step: OperatorAction) -> None:
         machine = self._output.machine
-        self._turns.heed_requests()
+        self._loop.check_requests()
         machine.go(State.WAITING, step.request)
         self._stream.publish(OperatorAsked(step.request, step.work))
         agreed = self._operator.confirm(step.request)
         machine.go(State.IDLE, "the operator answered")
-        self._turns.heed_requests()
+        self._loop.check_requests()
         if not agreed:
             raise Ended(Ending("aborted", f"the operator declined: {step.request}", Cause(CauseCode.DECLINED)))
-        self._rig.handwork(step.work, (step.specimen.nominal_k_c or None) if step.amount is None else step.amount)
+        self._rig.perform(step.work, (step.specimen.nominal_k_c or None) if step.amount is None else step.amount)
         self._specimen = step.specimen
-        if step.work in (Handwork.WATCH_BLOCK, Handwork.WATCH_STOREYS):
-            self._rest.sees_storeys = step.work is Handwork.WATCH_STOREYS
+        if step.work in (OperatorTask.WATCH_BLOCK, OperatorTask.WATCH_STOREYS):
+            self._rest.measures_storeys = step.work is OperatorTask.WATCH_STOREYS
         self._stream.publish(OperatorAnswered(step.request, self._operator.name))
         self._stream.publish(SpecimenMounted(step.specimen, step.work, step.amount))
+
+
+def configured_engine(
+    rig: Rig, configuration: BenchConfiguration, stream: EventStream, requests: Requests, operator: Operator
+) -> Engine:
+    """Engine of a configured bench; its guard has the configured limits and signal map."""
+    signals = SignalMap(rig.channels, configuration.laser_reference, configuration.calibrated)
+    limits, ramps, shaker = configuration.limits, configuration.ramps, configuration.shaker_model
+    guard = Guard(rig, limits, ramps, shaker, signals, configuration.channels)
+    return Engine(rig, guard, stream, requests, operator, configuration.block_samples)

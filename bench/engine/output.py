@@ -1,43 +1,163 @@
-"""The output of a bench: armed, given and read block by block, and brought down, in order or at once."""
+"""Output of a bench: arming, block-by-block exchange, ramp-down and cut."""
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 
 import numpy as np
+from numpy.typing import NDArray
 
-from bench.engine.ending import Ended, Ending
-from bench.engine.machine import Machine
-from bench.engine.placements import Placements
-from bench.engine.requests import Requests
-from bench.engine.source import Source
-from bench.engine.stream import Stream
-from bench.events import Acquired, State, StateChanged
+from bench.control.oscillator import Oscillator
+from bench.engine.interface import Ended, Ending, EventStream, Requests
+from bench.events import Acquired, SensorsAligned, State, StateChanged, Warned
 from bench.guard.guard import Exchange, Guard
 from drivers.rig import Rig, RigError
-from sim.errors import Cause, CauseCode, RockbenchError
+from sim.errors import UNKNOWN, Cause, CauseCode, InvalidInput, RockbenchError
+
+TRANSITIONS: dict[State, frozenset[State]] = {
+    State.IDLE: frozenset({State.ARMED, State.WAITING, State.HALTED, State.CLOSED}),
+    State.WAITING: frozenset({State.IDLE, State.HALTED, State.CLOSED}),
+    State.ARMED: frozenset({State.RUNNING, State.STOPPING, State.ABORTING, State.HALTED}),
+    State.RUNNING: frozenset({State.STOPPING, State.ABORTING, State.HALTED}),
+    State.STOPPING: frozenset({State.IDLE, State.ABORTING, State.HALTED}),
+    State.ABORTING: frozenset({State.IDLE, State.HALTED}),
+    State.HALTED: frozenset({State.CLOSED}),
+    State.CLOSED: frozenset(),
+}
+
+
+class StateMachine:
+    """State of the bench; calls `announce(before, after, reason, cause)` at each transition."""
+
+    def __init__(self, announce: Callable[[State, State, str, Cause], None]) -> None:
+        self._announce = announce
+        self._state = State.IDLE
+
+    @property
+    def state(self) -> State:
+        """State of the bench."""
+        return self._state
+
+    def go(self, after: State, reason: str, cause: Cause = UNKNOWN) -> None:
+        """Change the state. Raises RuntimeError for an illegal transition, which is a programming error."""
+        before = self._state
+        if after not in TRANSITIONS[before]:
+            raise RuntimeError(f"the bench cannot go from {before} to {after} ({reason})")
+        self._state = after
+        self._announce(before, after, reason, cause)
+
+
+Array = NDArray[np.float64]
+
+
+class DriveSource:
+    """Generates the drive block by block: from a prepared drive while one is playing, else from the oscillator."""
+
+    def __init__(self, sample_rate: float, drive_range: float) -> None:
+        self.oscillator = Oscillator(sample_rate)
+        self._range = drive_range
+        self._prepared = np.zeros(0)
+
+    def reset(self) -> None:
+        """Reset the drive to zero."""
+        self.oscillator.reset()
+        self._prepared = np.zeros(0)
+
+    @property
+    def playing(self) -> bool:
+        """Whether a prepared drive is playing."""
+        return self._prepared.size > 0
+
+    def play(self, volts: Array) -> None:
+        """Play `volts`, shape (n,), already checked, from the next sample on."""
+        self._prepared = volts.copy()
+
+    def require_playable(self, volts: Array) -> None:
+        """Check a prepared drive.
+
+        Raises InvalidInput unless it is one-dimensional, finite, zero at both ends and within the drive range, and
+        unless the present drive is zero.
+        """
+        if volts.ndim != 1 or volts.size == 0:
+            raise InvalidInput("shape of a prepared drive", volts.shape, "it must be a non-empty one-dimensional array")
+        if not np.isfinite(volts).all():
+            at = int(np.flatnonzero(~np.isfinite(volts))[0])
+            raise InvalidInput(f"sample {at} of a prepared drive", float(volts[at]), "every sample must be finite")
+        if volts[0] != 0.0 or volts[-1] != 0.0:
+            ends = float(volts[0]), float(volts[-1])
+            raise InvalidInput("ends of a prepared drive", ends, "it must begin and end at 0 V: taper it")
+        if (peak := float(np.abs(volts).max())) > self._range:
+            raise InvalidInput("peak of a prepared drive", peak, f"the drive range is +-{self._range:g} V: scale it")
+        if self.oscillator.amplitude != 0.0 or self.oscillator.remaining > 0:
+            asked = f"{self.oscillator.amplitude:g} m/s2"
+            raise InvalidInput("prepared drive on a sine of", asked, "ramp the sine to zero first")
+        self.require_silence("another prepared drive")
+
+    def require_silence(self, wanted: str) -> None:
+        """Raise InvalidInput naming the `wanted` step while a prepared drive is playing."""
+        if self.playing:
+            left = f"{self._prepared.size} samples left"
+            raise InvalidInput(f"{wanted} during a prepared drive", left, "ramp it out first")
+
+    def next(self, n: int) -> Array:
+        """The next `n` samples of drive [V], shape (n,)."""
+        if not self.playing:
+            return self.oscillator.next(n)
+        now, self._prepared = self._prepared[:n], self._prepared[n:]
+        return np.concatenate((now, self.oscillator.next(n - now.size))) if now.size < n else now
+
+
+class Alignments:
+    """Publishes, once per run, the alignment of free-running sensors to the sample clock."""
+
+    def __init__(self, rig: Rig, stream: EventStream) -> None:
+        self._rig, self._stream = rig, stream
+        self._run: int | None = None
+
+    def begin(self, run: int) -> None:
+        """Reset for a new run of the rig."""
+        self._run = run
+
+    def publish(self) -> None:
+        """Publish the alignments of the run once, if any. A rig that fails to report them causes only a warning."""
+        run, self._run = self._run, None
+        if run is None:
+            return
+        try:
+            alignments = self._rig.alignments
+        except RockbenchError as error:
+            self._stream.publish(Warned(f"the alignment of the sensors' clocks in run {run} is unknown: {error}"))
+            return
+        if alignments:
+            self._stream.publish(SensorsAligned(run, alignments))
+
+
+RESERVE = 2**25
+"""Memory released when there is none left [bytes], so that the output can be ramped to zero."""
+NO_MEMORY = "the memory of the computer is exhausted: close other programs, then start again"
 
 _DRIVEN = (State.ARMED, State.RUNNING, State.STOPPING, State.ABORTING)
 """States in which the rig is armed."""
 
 
 class Output:
-    """Holds the state of the bench, and passes the drive of its `source` through the guard, `block` samples a turn."""
+    """State of the bench and its drive: passes `source` through the guard, `block` samples per iteration."""
 
-    def __init__(self, rig: Rig, guard: Guard, stream: Stream, requests: Requests, block: int) -> None:
+    def __init__(self, rig: Rig, guard: Guard, stream: EventStream, requests: Requests, block: int) -> None:
         self._rig, self._guard, self._stream, self._requests = rig, guard, stream, requests
-        self._placements = Placements(rig, stream)
-        self.machine = Machine(self._announce)
-        self.source = Source(rig.sample_rate, rig.drive_range)
+        self._alignments = Alignments(rig, stream)
+        self.machine = StateMachine(self._announce)
+        self.source = DriveSource(rig.sample_rate, rig.drive_range)
         self.block = block
         self.drive = np.zeros(0)
-        """Drive [V] that was played while the last block was taken, shape (block,)."""
+        """Drive [V] played while the last block was acquired, shape (block,)."""
         self.read = 0
         """Samples read since the rig was armed."""
         self._run = 0
+        self._reserve = bytearray(RESERVE)
 
     @property
     def state(self) -> State:
-        """What the bench is doing."""
+        """State of the bench."""
         return self.machine.state
 
     @property
@@ -47,20 +167,20 @@ class Output:
 
     @property
     def begins(self) -> int:
-        """Index of the sample at which what is asked now begins: after those that already wait in the rig."""
+        """Index of the first sample that a new command affects: after those queued in the rig."""
         return self.read + self._rig.lead
 
     def arm(self, reason: str) -> None:
-        """Arm the rig, with silence ahead."""
+        """Arm the rig with zeros queued."""
         self.source.reset()
         self.read = 0
         self._run += 1
         self.machine.go(State.ARMED, reason)
         self._guard.arm()
-        self._placements.begin(self._run)
+        self._alignments.begin(self._run)
 
     def exchange(self) -> Exchange:
-        """Drive and read one block; an open safety input ends everything."""
+        """Drive and read one block; an open safety input halts the bench."""
         exchange = self._guard.exchange(self.source.next(self.block))
         self.read = exchange.block.first + len(exchange.block)
         self.drive = exchange.drive
@@ -71,44 +191,48 @@ class Output:
         return exchange
 
     def rest(self) -> None:
-        """The output is at zero: stop the rig."""
+        """Stop the rig, whose output is at zero."""
         self._guard.disarm()
         self.machine.go(State.IDLE, "the output is at zero")
-        self._placements.tell()
+        self._alignments.publish()
 
     def cut(self, ending: Ending) -> Ending:
-        """Cut the enable line now. Returns the ending, with what went wrong while cutting."""
+        """Cut the enable line now. Returns the ending, with errors of the cut appended."""
         try:
             self._guard.halt()
         except RigError as error:
             ending = ending.then(Ending.failed(error))
         if self.state not in (State.HALTED, State.CLOSED):
             try:
-                self.machine.go(State.HALTED, ending.reason)
+                self.machine.go(State.HALTED, ending.reason, ending.cause)
             except RockbenchError as error:
                 ending = ending.then(Ending.failed(error))
         # report the original cause, not a follow-up error
         with suppress(RockbenchError):
-            self._placements.tell()
+            self._alignments.publish()
         return ending
 
     def ending_of(self, work: Callable[[], object]) -> Ending | None:
-        """Why `work` could not be done to its end, or None."""
+        """Carry out `work`. Returns an ending if it fails, else None."""
         try:
             work()
         except Ended as ended:
             return ended.ending
         except RigError as error:
             if self._requests.strongest == "halt" and self.driven:
-                # the rig was cut under the loop by the thread that asked
+                # the requesting thread cut the rig during the iteration
                 return self.cut(Ending("halted", self._requests.reason, self._requests.cause))
             return self.cut(Ending.failed(error))
         except RockbenchError as error:
             return Ending.failed(error)
+        except MemoryError:
+            # frees memory for the ramp
+            self._reserve.clear()
+            return Ending("failed", NO_MEMORY, Cause(CauseCode.MEMORY))
         return None
 
     def rescue(self, error: BaseException, lasts: Sequence[Callable[[], object]]) -> None:
-        """Cut the output for an error that is about to be raised, then do `lasts`; note on it what else goes wrong."""
+        """Cut the output before `error` is raised, then call `lasts`; further errors are added to it as notes."""
         ending = Ending("failed", f"{type(error).__name__} in the plan or a subscriber")
         for last in (lambda: self.cut(ending), *lasts):
             try:
@@ -116,5 +240,6 @@ class Output:
             except Exception as another:
                 error.add_note(f"then {type(another).__name__}: {another}")
 
-    def _announce(self, before: State, after: State, reason: str) -> None:
-        self._stream.publish(StateChanged(before, after, reason))
+    def _announce(self, before: State, after: State, reason: str, cause: Cause) -> None:
+        code = "" if cause == UNKNOWN else cause.code
+        self._stream.publish(StateChanged(before, after, reason, code, cause.subject))

@@ -1,6 +1,6 @@
-"""The steps a plan is made of. A plan is a generator: it yields steps and is sent what came of them.
+"""Steps of a plan and their outcomes.
 
-A step says what the bench does, not how; the same plan can be run, summarised or timed without a device.
+A plan is a generator: it yields steps and receives their outcomes. It can be run, summarised or timed without a device.
 """
 
 from collections.abc import Callable, Generator
@@ -10,23 +10,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.analysis.cycles import Cycle
-from bench.control.calibration import DriveCalibration
-from bench.control.legs import Leg
+from bench.control.oscillator import DriveCalibration, Leg
 from bench.events import Event
-from bench.guard.violation import Violation
-from drivers.rig import Channel, Counts, Handwork
+from bench.guard.limits import Violation
+from drivers.rig import Channel, Counts, OperatorTask
 from sim.specimen import Specimen
 
 
 @dataclass(frozen=True)
-class Handle:
-    """A person does something at the resting bench; `request` says what and why. Comes to nothing.
+class OperatorAction:
+    """Operator action at the resting bench, described by `request`. Returns `Done`.
 
-    `specimen` is what stands on the table afterwards. `amount` goes with the work, see `drivers.rig.Handwork`; absent:
-    what the label of the specimen's spring says, if it has one [N/m].
+    `specimen` is the specimen on the table afterwards. `amount` is that of the work, see `drivers.rig.OperatorTask`;
+    by default the nominal stiffness of the specimen's spring, if it has one [N/m].
     """
 
-    work: Handwork
+    work: OperatorTask
     specimen: Specimen
     request: str
     amount: float | None = None
@@ -34,10 +33,10 @@ class Handle:
 
 @dataclass(frozen=True)
 class Arm:
-    """Arm the rig with the output at zero, wait until the storeys are still, and take the zero of every signal.
+    """Arm the rig with the output at zero, wait until the storeys are still, and tare every signal.
 
-    Still: over `rest` seconds neither u1 nor the drift scatters by more than `still` [m]. After `patience` seconds the
-    zero is taken all the same, with a warning.
+    The storeys are still when neither u1 nor the drift scatters by more than `still` [m] over `rest` seconds. After
+    `patience` seconds the signals are tared regardless, with a warning.
     """
 
     rest: float
@@ -46,52 +45,55 @@ class Arm:
 
 
 @dataclass(frozen=True)
-class Listen:
-    """Take samples for `duration` seconds with the output at zero, on a rig that is not armed. Comes to `Heard`."""
+class AcquireAtRest:
+    """Acquire samples for `duration` seconds with the output at zero, on a rig that is not armed.
+
+    Returns `RestSamples`.
+    """
 
     duration: float
 
 
 @dataclass(frozen=True)
 class Calibrate:
-    """From now on the drive is divided by this gain."""
+    """Use this calibration of the drive from now on."""
 
     calibration: DriveCalibration
 
 
 @dataclass(frozen=True)
-class Follow:
-    """Drive along legs, from where the drive is. Comes to `Fallen` as soon as the block has fallen, else to `Done`."""
+class Sweep:
+    """Sweep along legs from the present sine. Returns `Fallen` as soon as the block has fallen, else `Done`."""
 
     legs: tuple[Leg, ...]
 
 
 @dataclass(frozen=True)
 class Dwell:
-    """Hold amplitude and frequency for `cycles` whole cycles. Comes to `Measured`, or to `Fallen`."""
+    """Hold amplitude and frequency for `cycles` full cycles. Returns `Measured`, or `Fallen`."""
 
     cycles: int
 
 
 @dataclass(frozen=True)
-class Trim:
-    """Go to `shares`, over one cycle: complex, of the asked amplitude, for the fundamental, the second harmonic and so
-    on, as `bench.control.oscillator` plays them. A `Follow` gives them up again.
+class SetHarmonics:
+    """Blend to `shares` over one cycle: complex shares of the set amplitude for the fundamental, second harmonic
+    and so on, as in `bench.control.oscillator`. A `Sweep` resets them.
     """
 
     shares: tuple[complex, ...]
 
 
 Watch = Callable[[NDArray[np.float64]], Event | None]
-"""Is shown the signals of each block while a drive is played, shape (n, n_signals); what it returns is published."""
+"""Function of the signals of each block, shape (n, n_signals); the engine publishes the event that it returns."""
 
 
 @dataclass(frozen=True, eq=False)
 class Play:
-    """Play prepared `volts`, shape (n,), one per sample, from a drive at zero to a drive at zero, on an armed rig.
+    """Play prepared `volts`, shape (n,), one per sample, zero at both ends, on an armed rig at zero drive.
 
-    `watch` is shown every block of signals while it is played, counted from the first sample of `volts`. Comes to
-    `Played`, or to `Fallen` as soon as the block has fallen: the drive runs on until the plan ramps it out.
+    `watch` receives every block of signals, from the first sample of `volts` on. Returns `Played`, or `Fallen` as soon
+    as the block has fallen: the drive then continues until the plan ramps it out.
     """
 
     volts: NDArray[np.float64]
@@ -100,22 +102,22 @@ class Play:
 
 @dataclass(frozen=True)
 class RampOut:
-    """End the test: smooth ramp to zero, or the fast one; the rig is stopped afterwards.
+    """End the test: ramp to zero, smoothly or fast, then stop the rig.
 
-    Comes to `Fallen` when the block fell on the way, else to `Done`.
+    Returns `Fallen` when the block fell during the ramp, else `Done`.
     """
 
     fast: bool = False
 
 
 @dataclass(frozen=True)
-class Say:
+class Publish:
     """Publish an event; its time is set by the engine."""
 
     event: Event
 
 
-Step = Handle | Arm | Listen | Calibrate | Follow | Dwell | Trim | Play | RampOut | Say
+Step = OperatorAction | Arm | AcquireAtRest | Calibrate | Sweep | Dwell | SetHarmonics | Play | RampOut | Publish
 
 
 @dataclass(frozen=True)
@@ -125,9 +127,9 @@ class Done:
 
 @dataclass(frozen=True, eq=False)
 class Fallen:
-    """The block has fallen; the drive still runs until the plan ramps it out.
+    """The block has fallen; the drive continues until the plan ramps it out.
 
-    Of a `Play`: `signals`, shape (n, n_signals), are those until then, as `Played` has them.
+    For a `Play`, `signals`, shape (n, n_signals), are those until then, as in `Played`.
     """
 
     signals: NDArray[np.float64] | None = None
@@ -135,10 +137,10 @@ class Fallen:
 
 @dataclass(frozen=True, eq=False)
 class Played:
-    """What a played drive did: `signals`, shape (n, n_signals), as `bench.analysis.signals` numbers them, and the drive
-    [V] that really went out, shape (n,). Row i was taken while sample i of the volts was played; n is their number.
+    """Result of a played drive of n samples: `signals`, shape (n, n_signals), in the order of `bench.analysis.signals`,
+    and `drive` as sent [V], shape (n,). Row i was sampled while sample i of the volts was played.
 
-    Values that a sensor did not give are NaN.
+    Missing values of a sensor are NaN.
     """
 
     signals: NDArray[np.float64]
@@ -147,16 +149,16 @@ class Played:
 
 @dataclass(frozen=True)
 class Measured:
-    """The cycles of a dwell, in order; fewer than asked where samples were missing."""
+    """Cycles of a dwell, in order; fewer than requested where samples were missing."""
 
     cycles: tuple[Cycle, ...]
 
 
 @dataclass(frozen=True)
-class Heard:
-    """What all inputs gave with the output at zero: counts of shape (n, n_channels).
+class RestSamples:
+    """Counts of all inputs with the output at zero, shape (n, n_channels).
 
-    `violation` is what the guard found wrong, if it did: the listening ended there, and with it nothing else.
+    `violation` is the limit that ended the acquisition, if one did; the plan continues.
     """
 
     channels: tuple[Channel, ...]
@@ -164,6 +166,6 @@ class Heard:
     violation: Violation | None
 
 
-Outcome = Done | Fallen | Measured | Played | Heard
+Outcome = Done | Fallen | Measured | Played | RestSamples
 Plan = Generator[Step, Outcome, object]
-"""Steps in order; what it returns is kept by the engine."""
+"""Steps in order; the engine keeps the returned value."""

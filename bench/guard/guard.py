@@ -1,8 +1,8 @@
-"""The one way to the shaker.
+"""The only path to the shaker.
 
-The guard owns the rig's output. It refuses commands beyond the limits, watches the measured motion in the
-acquisition loop itself, and knows the three ways to end: *stop* (smooth ramp), *abort* (fast ramp), *halt* (enable
-line cut now). Once a ramp has begun nothing can raise the output again until the guard is armed anew.
+The guard owns the rig's output. It refuses commands beyond the limits, checks the measured motion within the
+acquisition loop, and ends a run in three ways: *stop* (smooth ramp), *abort* (fast ramp), *halt* (enable line cut
+now). Once a ramp has begun, nothing can raise the output until the guard is armed again.
 """
 
 from collections.abc import Sequence
@@ -12,12 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.analysis.signals import DRIFT, SIGNALS, SignalMap
-from bench.guard.health import SensorWatch
-from bench.guard.limits import Limits, Ramps, ramp_refusal
-from bench.guard.quantities import Mover
-from bench.guard.timing import TimeWatch
-from bench.guard.violation import Violation
-from bench.guard.watch import ChannelLimit, MotionWatch
+from bench.guard.conversion import Conversion
+from bench.guard.limits import Limits, Ramps, Violation, ramp_refusal
+from bench.guard.motion import ChannelLimit, MotionWatch
+from bench.guard.sensors import SensorWatch, TimeWatch
+from bench.guard.shaker import ShakerModel
 from drivers.errors import SafetyInputOpen
 from drivers.further import FurtherChannel
 from drivers.rig import Block, Rig, RigError
@@ -26,13 +25,13 @@ from sim.errors import InvalidInput
 
 @dataclass(frozen=True)
 class Exchange:
-    """One turn of the acquisition loop.
+    """One iteration of the acquisition loop.
 
-    `values` are the block's counts in units, shape (n, n_channels), and `signals` what they say of the experiment,
-    shape (n, n_signals), none without a map; `drive` [V], shape (n,), is what was played while they were taken;
-    `violation` is the limit that was exceeded first, if one was, `runaway` the first of those that say that the table
-    itself moves too much, and `warnings` are those that the motion has come near for the first time since arming.
-    `opened` names the safety inputs that are not good: the enable line is cut then.
+    `values` are the block's channel values in their units, shape (n, n_channels), `signals` those of the experiment,
+    shape (n, n_signals; 0 without a signal map), and `drive` [V], shape (n,), the samples played meanwhile. `violation`
+    is the first limit exceeded, if any, and `runaway` the first of the table itself. `warnings` are the limits whose
+    warning level was reached for the first time since arming. `opened` names the open safety inputs; the enable line
+    is then cut.
     """
 
     block: Block
@@ -46,10 +45,10 @@ class Exchange:
 
 
 class Guard:
-    """Stands between the engine and the rig.
+    """Checks commands and measured samples between the engine and the rig.
 
-    With a `mover`, a force and a current that no channel measures are estimated from the motion. With `signals`, every
-    block is turned into signals, once, and the drift among them is watched, and `further` channels that have a limit.
+    A `shaker` model estimates force and current from the motion where no channel measures them. `signals` converts each
+    block into signals, once; the guard then checks the drift, and `further` channels that have a limit.
     """
 
     def __init__(
@@ -57,18 +56,19 @@ class Guard:
         rig: Rig,
         limits: Limits,
         ramps: Ramps,
-        mover: Mover | None = None,
+        shaker: ShakerModel | None = None,
         signals: SignalMap | None = None,
         further: Sequence[FurtherChannel] = (),
     ) -> None:
         self._rig = rig
         self._limits = limits
         self._ramps = ramps
-        self._mover = mover
+        self._shaker = shaker
         self._signals = signals
         self._further = () if signals is None else _limits_of(signals, further)
         self._first_block = True
         self._channels = rig.channels
+        self._conversion = Conversion(rig.channels)
         self._waiting = np.zeros(0)
         self._command = self._sent = 0.0
         self._held: float | None = None
@@ -83,16 +83,16 @@ class Guard:
 
     @property
     def ramping(self) -> bool:
-        """Whether the output is being brought to zero."""
+        """Whether the output is being ramped to zero."""
         return self._ramp_samples is not None
 
     @property
     def at_zero(self) -> bool:
-        """Whether a ramp has ended and every sample that still waits in the rig is zero."""
+        """Whether a ramp has ended and every sample queued in the rig is zero."""
         return self.ramping and self._gain(0) == 0.0 and not self._waiting.any()
 
     def arm(self) -> None:
-        """Arm the rig with zeros waiting ahead of the first sample. Raises RigError while a safety input is open."""
+        """Arm the rig with zeros queued. Raises RigError while a safety input is open."""
         if opened := self._opened():
             raise SafetyInputOpen(f"arming is refused: {', '.join(opened)} open; close it, then begin again", opened)
         self._ramp_samples, self._ramp_done, self._ramp_from = None, 0, 1.0
@@ -106,7 +106,7 @@ class Guard:
     def exchange(self, volts: NDArray[np.float64]) -> Exchange:
         """Send a block of commands [V] and read as many samples.
 
-        A command beyond the limits is not sent, nor any after it: the last good value is held and brought to zero
+        From the first command beyond the limits on, none is sent: the last valid value is held and ramped to zero
         along the fast ramp.
         """
         refused = self.refusal(volts) if self._held is None else None
@@ -121,14 +121,15 @@ class Guard:
         queue = np.concatenate((self._waiting, sent))
         block = self._rig.read(volts.size)
         if block.first != self._expected or len(block) != volts.size:
-            came = f"{len(block)} from {block.first} on came where {volts.size} from {self._expected} on were due"
-            raise RigError(f"samples are missing: {came}")
+            expected = f"{self._expected}-{self._expected + volts.size - 1}"
+            received = f"{block.first}-{block.first + len(block) - 1}" if len(block) else "none"
+            raise RigError(f"samples are missing: expected {expected}, received {received}")
         self._expected += len(block)
         played, self._waiting = queue[: volts.size], queue[volts.size :]
-        values = self._values(block)
+        values, extremes = self._conversion.of(block.counts)
         signals = self._signals_of(values)
-        exceeded, near = self._motion.check(block.first, values, signals)
-        exceeded += self._sensors.check(block.first, block.counts, values, played)
+        exceeded, near = self._motion.check(block.first, values, signals, extremes)
+        exceeded += self._sensors.check(block.first, block.counts, values, played, extremes)
         exceeded += self._time.check(self._rig.clock.now(), self._expected)
         exceeded.sort(key=lambda violation: violation.sample)
         seen = exceeded[0] if exceeded else None
@@ -141,7 +142,9 @@ class Guard:
         return Exchange(block, values, signals, played, refused or seen, tuple(near), opened, runaway)
 
     def refusal(self, volts: NDArray[np.float64]) -> Violation | None:
-        """Why commands [V] of shape (n,), sent now, would not be sent to their end; None when they would."""
+        """Limit that commands [V], shape (n,), would exceed if sent now, or None."""
+        if self._acceptable(volts):
+            return None
         if not np.isfinite(volts).all():
             return Violation("drive command", float("nan"), self._limits.drive_voltage, "V", 0)
         peak = float(np.max(np.abs(volts)))
@@ -154,28 +157,36 @@ class Guard:
             return Violation("drive slew", float(change[at]) * rate, self._limits.drive_slew, "V/s", at)
         return None
 
-    def tare(self, values: NDArray[np.float64], *, drift: bool = True) -> None:
-        """Take a rest, values of shape (n, n_channels), as the zero of every signal.
+    def _acceptable(self, volts: NDArray[np.float64]) -> bool:
+        """Whether commands are within the limits; False if one is not finite, as a comparison with NaN is."""
+        largest, first = self._limits.drive_voltage, abs(float(volts[0]) - self._command)
+        if not (volts.max() <= largest and volts.min() >= -largest and first <= self._slew):
+            return False
+        change = volts[1:] - volts[:-1]
+        return not change.size or bool(change.max() <= self._slew and change.min() >= -self._slew)
 
-        From then on the drift is watched, unless it has no zero or is not `drift`: a laser may look elsewhere.
+    def tare(self, values: NDArray[np.float64], *, drift: bool = True) -> None:
+        """Take the mean of values at rest, shape (n, n_channels), as the zero of every signal.
+
+        The drift is checked from then on, unless it has no zero or `drift` is False: a laser may be aimed elsewhere.
         """
         if self._signals is not None:
             self._signals.tare(values)
             self._motion.drift_watched = drift and bool(self._signals.taken[DRIFT])
 
     def stop(self) -> None:
-        """Begin the smooth ramp to zero; a ramp that has begun goes on."""
+        """Begin the smooth ramp to zero; a ramp in progress continues."""
         if not self.ramping:
             self._begin(self._ramps.stop)
 
     def abort(self) -> None:
-        """Begin the fast ramp to zero; a slower ramp that has begun goes on from its value as a fast one."""
+        """Begin the fast ramp to zero, from the present value of a slower one."""
         fast = max(round(self._ramps.abort * self._rig.sample_rate), 1)
         if self._ramp_samples is None or self._ramp_samples - self._ramp_done > fast:
             self._begin(self._ramps.abort)
 
     def halt(self) -> None:
-        """Cut the enable line now; a rig that fails to is stopped instead. Raises RigError that says so."""
+        """Cut the enable line now. Raises RigError if that fails, after stopping the rig instead."""
         try:
             self._rig.halt()
         except RigError as error:
@@ -188,7 +199,7 @@ class Guard:
             raise RigError(f"{failed}, the output was stopped: switch the amplifier off") from error
 
     def disarm(self) -> None:
-        """Stop the rig; its output is at zero afterwards."""
+        """Stop the rig and bring its output to zero."""
         self._rig.stop()
 
     def _cut_because(self, opened: tuple[str, ...]) -> None:
@@ -202,7 +213,7 @@ class Guard:
 
     def _make_watches(self) -> None:
         rate = self._rig.sample_rate
-        self._motion = MotionWatch(self._channels, rate, self._limits, self._mover, self._further)
+        self._motion = MotionWatch(self._channels, rate, self._limits, self._shaker, self._further)
         self._sensors = SensorWatch(self._channels, rate, self._limits)
         self._time = TimeWatch(rate, self._limits)
 
@@ -226,7 +237,7 @@ class Guard:
         return volts
 
     def _slewed(self, volts: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Follows `volts` no faster than the limit: a command may slew by all of it, and the ramp adds its own."""
+        """`volts` with the slew limited: a command may use all of the limit, and the ramp adds its own slew."""
         if np.abs(np.diff(volts, prepend=self._sent)).max() <= self._slew:
             return volts
         slowed, last = np.empty_like(volts), self._sent
@@ -239,20 +250,14 @@ class Guard:
         if self._signals is None:
             return np.empty((len(values), 0))
         if self._first_block:
-            # the table is silent: near enough until a rest has been waited for
+            # the drive is zero: an approximate zero until the storeys are at rest
             self._signals.tare(values)
             self._first_block = False
         return self._signals.of(values)
 
-    def _values(self, block: Block) -> NDArray[np.float64]:
-        values = np.empty(block.counts.shape, order="F")
-        for column, channel in enumerate(self._channels):
-            values[:, column] = channel.to_unit(block.counts[:, column])
-        return values
-
 
 def _limits_of(signals: SignalMap, further: Sequence[FurtherChannel]) -> tuple[ChannelLimit, ...]:
-    """The limits of the channels that have one and are there; raises InvalidInput where one is not."""
+    """Limits of further channels. Raises InvalidInput for a channel that the rig lacks."""
     columns = {each.name: len(SIGNALS) + k for k, each in enumerate(signals.further)}
     found: list[ChannelLimit] = []
     for each in further:

@@ -1,15 +1,18 @@
-"""What the table, the shaker and the specimen may do at most, and what is expected of the sensors."""
+"""Limits of table, shaker, specimen and sensors, their debounce, and the ramps that bring the output to zero."""
 
+from dataclasses import dataclass
 from math import pi
 from typing import Literal
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import model_validator
 
 from sim.errors import InvalidInput
 from sim.parameters import Parameters, quantity
 
 _SHARE = "share of the limit from which the operator is warned"
-_PERSISTENCE = "how long the limit must be exceeded before it counts"
+_PERSISTENCE = "time for which the limit must be exceeded before it trips"
 
 
 DEBOUNCE = (1e-3, 0.05)
@@ -17,7 +20,7 @@ DEBOUNCE = (1e-3, 0.05)
 
 
 class Warnings(Parameters):
-    """From which share of a limit the operator is warned, once in a run."""
+    """Share of each limit from which the operator is warned, once per run."""
 
     displacement: float = quantity(0.9, "1", f"displacement of the table: {_SHARE}", gt=0, le=1)
     velocity: float = quantity(0.9, "1", f"velocity of the table: {_SHARE}", gt=0, le=1)
@@ -25,12 +28,12 @@ class Warnings(Parameters):
     force: float = quantity(0.9, "1", f"force on the table: {_SHARE}", gt=0, le=1)
     current: float = quantity(0.9, "1", f"current of the coil: {_SHARE}", gt=0, le=1)
     heating: float = quantity(0.8, "1", f"heating of the coil: {_SHARE}", gt=0, le=1)
-    laser_range: float = quantity(0.95, "1", f"place in the laser's range: {_SHARE}", gt=0, le=1)
+    laser_range: float = quantity(0.95, "1", f"position in the laser's range: {_SHARE}", gt=0, le=1)
     drift: float = quantity(0.9, "1", f"drift of the specimen: {_SHARE}", gt=0, le=1)
 
 
 class Debounce(Parameters):
-    """How long a measured limit must be exceeded before it counts: single spikes are noise."""
+    """Time for which a measured limit must be exceeded before it trips, so that single spikes are ignored."""
 
     displacement: float = quantity(0.003, "s", f"displacement of the table: {_PERSISTENCE}", ge=0, usual=DEBOUNCE)
     velocity: float = quantity(0.003, "s", f"velocity of the table: {_PERSISTENCE}", ge=0, usual=DEBOUNCE)
@@ -38,7 +41,7 @@ class Debounce(Parameters):
     force: float = quantity(0.003, "s", f"force on the table: {_PERSISTENCE}", ge=0, usual=DEBOUNCE)
     current: float = quantity(0.01, "s", f"current of the coil: {_PERSISTENCE}", ge=0, usual=DEBOUNCE)
     heating: float = quantity(0.0, "s", f"heating of the coil: {_PERSISTENCE}", ge=0, usual=(1e-3, 5.0))
-    laser_range: float = quantity(0.01, "s", f"place in the laser's range: {_PERSISTENCE}", ge=0, usual=DEBOUNCE)
+    laser_range: float = quantity(0.01, "s", f"position in the laser's range: {_PERSISTENCE}", ge=0, usual=DEBOUNCE)
     drift: float = quantity(0.01, "s", f"drift of the specimen: {_PERSISTENCE}", ge=0, usual=DEBOUNCE)
 
 
@@ -59,7 +62,7 @@ Confirmable = Literal[
 
 
 class Limits(Parameters):
-    """Levels at which the guard aborts a run. Magnitudes, in SI units."""
+    """Levels at which the guard aborts a run, as magnitudes in SI units."""
 
     drive_voltage: float = quantity(8.0, "V", "largest command to the amplifier", gt=0, le=10)
     drive_slew: float = quantity(400.0, "V/s", "fastest change of the command", gt=0)
@@ -70,26 +73,32 @@ class Limits(Parameters):
     current: float = quantity(16.0, "A", "largest current of the coil, measured or estimated", gt=0)
     heating: float = quantity(9.0, "A", "largest root mean square current of the coil over heating_time", gt=0)
     heating_time: float = quantity(60.0, "s", "time constant of the coil's temperature", gt=0)
-    laser_range: float = quantity(0.99, "1", "share of half its range that a storey may leave the laser's middle", gt=0)
+    laser_range: float = quantity(
+        0.99, "1", "largest distance of a storey from the laser's mid-range, relative to half the range", gt=0
+    )
     drift: float = quantity(0.080, "m", "largest drift of the specimen from rest", gt=0)
-    sensor_loss: float = quantity(0.5, "s", "how long a sensor may give no valid sample before the run aborts", gt=0)
-    stuck: float = quantity(1.0, "s", "how long a sensor may show the same count while the table is driven", gt=0)
-    late: float = quantity(0.5, "s", "how much later than due a block of samples may come", gt=0)
+    sensor_loss: float = quantity(0.5, "s", "time without a valid sample of a sensor before the run aborts", gt=0)
+    stuck: float = quantity(
+        1.0, "s", "time for which a sensor may give a constant count while the table is driven", gt=0
+    )
+    late: float = quantity(0.5, "s", "largest delay of a block of samples", gt=0)
     clock: float = quantity(
         1.0e-3, "1", "largest relative difference between the sample clock and the computer's clock", gt=0
     )
     confirmed: tuple[Confirmable, ...] = quantity(
-        (), "", "limits that are meant to lie beyond what this bench can show, by their keys: every run says so"
+        (), "", "keys of limits intentionally set beyond the range of this bench; every run reports them"
     )
     warning: Warnings = Warnings()
     debounce: Debounce = Debounce()
 
 
 class Ramps(Parameters):
-    """How the output is brought to zero."""
+    """Lengths of the ramps to zero."""
 
-    stop: float = quantity(4.0, "s", "length of the smooth ramp that ends a good run", ge=0.05, le=60)
-    abort: float = quantity(0.5, "s", "length of the fast ramp that ends a bad run", ge=0.05, le=10)
+    stop: float = quantity(
+        4.0, "s", "length of the smooth ramp, for a stop or the normal end of a test", ge=0.05, le=60
+    )
+    abort: float = quantity(0.5, "s", "length of the fast ramp, for an abort", ge=0.05, le=10)
 
     @model_validator(mode="after")
     def _abort_is_the_fast_one(self) -> "Ramps":
@@ -99,7 +108,7 @@ class Ramps(Parameters):
 
 
 def ramp_refusal(limits: Limits, ramps: Ramps) -> InvalidInput | None:
-    """Why the output could not be brought to zero in time from its limit, or None: half a cosine has its own slew."""
+    """Refusal of ramps that exceed the slew limit from the largest drive, or None. A ramp is half a cosine."""
     shortest = min(ramps.stop, ramps.abort)
     steepest = 0.5 * pi * limits.drive_voltage / shortest
     if steepest <= limits.drive_slew:
@@ -107,3 +116,49 @@ def ramp_refusal(limits: Limits, ramps: Ramps) -> InvalidInput | None:
     slew = f"limits.drive_slew = {limits.drive_slew:g} V/s"
     needs = f"a ramp from {limits.drive_voltage:g} V needs {steepest:.0f} V/s, {slew} allows less"
     return InvalidInput("ramps.abort", shortest, needs)
+
+
+@dataclass(frozen=True)
+class Violation:
+    """Exceeded limit: `quantity` reached `value` beyond `limit`, in `unit`, at this sample index since arming.
+
+    `of_table`: the limit concerns motion or load of the table, not a sensor, a clock or the specimen.
+    `timing`: the limit concerns the arrival time of blocks, which is not in the samples.
+    """
+
+    quantity: str
+    value: float
+    limit: float
+    unit: str
+    sample: int
+    of_table: bool = False
+    timing: bool = False
+
+    def __str__(self) -> str:
+        return f"{self.quantity} {self.value:.4g} {self.unit} exceeds {self.limit:.4g} {self.unit}"
+
+
+class Persistence:
+    """Counter that rises by one with each bad sample and falls by one with each good one, never below zero.
+
+    An interrupted condition still reaches the limit; a single spike does not.
+    """
+
+    def __init__(self, samples: int) -> None:
+        self._needed = max(samples, 1)
+        self._level = 0
+
+    @property
+    def counting(self) -> bool:
+        """Whether the count is above zero."""
+        return self._level > 0
+
+    def first(self, bad: NDArray[np.bool_]) -> int | None:
+        """Index of the sample at which the count reaches the limit, or None."""
+        if self._level == 0 and not bad.any():
+            return None
+        walk = self._level + np.cumsum(np.where(bad, 1, -1))
+        level = walk - np.minimum(np.minimum.accumulate(walk), 0)
+        self._level = min(int(level[-1]), self._needed)
+        reached = np.flatnonzero(level >= self._needed)
+        return int(reached[0]) if reached.size else None

@@ -1,87 +1,140 @@
-"""What the guard watches, made from the channels: motion of the table, load of the shaker, specimen."""
+"""Magnitudes of the limited quantities of table motion, shaker load and lasers, block by block."""
 
-from dataclasses import dataclass
+from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.analysis.signals import LASERS
+from bench.guard.conversion import Extremes
+from bench.guard.shaker import ShakerModel, exponential_mean
 from drivers.rig import Channel
+from sim.channel import COIL_CURRENT, STOREYS, TABLE_ACCELERATION, TABLE_DISPLACEMENT, TABLE_FORCE
 
 Array = NDArray[np.float64]
 
 VELOCITY_WINDOW = 0.02
-"""Time over which the table's velocity is differenced [s]: long against the noise, short against the motion."""
+"""Interval of the velocity's difference quotient [s]: long compared with the noise, short compared with the motion."""
 
-NAMES = {
-    "displacement": ("table displacement", "m"),
-    "velocity": ("table velocity", "m/s"),
-    "acceleration": ("table acceleration", "m/s2"),
-    "force": ("force on the table", "N"),
-    "current": ("coil current", "A"),
-    "heating": ("coil heating", "A"),
-    "laser_range": ("share of the laser's range", "1"),
-    "drift": ("drift", "m"),
-}
-"""Every watched quantity: its name for people, and its unit."""
+MOST_SKIPPED = 4000
+"""Number of skipped samples after which the heating is updated."""
+
+ROUNDING = 1e-9
+"""Allowance for rounding errors of a mean over this number of samples."""
 
 
-@dataclass(frozen=True)
-class Mover:
-    """What is known of the shaker: enough to estimate force and current where no channel measures them.
+class WatchedQuantities:
+    """Converts blocks of channel values into magnitudes of the limited quantities.
 
-    `mass` is everything that moves with the table, specimen included [kg], `stiffness` that of the suspension [N/m],
-    and `force_constant` that of the coil [N/A].
-    """
+    A missing value of a table channel counts as infinite: its converter is saturated. A missing value of a laser is
+    ignored here: `bench.guard.sensors` checks the loss of a sensor.
 
-    mass: float
-    stiffness: float
-    force_constant: float
-
-
-class Quantities:
-    """Turns blocks of channel values into the magnitudes of what is watched.
-
-    A table channel without a value counts as infinite: a converter at its rail says nothing but "more". A laser
-    without a value says nothing here: the loss of a sensor is watched apart.
+    A block is either converted by `of` or skipped: `bounds` returns upper bounds of its magnitudes, and `skip` stores
+    the state required by later blocks.
     """
 
     def __init__(
-        self, channels: tuple[Channel, ...], sample_rate: float, heating_time: float, mover: Mover | None
+        self, channels: tuple[Channel, ...], sample_rate: float, heating_time: float, shaker: ShakerModel | None
     ) -> None:
         self._columns = {channel.name: column for column, channel in enumerate(channels)}
-        self._mover = mover
+        self._shaker = shaker
         self._span = max(round(VELOCITY_WINDOW * sample_rate), 1)
         self._span_time = self._span / sample_rate
-        self._tail = np.zeros(0)
+        self._tail = self._long = np.zeros(0)
         self._forget = float(np.exp(-1.0 / (heating_time * sample_rate)))
-        self._heat = np.zeros(1)
-        self._middle = {name: _middle(channels[column]) for name, column in self._columns.items() if name in LASERS}
+        # the compiled function is loaded here, not while the table moves
+        self._heat = exponential_mean(np.zeros(1), self._forget)[1]
+        self._skipped: list[Array] = []
+        self._skipped_samples, self._skipped_current = 0, 0.0
+        self._places = [(k, *_middle(channels[k])) for name, k in self._columns.items() if name in STOREYS]
 
     def of(self, values: Array) -> dict[str, Array]:
-        """Magnitude of each quantity that the channels tell, shape (n,), by its key in `NAMES`."""
+        """Magnitude of each measured or estimated quantity, shape (n,), by its key in `WATCHED`."""
+        self._catch_up()
         found: dict[str, Array] = {}
-        x, a = self._column(values, "table_displacement"), self._column(values, "table_acceleration")
+        x, a = self._column(values, TABLE_DISPLACEMENT), self._column(values, TABLE_ACCELERATION)
         if x is not None:
             found["displacement"] = _magnitude(x)
             found["velocity"] = _magnitude(self._velocity(x))
         if a is not None:
             found["acceleration"] = _magnitude(a)
-        self._add_load(found, values, x, a)
+        self._add_load(found, values)
         if (place := self._laser_place(values)) is not None:
             found["laser_range"] = place
         return found
 
-    def _add_load(self, found: dict[str, Array], values: Array, x: Array | None, a: Array | None) -> None:
-        force, current = self._column(values, "table_force"), self._column(values, "coil_current")
-        if self._mover is not None and a is not None:
-            m = self._mover
-            needed = m.mass * np.nan_to_num(a)
+    def bounds(self, values: Array, extremes: Extremes) -> dict[str, float]:
+        """Upper bound of each magnitude that `of` would return for a block without missing samples.
+
+        Every rounded operation is monotonic, so that the bounds equal the largest magnitudes bit for bit; only current
+        and heating may be below their bounds.
+        """
+        found: dict[str, float] = {}
+        columns, shaker = self._columns, self._shaker
+        x, a = columns.get(TABLE_DISPLACEMENT), columns.get(TABLE_ACCELERATION)
+        force, current = columns.get(TABLE_FORCE), columns.get(COIL_CURRENT)
+        displaced, accelerated = 0.0, 0.0
+        if x is not None:
+            found["displacement"] = displaced = extremes.magnitude(x)
+            self._long = np.concatenate((self._tail, values[:, x]))
+            change = self._long[self._span :] - self._long[: -self._span]
+            found["velocity"] = largest(change) / self._span_time if change.size else 0.0
+        if a is not None:
+            found["acceleration"] = accelerated = extremes.magnitude(a)
+        if force is not None:
+            found["force"] = extremes.magnitude(force)
+        elif shaker is not None and a is not None:
+            found["force"] = shaker.largest_force(accelerated)
+        if current is not None:
+            found["current"] = extremes.magnitude(current)
+        elif shaker is not None and a is not None:
+            found["current"] = shaker.largest_current(accelerated, displaced)
+        if "current" in found:
+            found["heating"] = self._largest_heating(found["current"])
+        if self._places:
+            found["laser_range"] = max(
+                [max(middle - extremes.low[k], extremes.high[k] - middle) / half for k, middle, half in self._places]
+            )
+        return found
+
+    def skip(self, values: Array, bounds: dict[str, float]) -> None:
+        """Skip a block without missing samples with these `bounds`."""
+        self._tail = self._long[-self._span :]
+        if "current" in bounds:
+            self._skipped.append(values)
+            self._skipped_samples += len(values)
+            self._skipped_current = max(self._skipped_current, bounds["current"])
+            if self._skipped_samples > MOST_SKIPPED:
+                self._catch_up()
+
+    def _largest_heating(self, current: float) -> float:
+        """Upper bound of the heating up to the end of a block of this largest `current` [A]: a mean lies between its
+        start and the largest square since.
+        """
+        before = float(self._heat[0]) / self._forget if self._forget > 0.0 else 0.0
+        return sqrt(max(before, self._skipped_current**2, current**2) * (1.0 + ROUNDING))
+
+    def _catch_up(self) -> None:
+        """Update the heating for the skipped blocks."""
+        if self._skipped:
+            values = np.concatenate(self._skipped)
+            self._skipped, self._skipped_samples, self._skipped_current = [], 0, 0.0
+            if (current := self._load(values)[1]) is not None:
+                self._heating(np.nan_to_num(current))
+
+    def _load(self, values: Array) -> tuple[Array | None, Array | None]:
+        """Force [N] and current [A], measured or estimated; None where neither is possible."""
+        x, a = self._column(values, TABLE_DISPLACEMENT), self._column(values, TABLE_ACCELERATION)
+        force, current = self._column(values, TABLE_FORCE), self._column(values, COIL_CURRENT)
+        if (shaker := self._shaker) is not None and a is not None:
+            known = np.nan_to_num(a)
             if force is None:
-                force = needed
+                force = shaker.force(known)
             if current is None:
-                springs = 0.0 if x is None else m.stiffness * np.nan_to_num(x)
-                current = (needed + springs) / m.force_constant
+                current = shaker.current(known, np.zeros(known.size) if x is None else np.nan_to_num(x))
+        return force, current
+
+    def _add_load(self, found: dict[str, Array], values: Array) -> None:
+        force, current = self._load(values)
         if force is not None:
             found["force"] = _magnitude(force)
         if current is not None:
@@ -89,11 +142,9 @@ class Quantities:
             found["heating"] = self._heating(np.nan_to_num(current))
 
     def _heating(self, current: Array) -> Array:
-        """Root of the square current's exponential mean: what the coil's temperature follows."""
-        from scipy import signal
-
-        mean, self._heat = signal.lfilter([1.0 - self._forget], [1.0, -self._forget], current**2, zi=self._heat)
-        return np.sqrt(np.asarray(mean))
+        """Root of the exponential mean of the squared current [A], a measure of the coil's temperature."""
+        mean, self._heat = exponential_mean(current**2, self._forget, self._heat)
+        return np.sqrt(mean)
 
     def _velocity(self, x: Array) -> Array:
         long = filled(np.concatenate((self._tail, x)))
@@ -105,10 +156,7 @@ class Quantities:
         return speed
 
     def _laser_place(self, values: Array) -> Array | None:
-        places = [
-            np.abs(np.nan_to_num((values[:, self._columns[name]] - middle) / half))
-            for name, (middle, half) in self._middle.items()
-        ]
+        places = [np.abs(np.nan_to_num((values[:, k] - middle) / half)) for k, middle, half in self._places]
         return np.maximum.reduce(places) if places else None
 
     def _column(self, values: Array, name: str) -> Array | None:
@@ -117,7 +165,7 @@ class Quantities:
 
 
 def filled(x: Array) -> Array:
-    """Missing samples take the value of the last valid one."""
+    """`x` with missing samples replaced by the last valid one."""
     missing = np.isnan(x)
     if not missing.any():
         return x
@@ -132,3 +180,8 @@ def _magnitude(x: Array) -> Array:
 def _middle(channel: Channel) -> tuple[float, float]:
     low, high = channel.limits
     return 0.5 * (low + high), 0.5 * (high - low)
+
+
+def largest(x: Array) -> float:
+    """Largest magnitude of values of shape (n,), n > 0; NaN if one is missing."""
+    return max(-float(np.minimum.reduce(x)), float(np.maximum.reduce(x)))

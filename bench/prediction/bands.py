@@ -1,4 +1,4 @@
-"""The band within which a predicted alpha_2 lies, for what is left open of the specimen."""
+"""Uncertainty band of a predicted alpha_2 due to the uncertainty of the specimen."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,17 +8,20 @@ from numpy.typing import NDArray
 
 from bench.analysis.gain import COVERAGE
 from sim.ensemble import record_gains, steady_gains
+from sim.errors import InvalidInput
 from sim.excitation import SampledRecord
-from sim.knowledge import SpecimenKnowledge
+from sim.gain import Layer
+from sim.knowledge import SPRING, SpecimenKnowledge
+from sim.sensitivity import Sensitivity, budget, sensitivities
 from sim.specimen import Specimen
-from sim.steady import Orbit
+from sim.steady import NoOrbit, Orbit
 from sim.sweep import Done
 
 INTERVAL = (0.025, 0.975)
-"""Ends of a band that holds 95 % of the members of a Monte Carlo."""
+"""Percentiles that enclose 95 % of the members of a Monte Carlo."""
 
 SEED = 20260101
-"""Of the members: the same for every point, so that a band is as smooth as its curve."""
+"""Seed of the members: the same for every point, so that a band is as smooth as its curve."""
 
 Floats = NDArray[np.float64]
 
@@ -27,8 +30,8 @@ Floats = NDArray[np.float64]
 class Bands:
     """Bands of alpha_2 at n steady motions, arrays of shape (n,); NaN where none can be stated.
 
-    `uncertainty` is expanded (k = 2); `low` and `high` hold 95 %; `share` is the part of the members that have such a
-    motion at all, 1 to first order.
+    `uncertainty` is expanded (k = 2); `low` and `high` enclose 95 %; `share` is the fraction of the members that have
+    such a motion, 1 to first order.
     """
 
     uncertainty: Floats
@@ -44,18 +47,18 @@ def bands(
     members: int = 0,
     done: Done | None = None,
 ) -> Bands:
-    """The band around each `alpha_2`, shape (n,), of the motions `orbits`.
+    """Band around each `alpha_2`, shape (n,), of the motions `orbits`.
 
-    By a Monte Carlo with so many `members`, or with none to first order: along each independent direction the gain is
-    computed one standard uncertainty to either side (GUM 5.1.4, note 2), and the band is symmetric. Where a motion
-    exists on one side only, that side counts.
+    With `members` > 0, by a Monte Carlo with as many draws; otherwise to first order: the gain is computed one standard
+    uncertainty to either side along each independent direction (GUM 5.1.4, note 2), and the band is symmetric. Where a
+    motion exists on one side only, that side is used.
     """
     best = np.asarray(alpha_2, dtype=np.float64)
     of: dict[Specimen, list[Specimen]] = {}
     for orbit in orbits:
         if orbit.specimen not in of:
             of[orbit.specimen] = _members(orbit.specimen, known, members)
-    # what is exactly known of one spring may be open of another: as many members for all
+    # pad to equal numbers of members: a quantity may be exact for one spring and uncertain for another
     most = max(map(len, of.values()), default=0)
     own = [of[orbit.specimen] + [orbit.specimen] * (most - len(of[orbit.specimen])) for orbit in orbits]
     gains = steady_gains(orbits, own, done=done)[:, :, 1]
@@ -63,9 +66,9 @@ def bands(
 
 
 def record_bands(specimens: Sequence[Specimen], record: SampledRecord, known: SpecimenKnowledge, members: int) -> Bands:
-    """The band of alpha_2 of each of n `specimens` under `record`, from rest, by a Monte Carlo with so many `members`.
+    """Band of alpha_2 of each of n `specimens` under `record`, from rest, by a Monte Carlo with `members` draws.
 
-    First order says nothing here: who topples, and when impacts fall, does not change smoothly.
+    First order does not apply here: toppling and the times of impacts do not change smoothly.
     """
     drawn = [_members(specimen, known, members) for specimen in specimens]
     gains = record_gains([one for own in drawn for one in own], record)[:, 1]
@@ -81,7 +84,7 @@ def _members(specimen: Specimen, known: SpecimenKnowledge, members: int) -> list
 def _first_order(best: Floats, gains: Floats) -> Bands:
     sides = gains.reshape(len(best), gains.shape[1] // 2, 2) - best[:, None, None]
     lost = np.isnan(sides)
-    # of a side that is lost the other is the mirror image
+    # replace a missing side by the mirror image of the other
     one, other = (np.where(lost[:, :, k], -sides[:, :, 1 - k], sides[:, :, k]) for k in (0, 1))
     size = COVERAGE * np.sqrt(np.sum((0.5 * (one - other)) ** 2, axis=1))
     return Bands(size, np.maximum(best - size, 0.0), best + size, np.ones(best.size))
@@ -96,3 +99,29 @@ def _drawn(gains: Floats) -> Bands:
         size[some] = COVERAGE * np.nanstd(gains[some], axis=1, ddof=1)
         low[some], high[some] = np.nanquantile(gains[some], INTERVAL, axis=1)
     return Bands(size, low, high, share)
+
+
+def expanded_uncertainty(layer: Layer, known: SpecimenKnowledge) -> float | None:
+    """Expanded uncertainty (k = 2) of the predicted alpha_2 of a steady motion, to first order.
+
+    From the sensitivities of the steady motion and the covariance of its inputs. The uncertainty of a spring is that of
+    its k_C, so that beta = k_C / k1 is anticorrelated with k1. None where the motion cannot be differentiated.
+    """
+    orbit = layer.orbit
+    specimen = orbit.specimen
+    try:
+        slopes = sensitivities(specimen, orbit.omega, orbit.amplitude, orbit.layer, orbit)
+    except (NoOrbit, InvalidInput):
+        return None
+    beta, k1 = slopes["beta"], slopes["k1"]
+    each = {
+        **slopes,
+        "k1": Sensitivity(
+            k1.value,
+            alpha_1=k1.alpha_1 - beta.value / k1.value * beta.alpha_1,
+            alpha_2=k1.alpha_2 - beta.value / k1.value * beta.alpha_2,
+        ),
+        SPRING: Sensitivity(specimen.k_c, beta.alpha_1 / k1.value, beta.alpha_2 / k1.value),
+    }
+    sizes = {name: size * each[name].value for name, size in known.relative(specimen).items()}
+    return COVERAGE * budget(each, sizes, known.correlations(specimen)).alpha_2

@@ -1,4 +1,4 @@
-"""Predictions as files and as plain data: CSV, HDF5, JSON."""
+"""Output of predictions as CSV, HDF5 or JSON data."""
 
 import csv
 import json
@@ -8,9 +8,10 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from bench.datafile.tables import Table
+from bench.inert import csv_cell
 from bench.provenance import software
-from bench.record.tables import Table
-from bench.report.files import write_new
+from bench.unfinished import write_new
 from sim.knowledge import SpecimenKnowledge
 from sim.parameters import Parameters
 from sim.specimen import Specimen
@@ -19,7 +20,7 @@ FORMAT, FORMAT_VERSION = "rocking-bench prediction", 1
 
 
 def provenance(request: Parameters, specimen: Specimen, known: SpecimenKnowledge | None = None) -> dict[str, Any]:
-    """What a prediction was computed from and with; `known` where it says how far it may be off."""
+    """Inputs and software of a prediction, with the knowledge of the specimen if it states an uncertainty."""
     found = {"request": request.model_dump(mode="json"), "specimen": specimen.model_dump(mode="json")}
     if known is not None:
         found["known"] = known.model_dump(mode="json")
@@ -27,23 +28,23 @@ def provenance(request: Parameters, specimen: Specimen, known: SpecimenKnowledge
 
 
 def rows_of(table: Table) -> list[dict[str, Any]]:
-    """One dictionary per row: numbers, truth values, texts; None where a value is absent (NaN)."""
+    """One dictionary per row: numbers, Booleans, strings; None where a value is absent (NaN)."""
     columns = [plain(column.values) for column in table.values()]
     return [dict(zip(table, row, strict=True)) for row in zip(*columns, strict=True)]
 
 
 def plain(values: NDArray[Any]) -> list[Any]:
-    """The values of an array, shape (n,), as Python's own; None where one is absent (NaN)."""
+    """Values of an array, shape (n,), as Python objects; None where a value is absent (NaN)."""
     # NaN is the one value that differs from itself
     return [None if value != value else value for value in values.tolist()]
 
 
 def write_csv(path: Path, table: Table) -> None:
-    """Write a table: one header line, names ending with the unit; full precision; empty where a value is absent.
+    """Write a table as CSV: one header line, names ending in the unit, full precision, empty cells for absent values.
 
     Raises InvalidInput when `path` exists, RockbenchError when the disk fails.
     """
-    cells = [[_text(value) for value in plain(column.values)] for column in table.values()]
+    cells = [[csv_cell(_text(value)) for value in plain(column.values)] for column in table.values()]
 
     def write(unfinished: Path) -> None:
         with unfinished.open("w", encoding="utf-8", newline="") as file:
@@ -55,13 +56,13 @@ def write_csv(path: Path, table: Table) -> None:
 
 
 def write_hdf5(path: Path, title: str, tables: Mapping[str, Table], metadata: Mapping[str, Any]) -> None:
-    """Write tables, with the units and the meaning of their columns, and what they were computed from.
+    """Write tables, with units and descriptions of their columns, and `metadata` to an HDF5 file.
 
     Raises InvalidInput when `path` exists, RockbenchError when the disk fails.
     """
-    from bench.record import hdf5
-    from bench.record import tables as stored
-    from bench.record.layout import now
+    from bench.datafile import hdf5
+    from bench.datafile import tables as stored
+    from bench.datafile.layout import now
 
     for name, table in tables.items():
         stored.check(name, table)
@@ -73,7 +74,9 @@ def write_hdf5(path: Path, title: str, tables: Mapping[str, Table], metadata: Ma
             file.attrs["format"], file.attrs["format_version"] = FORMAT, FORMAT_VERSION
             entry = hdf5.create_group(file, "entry", "NXentry")
             hdf5.write_text(entry, "title", title)
-            hdf5.write_text(entry, "start_time", now(), description="wall clock at the creation of this file, ISO 8601")
+            hdf5.write_text(
+                entry, "start_time", now(), description="creation time of this file by the wall clock, ISO 8601"
+            )
             hdf5.write_text(entry, "program_name", "rocking-bench").attrs["version"] = software()["rocking-bench"]
             group = hdf5.create_group(entry, "metadata", "NXcollection")
             for name, value in metadata.items():

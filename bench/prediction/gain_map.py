@@ -1,4 +1,4 @@
-"""The gain map: every steady motion over frequency and stiffness, as in Fig. 4 of the paper."""
+"""Gain map: all steady motions over frequency and stiffness, as in Fig. 4 of the paper."""
 
 from collections.abc import Mapping
 from typing import Any, Literal
@@ -6,10 +6,10 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.datafile.tables import Table
 from bench.prediction.requests import MapRequest
 from bench.prediction.steady import amplitude_of, band_columns, table_of
 from bench.progress import Progress, counting, silent
-from bench.record.tables import Table
 from sim.knowledge import SpecimenKnowledge
 from sim.maps import GainMap, LayerMap, gain_map
 from sim.rocking import Peaks, State
@@ -17,16 +17,16 @@ from sim.specimen import Specimen
 from sim.steady import Orbit, resting_level
 
 IMPACTS: dict[Literal["rocking", "resting"], int] = {"rocking": 2, "resting": 0}
-"""Impacts of each layer in a period of the drive."""
+"""Impacts per period of the drive, by layer."""
 
 
 def map_table(
     specimen: Specimen, request: MapRequest, known: SpecimenKnowledge | None = None, progress: Progress = silent
 ) -> Table:
-    """One row for each layer that exists at a point, ascending in stiffness, then frequency.
+    """One row for each layer that exists at a point, sorted by stiffness, then frequency.
 
-    With `known`, how well the specimen is, columns more are the band of alpha_2.
-    Raises SchedulerUnavailable when the request names a scheduler that does not answer.
+    With `known`, the knowledge of the specimen, additional columns give the band of alpha_2.
+    Raises SchedulerUnavailable if the requested scheduler does not respond.
     """
     betas, omegas = np.sort(request.beta), np.sort(request.omega)
     amplitude = amplitude_of(specimen, request)
@@ -53,13 +53,13 @@ def map_table(
         for part, name in zip(parts, IMPACTS, strict=True):
             part |= band_columns(_orbits(made, name), part["alpha_2"], known, request.members, done)
     whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    # stable: of two layers at one point, the rocking one stays first
+    # stable sort: at each point the rocking layer remains first
     order = np.lexsort((whole["omega_rad_s"], whole["beta"]))
     return table_of({name: values[order] for name, values in whole.items()})
 
 
 def grids(table: Mapping[str, NDArray[Any]], request: MapRequest, layer: str, name: str) -> NDArray[np.float64]:
-    """A column of one layer over the grid, shape (n_beta, n_omega), ascending in both; NaN where it has no row."""
+    """Column of one layer over the grid, shape (n_beta, n_omega), ascending in both; NaN where it has no row."""
     betas, omegas = np.sort(request.beta), np.sort(request.omega)
     grid = np.full((betas.size, omegas.size), np.nan)
     rows = table["layer"] == layer
@@ -70,10 +70,10 @@ def grids(table: Mapping[str, NDArray[Any]], request: MapRequest, layer: str, na
 
 
 def resting_margin(specimen: Specimen, request: MapRequest) -> NDArray[np.float64]:
-    """How far a resting block is from lifting, shape (n_beta, n_omega), ascending in both.
+    """Margin of a resting block against uplift, shape (n_beta, n_omega), ascending in both.
 
-    Amplitude that would lift it over the amplitude of the test, minus one: the resting layer exists where it is
-    positive.
+    Amplitude that would uplift the block relative to the amplitude of the test, minus one: the resting layer exists
+    where it is positive.
     """
     amplitude = amplitude_of(specimen, request)
     return np.array(
@@ -85,7 +85,7 @@ def resting_margin(specimen: Specimen, request: MapRequest) -> NDArray[np.float6
 
 
 def _orbits(made: GainMap, name: Literal["rocking", "resting"]) -> list[Orbit]:
-    """The motions of one layer, in the order of its columns."""
+    """Motions of one layer, in the order of its columns."""
     layer = made.rocking if name == "rocking" else made.resting
     specimens = [made.specimen.coupled(float(beta)) for beta in made.betas]
     orbits: list[Orbit] = []

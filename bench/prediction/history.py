@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.comparators.catalogue import solve
+from bench.datafile.tables import Column, Table
 from bench.prediction.requests import HistoryRequest
 from bench.prediction.steady import amplitude_of
 from bench.progress import Progress, silent
-from bench.record.tables import Column, Table
 from sim.errors import InvalidInput
 from sim.excitation import SineProgram, Sweep
 from sim.gain import predict_gain
@@ -20,12 +20,12 @@ from sim.specimen import Specimen
 from sim.steady import Orbit
 
 FROM_REST = "from rest"
-"""Name of the motion that begins at rest; the others are named after the layer of the steady state."""
+"""Name of the motion from rest; the others are named after the layer of the steady state."""
 
 TIME = "time_s"
 
 QUANTITIES: dict[str, tuple[str, str]] = {
-    TIME: ("s", "time since the sine began, or since a beginning of its period"),
+    TIME: ("s", "time since the start of the sine, or of one of its periods"),
     "base_acceleration_m_s2": ("m/s2", "acceleration of the base"),
     "u1_m": ("m", "displacement of the first storey relative to the ground"),
     "drift_m": ("m", "drift u2 - u1"),
@@ -33,14 +33,14 @@ QUANTITIES: dict[str, tuple[str, str]] = {
     "bare_u1_m": ("m", "displacement of the first storey of the bare frame"),
     "bare_drift_m": ("m", "drift of the bare frame"),
 }
-"""What a history holds: unit and meaning. The coupled quantities are NaN after the block has overturned."""
+"""Columns of a history: unit and description. The coupled quantities are NaN after the block has overturned."""
 
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """One motion: `values` holds an array of shape (n,) for each of `QUANTITIES`.
+    """Motion: `values` holds an array of shape (n,) for each of `QUANTITIES`.
 
-    `status` says how it ended, at `end_time` [s]; `impacts` are counted to then.
+    `status` is the ending at `end_time` [s]; `impacts` counts the impacts until then.
     """
 
     omega: float
@@ -52,15 +52,15 @@ class History:
     values: Mapping[str, NDArray[np.float64]]
 
     def peak(self, name: str) -> float:
-        """Greatest absolute value of a sampled quantity; NaN without a sample of it."""
+        """Largest absolute value of a sampled quantity; NaN without samples."""
         values = np.abs(self.values[name])
         return float(np.nanmax(values)) if np.isfinite(values).any() else float("nan")
 
 
 def histories(specimen: Specimen, request: HistoryRequest, progress: Progress = silent) -> list[History]:
-    """A history for every frequency at every stiffness, or one for each steady motion that exists there.
+    """One history for each frequency at each stiffness, or one for each steady motion that exists there.
 
-    Raises InvalidInput for steady motions by another solver than taylor, or a tolerance that the solver refuses.
+    Raises InvalidInput for steady motions by another solver than taylor, or a tolerance outside the solver's range.
     """
     if request.steady and request.solver != "taylor":
         raise InvalidInput("--solver", request.solver, "steady histories are those of taylor; leave --steady out")
@@ -81,7 +81,7 @@ def histories(specimen: Specimen, request: HistoryRequest, progress: Progress = 
 
 
 def history_table(made: Sequence[History]) -> Table:
-    """All histories below each other: one row per sample."""
+    """All histories, concatenated: one row per sample."""
     columns = _points([history for history in made for _ in history.values[TIME]])
     for name, (unit, description) in QUANTITIES.items():
         joined = np.concatenate([history.values[name] for history in made]) if made else np.empty(0)
@@ -90,17 +90,19 @@ def history_table(made: Sequence[History]) -> Table:
 
 
 def runs_table(made: Sequence[History]) -> Table:
-    """One row per history: how it ended, and the greatest values among its samples."""
+    """One row per history: its ending, and the largest values of its samples."""
     columns = _points(made)
-    columns["status"] = Column(np.array([history.status for history in made], np.str_), "", "how it ended")
-    columns["end_time_s"] = Column(np.array([history.end_time for history in made], np.float64), "s", "when it ended")
-    columns["impacts"] = Column(np.array([history.impacts for history in made], np.int64), "1", "impacts until then")
+    columns["status"] = Column(np.array([history.status for history in made], np.str_), "", "ending of the motion")
+    columns["end_time_s"] = Column(
+        np.array([history.end_time for history in made], np.float64), "s", "time of the ending"
+    )
+    columns["impacts"] = Column(
+        np.array([history.impacts for history in made], np.int64), "1", "impacts up to the ending"
+    )
     for name in ("u1_m", "drift_m", "theta_rad", "bare_u1_m", "bare_drift_m"):
         unit, description = QUANTITIES[name]
         peaks = np.array([history.peak(name) for history in made], np.float64)
-        columns[f"sampled_max_{name}"] = Column(
-            peaks, unit, f"greatest absolute value among the samples: {description}"
-        )
+        columns[f"sampled_max_{name}"] = Column(peaks, unit, f"largest absolute value of the samples: {description}")
     return columns
 
 
@@ -141,7 +143,7 @@ def _from_rest(coupled: Specimen, omega: float, amplitude: float, request: Histo
 
 
 def _steady(orbit: Orbit, request: HistoryRequest) -> History:
-    """Whole periods, beginning with the base's sine."""
+    """Full periods, starting with the sine of the base."""
     n, periods = request.samples_per_period, request.periods
     one = orbit.samples(n)[:, 1:]
     count = n * periods + 1
@@ -176,7 +178,7 @@ def _in_order(
 
 
 def _filled(samples: NDArray[np.float64] | None, n: int) -> NDArray[np.float64]:
-    """The samples with NaN below them up to `n` rows."""
+    """The samples, padded with NaN to `n` rows."""
     filled = np.full((n, 6), np.nan)
     if samples is not None:
         filled[: len(samples)] = samples

@@ -1,16 +1,21 @@
-"""Gain coefficients under earthquake records: against stiffness, and against the lower end of the table's band."""
+"""Gain coefficients under earthquake records against stiffness and lower band edge, and their tables."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
 
 from bench.accelerograms.accelerogram import Accelerogram
 from bench.config.model import BenchConfiguration
 from bench.config.numbers import read_band
 from bench.control.preparation import PreparedMotion, prepare
-from bench.control.stroke.fit import Method, periods_of
-from bench.control.stroke.reach import Reach
+from bench.control.stroke_fit import Method, periods_of
+from bench.control.target import Reach
+from bench.datafile.tables import Column, Table
 from bench.prediction.bands import Bands, record_bands
 from bench.prediction.requests import BandStudyRequest, RecordsRequest, SeismicRequest
+from bench.prediction.steady import rounded
 from bench.progress import Progress, silent
 from sim.errors import InvalidInput
 from sim.gain import SeismicGain, seismic_curve
@@ -22,9 +27,9 @@ Band = tuple[float, float] | None
 
 @dataclass(frozen=True, eq=False)
 class SeismicCurve:
-    """What the model says of one record: the motion of the table that it becomes, and a gain for each stiffness.
+    """Prediction for one record: the table motion, and a gain for each stiffness.
 
-    `bands`, where they were asked for: of alpha_2 at each stiffness.
+    `bands` of alpha_2 at each stiffness, if requested.
     """
 
     accelerogram: Accelerogram
@@ -34,7 +39,7 @@ class SeismicCurve:
 
 
 def band_of(text: str | None, configuration: BenchConfiguration) -> Band:
-    """The band [Hz] that `text` asks for: "LOW:HIGH", "none", or None for the configured one. Raises InvalidInput."""
+    """Band [Hz] requested by `text`: "LOW:HIGH", "none", or None for the configured one. Raises InvalidInput."""
     if text is None:
         return configuration.table_band
     if text == "none":
@@ -42,7 +47,7 @@ def band_of(text: str | None, configuration: BenchConfiguration) -> Band:
     try:
         return read_band(text)
     except ValueError as error:
-        allowed = str(error) or "it must be LOW:HIGH, two frequencies above 0 Hz that ascend, or none"
+        allowed = str(error) or "it must be LOW:HIGH, two ascending frequencies above 0 Hz, or none"
         raise InvalidInput("--table-band", text, allowed) from None
 
 
@@ -54,7 +59,7 @@ def seismic_curves(
     known: SpecimenKnowledge | None = None,
     progress: Progress = silent,
 ) -> list[SeismicCurve]:
-    """A curve for each record, with the bands that are asked for, where it is `known` how well the specimen is.
+    """One curve for each record, with the requested bands if the uncertainty of the specimen is `known`.
 
     Raises InvalidInput for a record that cannot be prepared.
     """
@@ -82,13 +87,13 @@ def band_study(
     configuration: BenchConfiguration,
     progress: Progress = silent,
 ) -> list[SeismicCurve]:
-    """A curve for each record at each lower end of the band, ascending; each is scaled to the peak by itself.
+    """One curve for each record and lower end of the band, ascending; each motion is scaled to the peak separately.
 
-    Raises InvalidInput for a band that does not go up, or a record that cannot be prepared.
+    Raises InvalidInput for a band that is not ascending, or a record that cannot be prepared.
     """
     band, betas = band_of(request.table_band, configuration), sorted(request.beta)
     if band is None:
-        raise InvalidInput("--table-band", "none", "the study moves the band's lower end: leave it out, or LOW:HIGH")
+        raise InvalidInput("--table-band", "none", "the study varies the band's lower end: omit it, or give LOW:HIGH")
     if max(request.corner) >= band[1]:
         raise InvalidInput("--corner", max(request.corner), f"it must be below the band's upper end, {band[1]:g} Hz")
     bands = [(record, (corner, band[1])) for record in records for corner in sorted(request.corner)]
@@ -122,3 +127,136 @@ def _curve(
     except InvalidInput as refused:
         raise InvalidInput(f"{refused.item} of {record.name}", refused.value, refused.allowed) from None
     return SeismicCurve(record, prepared, seismic_curve(specimen, prepared.record, betas))
+
+
+DIGITS = 9
+"""Significant digits of peaks and gains: the error of a step is 1e-10, and impacts amplify it."""
+
+Columns = Mapping[str, tuple[type, str, str]]
+
+RECORD: Columns = {
+    "record": (np.str_, "", "name of the record"),
+    "synthetic": (np.bool_, "1", "whether it is synthetic, not measured"),
+}
+
+BAND: Columns = {
+    "band_low_hz": (np.float64, "Hz", "lower end of the table's band; absent without filter"),
+    "band_high_hz": (np.float64, "Hz", "upper end of the table's band; absent without filter"),
+}
+
+GAINS: Columns = {
+    **RECORD,
+    **BAND,
+    "beta": (np.float64, "1", "stiffness ratio k_C/k1 of the coupling spring"),
+    "alpha_1": (np.float64, "1", "gain of the peak of u1, coupled over bare; absent unless completed"),
+    "alpha_2": (np.float64, "1", "gain of the peak drift u2 - u1, coupled over bare; absent unless completed"),
+    "status": (np.str_, "", "ending of the run"),
+    "toppled": (np.bool_, "1", "whether the block overturned"),
+    "toppled_time_s": (
+        np.float64,
+        "s",
+        "time of overturning since the start of the motion; absent if it did not overturn",
+    ),
+    "impacts": (np.int64, "1", "impacts of the block"),
+    "u1_max_m": (np.float64, "m", "greatest |u1|; absent unless completed"),
+    "drift_max_m": (np.float64, "m", "greatest |u2 - u1|; absent unless completed"),
+    "theta_max_rad": (np.float64, "rad", "greatest |theta|; absent unless completed"),
+    "bare_u1_max_m": (np.float64, "m", "greatest |u1| of the bare frame"),
+    "bare_drift_max_m": (np.float64, "m", "greatest |u2 - u1| of the bare frame"),
+}
+
+GAIN_BANDS: Columns = {
+    "alpha_2_low": (
+        np.float64,
+        "1",
+        "lower bound of the 95 % interval of alpha_2 over the drawn specimens that did not topple",
+    ),
+    "alpha_2_high": (np.float64, "1", "upper bound of this interval"),
+    "members_share": (np.float64, "1", "share of the drawn specimens that did not topple"),
+}
+
+MOTIONS: Columns = {
+    **RECORD,
+    "source": (np.str_, "", "file of the record, or its synthesis"),
+    "sha256": (np.str_, "", "hash of the file's bytes, or of the samples"),
+    **BAND,
+    "record_peak_m_s2": (np.float64, "m/s2", "greatest acceleration of the record"),
+    "factor": (np.float64, "1", "factor on all accelerations"),
+    "peak_m_s2": (np.float64, "m/s2", "greatest acceleration of the motion"),
+    "velocity_max_m_per_s": (np.float64, "m/s", "greatest velocity of the table"),
+    "displacement_max_m": (np.float64, "m", "greatest displacement of the table"),
+    "begin_s": (np.float64, "s", "start of the motion on the record's time axis"),
+    "duration_s": (np.float64, "s", "length of the motion"),
+    "steps": (np.str_, "", "processing steps, in order"),
+}
+
+
+def gains_table(curves: Sequence[SeismicCurve]) -> Table:
+    """One row for each record, band and stiffness."""
+    table = _table(GAINS, [_gain(curve, gain) for curve in curves for gain in curve.gains])
+    found = [curve.bands for curve in curves if curve.bands is not None]
+    if len(found) < len(curves):
+        return table
+    rows = [row for each in found for row in zip(each.low, each.high, each.share, strict=True)]
+    return {**table, **_table(GAIN_BANDS, rows)}
+
+
+def motions_table(curves: Sequence[SeismicCurve]) -> Table:
+    """One row for each motion of the table: its record and its processing."""
+    return _table(MOTIONS, [_motion(curve) for curve in curves])
+
+
+def _gain(curve: SeismicCurve, gain: SeismicGain) -> list[Any]:
+    motion, bare = gain.motion, gain.bare
+    completed, toppled = gain.alpha_2 is not None, motion.overturned is not None
+    peaks = (motion.peaks.u1, motion.peaks.drift, motion.peaks.theta) if completed else (np.nan,) * 3
+    return [
+        *_record(curve),
+        *_band(curve.prepared),
+        gain.beta,
+        np.nan if gain.alpha_1 is None else gain.alpha_1,
+        np.nan if gain.alpha_2 is None else gain.alpha_2,
+        str(motion.status),
+        toppled,
+        motion.end_time if toppled else np.nan,
+        motion.impacts,
+        *peaks,
+        bare.u1,
+        bare.drift,
+    ]
+
+
+def _motion(curve: SeismicCurve) -> list[Any]:
+    record, prepared = curve.accelerogram, curve.prepared
+    return [
+        *_record(curve),
+        record.source,
+        record.sha256,
+        *_band(prepared),
+        prepared.peak_before,
+        prepared.factor,
+        prepared.peak,
+        prepared.motion.peak_velocity,
+        prepared.motion.peak_displacement,
+        prepared.begin,
+        prepared.record.duration,
+        "; ".join(prepared.steps),
+    ]
+
+
+def _record(curve: SeismicCurve) -> tuple[str, bool]:
+    return curve.accelerogram.name, curve.accelerogram.synthetic
+
+
+def _band(prepared: PreparedMotion) -> tuple[float, float]:
+    return prepared.band or (np.nan, np.nan)
+
+
+def _table(columns: Columns, rows: Sequence[Sequence[Any]]) -> Table:
+    made: dict[str, Column] = {}
+    for (name, (kind, unit, description)), values in zip(columns.items(), zip(*rows, strict=True), strict=True):
+        if kind is np.float64:
+            made[name] = Column(rounded(np.array(values, np.float64), DIGITS), unit, description)
+        else:
+            made[name] = Column(np.array(values, np.dtype(kind)), unit, description)
+    return made

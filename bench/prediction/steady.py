@@ -1,40 +1,145 @@
-"""Steady motions and their gain coefficients: one row for each layer that exists at a point."""
+"""Modes of the specimen as in Fig. 3 of the paper, and steady motions with their gain coefficients, as tables.
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+Other solvers compute gains from long simulations that start on the exact orbit.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from math import nan, tau
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.datafile.tables import Column, Table
 from bench.prediction.bands import bands
-from bench.prediction.requests import SineRequest
+from bench.prediction.requests import OrbitsRequest, SineRequest
 from bench.progress import Progress, counting, silent
-from bench.record.tables import Column, Table
 from sim.gain import GainPrediction, gain_spectrum, predict_gain
 from sim.knowledge import SpecimenKnowledge
+from sim.linear import Modes, bare_modes, coupled_modes
+from sim.rocking import Status
 from sim.specimen import Specimen
 from sim.steady import Orbit
-from sim.sweep import Done
+from sim.sweep import Done, sweep
 
-if TYPE_CHECKING:
-    from bench.prediction.timed import Timed
+RUN_DURATION = 120.0
+"""Length of a simulation [s], as in the paper."""
+
+
+@dataclass(frozen=True)
+class Timed:
+    """Result of a simulation; gains and peaks are NaN if it ended early. `impacts_per_period` is a mean."""
+
+    alpha_1: float
+    alpha_2: float
+    u1: float
+    drift: float
+    theta: float
+    impacts_per_period: float
+    status: str
+
+    def as_row(self) -> dict[str, float | str | bool | None]:
+        """Columns of the table of steady motions that are determined by the simulation."""
+        return {
+            "alpha_1": self.alpha_1,
+            "alpha_2": self.alpha_2,
+            "u1_max_m": self.u1,
+            "drift_max_m": self.drift,
+            "theta_max_rad": self.theta,
+            "impacts_per_period": self.impacts_per_period,
+            "status": self.status,
+        }
+
+
+def timed_gains(
+    specimen: Specimen,
+    request: SineRequest,
+    predictions: Sequence[GainPrediction],
+    scheduler: str | None = None,
+    done: Done | None = None,
+) -> list[Timed | None]:
+    """One simulation by the requested solver per prediction, on all processors; None without a rocking orbit.
+
+    Raises InvalidInput for a tolerance outside the solver's range.
+    """
+    return sweep(partial(_timed, specimen, request.solver, request.tolerance), predictions, scheduler, done=done)
+
+
+def _timed(specimen: Specimen, solver: str, tolerance: float | None, prediction: GainPrediction) -> Timed | None:
+    from bench.comparators.catalogue import steady_gain_by_time
+
+    if prediction.rocking is None:
+        return None
+    orbit = prediction.rocking.orbit
+    run = steady_gain_by_time(
+        solver,
+        specimen.coupled(prediction.beta),
+        prediction.omega,
+        prediction.amplitude,
+        RUN_DURATION,
+        state=orbit.start,
+        phase=orbit.phase,
+        tolerance=tolerance,
+    )
+    motion = run.motion
+    if motion.status is not Status.COMPLETED:
+        return Timed(nan, nan, nan, nan, nan, nan, f"{motion.status} at {motion.end_time:.2f} s")
+    impacts = motion.impacts / (RUN_DURATION * prediction.omega / tau)
+    peaks = motion.peaks
+    return Timed(run.alpha_1, run.alpha_2, peaks.u1, peaks.drift, peaks.theta, impacts, str(motion.status))
+
+
+def modes_table(specimen: Specimen, betas: Sequence[float]) -> Table:
+    """One row per mode: first those of the bare frame (beta NaN), then those of the coupled system at each stiffness.
+
+    Source: Eq. (12) to (14). A divergent mode has a growth rate instead of a frequency.
+    """
+    rows = list(_mode_rows(float("nan"), bare_modes(specimen.frame)))
+    for beta in betas:
+        rows += _mode_rows(beta, coupled_modes(specimen.coupled(beta)))
+    beta, mode, omega, u1, u2, theta = (np.array(column) for column in zip(*rows, strict=True))
+    divergent = omega < 0.0
+    return {
+        "system": Column(np.where(np.isnan(beta), "bare", "coupled"), "", "bare frame, or coupled with the block"),
+        "beta": Column(beta, "1", "stiffness ratio of the coupling spring; absent for the bare frame"),
+        "mode": Column(mode.astype(np.int64), "1", "number of the mode, in ascending order of the eigenvalue"),
+        "divergent": Column(divergent, "1", "whether the mode grows instead of oscillating: negative stiffness"),
+        "omega_rad_s": Column(np.where(divergent, np.nan, omega), "rad/s", "circular frequency; absent if divergent"),
+        "frequency_hz": Column(np.where(divergent, np.nan, omega / (2.0 * np.pi)), "Hz", "frequency, likewise"),
+        "growth_rate_per_s": Column(np.where(divergent, -omega, np.nan), "1/s", "growth rate if divergent"),
+        "signed_root_rad_s": Column(omega, "rad/s", "sign(lambda) sqrt|lambda|, lambda an eigenvalue of M^-1 K"),
+        "shape_u1": Column(
+            u1, "1", "displacement of the first storey in the mode; normalised to unity unless it vanishes"
+        ),
+        "shape_u2": Column(u2, "1", "displacement of the second storey in the mode"),
+        "shape_theta_rad_per_m": Column(theta, "rad/m", "rotation of the block in the mode; absent for the bare frame"),
+    }
+
+
+def _mode_rows(beta: float, modes: Modes) -> Iterator[tuple[float, float, float, float, float, float]]:
+    for i, omega in enumerate(modes.omega):
+        u1, u2, *theta = (float(value) for value in modes.shapes[:, i])
+        yield beta, i + 1, float(omega), u1, u2, theta[0] if theta else float("nan")
+
 
 DIGITS = 11
 """Significant digits of peaks and gains.
 
-Against orbits of order 26 closed to 5e-14, the peaks of 228 points of a map err by 1e-12 in the median and by 3e-11 at
-most.
+Compared with orbits of order 26 closed to 5e-14, peaks at 228 points of a map have a median error of 1e-12, at
+most 3e-11.
 """
 
 MULTIPLIER_DIGITS = 9
-"""Of Floquet multipliers, whose Jacobian comes from differences and errs by 1e-10 to 1e-9."""
+"""Rounding of Floquet multipliers: their Jacobian is computed by finite differences, accurate to 1e-10 to 1e-9."""
 
 COLUMNS: dict[str, tuple[str, str, int | None]] = {
     "omega_rad_s": ("rad/s", "circular frequency of the base motion", None),
     "beta": ("1", "stiffness ratio k_C/k1 of the coupling spring", None),
     "amplitude_m_s2": ("m/s2", "amplitude of the base acceleration", None),
     "layer": ("", "rocking, or resting where the block never lifts", None),
-    "stable": ("1", "whether small disturbances die out", None),
+    "stable": ("1", "whether small disturbances decay", None),
     "alpha_1": ("1", "gain of the peak of u1, coupled over bare", DIGITS),
     "alpha_2": ("1", "gain of the peak drift u2 - u1, coupled over bare", DIGITS),
     "u1_max_m": ("m", "greatest |u1|", DIGITS),
@@ -42,36 +147,36 @@ COLUMNS: dict[str, tuple[str, str, int | None]] = {
     "theta_max_rad": ("rad", "greatest |theta|", DIGITS),
     "bare_u1_max_m": ("m", "greatest |u1| of the bare frame", DIGITS),
     "bare_drift_max_m": ("m", "greatest |u2 - u1| of the bare frame", DIGITS),
-    "impacts_per_period": ("1", "impacts of the block in a period of the drive", None),
+    "impacts_per_period": ("1", "impacts of the block per period of the drive", None),
     "floquet_modulus": (
         "1",
-        "greatest |Floquet multiplier|: what is left of a disturbance after a period",
+        "greatest |Floquet multiplier|: remaining share of a disturbance after a period",
         MULTIPLIER_DIGITS,
     ),
     "floquet_argument_rad": ("rad", "argument of that multiplier: 0 fold, pi flip, between them Neimark-Sacker", 6),
 }
-"""Unit, meaning, and significant digits of what is computed."""
+"""Unit, description and significant digits of the results."""
 
 EXTRA: dict[str, tuple[str, str, int | None]] = {
-    "alpha_2_uncertainty": ("1", "expanded uncertainty of alpha_2 (k = 2): what is left open of the specimen", 6),
-    "alpha_2_low": ("1", "where the band of alpha_2 that holds 95 % begins", 6),
-    "alpha_2_high": ("1", "where it ends", 6),
+    "alpha_2_uncertainty": ("1", "expanded uncertainty of alpha_2 (k = 2) due to the specimen", 6),
+    "alpha_2_low": ("1", "lower bound of the 95 % band of alpha_2", 6),
+    "alpha_2_high": ("1", "upper bound of the 95 % band of alpha_2", 6),
     "members_share": ("1", "share of the drawn specimens that have this motion; 1 to first order", 6),
-    "status": ("", "exact, or how the run by another solver ended", None),
-    "outcome": ("", "what the sine switched on at rest comes to: rocking, resting, other, toppled or failed", None),
-    "outcome_time_s": ("s", "time of the overturning, or when the outcome was decided", None),
+    "status": ("", "exact, or the ending of the simulation by another solver", None),
+    "outcome": ("", "outcome of the sine switched on at rest: rocking, resting, other, toppled or failed", None),
+    "outcome_time_s": ("s", "time of overturning, or at which the outcome was decided", None),
 }
 
 Row = dict[str, float | str | bool | None]
 
 
-def amplitude_of(specimen: Specimen, request: SineRequest) -> float:
-    """Amplitude of the base acceleration that is asked for [m/s2]."""
+def amplitude_of(specimen: Specimen, request: OrbitsRequest) -> float:
+    """Requested amplitude of the base acceleration [m/s2]."""
     return request.amplitude_factor * specimen.uplift_acceleration
 
 
 def predict_points(specimen: Specimen, request: SineRequest, progress: Progress = silent) -> list[GainPrediction]:
-    """A prediction for every frequency at every stiffness; each is found by itself, whatever else is asked for."""
+    """One prediction for each frequency at each stiffness, each computed independently."""
     amplitude = amplitude_of(specimen, request)
     points = [(beta, omega) for beta in request.beta for omega in request.omega]
     found: list[GainPrediction] = []
@@ -81,8 +186,8 @@ def predict_points(specimen: Specimen, request: SineRequest, progress: Progress 
     return found
 
 
-def predict_spectra(specimen: Specimen, request: SineRequest, progress: Progress = silent) -> list[GainPrediction]:
-    """The same along ascending frequency, each from its neighbours: five times cheaper."""
+def predict_spectra(specimen: Specimen, request: OrbitsRequest, progress: Progress = silent) -> list[GainPrediction]:
+    """The same, continued along ascending frequency from neighbouring points: five times faster."""
     amplitude, omegas = amplitude_of(specimen, request), sorted(request.omega)
     found: list[GainPrediction] = []
     for i, beta in enumerate(request.beta):
@@ -98,11 +203,11 @@ def steady_table(
     members: int = 0,
     progress: Progress = silent,
 ) -> Table:
-    """One row for each layer of each prediction, to the digits that are known.
+    """One row for each layer of each prediction, rounded to the significant digits.
 
-    `timed`, one for each prediction: gains of the rocking layer by another solver, which take the place of the exact
-    ones; how its run ended is then a column more. `known`: how well the specimen is; columns more are then the band of
-    alpha_2, see `bench.prediction.bands.bands`.
+    `timed`, one for each prediction: gains of the rocking layer by another solver, which replace the exact ones; an
+    additional column gives the ending of its simulation. `known`: knowledge of the specimen; additional columns then
+    give the band of alpha_2, see `bench.prediction.bands.bands`.
     """
     rows: list[Row] = []
     for k, prediction in enumerate(predictions):
@@ -135,7 +240,7 @@ def band_columns(
     members: int,
     done: Done | None = None,
 ) -> dict[str, NDArray[np.float64]]:
-    """The columns of a band of alpha_2, by name."""
+    """Columns of a band of alpha_2, by name."""
     found = bands(orbits, alpha_2, known, members, done)
     return {
         "alpha_2_uncertainty": found.uncertainty,
@@ -146,7 +251,7 @@ def band_columns(
 
 
 def table_of(values: Mapping[str, NDArray[Any]]) -> Table:
-    """The table of steady motions from its columns by name, rounded to the digits that are known."""
+    """Table of steady motions from its columns by name, rounded to the significant digits."""
     made: dict[str, Column] = {}
     for name, (unit, description, digits) in {**COLUMNS, **EXTRA}.items():
         if name in EXTRA and name not in values:
@@ -156,14 +261,37 @@ def table_of(values: Mapping[str, NDArray[Any]]) -> Table:
     return made
 
 
+EXACT_POWER = 22
+"""Largest power of ten that a double represents exactly: dividing by it rounds once, like reading a decimal number."""
+
+NEAR_TIE = 1e-3
+"""Distance of the discarded digits from one half below which rounding is left to the decimal conversion."""
+
+
 def rounded(values: NDArray[np.float64], digits: int) -> NDArray[np.float64]:
-    """`values`, shape (n,), to so many significant digits."""
-    return np.array([float(f"{value:.{digits - 1}e}") for value in values.tolist()], dtype=np.float64)
+    """`values`, shape (n,), rounded to the given number of significant digits: the doubles nearest to the decimal
+    numbers, as by a conversion to text and back.
+    """
+    magnitude = np.abs(values)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        power = digits - 1 - np.floor(np.log10(magnitude))
+        scaled = magnitude * 10.0 ** np.clip(power, -EXACT_POWER, EXACT_POWER)
+        whole = np.rint(scaled)
+        # one rounding only: the integer and the power of ten are exact
+        factor = 10.0 ** np.abs(np.clip(power, -EXACT_POWER, EXACT_POWER))
+        found = np.copysign(np.where(power > 0, whole / factor, whole * factor), values)
+        exact = (np.abs(power) <= EXACT_POWER) & (scaled >= 10.0 ** (digits - 1)) & (scaled < 10.0**digits - 1.0)
+        exact &= np.abs(np.abs(scaled - whole) - 0.5) > NEAR_TIE
+    plain = ~np.isfinite(values) | (values == 0.0)
+    found[plain], exact[plain] = values[plain], True
+    for at in np.flatnonzero(~exact).tolist():
+        found[at] = float(f"{values[at]:.{digits - 1}e}")
+    return found
 
 
 def _row(prediction: GainPrediction, name: str) -> Row:
     layer, bare = prediction.layers[name], prediction.bare
-    multipliers, peaks = layer.orbit.multipliers, layer.orbit.peaks
+    peaks = layer.orbit.peaks
     return {
         "omega_rad_s": prediction.omega,
         "beta": prediction.beta,
@@ -179,6 +307,5 @@ def _row(prediction: GainPrediction, name: str) -> Row:
         "bare_drift_max_m": bare.drift,
         "impacts_per_period": layer.orbit.impacts,
         "floquet_modulus": layer.multiplier,
-        # of a conjugate pair, the one in the upper half
-        "floquet_argument_rad": abs(float(np.angle(multipliers[np.abs(multipliers).argmax()]))),
+        "floquet_argument_rad": float(np.angle(layer.orbit.slowest)),
     }

@@ -1,4 +1,4 @@
-"""A record made to fit the stroke of a bench, by one method or by both, and what each does to its spectrum."""
+"""Fit of a record to the stroke of a bench by one or both methods, and its effect on the spectrum."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from bench.accelerograms.accelerogram import Accelerogram
 from bench.config.model import BenchConfiguration
 from bench.control.preparation import PreparedMotion, prepare
-from bench.control.stroke.fit import PERIODS, Method, StrokeFit, periods_of
-from bench.control.stroke.reach import Reach
+from bench.control.stroke_fit import PERIODS, Method, StrokeFit, periods_of
+from bench.control.target import Reach
 from bench.prediction.requests import StrokeFitRequest
 from bench.prediction.seismic import band_of
 from sim.errors import InvalidInput
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class StrokeFits:
-    """`unfitted` is the motion before the fit; `fitted` and `refused` are by method, the latter with the reason.
+    """`unfitted` is the motion before the fit; `fitted` has the fit by method, `refused` the reason by method.
 
     `own` are the periods [s] of the bare frame's modes.
     """
@@ -35,12 +35,12 @@ class StrokeFits:
 
     @property
     def chosen(self) -> PreparedMotion:
-        """The fit by the first method that was asked for and succeeded: least change before high-pass."""
+        """Fit by the first requested method that succeeded: least change before high-pass."""
         return next(iter(self.fitted.values()))
 
 
 def stroke_fits(record: Accelerogram, request: StrokeFitRequest, configuration: BenchConfiguration) -> StrokeFits:
-    """Raises InvalidInput for a record that cannot be prepared, and where no method that was asked for makes it fit."""
+    """Fit `record` by the requested methods. Raises InvalidInput if it cannot be prepared or no method succeeds."""
     specimen = configuration.known_specimen
     reach = Reach.of(configuration, request.share)
     asked: dict[str, Any] = {
@@ -65,11 +65,11 @@ def stroke_fits(record: Accelerogram, request: StrokeFitRequest, configuration: 
 
 
 def change_at(fit: StrokeFit, periods: Array) -> Array:
-    """Relative change of the response spectrum at some of its `periods` [s], same shape."""
+    """Relative change of the response spectrum at `periods` [s], same shape, which must be among its own."""
     return fit.change[np.searchsorted(fit.periods, periods)]
 
 
 def change_over(fit: StrokeFit) -> tuple[float, float]:
-    """Root mean square and greatest magnitude of the change between 0.1 and 2 s."""
+    """Root mean square and largest magnitude of the change at periods from 0.1 to 2 s."""
     change = change_at(fit, PERIODS)
     return float(np.sqrt(np.mean(change**2))), float(np.abs(change).max())

@@ -1,1 +1,1 @@
-"""Compile, predict, check: what a run will ask of the bench, against everything that bounds it, before it runs."""
+"""Preflight: forecast of a run and its margins to all limits."""

@@ -1,40 +1,157 @@
-"""How far a run stays from everything that bounds it: margin = 1 - demand / limit."""
+"""Forecast of a run, its drive and demands, and the margins to its limits: margin = 1 - demand / limit."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from math import inf
+from math import inf, nan
 
-from bench.preflight.bounds import Bound
-from bench.preflight.forecast import Demand
+import numpy as np
+
+from bench.config.model import BenchConfiguration
+from bench.control.oscillator import Leg
+from bench.datafile.tables import Column, Table
+from bench.guard.motion import WATCHED
+from sim.channel import STOREYS
 from sim.errors import InvalidInput
 
 
 @dataclass(frozen=True)
+class Demand:
+    """Largest predicted value of one limited quantity, a key of `bounds`, in its SI unit.
+
+    `value` is for the nominal specimen; 95 % of the specimens within the uncertainty stay below `likely`.
+    `where` is the part of the run in which it occurs. Both values are None if not predicted; `where` is
+    then the reason.
+    """
+
+    quantity: str
+    value: float | None
+    likely: float | None
+    where: str
+
+
+@dataclass(frozen=True)
+class Stage:
+    """Part of a run: table motions from rest, and the estimated chance of success, if known."""
+
+    name: str
+    legs: tuple[Leg, ...]
+    chance: float | None = None
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """Forecast of a run; empty if its protocol predicts nothing. `duration` is the expected length [s].
+
+    `warnings` do not prevent the run. `notes` describe the processing of the input.
+    """
+
+    demands: tuple[Demand, ...] = ()
+    stages: tuple[Stage, ...] = ()
+    duration: float | None = None
+    warnings: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+_LESS = "ask for less acceleration"
+_FASTER = f"{_LESS}, or for higher frequencies"
+_AWAY = f"{_LESS}, or keep the frequencies farther from the resonances of the specimen"
+
+
+@dataclass(frozen=True)
+class Bound:
+    """`limit` of one quantity in its SI `unit`, the key or part that sets it, and the remedy if it is exceeded."""
+
+    quantity: str
+    name: str
+    unit: str
+    limit: float
+    owner: str
+    remedy: str
+
+    @property
+    def suffix(self) -> str:
+        """The unit after a number, empty for a pure number."""
+        return "" if self.unit == "1" else f" {self.unit}"
+
+
+def bounds(configuration: BenchConfiguration) -> dict[str, Bound]:
+    """Bound of every quantity, by its key: the lowest where several apply."""
+    limits = configuration.limits
+
+    def guarded(quantity: str) -> tuple[float, str]:
+        return float(getattr(limits, quantity)), f"limits.{quantity}"
+
+    laser = min(guarded("laser_range"), (1.0, "the laser's range"))
+    found = {
+        "drive_voltage": ("drive", "V", min([guarded("drive_voltage"), *_drive(configuration)]), _FASTER),
+        "drive_slew": ("slew of the drive", "V/s", guarded("drive_slew"), f"{_LESS}, or for lower frequencies"),
+        "displacement": (*WATCHED["displacement"], min(guarded("displacement"), _stroke(configuration)), _FASTER),
+        "velocity": (*WATCHED["velocity"], guarded("velocity"), _FASTER),
+        "acceleration": (*WATCHED["acceleration"], guarded("acceleration"), _LESS),
+        "force": (*WATCHED["force"], guarded("force"), _LESS),
+        "current": (*WATCHED["current"], min([guarded("current"), *_current(configuration)]), _LESS),
+        "heating": (*WATCHED["heating"], guarded("heating"), _LESS),
+        **{
+            name: (f"share of laser {number}'s half range", "1", laser, _AWAY)
+            for number, name in enumerate(STOREYS, start=1)
+        },
+        "drift": (*WATCHED["drift"], guarded("drift"), _AWAY),
+    }
+    return {key: Bound(key, name, unit, *least, remedy) for key, (name, unit, least, remedy) in found.items()}
+
+
+def _stroke(configuration: BenchConfiguration) -> tuple[float, str]:
+    return configuration.half_stroke, "the shaker's stroke"
+
+
+def _drive(configuration: BenchConfiguration) -> list[tuple[float, str]]:
+    if configuration.backend != "simulated":
+        key = "hardware.daq.output_range" if configuration.backend == "hardware" else "rig.drive_range"
+        return [(configuration.settings.drive_range, key)]
+    shaker = configuration.simulation.bench.shaker
+    supply = "voltage_limit" if shaker.amplifier == "voltage" else "current_limit"
+    largest = float(getattr(shaker, supply)) / shaker.gain
+    return [(shaker.drive_range, "the shaker's drive_range"), (largest, f"the amplifier's {supply}")]
+
+
+def _current(configuration: BenchConfiguration) -> list[tuple[float, str]]:
+    if configuration.backend != "simulated":
+        return []
+    return [(configuration.simulation.bench.shaker.current_limit, "the amplifier's current_limit")]
+
+
+@dataclass(frozen=True)
 class Margin:
-    """A demand beside its bound."""
+    """Demand and bound of one quantity, with the margins between them."""
 
     bound: Bound
     demand: Demand
 
     @property
     def margin(self) -> float | None:
-        """What is left of the limit as assumed, as a share of it; None where the demand is not predicted."""
+        """Margin for the nominal specimen; None if the demand is not predicted."""
         return None if self.demand.value is None else 1.0 - self.demand.value / self.bound.limit
 
     @property
     def likely(self) -> float | None:
-        """The same for 95 % of the specimens that the uncertainty allows."""
+        """Margin kept by 95 % of the specimens within the uncertainty; None if not predicted."""
         return None if self.demand.likely is None else 1.0 - self.demand.likely / self.bound.limit
+
+    @property
+    def excess(self) -> str:
+        """Predicted demand and the limit that it exceeds, as text."""
+        bound = self.bound
+        return f"{bound.name} {self.demand.value:.4g}{bound.suffix}, {bound.owner} = {bound.limit:g}{bound.suffix}"
 
 
 def margins(demands: Iterable[Demand], bounds: Mapping[str, Bound]) -> tuple[Margin, ...]:
-    """Each demand beside its bound, tightest first, what is not predicted last."""
+    """Margin of each demand, tightest first, those not predicted last."""
     found = [Margin(bounds[demand.quantity], demand) for demand in demands]
     return tuple(sorted(found, key=lambda each: inf if each.margin is None else each.margin))
 
 
 def refusal(found: Sequence[Margin]) -> InvalidInput | None:
-    """Why a run with these margins, tightest first, is refused: the limit that binds, or None."""
+    """Refusal naming the exceeded limit with the least margin, or None. `found` is in ascending order of margin."""
     binding = found[0] if found else None
     if binding is None or binding.margin is None or binding.margin >= 0.0:
         return None
@@ -44,9 +161,9 @@ def refusal(found: Sequence[Margin]) -> InvalidInput | None:
 
 
 def warnings(found: Sequence[Margin]) -> tuple[str, ...]:
-    """What would be exceeded with a specimen that the uncertainty allows, though not with the assumed one."""
+    """Warnings of limits that the nominal specimen keeps but others within the uncertainty may exceed."""
     return tuple(
-        f"with a specimen at the 95 % of its uncertainty {bound.owner} = {bound.limit:g} would be exceeded: "
+        f"at the 95 % bound of the specimen's uncertainty {bound.owner} = {bound.limit:g} would be exceeded: "
         + _needs(each, each.demand.likely, each.likely)
         for each in found
         if each.likely is not None and each.likely < 0.0 <= (each.margin or 0.0)
@@ -56,5 +173,43 @@ def warnings(found: Sequence[Margin]) -> tuple[str, ...]:
 
 def _needs(each: Margin, value: float | None, margin: float | None) -> str:
     bound = each.bound
-    unit = "" if bound.unit == "1" else f" {bound.unit}"
-    return f"{each.demand.where} takes {value:.4g}{unit} ({bound.name}), margin {100.0 * (margin or 0.0):.1f} %"
+    return f"{each.demand.where} takes {value:.4g}{bound.suffix} ({bound.name}), margin {100.0 * (margin or 0.0):.1f} %"
+
+
+def margins_table(margins: Sequence[Margin]) -> Table:
+    """One row for each limited quantity, tightest first."""
+
+    def numbers(values: list[float | None], unit: str, description: str) -> Column:
+        return Column(np.array([nan if value is None else value for value in values]), unit, description)
+
+    def texts(values: list[str], description: str) -> Column:
+        return Column(np.array(values, dtype=np.str_), "", description)
+
+    assumed, likely = "for the nominal specimen", "that 95 % of the specimens within the uncertainty stay below"
+    return {
+        "quantity": texts([each.bound.name for each in margins], "limited quantity"),
+        "margin": numbers([each.margin for each in margins], "1", f"1 - demand / limit, {assumed}; NaN: not predicted"),
+        "margin_95": numbers([each.likely for each in margins], "1", f"1 - demand / limit, for the demand {likely}"),
+        "demand": numbers([each.demand.value for each in margins], "SI", f"largest predicted value {assumed}"),
+        "demand_95": numbers([each.demand.likely for each in margins], "SI", f"largest predicted value {likely}"),
+        "limit": numbers([each.bound.limit for each in margins], "SI", "largest allowed value"),
+        "unit": texts([each.bound.unit for each in margins], "unit of demands and limit in this row"),
+        "owner": texts([each.bound.owner for each in margins], "source of the limit"),
+        "where": texts(
+            [each.demand.where for each in margins],
+            "part of the run in which the demand occurs, or reason why it is not predicted",
+        ),
+    }
+
+
+def drive_table(stages: Sequence[Stage]) -> Table:
+    """One row for each leg of the planned drive; a stage starts at zero drive."""
+    rows = [(stage, leg) for stage in stages for leg in stage.legs]
+    chances = [nan if stage.chance is None else stage.chance for stage, _ in rows]
+    return {
+        "stage": Column(np.array([stage.name for stage, _ in rows], dtype=np.str_), "", "part of the run"),
+        "chance": Column(np.array(chances), "1", "estimated chance that the start succeeds; NaN: not a start"),
+        "duration": Column(np.array([leg.duration for _, leg in rows]), "s", "length of the leg"),
+        "amplitude": Column(np.array([leg.amplitude for _, leg in rows]), "m/s2", "table acceleration at its end"),
+        "omega": Column(np.array([leg.omega for _, leg in rows]), "rad/s", "circular frequency at its end"),
+    }

@@ -1,52 +1,86 @@
-"""How far the specimen moves along a programme of sines: what the lasers see of it, and its drift."""
+"""Demands of a table motion on table, shaker, lasers and a resting block."""
 
-from dataclasses import dataclass
-from math import tau
-from typing import Literal
+from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
-from bench.preflight.load import envelope
-from sim.excitation import SineProgram
-from sim.rocking import simulate
+from bench.config.model import BenchConfiguration
+from bench.guard.shaker import Motion, ShakerModel
+from sim.channel import STOREYS
+from sim.linear import frame_matrices
 from sim.specimen import Specimen
 
-PER_CYCLE = 32
-"""Samples in a cycle of the highest frequency: a peak between two is missed by 0.5 % at most."""
-
-TOLERANCE = 1e-7
-"""Of the simulations."""
+Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class Travel:
-    """Greatest magnitudes [m]: of what either laser sees, and of the drift."""
+def table_demands(
+    displacement: Motion, velocity: Motion, acceleration: Motion, shaker: ShakerModel | None
+) -> dict[str, Motion]:
+    """Demands on the table, plus force and current if the shaker is known; accepts samples, spectra or peaks."""
+    found = {"displacement": displacement, "velocity": velocity, "acceleration": acceleration}
+    if shaker is not None:
+        found |= {"force": shaker.force(acceleration), "current": shaker.current(acceleration, displacement)}
+    return found
 
-    storey_1: float
-    storey_2: float
-    drift: float
+
+def laser_demands(storey_1: Motion, storey_2: Motion, drift: Motion, halves: tuple[float, float]) -> dict[str, Motion]:
+    """Measured displacements of the storeys over half the range of their lasers, and the drift [m]."""
+    return {STOREYS[0]: storey_1 / halves[0], STOREYS[1]: storey_2 / halves[1], "drift": drift}
 
 
-def travel(
-    specimen: Specimen,
-    program: SineProgram,
-    begin: float,
-    reference: Literal["ground", "table"],
-    catch_angle: float,
-) -> Travel:
-    """Simulated from rest; the motion from `begin` [s] on counts, up to where the block falls if it does.
+def peaks(series: Mapping[str, Array]) -> dict[str, float]:
+    """Largest magnitude of each series."""
+    return {name: float(np.abs(values).max()) for name, values in series.items()}
 
-    `reference` is where the lasers stand; `catch_angle` [rad] counts as fallen.
+
+RESTING = "resting"
+"""Key of the uplift moment relative to the moment of the block's weight."""
+
+_SILENCE = 30.0
+"""Time at rest after the record in the transform, so that ringing does not wrap around to its beginning [s]."""
+
+
+def resting_demands(
+    acceleration: Array, sample_rate: float, specimen: Specimen, configuration: BenchConfiguration
+) -> dict[str, float]:
+    """Largest magnitude of each limited quantity, in its unit, and of `RESTING`, from rest to rest, in closed form.
+
+    The system is linear while the block rests: the spring is then grounded, and the moment about a corner,
+    h_b M a - k_C h1 u1, shows the margin to uplift (Eq. 9 and A.3 of the paper).
+
+    `acceleration` [m/s2] of the table, shape (n,), begins at rest. Force and current are absent for an unknown shaker,
+    `RESTING` without a block.
     """
-    highest = max(max(sweep.omega) for sweep in program.sweeps)
-    times = np.arange(begin, program.duration, tau / highest / PER_CYCLE)
-    motion = simulate(
-        specimen, program, sample_times=times, peaks_from=None, tolerance=TOLERANCE, overturning_angle=catch_angle
-    )
-    moved = np.zeros((0, 6)) if motion.samples is None else motion.samples
-    if not len(moved):
-        return Travel(0.0, 0.0, 0.0)
-    u1, u2 = moved[:, 0], moved[:, 1]
-    amplitude, omega, phase = envelope(program, times[: len(moved)])
-    table = -amplitude / omega**2 * np.sin(phase) if reference == "ground" else np.zeros(len(moved))
-    return Travel(*(float(np.abs(each).max()) for each in (u1 + table, u2 + table, u2 - u1)))
+    from scipy.fft import next_fast_len
+
+    size = next_fast_len(acceleration.size + round(_SILENCE * sample_rate), real=True)
+    omega: Array = 2.0 * np.pi * np.fft.rfftfreq(size, 1.0 / sample_rate).astype(np.float64)
+    a = np.fft.rfft(acceleration, size)
+    # the table does not drift: no velocity and no displacement at zero frequency
+    a[0], omega[0] = 0.0, 1.0
+    x = -a / omega**2
+    u1, u2 = _storeys(specimen, omega) * a
+    ground = x if configuration.laser_reference == "ground" else 0.0 * x
+    series = table_demands(x, 1j * omega * x, a, configuration.shaker_model)
+    series |= laser_demands(u1 + ground, u2 + ground, u2 - u1, configuration.laser_half_ranges)
+    if specimen.beta is not None:
+        block = specimen.block
+        moment = block.h_b * block.mass * a - specimen.k_c * specimen.frame.h1 * u1
+        series[RESTING] = moment / (block.b * specimen.g * block.mass)
+    made = {name: np.fft.irfft(spectrum, size)[: acceleration.size] for name, spectrum in series.items()}
+    found = peaks(made)
+    if "current" in made:
+        # rms over the record: conservative, as the guard averages over a longer time
+        found["heating"] = float(np.sqrt(np.mean(made["current"] ** 2)))
+    return found
+
+
+def _storeys(specimen: Specimen, omega: Array) -> NDArray[np.complex128]:
+    """u1 and u2 [m] per table acceleration [m/s2] at `omega` [rad/s], shape (2, n); with a block, while it rests."""
+    mass, damping, stiffness = frame_matrices(specimen.frame)
+    stiffness[0, 0] += specimen.k_c
+    w = omega[:, None, None]
+    dynamic = stiffness - w**2 * mass + 1j * w * damping
+    push = np.broadcast_to(-np.diag(mass)[:, None], (omega.size, 2, 1))
+    return np.linalg.solve(dynamic, push)[..., 0].T.astype(np.complex128)

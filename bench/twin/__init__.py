@@ -1,1 +1,1 @@
-"""The live twin: the model of the specimen runs beside every test, under the table's motion as it is measured."""
+"""Live twin: model of the specimen under the measured table motion, computed during every test."""

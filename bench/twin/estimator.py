@@ -1,31 +1,157 @@
-"""The twin of one run: blocks of samples in, estimates out. It knows of no thread and of no event but its own."""
+"""Twin of one run, without threads: computes estimates and residuals from blocks of samples."""
 
+from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
+from math import ceil, nan
 from typing import Any
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from bench.analysis.signals import ACCELERATION, DISPLACEMENT, LASER_1, LASER_2
+from bench.analysis.transient_base import MODEL_RATE
+from bench.config.model import BenchConfiguration
 from bench.events import TwinEstimate
-from bench.twin.ensemble import Candidates, Ensemble
-from bench.twin.gains import Gains, Measured
-from bench.twin.resampling import Resampler
-from bench.twin.residual import Residual
+from bench.twin.ensemble import Ensemble, Gains, Measured, Members
 from sim.errors import RockbenchError
+
+_PIPELINE = 3
+"""Measurements from exposure to output of an optoNCDT 1420; the output begins up to one later (manual, p. 52)."""
+_HELD = 0.5
+"""Mean age of the value at an output, which is held until the next measurement, in measurements."""
+
+
+def laser_lag(configuration: BenchConfiguration) -> tuple[float, float]:
+    """Delay of the lasers relative to the accelerometer and to the displacement sensor [s].
+
+    Serial lasers are aligned to the sample clock by `hardware.lasers.delay` and have none. A backend of another package
+    is assumed to have none.
+    """
+    if (told := configuration.twin.laser_lag) is not None:
+        return told, told
+    if configuration.backend == "simulated":
+        laser = configuration.simulation.bench.laser_1
+        lag = (laser.latency + _HELD) / laser.rate
+        # the simulated accelerometer averages over the preceding tick
+        return lag - 0.5 / configuration.sample_rate, lag
+    lasers = configuration.hardware.lasers
+    placed = configuration.backend != "hardware" or lasers.connection == "serial"
+    lag = 0.0 if placed else (_PIPELINE + _HELD) / lasers.rate
+    return lag, lag
+
 
 Array = NDArray[np.float64]
 
+_CUTOFF = 0.35
+"""Middle of the transition band, as a share of the model's rate. The filter cards limit the motion to far below it."""
+_HALF_WIDTH = 6
+"""Half the length of the impulse response [samples of the model]."""
+_KAISER = 5.65
+"""Window beta for 60 dB (Kaiser, 1974); with this length the transition band is 0.3 of the model's rate wide."""
+
+
+class Resampler:
+    """Linear-phase low-pass for signals in blocks; the output does not depend on the division into blocks.
+
+    Delays every signal by `latency` [s], and signal i by `delays[i]` [s] (0 or more) in addition, with interpolation
+    between samples. Outputs a sample every `dt` [s]. The input before the first block is zero.
+    """
+
+    def __init__(self, sample_rate: float, delays: Sequence[float]) -> None:
+        self.every = max(round(sample_rate / MODEL_RATE), 1)
+        self.dt = self.every / sample_rate
+        half = _HALF_WIDTH * self.every
+        self.latency = half / sample_rate
+        late = np.array(delays) * sample_rate
+        length = 2 * half + 1 + ceil(float(late.max()))
+        # weight of the newest sample last, in the order of the window
+        places = (np.arange(length)[::-1] - half - late[:, None]) / self.every
+        window = np.i0(_KAISER * np.sqrt(np.maximum(1.0 - (places / _HALF_WIDTH) ** 2, 0.0)))
+        taps = np.sinc(2.0 * _CUTOFF * places) * np.where(np.abs(places) <= _HALF_WIDTH, window, 0.0)
+        self._taps = taps / taps.sum(axis=1, keepdims=True)
+        self._kept = np.zeros((length - 1, len(late)))
+        self._skip = 0
+
+    def push(self, block: Array) -> tuple[Array, int]:
+        """Resample a block, shape (n, n_signals). Returns samples, shape (m, n_signals), NaN where an input within the
+        filter's length is missing, and the number of input samples of the block after the last output sample.
+        """
+        line = np.concatenate((self._kept, block))
+        chosen = sliding_window_view(line, self._taps.shape[1], axis=0)[self._skip :: self.every]
+        self._kept = line[len(block) :]
+        self._skip = (self._skip - len(block)) % self.every
+        return np.einsum("nct,ct->nc", chosen, self._taps), self.every - 1 - self._skip
+
+
+SPAN = 1.0
+"""Window of a residual [s]."""
+
+
+class Residual:
+    """Root mean squares over the last `SPAN`, relative to the largest measured drift so far.
+
+    `least` [m] replaces a smaller largest drift: differences below the sensors' resolution are not significant.
+    """
+
+    def __init__(self, dt: float, least: float) -> None:
+        self._span, self._least = round(SPAN / dt), least
+        self._sums: deque[tuple[int, int, Array]] = deque()
+        self._largest = 0.0
+
+    def push(self, measured: Array, model: Array, low: Array, high: Array) -> tuple[float, float]:
+        """Relative rms of measured minus model and of the excess over the band, after further samples [m], shape (n,).
+
+        NaN until the window is full, and while more than half of its values are missing.
+        """
+        parts = np.stack((measured, measured - model, np.maximum(np.maximum(measured - high, low - measured), 0.0)))
+        known = np.isfinite(parts).all(axis=0)
+        squares = np.square(parts[:, known]).sum(axis=1)
+        self._sums.append((measured.size, int(np.count_nonzero(known)), squares))
+        total = sum(size for size, *_ in self._sums)
+        while total - self._sums[0][0] >= self._span:
+            total -= self._sums.popleft()[0]
+        seen = sum(n for _, n, _ in self._sums)
+        if total < self._span or 2 * seen <= total:
+            return nan, nan
+        rms = np.sqrt(np.sum([part for *_, part in self._sums], axis=0) / seen)
+        self._largest = max(self._largest, float(rms[0]))
+        scale = max(self._largest, self._least)
+        return float(rms[1]) / scale, float(rms[2]) / scale
+
+
+class Limit:
+    """Limit that trips once, after a value has exceeded it for `persistence` [s]."""
+
+    def __init__(self, limit: float | None, persistence: float) -> None:
+        self.limit = limit
+        self._persistence = persistence
+        self._since: float | None = None
+        self._counted = False
+
+    def exceeded(self, value: float, seconds: float) -> bool:
+        """Whether the limit trips with `value` at `seconds` [s]; NaN does not exceed it."""
+        if self.limit is None or not value > self.limit:
+            self._since = None
+            return False
+        self._since = seconds if self._since is None else self._since
+        if self._counted or seconds - self._since < self._persistence:
+            return False
+        self._counted = True
+        return True
+
+
 _TRACE = 0.01
-"""Time between two rows of a trace [s]."""
+"""Sampling interval of a trace [s]."""
 
 
 @dataclass(frozen=True)
 class Setting:
-    """What the twin of a run needs to know of the bench.
+    """Sample rate and sensors of the bench.
 
-    `on_ground`: the lasers see the table's displacement too. `lag` is theirs behind the
-    table's accelerometer and displacement sensor [s], `linearity` their largest error [m], that of storey 1 first.
+    `on_ground`: the lasers' signals include the table's displacement. `lag` is their delay relative to the table's
+    accelerometer and displacement sensor [s], `linearity` their largest errors [m], storey 1 first.
     """
 
     sample_rate: float
@@ -34,55 +160,55 @@ class Setting:
     linearity: tuple[float, float]
 
 
-class Blind(RockbenchError):
-    """Without every sample of the table's acceleration there is no model."""
+class NoEstimate(RockbenchError):
+    """Missing samples of the table's acceleration: the model cannot continue."""
 
     error_code = "no_estimate"
 
 
 class Estimator:
-    """It begins at rest, with the first block that it is given, and takes every one from there on."""
+    """Computes estimates from consecutive blocks, the first of them at rest."""
 
-    def __init__(self, run: int, setting: Setting, those: Candidates) -> None:
+    def __init__(self, run: int, setting: Setting, members: Members) -> None:
         self._run, self._setting = run, setting
-        # the model gets the acceleration as late as the lasers show what came of it
+        # delays the acceleration by the lag of the lasers
         lasers = max(0.0, *(-lag for lag in setting.lag))
         self._resampler = Resampler(setting.sample_rate, (*(lasers + lag for lag in setting.lag), lasers, lasers))
         dt = self._resampler.dt
         self._latency = self._resampler.latency + lasers
-        self._ensemble, self._gains = Ensemble(those, dt), Gains(those, dt)
+        self._ensemble, self._gains = Ensemble(members, dt), Gains(members, dt)
         first, second = setting.linearity
-        self._doubts = np.array([first, second, np.hypot(first, second)])
-        self._residual = Residual(dt, float(self._doubts[2]))
-        self._peaks = np.zeros(len(those.specimens))
+        self._uncertainties = np.array([first, second, np.hypot(first, second)])
+        self._residual = Residual(dt, float(self._uncertainties[2]))
+        self._peaks = np.zeros(len(members.specimens))
         self._measured_peak = 0.0
         self._every, self._skip = max(round(_TRACE / dt), 1), 0
 
     @property
     def members(self) -> int:
-        """How many candidates there are besides the nominal one."""
+        """Number of members besides the nominal one."""
         return len(self._ensemble) - 1
 
     def shed(self) -> None:
-        """Go on with half of the members; their band holds less."""
+        """Drop half of the members; their band becomes narrower."""
         self._ensemble.keep(1 + self.members // 2)
 
     def take(self, time: float, end: int, signals: Array, measured: Measured | None) -> TwinEstimate | None:
-        """The estimate at the end of a block that was read at `time`; None of one too short for a sample of the model.
+        """Estimate at the end of a block read at `time`; None if the block is too short for a sample of the model.
 
-        `signals`, shape (n, n_signals), are those of the block before sample `end` of the run.
+        `signals`, shape (n, n_signals), are those of the block that ends before sample `end` of the run.
 
-        Raises Blind where the table's acceleration is missing.
+        Raises NoEstimate where the table's acceleration is missing.
         """
         setting = self._setting
         samples, newer = self._resampler.push(signals[:, [ACCELERATION, DISPLACEMENT, LASER_1, LASER_2]])
         if not np.isfinite(samples[:, 0]).all():
-            raise Blind("samples of the table's acceleration are missing")
+            raise NoEstimate("samples of the table's acceleration are missing")
         if not len(samples):
             return None
-        acceleration, x, laser_1, laser_2 = np.ascontiguousarray(samples.T)
-        u1 = laser_1 - x if setting.on_ground else laser_1
-        seen = np.stack((u1, u1 + laser_2 - laser_1, laser_2 - laser_1))
+        acceleration, x, first, second = np.ascontiguousarray(samples.T)
+        u1 = first - x if setting.on_ground else first
+        seen = np.stack((u1, u1 + second - first, second - first))
         motions = self._ensemble.feed(acceleration)
         u = np.stack((motions[0], motions[1], motions[1] - motions[0]))
         seconds = (end - 1 - newer) / setting.sample_rate - self._latency
@@ -98,8 +224,8 @@ class Estimator:
         theta: Array,
         measured: Measured | None,
     ) -> TwinEstimate:
-        """From u1, u2 and drift, `seen` of shape (3, n) and of the models of shape (3, k, n), and theta, (k, n)."""
-        low, high = _band(u.swapaxes(0, 1), self._doubts[:, None])
+        """From u1, u2 and drift, measured (`seen`, (3, n)) and modelled ((3, k, n)), and theta (k, n)."""
+        low, high = _band(u.swapaxes(0, 1), self._uncertainties[:, None])
         residual, excess = self._residual.push(seen[2], u[2, 0], low[2], high[2])
         alphas = self._gains.push(acceleration, u[2], measured)
         self._peaks = np.maximum(self._peaks[: u.shape[1]], np.abs(u[2]).max(axis=1))
@@ -107,9 +233,11 @@ class Estimator:
         stated = np.nan if measured is None else measured.alpha_2
         values: dict[str, float] = {}
         for k, name in enumerate(("u1", "u2", "drift")):
-            values |= _beside(name, u[k, 0, -1], low[k, -1], high[k, -1], seen[k, -1])
-        values |= _beside("drift_peak", self._peaks[0], *_band(self._peaks, self._doubts[2]), self._measured_peak)
-        values |= _beside("alpha_2", alphas[0], *_band(alphas, 0.0), stated)
+            values |= _fields(name, u[k, 0, -1], low[k, -1], high[k, -1], seen[k, -1])
+        values |= _fields(
+            "drift_peak", self._peaks[0], *_band(self._peaks, self._uncertainties[2]), self._measured_peak
+        )
+        values |= _fields("alpha_2", alphas[0], *_band(alphas, 0.0), stated)
         return TwinEstimate(
             time=time,
             run=self._run,
@@ -124,7 +252,7 @@ class Estimator:
         )
 
     def _trace(self, seconds: float, u: Array, theta: Array, low: Array, high: Array) -> Array:
-        """Columns `bench.events.TWIN_TRACE`."""
+        """Trace with the columns `bench.events.TWIN_TRACE`."""
         n = low.size
         rows = np.arange(self._skip, n, self._every)
         self._skip = (self._skip - n) % self._every
@@ -133,16 +261,16 @@ class Estimator:
         return trace
 
 
-def _band(values: Array, doubt: float | Array) -> tuple[Array, Array]:
-    """Least and largest of the candidates that stand, along the first axis, and as much wider as the sensors' `doubt`;
-    NaN where fewer than half of them stand.
+def _band(values: Array, uncertainty: float | Array) -> tuple[Array, Array]:
+    """Least and largest value of the members whose block stands, along the first axis, widened by the sensors'
+    `uncertainty`; NaN where fewer than half of the members stand.
     """
     few = 2 * np.count_nonzero(np.isfinite(values), axis=0) < len(values)
-    low, high = np.fmin.reduce(values, axis=0) - doubt, np.fmax.reduce(values, axis=0) + doubt
+    low, high = np.fmin.reduce(values, axis=0) - uncertainty, np.fmax.reduce(values, axis=0) + uncertainty
     return np.where(few, np.nan, low), np.where(few, np.nan, high)
 
 
-def _beside(name: str, model: Any, low: Any, high: Any, measured: Any) -> dict[str, float]:
-    """The fields of an estimate for one quantity."""
+def _fields(name: str, model: Any, low: Any, high: Any, measured: Any) -> dict[str, float]:
+    """Fields of an estimate for one quantity."""
     values = {name: model, f"{name}_low": low, f"{name}_high": high, f"{name}_measured": measured}
     return {key: float(value) for key, value in values.items()}

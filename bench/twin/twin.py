@@ -1,7 +1,7 @@
-"""The live twin as a subscriber: the model runs in a thread of its own, and no block ever waits for it.
+"""Live twin as a subscriber: the model runs in a separate thread, and the acquisition never waits for it.
 
-What came of a block is published with the next one. A model that is not done by then gives up half of its members; one
-that is a second behind is off until the rig is armed again.
+The estimate of a block is published with the next block. A late model drops half of its members; one that is a second
+behind is off until the rig is armed again.
 """
 
 from collections import deque
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.config.model import BenchConfiguration
-from bench.engine.requests import Requests
+from bench.engine.interface import Requests
 from bench.events import (
     Acquired,
     Estimate,
@@ -26,27 +26,70 @@ from bench.events import (
     TwinEstimate,
     Warned,
 )
-from bench.twin.beside import BEHIND
-from bench.twin.ensemble import Candidates, candidates
-from bench.twin.estimator import Estimator, Setting
-from bench.twin.gains import Measured
-from bench.twin.lag import laser_lag
-from bench.twin.residual import Limit
-from bench.twin.standing import Standing
+from bench.twin.ensemble import Measured, Members, draw_members
+from bench.twin.estimator import Estimator, Limit, Setting, laser_lag
+from drivers.rig import OperatorTask
 from sim.errors import CauseCode
 from sim.specimen import Specimen
+
+_BEGINS = {
+    OperatorTask.LOCK_FRAME: "the frame is locked",
+    OperatorTask.LOCK_TABLE: "the table is locked",
+    OperatorTask.HOLD_BLOCK: "the block is held",
+    OperatorTask.WATCH_BLOCK: "the laser of storey 2 is aimed at the block",
+    OperatorTask.TILT_BLOCK: "the block is released from a tilt",
+    OperatorTask.PULL_FRAME: "the frame is released from a deflection",
+}
+"""Operator actions after which the model does not apply, with the reason."""
+
+_MOUNTED = (OperatorTask.HOLD_BLOCK, OperatorTask.TILT_BLOCK, OperatorTask.PULL_FRAME)
+_ENDS = {
+    OperatorTask.UNLOCK_FRAME: (OperatorTask.LOCK_FRAME,),
+    OperatorTask.UNLOCK_TABLE: (OperatorTask.LOCK_TABLE,),
+    OperatorTask.WATCH_STOREYS: (OperatorTask.WATCH_BLOCK,),
+    OperatorTask.MOUNT_SPRING: _MOUNTED,
+    OperatorTask.REMOVE_BLOCK: _MOUNTED,
+}
+"""Operator actions that revoke an earlier one and its reason."""
+
+
+class Applicability:
+    """Applicability of the model, tracked from the operator actions."""
+
+    def __init__(self) -> None:
+        self._mounted: Specimen | None = None
+        self._against: set[OperatorTask] = set()
+
+    def follow(self, event: SpecimenMounted) -> None:
+        """Update the state for an operator action."""
+        self._mounted = event.specimen
+        self._against.difference_update(_ENDS.get(event.work, ()))
+        if event.work in _BEGINS:
+            self._against.add(event.work)
+
+    @property
+    def specimen(self) -> Specimen | None:
+        """Mounted specimen to which the model applies; None if it is unknown, or for the reason `why_not`."""
+        return None if self._against else self._mounted
+
+    @property
+    def why_not(self) -> str:
+        """Reason why the model does not apply to the mounted specimen; empty if it applies."""
+        return "; ".join(_BEGINS[work] for work in _BEGINS if work in self._against)
+
 
 Array = NDArray[np.float64]
 
 _LATE = 0.15
-"""What may wait for the model before it gives up members [s]; two blocks may in any case."""
+"""Backlog at which the model drops members [s]; at least two blocks."""
 _BEHIND = 1.0
-"""What may wait for it at all [s]."""
+"""Backlog above which the twin is switched off [s]."""
+_NOT_IN_TIME = "the twin did not keep up, and is off until the rig is armed again"
 
 
 @dataclass(eq=False)
 class _Run:
-    """A run of the rig that the model goes through."""
+    """Run of the rig that is followed by the model."""
 
     estimator: Future[Estimator]
     warn: Limit
@@ -55,10 +98,10 @@ class _Run:
 
 
 class Twin:
-    """Runs from when the zero is taken to when the rig is at rest again, wherever the model describes what is there.
+    """Follows every test from arming to rest if the model applies to the mounted specimen.
 
-    `publish` is called in the thread of the engine. A `patient` twin waits for its model, so that what it says and when
-    is always the same: for benches whose clock does not run on. `requests` are asked to stop when a residual says so.
+    `publish` is called in the engine's thread. A `patient` twin waits for its model, so that its estimates are
+    reproducible: for benches in virtual time. A residual beyond its limit requests a stop.
     """
 
     def __init__(
@@ -70,7 +113,7 @@ class Twin:
         *,
         patient: bool,
     ) -> None:
-        import_module("sim.kernel.rocking")  # loading it would hold up a bench that is armed
+        import_module("sim.kernel.rocking")  # load it now: loading would delay an armed bench
 
         self._configuration = configuration
         self._publish, self._requests, self._patient = publish, requests, patient
@@ -80,8 +123,8 @@ class Twin:
         self._setting = Setting(sample_rate, on_ground, lag, (first, second))
         block = configuration.block_samples / sample_rate
         self._late, self._most = max(round(_LATE / block), 2), max(round(_BEHIND / block), 5)
-        self._standing = Standing()
-        self._candidates: tuple[Specimen, Future[Candidates]] | None = None
+        self._applicability = Applicability()
+        self._members: tuple[Specimen, Future[Members]] | None = None
         self._measured: Measured | None = None
         self._warned_of: Specimen | None = None
         self._about_to_run = False
@@ -89,17 +132,17 @@ class Twin:
         self._worker = ThreadPoolExecutor(1, "twin")
 
     def close(self) -> None:
-        """Let go of the thread, which ends by itself. Allowed any number of times."""
+        """Release the thread. Allowed any number of times."""
         self._worker.shutdown(wait=False, cancel_futures=True)
 
     def __call__(self, event: Event) -> None:
         match event:
             case SpecimenMounted():
-                self._standing.follow(event)
+                self._applicability.follow(event)
                 self._draw()
             case StateChanged():
                 self._about_to_run = event.after is State.RUNNING
-                # what the protocol has stated is of the test before
+                # the published gain is that of the preceding test
                 self._measured = None
                 if event.after in (State.IDLE, State.HALTED, State.ARMED):
                     self._leave()
@@ -112,23 +155,23 @@ class Twin:
                 pass
 
     def _draw(self) -> None:
-        """Have the candidates for what stands there drawn, while nothing moves."""
-        specimen = self._standing.specimen
-        if specimen is not None and (self._candidates is None or self._candidates[0] != specimen):
-            self._candidates = specimen, self._worker.submit(candidates, specimen, self._configuration)
+        """Draw the members for the mounted specimen, while nothing moves."""
+        specimen = self._applicability.specimen
+        if specimen is not None and (self._members is None or self._members[0] != specimen):
+            self._members = specimen, self._worker.submit(draw_members, specimen, self._configuration)
 
     def _acquired(self, event: Acquired) -> None:
-        if self._about_to_run and self._candidates is not None and self._standing.specimen is not None:
-            self._begin(event.run, self._candidates[1])
+        if self._about_to_run and self._members is not None and self._applicability.specimen is not None:
+            self._begin(event.run, self._members[1])
         self._about_to_run = False
         if self._run is None:
             return
-        if self._hear(self._run, event.time):
+        if self._collect(self._run, event.time):
             self._offer(self._run, event)
 
-    def _begin(self, number: int, those: Future[Candidates]) -> None:
+    def _begin(self, number: int, members: Future[Members]) -> None:
         twin = self._configuration.twin
-        estimator = self._worker.submit(lambda: Estimator(number, self._setting, those.result()))
+        estimator = self._worker.submit(lambda: Estimator(number, self._setting, members.result()))
         warn, stop = (Limit(limit, twin.persistence) for limit in (twin.residual_warn, twin.residual_stop))
         self._run = _Run(estimator, warn, stop)
 
@@ -138,13 +181,13 @@ class Twin:
             for each in run.waiting:
                 each.cancel()
 
-    def _hear(self, run: _Run, now: float) -> bool:
-        """Publish what has come of the blocks before, in their order; whether the model goes on."""
+    def _collect(self, run: _Run, now: float) -> bool:
+        """Publish the finished estimates in order. Returns whether the model continues."""
         while run.waiting and (self._patient or run.waiting[0].done()):
             try:
                 estimate = run.waiting.popleft().result()
             except Exception as error:
-                # what runs beside a test never ends it
+                # an error in the twin must not end a test
                 self._give_up(now, f"the twin is off until the rig is armed again: {error}")
                 return False
             if estimate is not None:
@@ -154,23 +197,23 @@ class Twin:
 
     def _offer(self, run: _Run, event: Acquired) -> None:
         if len(run.waiting) >= self._most:
-            self._give_up(event.time, f"{BEHIND}: {len(run.waiting)} blocks wait for its model")
+            self._give_up(event.time, f"{_NOT_IN_TIME}: {len(run.waiting)} blocks wait for its model", realtime=True)
             return
         shed = len(run.waiting) >= self._late
         end = event.block.first + len(event.block)
         taking = self._worker.submit(_take, run.estimator, event.time, end, event.signals, self._measured, shed)
         run.waiting.append(taking)
 
-    def _give_up(self, now: float, why: str) -> None:
+    def _give_up(self, now: float, why: str, *, realtime: bool = False) -> None:
         self._leave()
-        self._publish(Warned(why, time=now))
+        self._publish(Warned(why, realtime, time=now))
 
     def _judge(self, run: _Run, estimate: TwinEstimate, now: float) -> None:
         excess, seconds = estimate.excess, estimate.seconds
-        what = f"drift outside the twin's band, rms over 1 s: {excess:.3g} of the drift's"
-        if run.warn.exceeded(excess, seconds) and self._warned_of != self._standing.specimen:
-            self._warned_of = self._standing.specimen
-            self._publish(Warned(f"{what}, limit {run.warn.limit:g}: is it the specimen that is configured?", time=now))
+        what = f"drift outside the twin's band: rms over 1 s {excess:.3g} of the drift"
+        if run.warn.exceeded(excess, seconds) and self._warned_of != self._applicability.specimen:
+            self._warned_of = self._applicability.specimen
+            self._publish(Warned(f"{what}, limit {run.warn.limit:g}: is another specimen mounted?", time=now))
         if run.stop.exceeded(excess, seconds):
             self._requests.stop(f"{what}, limit {run.stop.limit:g}", CauseCode.RESIDUAL)
 
@@ -178,7 +221,7 @@ class Twin:
 def _take(
     estimator: Future[Estimator], time: float, end: int, signals: Array, measured: Measured | None, shed: bool
 ) -> TwinEstimate | None:
-    """In the twin's thread, where the estimator has been made before."""
+    """Compute the estimate of a block; called in the twin's thread after the estimator has been created."""
     twin = estimator.result()
     if shed:
         twin.shed()

@@ -1,4 +1,4 @@
-"""The way to the driver: on this PC, or on a controller behind a gRPC device server."""
+"""Connection to the driver: on this PC, or on a controller behind a gRPC device server."""
 
 from typing import Any, cast
 
@@ -9,13 +9,13 @@ from drivers.errors import DeviceNotFound
 from sim.errors import InvalidInput
 
 _READY = 2.0
-"""Time for a server to answer at all [s]."""
+"""Time-out for a server's first answer [s]."""
 _PORT = 31763
-"""Port on which NI gRPC Device Server listens unless told otherwise (its README)."""
+"""Default port of NI gRPC Device Server (its README)."""
 
 
 class Connection:
-    """Where tasks are made. Only the options that it hands out differ between this PC and a server.
+    """Options for new tasks: the only difference between this PC and a server.
 
     Raises DeviceNotFound when no server answers within 2 s, InvalidInput for an address without port.
     """
@@ -30,19 +30,19 @@ class Connection:
 
     @property
     def late(self) -> bool:
-        """Whether the server once did not answer in time: nothing is known of its tasks since."""
+        """Whether a call has ever timed out, after which the state of the server's tasks is unknown."""
         return self._deadline is not None and bool(self._deadline.late)
 
     def options(self, name: str = "") -> Options:
-        """To make a new task of this name, to be found by whoever comes after this process; and only a new one."""
+        """Options for a new task of this name, under which later processes can find it; not for an existing task."""
         return self._session(name, SessionInitializationBehavior.INITIALIZE_SERVER_SESSION)
 
     def attaching(self, name: str) -> Options:
-        """To take hold of a task of this name that is on the server already."""
+        """Options for attaching to an existing task of this name on the server."""
         return self._session(name, SessionInitializationBehavior.ATTACH_TO_SERVER_SESSION)
 
     def close(self) -> None:
-        """Let go of the server; allowed any number of times."""
+        """Disconnect from the server; allowed any number of times."""
         if self._channel is not None:
             self._channel.close()
 
@@ -54,7 +54,7 @@ class Connection:
     def _connect(self, server: str, patience: float) -> None:
         if not server.rpartition(":")[2].isdigit():
             raise InvalidInput("hardware.daq.server", server, f"it must be host:port, such as crio.local:{_PORT}")
-        # the PC of a driver of its own has no use for gRPC, which takes half a second to import
+        # a PC with a local driver does not need gRPC, which takes half a second to import
         import grpc
 
         from drivers.daqmx.deadline import Deadline
@@ -63,12 +63,12 @@ class Connection:
         channel_options = [
             ("grpc.max_receive_message_length", -1),
             ("grpc.max_send_message_length", -1),
-            # a device stands in the laboratory, not behind the proxy to the internet
+            # do not use the internet proxy for a device in the laboratory
             ("grpc.enable_http_proxy", 0),
-            # at most two pings in a call: servers hang up on a client that pings too often
+            # at most two pings per call: servers disconnect clients that ping too often
             ("grpc.keepalive_time_ms", gone),
             ("grpc.keepalive_timeout_ms", gone),
-            # without it, a frozen machine is noticed after a minute only
+            # without it, a frozen machine is detected only after a minute
             ("grpc.http2.ping_timeout_ms", gone),
         ]
         library = cast(Any, grpc)
@@ -80,7 +80,7 @@ class Connection:
             ready.cancel()
             self._channel.close()
             raise DeviceNotFound(
-                f"no gRPC device server answers at {server}: start ni_grpc_device_server there and check the port"
+                f"no gRPC device server responds at {server}: start ni_grpc_device_server there and check the port"
                 f" ({_PORT} unless changed); to be reached from another machine it needs"
                 ' "address": "[::]" in its server_config.json'
             ) from error

@@ -1,4 +1,4 @@
-"""No call to a gRPC device server may last for ever."""
+"""Time-outs of calls to a gRPC device server."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -7,16 +7,16 @@ from typing import Any
 import grpc
 
 _SLOW = {"ResetDevice": 10.0}
-"""Calls that take their time without saying so [s]."""
+"""Additional time of calls whose requests carry no time-out [s]."""
 _LATE = 0.1
-"""What is left of the patience with a server that was late once: what is still tried must not take long."""
+"""Fraction of `patience` granted to calls after a first time-out."""
 _LEAST = 0.1
-"""Time that every call gets beyond its own [s]."""
+"""Shortest time beyond a call's own [s]."""
 
 
 @dataclass(frozen=True)
 class CallDetails(grpc.ClientCallDetails):
-    """How a call is made: the fields that gRPC asks for."""
+    """Details of a call: the fields that gRPC requires."""
 
     method: str
     timeout: float | None
@@ -27,12 +27,12 @@ class CallDetails(grpc.ClientCallDetails):
 
 
 class Deadline(grpc.UnaryUnaryClientInterceptor):
-    """Gives every call the time it asks for itself, plus `patience` seconds."""
+    """Sets the deadline of every call to its own time-out plus `patience` seconds."""
 
     def __init__(self, patience: float) -> None:
         self._patience = patience
         self.late = False
-        """Whether a call was not answered in time: what it was about is unknown since."""
+        """Whether a call has timed out: its effect is unknown."""
 
     def intercept_unary_unary(
         self, continuation: Callable[[grpc.ClientCallDetails, Any], Any], client_call_details: Any, request: Any

@@ -1,4 +1,4 @@
-"""What the driver complains of, as the errors of the rig."""
+"""Errors of the driver translated to those of the rig."""
 
 from collections.abc import Generator
 from contextlib import contextmanager
@@ -20,23 +20,23 @@ from drivers.errors import ConnectionLost, DeviceNotFound, DeviceTimeout, DriveU
 
 @dataclass(frozen=True)
 class _Meaning:
-    """What a group of codes is to the rig."""
+    """Translation of a group of codes."""
 
     error: type[RigError]
     remedy: str
 
 
-_UNDERFLOW = _Meaning(DriveUnderflow, "the drive was written too late: give it more lead")
-_OVERFLOW = _Meaning(InputOverflow, "the inputs were read too late: give hardware.daq.buffer more seconds")
-_TIMEOUT = _Meaning(DeviceTimeout, "stop, and check the wiring of clock and trigger and the load of the machine")
+_UNDERFLOW = _Meaning(DriveUnderflow, "the drive was written too late: increase acquisition.lead")
+_OVERFLOW = _Meaning(InputOverflow, "the inputs were read too late: increase hardware.daq.buffer")
+_TIMEOUT = _Meaning(DeviceTimeout, "stop, and check the wiring of clock and trigger and the CPU load")
 _GONE = _Meaning(ConnectionLost, "check power and cables, then open a new session")
-_ABSENT = _Meaning(DeviceNotFound, "`rockbench devices` lists what is there")
+_ABSENT = _Meaning(DeviceNotFound, "`rockbench devices` lists the devices present")
 _BUSY = _Meaning(DeviceNotFound, "another program holds the device: end it first")
 _NO_ROUTE = _Meaning(
     RigError,
-    "see hardware.daq.start_trigger and hardware.daq.clock; clock = OnboardClock leaves the output a clock of its own",
+    "see hardware.daq.start_trigger and hardware.daq.clock; clock = OnboardClock gives the output its own clock",
 )
-_OTHER = _Meaning(RigError, "the run is over")
+_OTHER = _Meaning(RigError, "the run has ended")
 
 _CODES: dict[_Meaning, tuple[DAQmxErrors, ...]] = {
     _UNDERFLOW: (
@@ -111,7 +111,7 @@ _BY_STATUS = {
     "FAILED_PRECONDITION": _Meaning(ConnectionLost, "another client has taken the device: open a new session"),
     "UNIMPLEMENTED": _Meaning(RigError, "update NI gRPC Device Server"),
 }
-"""What the states of a gRPC call mean, by their names."""
+"""Meanings of the status codes of a gRPC call, by name."""
 
 _UNSUPPORTED = {
     int(code)
@@ -125,17 +125,17 @@ _UNSUPPORTED = {
 
 
 def is_unsupported(error: DaqError) -> bool:
-    """Whether a device refused a property because it has no such thing."""
+    """Whether the error means that a device lacks a property."""
     return code_of(error) in _UNSUPPORTED
 
 
 def code_of(error: DaqError) -> int:
-    """The number that the driver gave."""
+    """The driver's error code."""
     return int(error.error_code)
 
 
 def translation(doing: str, error: Error) -> RigError:
-    """What the rig says of an error that came while `doing`."""
+    """The rig's error for a driver's error raised while `doing`."""
     if isinstance(error, DaqNotFoundError | DaqNotSupportedError):
         return DeviceNotFound(
             f"{doing} failed: there is no NI-DAQmx driver on this PC; install NI-DAQmx, or set hardware.daq.server to"
@@ -160,7 +160,7 @@ def status_of(error: RpcError) -> str:
 
 @contextmanager
 def translated(doing: str) -> Generator[None]:
-    """Raise errors of the driver as errors of the rig, saying that they came while `doing`."""
+    """Raise errors of the driver as errors of the rig, with the operation `doing` in the message."""
     try:
         yield
     except Error as error:

@@ -1,20 +1,58 @@
-"""The analogue inputs: one continuous task, read as raw counts."""
+"""Analogue inputs of a DAQ device: the task, and the scaling from raw counts to volts."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from uuid import uuid4
 
 import numpy as np
-from nidaqmx.constants import AcquisitionType, TerminalConfiguration
+from nidaqmx.constants import AcquisitionType, DataJustification, TaskMode, TerminalConfiguration
 from nidaqmx.error_codes import DAQmxErrors
 from nidaqmx.errors import DaqError
 from numpy.typing import NDArray
 
 from drivers.daqmx import library
 from drivers.daqmx.connection import Connection
-from drivers.daqmx.errors import code_of, translated
+from drivers.daqmx.delays import Connected, input_delays
+from drivers.daqmx.errors import code_of, is_unsupported, translated
+from drivers.daqmx.library import InputChannel
 from drivers.daqmx.parameters import AnalogInput, Daq, Wiring
-from drivers.daqmx.scaling import InputScaling, scaling_of
 from drivers.errors import DeviceTimeout, RigError
+
+
+@dataclass(frozen=True)
+class InputScaling:
+    """One input: volts = coefficients[0] + coefficients[1] counts + coefficients[2] counts^2 + ...
+
+    The coefficients are the device's own calibration. Counts from `lowest` to `highest` are measurements; beyond, the
+    converter is saturated. `bits` is the size of a raw sample.
+    """
+
+    coefficients: tuple[float, ...]
+    lowest: int
+    highest: int
+    bits: int
+
+
+def scaling_of(channel: InputChannel, terminal: str) -> InputScaling:
+    """Scaling of a task's input from its device. Raises RigError when the device returns no slope."""
+    coefficients = tuple(float(c) for c in channel.ai_dev_scaling_coeff)
+    if len(coefficients) < 2 or coefficients[1] == 0.0:
+        raise RigError(f"{terminal} cannot be scaled: its coefficients are {coefficients}; recalibrate it")
+    size = int(channel.ai_raw_samp_size)
+    left = channel.ai_raw_samp_justification is DataJustification.LEFT
+    return InputScaling(coefficients, *valid_counts(size, round(channel.ai_resolution), left=left), size)
+
+
+def valid_counts(size: int, resolution: int, *, left: bool) -> tuple[int, int]:
+    """Lowest and highest valid count of a signed converter of `resolution` bits in `size` bits.
+
+    At the extreme counts the converter is saturated, so they are excluded. `left`: the converter's bits are
+    the upper ones of the sample.
+    """
+    step = 2 ** (size - resolution) if left else 1
+    rail = 2 ** (resolution - 1)
+    return (1 - rail) * step, (rail - 2) * step
+
 
 NAME = "rockbench_in"
 
@@ -28,29 +66,40 @@ TERMINAL_CONFIGURATIONS: dict[Wiring, TerminalConfiguration] = {
 
 
 class Inputs:
-    """All inputs in one task, in the order given. The output starts on `trigger` and is clocked from `clock`.
+    """Input task with all inputs, in the given order, on `devices`, and their `delays`.
 
-    Both are the terminals that the device gives for its inputs, unless the configuration names others.
+    The output starts on `trigger` and is clocked from `clock`; by default both are terminals of the inputs' device.
     """
 
-    def __init__(self, connection: Connection, daq: Daq, inputs: Sequence[AnalogInput], rate: float) -> None:
-        # the device says more of what is wrong than a deadline does, so it comes first
+    def __init__(
+        self,
+        connection: Connection,
+        daq: Daq,
+        inputs: Sequence[AnalogInput],
+        rate: float,
+        devices: Sequence[Connected],
+    ) -> None:
+        # the device's own error is more specific than a time-out, so it is raised first
         self._allowance = daq.patience / 4.0
         mark = uuid4().hex
         self._names = [f"rockbench_{mark}_{k}" for k in range(len(inputs))]
-        with translated("making the input task"):
+        with translated("creating the input task"):
             self._task = library.task(NAME, connection.options(NAME))
         try:
-            with translated("making the input task"):
-                self.scalings = self._add(inputs)
+            with translated("creating the input task"):
+                channels = self._add(inputs)
+                self.scalings = tuple(
+                    scaling_of(channel, given.terminal) for channel, given in zip(channels, inputs, strict=True)
+                )
                 buffer = round(daq.buffer * rate)
                 self._task.timing.cfg_samp_clk_timing(
                     rate, sample_mode=AcquisitionType.CONTINUOUS, samps_per_chan=buffer
                 )
                 self._task.in_stream.input_buf_size = buffer
                 self.rate = float(self._task.timing.samp_clk_rate)
-                self.trigger = daq.start_trigger or str(self._task.triggers.start_trigger.term)
-                self.clock = daq.clock or str(self._task.timing.samp_clk_term)
+                self.delays = input_delays(self._task, channels, devices, self.rate)
+                trigger, clock = self._terminals()
+                self.trigger, self.clock = daq.start_trigger or trigger, daq.clock or clock
                 self._reader = library.unscaled_reader(self._task)
             self.dtype = _dtype(self.scalings)
         except BaseException:
@@ -60,8 +109,10 @@ class Inputs:
         self._raw: NDArray[np.int16 | np.int32] = np.empty((len(inputs), 0), self.dtype)
 
     def are_ours(self) -> bool:
-        """Whether no other client has taken the device. A server knows tasks by name, and the other's has ours."""
-        with translated("asking whose the input task is"):
+        """Whether the task still belongs to this client. A server identifies tasks by name, and tasks of all clients
+        have the same name.
+        """
+        with translated("checking the owner of the input task"):
             try:
                 return list(self._task.channel_names) == self._names
             except DaqError as error:
@@ -70,7 +121,7 @@ class Inputs:
                 return False
 
     def start(self) -> None:
-        """Start the sample clock, of the output as well."""
+        """Start the sample clock, also of the output."""
         with translated("starting the inputs"):
             self._task.start()
 
@@ -81,12 +132,12 @@ class Inputs:
         with translated("reading the inputs"):
             got = self._read(self._raw, n, n / self.rate + self._allowance)
         if got != n:
-            raise DeviceTimeout(f"reading the inputs failed: {got} of {n} samples came; the run is over")
+            raise DeviceTimeout(f"reading the inputs failed: {got} of {n} samples received; the run has ended")
         return self._raw.T.copy(order="C")
 
     def acquired(self) -> int:
-        """How many samples per input the device has taken since the start."""
-        with translated("asking how far the inputs are"):
+        """Samples per input acquired since the start."""
+        with translated("reading the number of acquired samples"):
             return int(self._task.in_stream.total_samp_per_chan_acquired)
 
     def stop(self) -> None:
@@ -99,18 +150,44 @@ class Inputs:
         with translated("clearing the input task"):
             self._task.close()
 
-    def _add(self, inputs: Sequence[AnalogInput]) -> tuple[InputScaling, ...]:
-        channels = [
+    def _terminals(self) -> tuple[str, str]:
+        """Terminals of start trigger and sample clock; the timing engine to which they belong is kept.
+
+        On a chassis with several engines they are undefined until the task is reserved, unless the engine is set
+        (NI-DAQmx help, "cDAQ-91xx and TestScale Chassis Timing Engines").
+        """
+        task = self._task
+        task.control(TaskMode.TASK_RESERVE)
+        try:
+            terminals = str(task.triggers.start_trigger.term), str(task.timing.samp_clk_term)
+            engine = self._engine()
+        finally:
+            # a watchdog starts only while nothing is reserved
+            task.control(TaskMode.TASK_UNRESERVE)
+        if engine is not None:
+            task.timing.samp_timing_engine = engine
+        return terminals
+
+    def _engine(self) -> int | None:
+        """The number of the timing engine; None on a device with only one."""
+        try:
+            return int(self._task.timing.samp_timing_engine)
+        except DaqError as error:
+            if is_unsupported(error):
+                return None
+            raise
+
+    def _add(self, inputs: Sequence[AnalogInput]) -> list[InputChannel]:
+        return [
             self._task.ai_channels.add_ai_voltage_chan(
                 given.terminal, name, TERMINAL_CONFIGURATIONS[given.wiring], -given.range, given.range
             )
             for name, given in zip(self._names, inputs, strict=True)
         ]
-        return tuple(scaling_of(channel, given.terminal) for channel, given in zip(channels, inputs, strict=True))
 
 
 def _dtype(scalings: Sequence[InputScaling]) -> type[np.int16] | type[np.int32]:
     widest = max(scaling.bits for scaling in scalings)
     if widest > 32:
-        raise RigError(f"the inputs have raw samples of {widest} bits and 32 is the most that can be read")
+        raise RigError(f"the inputs have raw samples of {widest} bits; at most 32 can be read")
     return np.int16 if widest <= 16 else np.int32

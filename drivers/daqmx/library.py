@@ -1,7 +1,7 @@
 # pyright: reportUnknownMemberType=false
-"""The part of nidaqmx that is used here, with types: nidaqmx has none of its own.
+"""Typed interface of the part of nidaqmx used here; nidaqmx has no type annotations.
 
-`options` say where the driver runs: None for the driver of this PC, otherwise a session of a gRPC device server.
+`options` select the driver: None for the driver of this PC, otherwise a session of a gRPC device server.
 """
 
 from collections.abc import Sequence
@@ -13,16 +13,20 @@ import numpy as np
 from nidaqmx.constants import (
     AcquisitionType,
     DataJustification,
+    DigitalWidthUnits,
     Level,
     OutputDataTransferCondition,
+    ProductCategory,
     RegenerationMode,
+    TaskMode,
     TerminalConfiguration,
+    WatchdogAOExpirState,
 )
 from nidaqmx.grpc_session_options import GrpcSessionOptions
 from nidaqmx.stream_readers import AnalogUnscaledReader, DigitalMultiChannelReader
 from nidaqmx.stream_writers import AnalogSingleChannelWriter, DigitalSingleChannelWriter
 from nidaqmx.system.watchdog import WatchdogTask as NiWatchdogTask
-from nidaqmx.types import DOExpirationState
+from nidaqmx.types import AOExpirationState, DOExpirationState
 from numpy.typing import NDArray
 
 Options = GrpcSessionOptions | None
@@ -43,7 +47,7 @@ class PhysicalInput(Named, Protocol):
 
 
 class Device(Named, Protocol):
-    """A DAQ device; a property that it does not have raises."""
+    """A DAQ device; reading a property that it lacks raises."""
 
     @property
     def product_type(self) -> str: ...
@@ -51,6 +55,12 @@ class Device(Named, Protocol):
     def serial_num(self) -> int: ...
     @property
     def is_simulated(self) -> bool: ...
+    @property
+    def product_category(self) -> ProductCategory: ...
+    @property
+    def compact_daq_chassis_device(self) -> Named: ...
+    @property
+    def compact_rio_chassis_device(self) -> Named: ...
     @property
     def ai_physical_chans(self) -> Sequence[PhysicalInput]: ...
     @property
@@ -75,7 +85,7 @@ class Device(Named, Protocol):
 
 
 class Version(Protocol):
-    """Of the driver."""
+    """Version of the driver."""
 
     @property
     def major_version(self) -> int: ...
@@ -86,7 +96,7 @@ class Version(Protocol):
 
 
 class System(Protocol):
-    """All devices that a driver knows."""
+    """All devices of a driver."""
 
     @property
     def devices(self) -> Sequence[Device]: ...
@@ -105,6 +115,11 @@ class InputChannel(Protocol):
     def ai_raw_samp_justification(self) -> DataJustification: ...
     @property
     def ai_resolution(self) -> float: ...
+    @property
+    def ai_filter_delay(self) -> float: ...
+
+    ai_filter_delay_units: DigitalWidthUnits
+    ai_remove_filter_delay: bool
 
 
 class InputChannels(Protocol):
@@ -145,19 +160,24 @@ class InputLineChannels(Protocol):
 
 
 class Timing(Protocol):
-    """The sample clock of a task."""
+    """The sample clock of a task; `samp_timing_engine` is the number of the engine that generates it."""
+
+    samp_timing_engine: int
 
     @property
     def samp_clk_rate(self) -> float: ...
     @property
     def samp_clk_term(self) -> str: ...
+    @property
+    def ai_conv_rate(self) -> float: ...
+    def __getitem__(self, device: str) -> "Timing": ...
     def cfg_samp_clk_timing(
         self, rate: float, source: str = "", *, sample_mode: AcquisitionType, samps_per_chan: int
     ) -> None: ...
 
 
 class StartTrigger(Protocol):
-    """What starts a task."""
+    """Start trigger of a task."""
 
     @property
     def term(self) -> str: ...
@@ -172,7 +192,7 @@ class Triggers(Protocol):
 
 
 class InStream(Protocol):
-    """The buffer of an input task, and how far its inputs have come."""
+    """The buffer of an input task, and the number of samples acquired."""
 
     input_buf_size: int
 
@@ -211,6 +231,7 @@ class Task(Named, Protocol):
     def in_stream(self) -> InStream: ...
     @property
     def out_stream(self) -> OutStream: ...
+    def control(self, action: TaskMode) -> None: ...
     def start(self) -> None: ...
     def stop(self) -> None: ...
     def close(self) -> None: ...
@@ -219,9 +240,12 @@ class Task(Named, Protocol):
 class WatchdogTask(Protocol):
     """The watchdog of a device."""
 
+    expir_trig_trig_on_network_conn_loss: bool
+
     @property
     def expired(self) -> bool: ...
     def cfg_watchdog_do_expir_states(self, expiration_states: Sequence[DOExpirationState]) -> object: ...
+    def cfg_watchdog_ao_expir_states(self, expiration_states: Sequence[AOExpirationState]) -> object: ...
     def clear_expiration(self) -> None: ...
     def reset_timer(self) -> None: ...
     def start(self) -> None: ...
@@ -230,14 +254,14 @@ class WatchdogTask(Protocol):
 
 
 class UnscaledReader(Protocol):
-    """Reads counts into an array of shape (channels, n); returns how many per channel."""
+    """Reads counts into an array of shape (channels, n); returns the number per channel."""
 
     def read_int16(self, data: NDArray[Any], number_of_samples_per_channel: int, timeout: float) -> int: ...
     def read_int32(self, data: NDArray[Any], number_of_samples_per_channel: int, timeout: float) -> int: ...
 
 
 class AnalogWriter(Protocol):
-    """Writes volts, shape (n,); returns how many."""
+    """Writes volts, shape (n,); returns their number."""
 
     def write_many_sample(self, data: NDArray[np.float64], timeout: float) -> int: ...
 
@@ -255,33 +279,38 @@ class LineWriter(Protocol):
 
 
 def system(options: Options) -> System:
-    """What the driver knows."""
+    """Properties of the driver and its devices."""
     return cast(System, nidaqmx.system.System(options))
 
 
 def task(name: str, options: Options) -> Task:
-    """A new task, or what `options` say of an old one."""
+    """A new task, or the existing one that `options` name."""
     return cast(Task, nidaqmx.Task(name, grpc_options=options))
 
 
 def watchdog_task(device: str, name: str, timeout: float, options: Options) -> WatchdogTask:
-    """The watchdog of a device; it barks `timeout` seconds after its last reset."""
+    """The watchdog of a device; it expires `timeout` seconds after its last reset."""
     return cast(WatchdogTask, cast(Any, NiWatchdogTask)(device, name, timeout, options))
 
 
 def let_go(task: WatchdogTask) -> None:
-    """Drop a watchdog that is not ours to close any more, or whose device is gone."""
-    # nidaqmx has no public way, and warns of every watchdog that was not closed
+    """Drop the object of a watchdog that must not be closed because it has another owner or its device is gone."""
+    # nidaqmx has no public method for this and warns about every watchdog not closed
     cast(Any, task)._handle = None
 
 
 def goes_low(line: str) -> DOExpirationState:
-    """A line that goes low when the watchdog barks."""
+    """Expiration state of a line that goes low."""
     return DOExpirationState(physical_channel=line, expiration_state=Level.LOW)
 
 
+def goes_to_zero(output: str) -> AOExpirationState:
+    """Expiration state of an analogue output that goes to 0 V."""
+    return AOExpirationState(physical_channel=output, expiration_state=0.0, output_type=WatchdogAOExpirState.VOLTAGE)
+
+
 def unscaled_reader(task: Task) -> UnscaledReader:
-    """Reads the inputs of a task; the shape of the array is the caller's affair: asking costs a call each time."""
+    """Reads the inputs of a task; the caller ensures the array's shape: the check would cost a call each time."""
     reader = AnalogUnscaledReader(task.in_stream)
     reader.verify_array_shape = False
     return cast(UnscaledReader, reader)
@@ -295,12 +324,12 @@ def analog_writer(task: Task, *, auto_start: bool) -> AnalogWriter:
 
 
 def lines_reader(task: Task) -> LinesReader:
-    """Reads the lines of a task, starting it for that where it is not running."""
+    """Reads the lines of a task; starts it for the read if it is not running."""
     reader = DigitalMultiChannelReader(task.in_stream)
     reader.verify_array_shape = False
     return cast(LinesReader, reader)
 
 
 def line_writer(task: Task) -> LineWriter:
-    """Writes the line of a task, starting it where it is not running."""
+    """Writes the line of a task; starts it if it is not running."""
     return cast(LineWriter, cast(Any, DigitalSingleChannelWriter)(task.out_stream, True))

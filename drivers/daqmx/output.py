@@ -1,4 +1,4 @@
-"""The drive output: a continuous task that plays each sample once."""
+"""Drive output: a continuous task that plays each sample once."""
 
 import time
 from math import ceil
@@ -19,16 +19,16 @@ from drivers.errors import RigError
 NAME = "rockbench_out"
 
 _AHEAD = 2.0
-"""How much more than the lead fits into the buffer [s]."""
+"""Length of the buffer beyond the lead [s]."""
 _ZERO_TIME = 0.1
-"""Time for writing a single value, which never has to wait [s]."""
+"""Time-out for writing a single value, which never waits [s]."""
 _FULL = int(DAQmxErrors.SAMPLES_CAN_NOT_YET_BE_WRITTEN)
 
 
 class Output:
     """One output on the sample clock at the terminal `clock`.
 
-    Each run has a task of its own: what an old one still held is gone with it.
+    Each run has a new task; samples left in the previous one are discarded.
     """
 
     def __init__(self, connection: Connection, daq: Daq, clock: str, rate: float, lead: int) -> None:
@@ -48,7 +48,7 @@ class Output:
             raise
 
     def prepare(self, trigger: str) -> None:
-        """A fresh task with the output at zero, which will start with `trigger`."""
+        """Create a new task with the output at zero that starts on `trigger`."""
         self.clear()
         self.zero()
         task = self._make()
@@ -56,9 +56,9 @@ class Output:
             task.triggers.start_trigger.cfg_dig_edge_start_trig(trigger)
 
     def write(self, volts: NDArray[np.float64]) -> None:
-        """Append samples, shape (n,) [V]; waits for room when it plays already.
+        """Append samples, shape (n,) [V]; waits for free space while playing.
 
-        Raises DriveUnderflow when the output has run dry, DeviceTimeout when no room comes free in time.
+        Raises DriveUnderflow when the output has run out of samples, DeviceTimeout if no space becomes free in time.
         """
         if not self._started and self._prefilled + volts.size > self._buffer:
             raise RigError(
@@ -72,26 +72,26 @@ class Output:
         self._prefilled += volts.size
 
     def arm(self) -> None:
-        """Let the task wait for its trigger; some samples must be written."""
+        """Arm the task on its trigger; it must have samples."""
         with translated("arming the output"):
             if self._task is not None:
                 self._task.start()
         self._started = True
 
     def zero(self) -> None:
-        """Put the output to 0 V now; no other task may hold it."""
+        """Set the output to 0 V now; no other task may have reserved it."""
         put_to_zero(self._connection, self._daq)
 
     def reset_device(self) -> None:
-        """Put every output of the device to its state at power-up, 0 V and low lines; its tasks are gone."""
+        """Reset the device: outputs at 0 V, lines low; its tasks are deleted."""
         with translated("resetting the device of the output"):
             devices = library.system(self._connection.options()).devices
             name = device_name(self._daq.output).lower()
             next(device for device in devices if device.name.lower() == name).reset_device()
 
     def clear(self) -> None:
-        """Stop playing and forget what waits; the output holds its last value."""
-        # a task is closed once: nidaqmx has let go of it even when the driver did not answer
+        """Stop playing and discard waiting samples; the output holds its last value."""
+        # a task can be closed only once: nidaqmx releases it even when the driver did not answer
         task, self._task = self._task, None
         self._started, self._prefilled = False, 0
         if task is not None:
@@ -99,8 +99,8 @@ class Output:
                 task.close()
 
     def _make(self) -> library.Task:
-        """The task that plays; its rate is read back."""
-        with translated("making the output task"):
+        """Create the output task and read back its rate."""
+        with translated("creating the output task"):
             self._task = task = library.task(NAME, self._connection.options(NAME))
             channel = _add_channel(task, self._daq)
             task.timing.cfg_samp_clk_timing(
@@ -114,7 +114,7 @@ class Output:
         return task
 
     def _append(self, volts: NDArray[np.float64], remaining: float) -> int:
-        """How many samples were taken before the buffer was full or the time over."""
+        """Write samples; returns the number written before the buffer was full or the time-out passed."""
         with translated("writing the drive"):
             try:
                 return self._writer.write_many_sample(volts, max(remaining, 0.0))
@@ -125,9 +125,9 @@ class Output:
 
 
 def put_to_zero(connection: Connection, daq: Daq) -> None:
-    """Put the output to 0 V now; no task may hold it."""
-    with translated("putting the output to 0 V"):
-        # without a name: one that a late server still makes must not stand in the way of the next
+    """Set the output to 0 V now; no task may have reserved it."""
+    with translated("setting the output to 0 V"):
+        # without a name: a task that a slow server creates late must not block the next one
         task = library.task("", connection.options())
         try:
             _add_channel(task, daq)
@@ -142,14 +142,14 @@ def _add_channel(task: library.Task, daq: Daq) -> library.OutputChannel:
 
 
 def _transfer_early(channel: library.OutputChannel) -> str:
-    """Let samples go on board as soon as it is half empty; says what became of it.
+    """Refill the onboard memory as soon as it is half empty; returns a description.
 
-    A deep memory on board costs no time here: how far ahead is written is up to the caller.
+    A deep onboard memory then adds no latency: only the caller's lead does.
     """
     try:
         channel.ao_data_xfer_req_cond = OutputDataTransferCondition.ON_BOARD_MEMORY_HALF_FULL_OR_LESS
     except DaqError as error:
         if not is_unsupported(error):
             raise
-        return "as the device does it"
+        return "device default"
     return "when half empty"

@@ -1,4 +1,4 @@
-"""How a DAQ device is wired to the bench: what the configuration says of it."""
+"""Parameters of a DAQ device: wiring, drive output, safety inputs."""
 
 from typing import Literal
 
@@ -11,7 +11,7 @@ Wiring = Literal["default", "differential", "pseudodifferential", "RSE", "NRSE"]
 
 
 class AnalogInput(Parameters):
-    """One analogue input: which terminal, how it is wired, and its range."""
+    """One analogue input: terminal, wiring and range."""
 
     terminal: str = quantity("Dev1/ai0", "", "physical channel of the input")
     wiring: Wiring = quantity("default", "", "terminal configuration of the input")
@@ -19,11 +19,13 @@ class AnalogInput(Parameters):
 
 
 class SafetyInput(Parameters):
-    """A contact that the program reads: which digital input line, and its level while all is well."""
+    """Contact read by the program: its digital input line and its level in the good state."""
 
     line: str = quantity("Dev1/port0/line1", "", "digital input line")
     good: Literal["high", "low"] = quantity(
-        "high", "", "level while all is well: the one that a broken wire does not show, high on pulled-down inputs"
+        "high",
+        "",
+        "level in the good state: choose the level that a broken wire cannot produce, high on pulled-down inputs",
     )
 
 
@@ -32,26 +34,26 @@ class EmergencyStop(SafetyInput):
 
 
 class OverTravel(SafetyInput):
-    """Contact of the over-travel switches: of both ends, or of one when over_travel_2 is the other."""
+    """Contact of the over-travel switches: of both ends, or of one end if over_travel_2 is set."""
 
     line: str = quantity("Dev1/port0/line2", "", "digital input line")
 
 
 class OverTravel2(SafetyInput):
-    """Contact of the over-travel switch at the other end, where it has a line of its own."""
+    """Contact of the over-travel switch at the other end, if it has its own line."""
 
     line: str = quantity("Dev1/port0/line3", "", "digital input line")
 
 
 class AmplifierReady(SafetyInput):
-    """Contact of the amplifier that says ready, or no fault."""
+    """Contact of the amplifier that signals ready or fault-free."""
 
     line: str = quantity("Dev1/port0/line4", "", "digital input line")
     delay: float | None = quantity(
         None,
         "s",
-        "it is good only while the amplifier is enabled, and by so long after the enable line closes at the latest;"
-        " absent: it is good before",
+        "longest time from closing the enable line to ready, for an amplifier that is ready only while enabled;"
+        " absent: it is ready before",
         gt=0,
         le=10,
         usual=(0.02, 5.0),
@@ -60,14 +62,14 @@ class AmplifierReady(SafetyInput):
 
 
 class Heartbeat(Parameters):
-    """A line that changes its level once per block, for a relay in the enable chain that opens when it stands still."""
+    """Line that toggles once per block, for a relay in the enable chain that opens when toggling stops."""
 
     line: str = quantity("Dev1/port0/line5", "", "digital output line")
-    timeout: float = quantity(1.0, "s", "how long after the last rising edge its relay opens", ge=0.1, le=10)
+    timeout: float = quantity(1.0, "s", "time after the last rising edge at which its relay opens", ge=0.1, le=10)
 
 
 class Daq(Parameters):
-    """The DAQ device: where its driver runs, the drive output, the enable line, the safety inputs."""
+    """The DAQ device: location of its driver, drive output, enable line, safety inputs."""
 
     server: str | None = quantity(
         None,
@@ -78,54 +80,54 @@ class Daq(Parameters):
     output: str = quantity("Dev1/ao0", "", "physical channel of the drive output")
     output_range: float = quantity(10.0, "V", "largest magnitude of the drive output", gt=0, le=10, usual=(1.0, 10.0))
     enable_line: str | None = quantity(
-        "Dev1/port0/line0", "", "digital line of the amplifier's enable relay; absent when there is none"
+        "Dev1/port0/line0", "", "digital line of the amplifier's enable relay; absent: none"
     )
     start_trigger: str | None = quantity(
         None,
         "",
-        "terminal of the inputs' start trigger; absent: as the input task says itself",
+        "terminal of the inputs' start trigger; absent: that of the input task",
         example="/Dev1/ai/StartTrigger",
     )
     clock: str | None = quantity(
         None,
         "",
-        "terminal of the output's sample clock; absent: that of the inputs, as the input task says itself;"
-        " OnboardClock: one of its own, which only starts with the inputs",
+        "terminal of the output's sample clock; absent: that of the input task;"
+        " OnboardClock: its own clock, started together with the inputs",
         example="OnboardClock",
     )
     watchdog: float | None = quantity(
         None,
         "s",
-        "time-out of the device's watchdog on the enable line; absent when it has none",
+        "time-out of the device's watchdog on the enable line; absent: no watchdog",
         ge=0.1,
         le=30,
         usual=(0.2, 5.0),
         example=1.0,
     )
-    emergency_stop: EmergencyStop | None = quantity(None, "", "emergency stop; absent when it is not wired")
-    over_travel: OverTravel | None = quantity(None, "", "over-travel switches; absent when they are not wired")
+    emergency_stop: EmergencyStop | None = quantity(None, "", "emergency stop; absent: not wired")
+    over_travel: OverTravel | None = quantity(None, "", "over-travel switches; absent: not wired")
     over_travel_2: OverTravel2 | None = quantity(
-        None, "", "over-travel switch at the other end; absent when over_travel is both, or not wired"
+        None, "", "over-travel switch at the other end; absent: over_travel covers both ends, or not wired"
     )
-    amplifier_ready: AmplifierReady | None = quantity(None, "", "amplifier ready; absent when it is not wired")
-    heartbeat: Heartbeat | None = quantity(None, "", "heartbeat; absent when no relay waits for one")
-    buffer: float = quantity(10.0, "s", "length of the input buffer: how late a block may be read", ge=1.0, le=60.0)
-    patience: float = quantity(2.0, "s", "how long a call may take beyond its own duration", ge=0.1, le=60)
+    amplifier_ready: AmplifierReady | None = quantity(None, "", "amplifier ready; absent: not wired")
+    heartbeat: Heartbeat | None = quantity(None, "", "heartbeat; absent: no heartbeat relay")
+    buffer: float = quantity(10.0, "s", "length of the input buffer: longest delay of a read", ge=1.0, le=60.0)
+    patience: float = quantity(2.0, "s", "time allowed for a call beyond its own duration", ge=0.1, le=60)
 
     @property
     def safety_inputs(self) -> dict[str, SafetyInput]:
-        """The safety inputs that are wired, by the names under which the rig tells of them."""
+        """The wired safety inputs, by their names in the rig's interlocks."""
         return {name: given for name, given in self._possible_inputs.items() if given is not None}
 
     @property
     def missing_inputs(self) -> tuple[str, ...]:
-        """The names of the safety inputs that are not wired; one line may be all there is for both ends."""
+        """The names of the safety inputs that are not wired; a single over-travel line may cover both ends."""
         given = self.safety_inputs
         return tuple(name for name in self._possible_inputs if name not in given and name != "over-travel 2")
 
     @property
     def digital_lines(self) -> dict[str, str]:
-        """Every digital line that is used, by the key that names it."""
+        """Every digital line in use, by its key."""
         inputs = {f"{name.replace('-', '_').replace(' ', '_')}.line": g.line for name, g in self.safety_inputs.items()}
         outputs = {} if self.enable_line is None else {"enable_line": self.enable_line}
         return {**outputs, **inputs, **({} if self.heartbeat is None else {"heartbeat.line": self.heartbeat.line})}
@@ -144,16 +146,16 @@ class Daq(Parameters):
         seen: dict[str, str] = {}
         for item, line in self.digital_lines.items():
             if (other := seen.setdefault(line.strip("/").lower(), item)) != item:
-                raise InvalidInput(item, line, f"{other} has this line already; each needs one of its own")
+                raise InvalidInput(item, line, f"{other} uses this line already; each needs its own")
         return self
 
     @model_validator(mode="after")
     def _safety_inputs_need_something_to_open(self) -> "Daq":
         if self.heartbeat is not None and self.enable_line is None:
-            raise InvalidInput("heartbeat.line", self.heartbeat.line, "it needs enable_line, which it stands beside")
+            raise InvalidInput("heartbeat.line", self.heartbeat.line, "it requires enable_line")
         return self
 
 
 def device_name(terminal: str) -> str:
-    """The device of a physical channel or line, as it is written there; DAQmx does not tell upper from lower case."""
+    """The device name in a physical channel or line, in its original case; DAQmx ignores case."""
     return terminal.strip("/").split("/")[0]

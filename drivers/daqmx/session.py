@@ -1,4 +1,4 @@
-"""A DAQ device under this program's control: drive output, inputs and enable relay as one."""
+"""Session with a DAQ device: drive output, inputs and enable relay under one state machine."""
 
 import threading
 from collections.abc import Generator, Sequence
@@ -10,16 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.daqmx import library
-from drivers.daqmx.checks import checked_devices
-from drivers.daqmx.cleanup import clear_stale
 from drivers.daqmx.connection import Connection
-from drivers.daqmx.description import description_of
-from drivers.daqmx.enable import EnableLine
+from drivers.daqmx.delays import InputDelay
+from drivers.daqmx.devices import checked_devices, described
 from drivers.daqmx.errors import translated
+from drivers.daqmx.inputs import InputScaling
 from drivers.daqmx.output import put_to_zero
 from drivers.daqmx.parameters import AnalogInput, Daq, device_name
-from drivers.daqmx.scaling import InputScaling
-from drivers.daqmx.tasks import Tasks
+from drivers.daqmx.safety import EnableLine, reset_chassis
+from drivers.daqmx.tasks import Tasks, chassis_of, clear_stale, description_of
 from drivers.errors import ConnectionLost, RigError
 from sim.errors import InvalidInput
 
@@ -33,19 +32,18 @@ class _State(Enum):
 
 
 class DaqSession:
-    """Output and inputs share start trigger and sample clock: sample i leaves while sample i is taken.
+    """Output and inputs share start trigger and sample clock: output sample i is played while input sample i is
+    acquired.
 
-    The output is clocked from the terminal of the inputs' sample clock. A device that has no such route refuses the
-    output: then `hardware.daq.clock` may name another terminal, or with OnboardClock leave the output a clock of its
-    own, which starts with the inputs and keeps up with them where both have one timebase. Nothing falls back by itself.
+    The output is clocked from the terminal of the inputs' sample clock. A device without such a route refuses the
+    output: then `hardware.daq.clock` may name another terminal, or with OnboardClock give the output its own clock,
+    which starts with the inputs and stays synchronous if both have the same timebase. There is no automatic fallback.
 
-    A run is `prepare`, `write` the first samples, `start`, then `write` and `read` in turn, and `stop`. Whatever
-    fails in between opens the relay and puts the output to zero before it is raised. One thread at a time may run
-    it; `cut`, `stop` and `close` may come from any other.
-
-    The bench is safe before anything is checked. Raises InvalidInput for what the device cannot do, and for a sample
-    rate that it would not make exactly; DeviceNotFound when driver, server or device are not there or another program
-    holds them.
+    A run is `prepare`, `write` the first samples, `start`, then `write` and `read` in turn, and `stop`. On any failure
+    in between, the relay is opened and the output set to zero before the error is raised. One thread at a time may use
+    it; `cut`, `stop` and `close` may be called from any other. The constructor makes the bench safe before it checks
+    anything. Raises InvalidInput for unsupported settings and for a sample rate that the device cannot produce exactly;
+    DeviceNotFound when driver, server or device are missing or held by another program.
     """
 
     def __init__(self, daq: Daq, inputs: Sequence[AnalogInput], sample_rate: float, lead: int) -> None:
@@ -56,15 +54,15 @@ class DaqSession:
         self._lost = False
         self._connection = Connection(daq.server, daq.patience)
         try:
-            # whatever is wrong with the rest: an earlier program may have died with the shaker enabled
+            # before any check: an earlier program may have crashed with the shaker enabled
             terminals = (daq.output, *daq.digital_lines.values(), *(given.terminal for given in inputs))
             stale = clear_stale(self._connection, [device_name(terminal) for terminal in terminals])
             _make_safe(self._connection, daq)
-            with translated("asking the driver for its devices"):
+            with translated("listing the driver's devices"):
                 system = library.system(self._connection.options())
                 used = checked_devices(system, daq, inputs, sample_rate, lead)
                 version = system.driver_version
-            self._tasks = Tasks(self._connection, daq, inputs, sample_rate, lead)
+            self._tasks = Tasks(self._connection, daq, inputs, sample_rate, lead, used)
         except BaseException:
             self._connection.close()
             raise
@@ -73,7 +71,7 @@ class DaqSession:
 
     @property
     def sample_rate(self) -> float:
-        """Samples per second and channel, for inputs and output alike, as the device made it [1/s]."""
+        """Samples per second per channel, for inputs and output, as read back from the device [1/s]."""
         return self._tasks.inputs.rate
 
     @property
@@ -83,8 +81,13 @@ class DaqSession:
 
     @property
     def scalings(self) -> tuple[InputScaling, ...]:
-        """From counts to volts, for each input."""
+        """Conversion from counts to volts of each input."""
         return self._tasks.inputs.scalings
+
+    @property
+    def delays(self) -> tuple[InputDelay, ...]:
+        """Delay of each input, which `read` does not remove."""
+        return self._tasks.inputs.delays
 
     @property
     def dtype(self) -> type[np.int16] | type[np.int32]:
@@ -93,11 +96,14 @@ class DaqSession:
 
     @property
     def description(self) -> dict[str, str]:
-        """What the device is and how it was set, for the data file."""
+        """Identity and settings of the device, for the data file."""
         return dict(self._description)
 
     def prepare(self) -> None:
-        """Put the output to 0 V, arm it on the inputs' start trigger, close the enable relay. Nothing runs yet."""
+        """Set the output to 0 V, arm it on the inputs' start trigger, close the enable relay.
+
+        The sample clock does not run yet.
+        """
         with self._lock:
             self._require(_State.IDLE, "prepare")
             if self._lost:
@@ -106,31 +112,31 @@ class DaqSession:
                 raise ConnectionLost("prepare is refused: the device had to be reset; open a new session")
             if not self._tasks.inputs.are_ours():
                 raise ConnectionLost("prepare is refused: another client has taken the device; open a new session")
-            # what a stop could not bring to rest comes first
+            # complete an earlier stop that failed
             self._rest()
             self._state, self._at_rest, self._cut = _State.PREPARED, False, False
             with self._resting_on_failure():
                 self._tasks.prepare(lambda: self._cut)
 
     def write(self, volts: NDArray[np.float64]) -> None:
-        """Append drive samples, shape (n,), finite and in range [V]; before `start` they are what it begins with.
+        """Append drive samples, shape (n,), finite and in range [V]; before `start` they are its first samples.
 
-        Raises DriveUnderflow when the output has run dry, DeviceTimeout when no room comes free, RigError when the
-        session is not prepared.
+        Raises DriveUnderflow when the output has run out of samples, DeviceTimeout if no space becomes free, RigError
+        when the session is not prepared.
         """
         with self._lock:
             if self._state is not _State.RUNNING:
                 self._require(_State.PREPARED, "write")
             with self._resting_on_failure():
                 self._tasks.output.write(volts)
-                self._tell_watchdog()
+                self._reset_watchdog()
 
     def start(self) -> None:
-        """Start the sample clock: sample 0 is taken and played now. DriveUnderflow when nothing was written."""
+        """Start the sample clock, at sample 0. Raises DriveUnderflow when nothing was written."""
         with self._lock:
             self._require(_State.PREPARED, "start")
             with self._resting_on_failure():
-                self._tell_watchdog()
+                self._reset_watchdog()
                 self._beat()
                 self._tasks.output.arm()
                 self._tasks.inputs.start()
@@ -147,24 +153,24 @@ class DaqSession:
         with self._resting_on_failure():
             counts = self._tasks.inputs.read(n)
             if self._state is not _State.RUNNING:
-                # the driver starts a stopped task by itself when it is read
+                # reading a stopped task would restart it
                 self._tasks.inputs.stop()
                 raise RigError("read is refused: the session was stopped meanwhile")
-            self._tell_watchdog()
+            self._reset_watchdog()
             self._beat()
         return counts
 
     def acquired(self) -> int:
-        """How many samples of each input the device has taken since `start`: bounds its clock. Errors as of `read`."""
-        self._require(_State.RUNNING, "asking for the sample clock")
+        """Samples of each input acquired since `start`: bounds the sample clock. Raises as `read` does."""
+        self._require(_State.RUNNING, "reading the sample clock")
         with self._resting_on_failure():
             return self._tasks.inputs.acquired()
 
     def safety_inputs(self) -> dict[str, bool]:
-        """Whether each safety input that is wired is good now: one call to the device; in every state but closed.
+        """Whether each wired safety input is good now, by one call to the device; in every state but closed.
 
-        An amplifier that says ready only while it is enabled is left out when it is not to be enabled. Raises RigError
-        as of `read`.
+        An amplifier that reports ready only while enabled is omitted while it is not commanded on. Raises RigError as
+        `read` does.
         """
         safety = self._tasks.safety
         if safety is None:
@@ -179,19 +185,19 @@ class DaqSession:
         return good
 
     def cut(self) -> bool:
-        """Open the enable relay now, in one call; from any thread, while another reads, in every state.
+        """Open the enable relay now, in one call, from any thread and in every state, even during a read.
 
-        True when the device confirmed it. False when there is no enable line, or the device did not answer: then only
-        the emergency stop is left. Never raises. The sample clock goes on until `stop`; the watchdog is told no more.
+        True when the device confirmed it. False if there is no enable line or the device did not respond: then only
+        the emergency stop remains. Never raises. The sample clock runs until `stop`; the watchdog is no longer reset.
         """
         self._cut = True
         return self._tasks.relay is not None and self._tasks.relay.cut()
 
     def stop(self) -> None:
-        """Open the relay, end the tasks, put the output to 0 V. Allowed in every state, any number of times.
+        """Open the relay, end the tasks, set the output to 0 V.
 
-        Every step is tried. Raises RigError at the end when relay or output could not be set; the next call tries
-        again.
+        Allowed in every state, any number of times. Attempts every step. Raises RigError at the end if relay or
+        output could not be set; the next call repeats them.
         """
         with self._lock:
             if self._state is _State.CLOSED:
@@ -200,7 +206,7 @@ class DaqSession:
             self._rest()
 
     def close(self) -> None:
-        """Stop, and give the device back. Allowed any number of times; errors as of `stop`."""
+        """Stop, and release the device. Allowed any number of times; raises as `stop` does."""
         with self._lock:
             if self._state is _State.CLOSED:
                 return
@@ -222,22 +228,22 @@ class DaqSession:
 
     @property
     def _is_enabled(self) -> bool:
-        """Whether the enable line is meant to be closed."""
+        """Whether the enable line is commanded closed."""
         return self._state in (_State.PREPARED, _State.RUNNING) and not self._cut
 
-    def _tell_watchdog(self) -> None:
+    def _reset_watchdog(self) -> None:
         if self._tasks.watchdog is not None and not self._cut:
-            self._tasks.watchdog.tell()
+            self._tasks.watchdog.reset()
 
     def _beat(self) -> None:
-        # under the lock: no edge may come after a stop has put the line to rest
+        # under the lock: no edge may follow once a stop has set the line low
         with self._lock:
             if self._tasks.heartbeat is not None and self._is_enabled:
                 self._tasks.heartbeat.beat()
 
     @contextmanager
     def _resting_on_failure(self) -> Generator[None]:
-        """Come to rest before an error goes out; what fails of that is told with it, and tried again by `stop`."""
+        """Stop the bench before an error is raised, and add failures of the stop to it; `stop` repeats them."""
         try:
             yield
         except BaseException as error:
@@ -261,12 +267,19 @@ class DaqSession:
 
 
 def _make_safe(connection: Connection, daq: Daq) -> None:
-    """Open the relay and put the output to 0 V, as far as their names are right and the device obeys.
+    """Open the relay and set the output to 0 V as far as possible.
 
-    What it refuses here it refuses again, by name, when the tasks are made.
+    A failure here is reported when the tasks are created.
     """
     with suppress(RigError):
         if daq.enable_line is not None:
-            EnableLine(connection, daq.enable_line).close()
+            line = EnableLine(connection, daq.enable_line)
+            line.close()
+            if line.chassis_expired:
+                # the watchdog of a program that has crashed
+                with translated("looking for the chassis, whose watchdog has expired,"):
+                    found = [described(device) for device in library.system(connection.options()).devices]
+                if (chassis := chassis_of(daq.enable_line, found)) is not None:
+                    reset_chassis(connection, chassis)
     with suppress(RigError):
         put_to_zero(connection, daq)

@@ -1,37 +1,59 @@
-"""The tasks of one session: made together, brought to rest together."""
+"""Tasks of one session, and removal of tasks left by a dead client.
 
-from collections.abc import Callable, Sequence
+A gRPC device server keeps tasks indefinitely, independent of connections. Their output holds its last value, their
+relay may be closed, and no other client can use the device.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack, suppress
 
+from nidaqmx.errors import DaqError, RpcError
+
 from drivers.clock import WallClock
+from drivers.daqmx import inputs, library, output
 from drivers.daqmx.connection import Connection
-from drivers.daqmx.enable import EnableLine
-from drivers.daqmx.heartbeat import Heartbeat
+from drivers.daqmx.delays import Connected
+from drivers.daqmx.devices import FoundDevice
+from drivers.daqmx.errors import status_of, translated
 from drivers.daqmx.inputs import Inputs
+from drivers.daqmx.library import Version
 from drivers.daqmx.output import Output
-from drivers.daqmx.parameters import AnalogInput, Daq
-from drivers.daqmx.safety_inputs import SafetyInputs
-from drivers.daqmx.watchdog import Watchdog
-from drivers.errors import RigError, SafetyInputOpen
+from drivers.daqmx.parameters import AnalogInput, Daq, device_name
+from drivers.daqmx.safety import (
+    ENABLE_TASK,
+    HEARTBEAT_TASK,
+    SAFETY_TASK,
+    WATCHDOG_TASK,
+    EnableLine,
+    Heartbeat,
+    SafetyInputs,
+    Watchdog,
+)
+from drivers.errors import DeviceNotFound, RigError, SafetyInputOpen
 from sim.errors import InvalidInput
 
 _LOOK = 0.05
-"""Time between two looks at an amplifier that is not ready yet [s]."""
+"""Interval between checks of an amplifier that is not yet ready [s]."""
 _SAME_RATE = 1.0e-9
-"""Relative difference below which two sample rates are one."""
+"""Relative difference below which two sample rates are equal."""
 
 
 class Tasks:
-    """Enable relay, watchdog, heartbeat, safety inputs, output and inputs. When one cannot be made, the others are
-    cleared.
+    """Enable relay, watchdog, heartbeat, safety inputs, output and inputs, on the devices `used`.
 
-    After the constructor the relay is open and the output at 0 V. `was_reset` says that the device had to be reset to
-    bring the output to rest: its tasks are gone then. Raises InvalidInput for a sample rate that the
-    device would not make exactly.
+    When one cannot be created, the others are cleared. After construction the relay is open and the output at 0 V.
+    `was_reset`: the device had to be reset to set the output to 0 V, so its tasks are gone. Raises InvalidInput for a
+    sample rate that the device cannot produce exactly.
     """
 
     def __init__(
-        self, connection: Connection, daq: Daq, inputs: Sequence[AnalogInput], sample_rate: float, lead: int
+        self,
+        connection: Connection,
+        daq: Daq,
+        inputs: Sequence[AnalogInput],
+        sample_rate: float,
+        lead: int,
+        used: Sequence[FoundDevice],
     ) -> None:
         self.relay: EnableLine | None = None
         self.watchdog: Watchdog | None = None
@@ -39,13 +61,14 @@ class Tasks:
         self.safety: SafetyInputs | None = None
         self.was_reset = False
         self.ready_delay = None if daq.amplifier_ready is None else daq.amplifier_ready.delay
-        """How long after the enable line the amplifier says that it is ready [s]; None when the line is no matter."""
+        """Delay between enable line and amplifier ready [s]; None when ready does not depend on the line."""
         with ExitStack() as made:
             if daq.enable_line is not None:
                 self.relay = EnableLine(connection, daq.enable_line)
                 made.callback(_quietly, self.relay.close)
                 if daq.watchdog is not None:
-                    self.watchdog = Watchdog(connection, daq.enable_line, daq.watchdog)
+                    chassis = chassis_of(daq.enable_line, used)
+                    self.watchdog = Watchdog(connection, daq.enable_line, daq.watchdog, chassis, daq.output)
                     made.callback(_quietly, self.watchdog.close)
             if daq.heartbeat is not None:
                 self.heartbeat = Heartbeat(connection, daq.heartbeat.line)
@@ -53,7 +76,7 @@ class Tasks:
             if daq.safety_inputs:
                 self.safety = SafetyInputs(connection, daq.safety_inputs)
                 made.callback(_quietly, self.safety.close)
-            self.inputs = Inputs(connection, daq, inputs, sample_rate)
+            self.inputs = Inputs(connection, daq, inputs, sample_rate, [_connected(one, used) for one in inputs])
             made.callback(_quietly, self.inputs.close)
             self.output = Output(connection, daq, self.inputs.clock, sample_rate, lead)
             made.callback(_quietly, self.output.clear)
@@ -62,19 +85,19 @@ class Tasks:
             self._made = made.pop_all()
 
     def prepare(self, is_cut: Callable[[], bool]) -> None:
-        """Output at 0 V and armed on the inputs' trigger, enable relay closed, amplifier ready.
+        """Set the output to 0 V, arm it on the inputs' trigger, close the enable relay and wait for the amplifier.
 
-        Raises RigError when a step fails, the amplifier does not say that it is ready, or `is_cut` meanwhile.
+        Raises RigError when a step fails, the amplifier does not report ready, or `is_cut` becomes true.
         """
         if self.relay is not None:
             self.relay.open()
-        # a call that a halt interrupted may have left them at work
+        # a call interrupted by a halt may have left them running
         if self.heartbeat is not None:
             self.heartbeat.rest()
         if self.safety is not None:
             self.safety.stop()
         self.output.prepare(self.inputs.trigger)
-        # while its watchdog starts nothing may be reserved on the device: that comes with the first samples
+        # nothing on the device may be reserved when its watchdog starts; the first samples reserve the output
         if self.watchdog is not None:
             self.watchdog.start()
         if self.safety is not None:
@@ -88,10 +111,8 @@ class Tasks:
             self._await_amplifier(self.safety, self.ready_delay, is_cut)
 
     def rest(self) -> None:
-        """Relay open, nothing runs, output at 0 V.
-
-        Every step is tried, whatever happens in another, also an interrupt. Raises what is no error of the rig, or
-        the first failure of relay or output.
+        """Open the relay, stop the tasks, set the output to 0 V. Attempts every step, even after a failure or an
+        interrupt. Raises an error that is not a RigError, else the first failure of relay or output.
         """
         failures: list[BaseException] = []
 
@@ -107,33 +128,49 @@ class Tasks:
                 return False
             return True
 
+        self._end_expiration(attempt, failures)
         if self.relay is not None:
             attempt(self.relay.open, matters=True)
         if self.heartbeat is not None:
-            # a line that cannot be put low stands still as well
+            # a line that cannot be set low does not toggle any more either
             attempt(self.heartbeat.rest)
         if self.safety is not None:
             attempt(self.safety.stop)
-        # stopping a task that an error has ended raises that error once more; a task that is not cleared keeps the
-        # output, and then the zero fails
+        # stopping a task that ended with an error raises that error again; a task that is not cleared keeps the output,
+        # so that setting it to zero fails
         cleared = attempt(self.output.clear)
         zeroed = attempt(self.output.zero, matters=cleared)
         if not (cleared or zeroed) and attempt(self.output.reset_device, matters=True):
             self.was_reset = True
-            failures.append(RigError("the output was held by its task: the device was reset; open a new session"))
+            failures.append(RigError("the output was still reserved: the device was reset; open a new session"))
         attempt(self.inputs.stop)
-        # a watchdog is let go only when all is at rest: one that is told no more opens the relay itself, and one that
-        # has barked holds it open
+        # a watchdog is stopped only after everything else: without resets it opens the relay, and once expired it keeps
+        # the relay open
         if self.watchdog is not None and not failures:
             attempt(self.watchdog.stop)
             if self.relay is not None:
-                # a line that the watchdog held may go back to what was written last
+                # a line locked by the watchdog may return to the level written last
                 attempt(self.relay.open, matters=True)
         if failures:
             raise failures[0]
 
+    def _end_expiration(self, attempt: Callable[..., bool], failures: list[BaseException]) -> None:
+        """Reset a chassis whose watchdog has expired: the relay is open, and no task runs until the reset."""
+        watchdog = self.watchdog
+        expired: list[bool] = []
+        if (
+            watchdog is None
+            or self.was_reset
+            or not attempt(lambda: expired.append(watchdog.has_barred_chassis))
+            or not expired[0]
+        ):
+            return
+        if attempt(watchdog.reset_chassis, matters=True):
+            self.was_reset = True
+            failures.append(RigError("the watchdog had expired: the chassis was reset; open a new session"))
+
     def clear(self) -> None:
-        """Give everything back to the driver, as far as it still answers and nobody else has it; once."""
+        """Release all tasks, once, if the driver responds and no other client owns them."""
         with self._made, suppress(RigError):
             if not self.inputs.are_ours():
                 self._made.pop_all()
@@ -151,14 +188,26 @@ class Tasks:
                 raise SafetyInputOpen(f"prepare is refused: {text}", opened)
             clock.wait_until(clock.now() + _LOOK)
             if self.watchdog is not None:
-                self.watchdog.tell()
+                self.watchdog.reset()
             if self.heartbeat is not None:
                 self.heartbeat.beat()
 
 
+def chassis_of(line: str, used: Sequence[FoundDevice]) -> str | None:
+    """The chassis of a line's module; None for a device of its own."""
+    name = device_name(line).lower()
+    return next((device.chassis for device in used if device.name.lower() == name), None)
+
+
+def _connected(given: AnalogInput, used: Sequence[FoundDevice]) -> Connected:
+    name = device_name(given.terminal).lower()
+    device = next(device for device in used if device.name.lower() == name)
+    return Connected(device.name, device.product, device.simultaneous)
+
+
 def _require_not_cut(is_cut: Callable[[], bool]) -> None:
     if is_cut():
-        raise RigError("prepare is refused: the enable line was cut meanwhile")
+        raise RigError("prepare is refused: the enable line was cut during it")
 
 
 def _quietly(step: Callable[[], None]) -> None:
@@ -168,4 +217,108 @@ def _quietly(step: Callable[[], None]) -> None:
 
 def _require_rate(what: str, made: float, asked: float) -> None:
     if abs(made - asked) > _SAME_RATE * asked:
-        raise InvalidInput("sample_rate", asked, f"the {what} would make {made!r}/s of it; ask for a rate that it has")
+        raise InvalidInput("sample_rate", asked, f"the {what} would run at {made!r}/s; choose a rate that it supports")
+
+
+_MISSING = "not wired to this program: it must open the enable chain by itself"
+
+
+def description_of(
+    daq: Daq,
+    inputs: Sequence[AnalogInput],
+    used: Sequence[FoundDevice],
+    version: Version,
+    tasks: Tasks,
+    stale: Sequence[str],
+) -> dict[str, str]:
+    """Names and settings as text; `used` are the devices, `stale` the tasks left by another client."""
+    heartbeat = daq.heartbeat
+    return {
+        "driver": f"NI-DAQmx {version.major_version}.{version.minor_version}.{version.update_version}",
+        "server": daq.server or "none: the driver of this PC",
+        **{f"device {device.name}": device.identity for device in used},
+        "inputs": ", ".join(f"{given.terminal} ({given.wiring}, +-{given.range:g} V)" for given in inputs),
+        "input delays": ", ".join(
+            f"{given.terminal} {1e6 * delay.seconds:.1f} us ({delay.source})"
+            for given, delay in zip(inputs, tasks.inputs.delays, strict=True)
+        ),
+        "output": f"{daq.output} (+-{daq.output_range:g} V)",
+        "output transfer": tasks.output.transfer,
+        "start trigger": tasks.inputs.trigger,
+        "sample clock of the output": tasks.inputs.clock,
+        "enable line": daq.enable_line or "none",
+        "watchdog": "none: a crashed program leaves the relay in its state"
+        if daq.watchdog is None
+        else f"{daq.watchdog:g} s",
+        "heartbeat": "none"
+        if heartbeat is None
+        else f"{heartbeat.line}, its relay opens after {heartbeat.timeout:g} s",
+        **{name: f"{given.line}, {given.good} is good" for name, given in daq.safety_inputs.items()},
+        **dict.fromkeys(daq.missing_inputs, _MISSING),
+        "tasks left by another client": ", ".join(stale) or "none",
+    }
+
+
+_OURS = (ENABLE_TASK, HEARTBEAT_TASK, output.NAME, inputs.NAME, SAFETY_TASK, WATCHDOG_TASK)
+_WATCH = 0.6
+"""Observation time of a running output [s]; an active client writes every 0.2 s."""
+_POLL = 0.05
+"""Time between two readings [s]."""
+_UNKNOWN = ("FAILED_PRECONDITION", "NOT_FOUND")
+"""Status codes of a server for an unknown name."""
+
+
+def clear_stale(connection: Connection, devices: Iterable[str]) -> tuple[str, ...]:
+    """Clear tasks of this program's names, and reset the devices if there were any; returns the names found.
+
+    Raises DeviceNotFound while another client drives the output. An idle client cannot be distinguished from a dead
+    one: it loses its tasks, and its next `prepare` raises ConnectionLost.
+    """
+    if connection.server is None:
+        # the local driver clears the tasks of a process that ends
+        return ()
+    with translated("clearing tasks that another client left"):
+        found = {name: task for name in _OURS if (task := _attached(connection, name)) is not None}
+        if output.NAME in found and _is_written(found[output.NAME]):
+            raise DeviceNotFound(f"another client drives the shaker through {connection.server}: end its run first")
+        with ExitStack() as ending:
+            # attempt all even if one fails, then reset
+            if found:
+                ending.callback(_reset, connection, devices)
+            for task in found.values():
+                ending.callback(task.close)
+    return tuple(found)
+
+
+def _reset(connection: Connection, names: Iterable[str]) -> None:
+    """Reset those of the named devices that exist."""
+    wanted = {name.lower() for name in names}
+    with ExitStack() as resets:
+        for device in library.system(connection.options()).devices:
+            if device.name.lower() in wanted:
+                resets.callback(device.reset_device)
+
+
+def _attached(connection: Connection, name: str) -> library.Task | None:
+    try:
+        return library.task(name, connection.attaching(name))
+    except RpcError as error:
+        if status_of(error) in _UNKNOWN:
+            return None
+        raise
+
+
+def _is_written(task: library.Task) -> bool:
+    """Whether a client appends samples to an output."""
+    clock = WallClock()
+    end = clock.now() + _WATCH
+    try:
+        before = task.out_stream.curr_write_pos
+        while clock.now() < end:
+            clock.wait_until(clock.now() + _POLL)
+            if task.out_stream.curr_write_pos != before:
+                return True
+    except DaqError:
+        # an output that has underflowed or was never started has no active client
+        return False
+    return False

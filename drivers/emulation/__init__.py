@@ -1,1 +1,1 @@
-"""Stand-ins for the instruments: they speak the real protocols, and behind them moves the virtual bench."""
+"""Emulated instruments: the real wire protocols, connected to the virtual bench."""

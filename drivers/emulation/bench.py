@@ -1,4 +1,4 @@
-"""The virtual bench in real time: what the emulated instruments are wired to."""
+"""Virtual bench in real time, to which the emulated instruments are wired."""
 
 import threading
 import time
@@ -8,23 +8,22 @@ from math import floor
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.emulation.history import History
-from drivers.emulation.plant import Output
+from drivers.emulation.plant import History, Output
 from drivers.errors import RigError
-from drivers.handyman import Handyman
-from drivers.rig import Handwork
+from drivers.rig import OperatorTask
+from drivers.specimen_handling import SpecimenHandling
 from sim.channel import Channel, Counts
 from sim.specimen import Specimen
 from sim.virtual_bench import VirtualBench, VirtualBenchParameters
 
 _KEPT = 30.0
-"""How long the past can be asked for [s]."""
+"""Length of the retained history [s]."""
 _IDLE_TURN = 0.02
-"""How often the bench moves on when nobody looks at it [s]."""
+"""Period of the bench's steps without a client [s]."""
 
 
 class EmulatedBench:
-    """A `Plant` made of the virtual bench. It moves on whenever somebody looks, and by itself in between.
+    """A `Plant` around the virtual bench. It advances at every read, and in a separate thread in between.
 
     One tick is one sample of the virtual bench; `clock_error` is the relative error of the tick rate.
     """
@@ -39,7 +38,7 @@ class EmulatedBench:
         clock_error: float = 0.0,
     ) -> None:
         self._bench = VirtualBench(parameters, specimen, seed)
-        self._handyman = Handyman(specimen, spring_factor)
+        self._handling = SpecimenHandling(specimen, spring_factor)
         self._rate = parameters.sample_rate * (1.0 + clock_error)
         kept = round(_KEPT * parameters.sample_rate)
         self._counts = History(kept, self.terminals, np.int16)
@@ -50,31 +49,31 @@ class EmulatedBench:
         self._output: Output | None = None
         self._enabled = False
         self._half_stroke = parameters.shaker.half_stroke
-        self._told: Callable[[NDArray[np.float64]], None] | None = None
+        self._subscriber: Callable[[NDArray[np.float64]], None] | None = None
         self.lock = threading.RLock()
-        """Guards the bench; whoever is told of the table's motion holds it."""
-        # the compiled bench is loaded and has seen a sample before its clock starts
+        """Guards the bench; held while subscribers receive the table's motion."""
+        # load the compiled code and run one sample before the clock starts
         self._bench.run(np.zeros(1))
         self._started = time.monotonic()
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._idle, name="emulated-bench", daemon=True)
 
     def start(self) -> None:
-        """Let it move by itself."""
+        """Start the thread that advances the bench."""
         while self._seen.end < 2:
-            # two ticks, so that there is something between them to look at
+            # two ticks, so that an interval exists
             self._advance()
         self._thread.start()
 
     def close(self) -> None:
-        """Stand still. Allowed any number of times."""
+        """Stop the thread. Allowed any number of times."""
         self._over.set()
         if self._thread.is_alive():
             self._thread.join()
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """What the inputs measure."""
+        """Quantities at the inputs."""
         return self._bench.channels
 
     @property
@@ -118,25 +117,25 @@ class EmulatedBench:
 
     @property
     def half_stroke(self) -> float:
-        """Displacement of the table from mid stroke at which the end stops touch [m]."""
+        """Distance from mid stroke to each end stop of the table [m]."""
         return self._half_stroke
 
-    def watch(self, told: Callable[[NDArray[np.float64]], None]) -> None:
-        """Tell somebody of the table's displacement [m] at all ticks, shape (n,), as soon as they are computed."""
+    def watch(self, subscriber: Callable[[NDArray[np.float64]], None]) -> None:
+        """Pass the table's displacement [m] at all ticks, shape (n,), to the subscriber as soon as it is computed."""
         with self.lock:
-            self._told = told
+            self._subscriber = subscriber
 
     def connect_laser(self, storey: int, live: Callable[[], bool]) -> None:
-        """Let the analogue output of the laser on a storey, 1 or 2, show its error current while it is not `live`."""
+        """Make the analogue output of the laser on a storey, 1 or 2, show its error current while not `live`."""
         with self.lock:
             self._outputs[1 + storey] = live
 
     def sight(self, storey: int) -> "Storey":
-        """What the laser of a storey sees, 1 or 2: the storey, or the block that laser 2 was turned to."""
+        """Target of the laser of a storey, 1 or 2: the storey, or the block while laser 2 is aimed at it."""
         return Storey(self, storey)
 
     def seen(self, storey: int, times: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Displacement [m] that the laser of a storey sees at monotonic times [s]: cubic between the ticks."""
+        """Displacement [m] of the target of a storey's laser at monotonic times [s]: cubic between the ticks."""
         ticks = (times - self._started) * self._rate
         with self.lock:
             if ticks.size and ticks[-1] > self._seen.end - 1:
@@ -151,27 +150,29 @@ class EmulatedBench:
         end = x1 * (1.0 + 2.0 * rest) - length * v1 * rest
         return start * rest * rest + end * place * place
 
-    def handwork(self, work: Handwork, amount: float | None) -> None:
-        """Do at the bench what a person does. Raises RigError while the amplifier is enabled."""
+    def perform(self, work: OperatorTask, amount: float | None) -> None:
+        """Carry out an operator's task. Raises RigError while the amplifier is enabled."""
         with self.lock:
             if self._enabled:
-                raise RigError(f"{work.value} is refused: the amplifier is enabled; hands belong on a stopped bench")
+                raise RigError(
+                    f"{work.value} is refused: the amplifier is enabled; operator actions require a stopped bench"
+                )
             self._advance()
-            self._bench.mount(self._handyman.after(work, amount, self._bench.arrangement))
+            self._bench.mount(self._handling.after(work, amount, self._bench.arrangement))
 
     @property
     def enabled(self) -> bool:
-        """Whether the amplifier listens to the drive."""
+        """Whether the amplifier follows the drive."""
         return self._enabled
 
     @property
     def specimen(self) -> Specimen:
-        """What stands on the table."""
+        """The specimen on the table."""
         return self._bench.specimen
 
     @property
     def fallen(self) -> bool:
-        """Whether the block hangs in its catch."""
+        """Whether the block is held by its catch."""
         return self._bench.fallen
 
     def _idle(self) -> None:
@@ -180,12 +181,12 @@ class EmulatedBench:
                 self._advance()
 
     def _advance(self) -> None:
-        """Compute every tick that has passed."""
+        """Compute all ticks that have passed."""
         first = self._counts.end
         n = self.tick() - first
         if n <= 0:
             return
-        # the output plays on whether or not the amplifier listens
+        # the output continues regardless of the amplifier's state
         volts = np.zeros(n) if self._output is None else self._output(first, n)
         counts = self._bench.run(volts if self._enabled else np.zeros(n))
         for column, live in self._outputs.items():
@@ -193,12 +194,12 @@ class EmulatedBench:
                 counts[:, column] = self._error_counts
         self._counts.append(counts)
         self._seen.append(self._bench.sights.T)
-        if self._told is not None:
-            self._told(self._bench.truth.x)
+        if self._subscriber is not None:
+            self._subscriber(self._bench.truth.x)
 
 
 class Storey:
-    """A `Sight`: what one of the lasers looks at."""
+    """A `Sight`: the target of one of the lasers."""
 
     def __init__(self, bench: EmulatedBench, storey: int) -> None:
         self._bench, self._storey = bench, storey

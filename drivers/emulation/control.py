@@ -1,4 +1,4 @@
-"""The control channel of an emulated laboratory: how another program does handwork, causes faults and asks the truth.
+"""Control channel of an emulated laboratory, server and client: operator actions, faults, true values.
 
 A request is one line of JSON, `{"command": "handwork", "work": "remove block", "amount": null}`; the answer is one
 line, `{"ok": true, "result": ...}` or `{"ok": false, "error": "..."}`. A connection may carry any number of requests.
@@ -7,25 +7,26 @@ line, `{"ok": true, "result": ...}` or `{"ok": false, "error": "..."}`. A connec
 import json
 import socket
 import threading
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from typing import Any, BinaryIO, cast
 
-from drivers.errors import RigError
-from sim.errors import RockbenchError
+from drivers.errors import ConnectionLost, DeviceTimeout, RigError
+from sim.errors import InvalidInput, RockbenchError
 
 Handler = Callable[[dict[str, Any]], object]
-"""Given the arguments of a command, does it; what it returns must fit into JSON."""
+"""Handler of a command with its arguments; returns data for JSON."""
 
 _LONGEST = 65536
-"""Bytes of the longest request."""
+"""Length of the longest request [bytes]."""
 
 
 class ControlServer:
-    """Answers on a port of this machine that the system chooses; serves from the moment it is made.
+    """Server on a free local port; the constructor starts it.
 
-    Each connection has a thread of its own, so that handlers may wait and may run at the same time. A handler refuses
-    by raising.
+    Each connection has its own thread, so that handlers may block and run concurrently. A handler refuses a command by
+    raising.
     """
 
     def __init__(self, handlers: Mapping[str, Handler]) -> None:
@@ -36,17 +37,17 @@ class ControlServer:
         self._listening = socket.create_server(("127.0.0.1", 0))
         host, port = self._listening.getsockname()
         self.address = f"{host}:{port}"
-        """Where it listens, as `host:port`."""
+        """Listening address, as `host:port`."""
         self._accepting = threading.Thread(target=self._accept, name="emulated-control", daemon=True)
         self._accepting.start()
 
     def close(self) -> None:
-        """Close every connection, after the handlers at work have ended. Allowed any number of times."""
+        """Close every connection, after the running handlers have ended. Allowed any number of times."""
         with self._lock:
             first, self._closing = not self._closing, True
             served = list(self._served.items())
         if first:
-            # closing a socket does not wake the thread that waits at it, a connection does
+            # closing a socket does not wake the thread in accept(), a connection does
             with socket.create_connection(self._listening.getsockname()):
                 self._accepting.join()
             self._listening.close()
@@ -69,7 +70,7 @@ class ControlServer:
 
     def _serve(self, connection: socket.socket) -> None:
         """The thread of one connection."""
-        # a client may go at any time
+        # a client may disconnect at any time
         with connection, suppress(OSError), connection.makefile("rb") as lines:
             for line in _requests(lines):
                 connection.sendall(self._answer(line) + b"\n")
@@ -77,18 +78,18 @@ class ControlServer:
             self._served.pop(connection, None)
 
     def _answer(self, line: bytes) -> bytes:
-        """The answer to one request, whatever it is."""
+        """Reply to any request, valid or not."""
         try:
             return json.dumps({"ok": True, "result": self._result(line)}).encode()
         except RockbenchError as error:
             text = str(error)
         except Exception as error:
-            # a handler that fails must not end the conversation, and its failure must not be hidden
+            # a failing handler must not end the connection, and its failure must be reported
             text = f"{type(error).__name__}: {error}"
         return json.dumps({"ok": False, "error": text}).encode()
 
     def _result(self, line: bytes) -> object:
-        """What the handler gives. Raises RigError for what is no request."""
+        """Result of the handler. Raises RigError for an invalid request."""
         if len(line) > _LONGEST:
             raise RigError(f"a request of more than {_LONGEST} bytes is refused")
         try:
@@ -101,12 +102,12 @@ class ControlServer:
         command = arguments.pop("command", None)
         if not isinstance(command, str) or (handler := self._handlers.get(command)) is None:
             known = ", ".join(sorted(self._handlers))
-            raise RigError(f"command {command!r} is refused: there are {known}")
+            raise RigError(f"command {command!r} is refused: available: {known}")
         return handler(arguments)
 
 
 def _requests(lines: BinaryIO) -> Iterator[bytes]:
-    """What comes, line by line; of a line that is too long only the beginning."""
+    """Received lines; only the beginning of a line that is too long."""
     while line := lines.readline(_LONGEST + 1):
         part = line
         while part and not part.endswith(b"\n"):
@@ -115,6 +116,68 @@ def _requests(lines: BinaryIO) -> Iterator[bytes]:
 
 
 def _hang_up(connection: socket.socket) -> None:
-    """Let the thread that reads from the connection find its end, if it has not ended already."""
+    """End the connection for the thread that reads from it, unless it has already ended."""
     with suppress(OSError):
         connection.shutdown(socket.SHUT_RD)
+
+
+_PATIENCE = 60.0
+"""Time-out for a reply [s], long enough for the bench to come to rest."""
+
+
+def ask(address: str, command: str, /, *, patience: float = _PATIENCE, **arguments: object) -> Any:
+    """Send a command to the emulated laboratory at `address` (`host:port`); returns its answer within `patience` [s].
+
+    Raises RigError when it refuses, ConnectionLost without a connection, DeviceTimeout when it does not answer in time,
+    InvalidInput for an invalid address.
+    """
+    place = place_of(address)
+    deadline = time.monotonic() + patience
+    request = json.dumps({"command": command, **arguments}).encode() + b"\n"
+    try:
+        with socket.create_connection(place, timeout=patience) as connection:
+            connection.sendall(request)
+            line = _line(connection, deadline)
+    except TimeoutError:
+        raise DeviceTimeout(
+            f"the emulated laboratory at {address} did not answer {command} in {patience:g} s"
+        ) from None
+    except OSError as error:
+        raise ConnectionLost(
+            f"{command} is refused: no connection to the emulated laboratory at {address} ({error});"
+            " check that it is running and that hardware.hands is its address"
+        ) from None
+    return _result(address, command, line)
+
+
+def place_of(address: str) -> tuple[str, int]:
+    """Host and port of an address, `host:port`. Raises InvalidInput."""
+    host, _, port = address.rpartition(":")
+    if not host or not port.isdecimal() or not 0 < int(port) < 65536:
+        raise InvalidInput("hands", address, "it must be host:port, such as localhost:31700")
+    return host.strip("[]"), int(port)
+
+
+def _line(connection: socket.socket, deadline: float) -> bytes:
+    """The answer, without the end of its line. Raises OSError, TimeoutError when the deadline passes."""
+    received = b""
+    while not received.endswith(b"\n"):
+        if (left := deadline - time.monotonic()) <= 0.0:
+            raise TimeoutError
+        connection.settimeout(left)
+        if not (part := connection.recv(65536)):
+            raise ConnectionResetError("it closed the connection without an answer")
+        received += part
+    return received
+
+
+def _result(address: str, command: str, line: bytes) -> Any:
+    """The result of an answer. Raises RigError."""
+    try:
+        answer: Any = json.loads(line)
+        if answer["ok"]:
+            return answer["result"]
+        error = str(answer["error"])
+    except (ValueError, TypeError, KeyError):
+        raise RigError(f"invalid answer of {address} to {command}: check that it is an emulated laboratory") from None
+    raise RigError(error)

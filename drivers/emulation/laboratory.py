@@ -1,6 +1,6 @@
-"""The whole emulated laboratory: bench, DAQ, lasers, and the hands that change springs and cause faults."""
+"""The emulated laboratory: bench, DAQ, lasers, and a control channel for operator tasks and faults."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any, Self
@@ -8,19 +8,18 @@ from typing import Any, Self
 from drivers.emulation.bench import EmulatedBench
 from drivers.emulation.control import ControlServer
 from drivers.emulation.daqmx.lines import Wires
-from drivers.emulation.daqmx.models import compact_rio, x_series
 from drivers.emulation.daqmx.server import DaqServer
 from drivers.emulation.optoncdt.laser import EmulatedLaser
 from drivers.emulation.safety_chain import INPUTS, SafetyChain
-from drivers.emulation.wiring import HEARTBEAT, LINES, Connection, Device, hardware_of
-from drivers.rig import Handwork
+from drivers.emulation.wiring import HEARTBEAT, Connection, Device, hardware_of, site_of
+from drivers.rig import OperatorTask
 from sim.specimen import Specimen
 from sim.virtual_bench import VirtualBenchParameters
 
 
 @dataclass(frozen=True)
 class ClockErrors:
-    """Relative errors of the clocks: sample clock of the DAQ, laser on the first and on the second storey."""
+    """Relative errors of the clocks: sample clock of the DAQ, lasers on the first and the second storey."""
 
     daq: float = 12e-6
     laser_1: float = 30e-6
@@ -28,10 +27,11 @@ class ClockErrors:
 
 
 class Laboratory:
-    """Instruments that speak their real protocols, around one virtual bench in real time.
+    """Emulated instruments with their real wire protocols, around one virtual bench in real time.
 
-    `hardware` is the configuration with which a client reaches them. Raises DeviceNotFound where pseudo-terminals,
-    which serial lasers need, do not exist; nothing is left open then.
+    `hardware` is the configuration of a client; `modules` are those of a chassis. Raises InvalidInput for devices that
+    lack something, DeviceNotFound if pseudo-terminals, which serial lasers need, do not exist; everything is then
+    closed.
     """
 
     def __init__(
@@ -43,9 +43,11 @@ class Laboratory:
         spring_factor: float = 1.0,
         connection: Connection = "serial",
         device: Device = "usb",
+        modules: Sequence[str] = (),
         clock_errors: ClockErrors | None = None,
     ) -> None:
         errors = clock_errors or ClockErrors()
+        site = site_of(device, modules)
         with ExitStack() as opened:
             bench = EmulatedBench(parameters, specimen, seed=seed, spring_factor=spring_factor, clock_error=errors.daq)
             opened.callback(bench.close)
@@ -62,20 +64,18 @@ class Laboratory:
                     opened.callback(one.close)
                     bench.connect_laser(storey, lambda one=one: one.analogue)
                     self.lasers += (one,)
-            models = (x_series(calibrated=True),) if device == "usb" else compact_rio(calibrated=True)
             self.safety = SafetyChain(bench, HEARTBEAT)
-            enable, heartbeat, inputs = LINES[device]
             wires = Wires(
-                {enable: self.safety.enable_line, heartbeat: self.safety.heartbeat_line},
-                {line: self.safety.inputs[name] for name, line in zip(INPUTS, inputs, strict=True)},
+                {site.enable: self.safety.enable_line, site.heartbeat: self.safety.heartbeat_line},
+                {line: self.safety.inputs[name] for name, line in zip(INPUTS, site.contacts, strict=False)},
             )
-            self.daq = DaqServer(bench, models, converter=parameters.converter, wires=wires)
+            self.daq = DaqServer(bench, site.devices, converter=parameters.converter, drive=site.output, wires=wires)
             opened.callback(self.daq.close)
             self._control = ControlServer(self._handlers())
             opened.callback(self._control.close)
             ports = [laser.port for laser in self.lasers] or [None, None]
             self.hardware = hardware_of(
-                parameters, device, connection, server=self.daq.address, hands=self._control.address, ports=ports
+                parameters, site, connection, server=self.daq.address, hands=self._control.address, ports=ports
             )
             self._opened = opened.pop_all()
 
@@ -87,7 +87,7 @@ class Laboratory:
         self.daq.start()
 
     def close(self) -> None:
-        """Switch everything off; no thread, port or process is left. Allowed any number of times."""
+        """Switch everything off; no thread, port or process remains. Allowed any number of times."""
         self._opened.close()
 
     def __enter__(self) -> Self:
@@ -98,29 +98,29 @@ class Laboratory:
         self.close()
 
     def _handlers(self) -> dict[str, Any]:
-        """What may be asked for from outside: the work of hands, faults, and the truth that no client could know."""
+        """Handlers of remote commands: operator tasks, faults, and the true motion, which no client can measure."""
         return {
-            "handwork": self._handwork,
+            "handwork": self._perform,
             "laser": self._laser,
             "daq": self._daq,
             "safety": self._safety,
             "truth": self._truth,
         }
 
-    def _handwork(self, arguments: Mapping[str, Any]) -> None:
-        self.bench.handwork(Handwork(arguments["work"]), arguments.get("amount"))
+    def _perform(self, arguments: Mapping[str, Any]) -> None:
+        self.bench.perform(OperatorTask(arguments["work"]), arguments.get("amount"))
 
     def _laser(self, arguments: Mapping[str, Any]) -> None:
-        """A fault of the laser on `storey`: the name of a method of EmulatedLaser, and its `arguments`."""
+        """Inject a fault of the laser on `storey`: the name of a method of EmulatedLaser, and its `arguments`."""
         laser = self.lasers[int(arguments["storey"]) - 1]
         _FAULTS_OF_LASER[arguments["fault"]](laser, *arguments.get("arguments", ()))
 
     def _daq(self, arguments: Mapping[str, Any]) -> None:
-        """A fault of the DAQ: the name of a method of DaqServer, and its `arguments`."""
+        """Inject a fault of the DAQ: the name of a method of DaqServer, and its `arguments`."""
         _FAULTS_OF_DAQ[arguments["fault"]](self.daq, *arguments.get("arguments", ()))
 
     def _safety(self, arguments: Mapping[str, Any]) -> None:
-        """Something in the enable chain: the name of a method of SafetyChain, and its `arguments`."""
+        """Change the enable chain: the name of a method of SafetyChain, and its `arguments`."""
         _FAULTS_OF_SAFETY[arguments["fault"]](self.safety, *arguments.get("arguments", ()))
 
     def _truth(self, arguments: Mapping[str, Any]) -> dict[str, Any]:  # noqa: ARG002 - the signature of a handler

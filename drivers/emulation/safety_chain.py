@@ -1,7 +1,7 @@
-"""The amplifier's enable chain: what must be closed for the drive to move the table, and the contacts that show it.
+"""Enable chain of the amplifier and its monitoring contacts.
 
-In series: enable relay, heartbeat relay, emergency stop, over-travel switches; behind them the amplifier, which may
-have tripped. A second contact of each goes to a digital input of the DAQ device.
+In series: enable relay, heartbeat relay, emergency stop, over-travel switches; then the amplifier, which may have
+tripped. A second contact of each is wired to a digital input of the DAQ device.
 """
 
 import time
@@ -15,7 +15,7 @@ from drivers.errors import RigError
 
 
 class PulseRelay:
-    """Closed for `timeout` seconds [s] after each rising edge; a level that stands still, high or low, opens it."""
+    """Closed for `timeout` [s] after each rising edge; a constant level, high or low, opens it."""
 
     def __init__(self, timeout: float) -> None:
         self._timeout = timeout
@@ -24,31 +24,31 @@ class PulseRelay:
 
     @property
     def closed(self) -> bool:
-        """Whether the last rising edge is young enough."""
+        """Whether the last rising edge is recent enough."""
         return time.monotonic() < self._until
 
     def level(self, high: bool) -> None:
-        """The line has this level now."""
+        """Set the level of the line."""
         if high and not self._high:
             self._until = time.monotonic() + self._timeout
         self._high = high
 
 
 INPUTS = ("emergency_stop", "over_travel", "over_travel_2", "amplifier_ready")
-"""The contacts that are wired to inputs."""
+"""Names of the contacts wired to inputs."""
 _TRIP = 0.95
-"""Displacement at which an over-travel switch opens, in parts of the half stroke."""
+"""Displacement at which an over-travel switch opens, as a fraction of the half stroke."""
 _HOLD = 1.0
-"""How long the relay behind an over-travel switch stays open after the table has come back [s]."""
+"""Time for which the relay of an over-travel switch stays open after the table has returned [s]."""
 _SOFT_START = 0.05
 """Time from enable to ready of the amplifier [s]."""
 _ENDS: tuple[int, ...] = (1, 2)
 
 
 class SafetyChain:
-    """Acts on the enable input of `bench`; the relay of the heartbeat opens `heartbeat` seconds after its last edge.
+    """Controls the enable input of `bench`; the heartbeat relay opens `heartbeat` seconds after the last edge.
 
-    Contacts and faults may be asked for and set from any thread.
+    Contacts and faults may be read and set from any thread.
     """
 
     def __init__(self, bench: EmulatedBench, heartbeat: float) -> None:
@@ -82,56 +82,56 @@ class SafetyChain:
 
     @property
     def inputs(self) -> Mapping[str, Callable[[], bool]]:
-        """What the wire of each input shows, by name of the contact: high while it is closed."""
+        """Level of each input by name of the contact: high while it is closed."""
         return {name: lambda name=name: self._level(name) for name in INPUTS}
 
     def enable_line(self, high: bool) -> None:
-        """The line of the enable relay has this level."""
+        """Set the level of the enable relay's line."""
         with self._lock:
             self._enable_relay = high
             self._settle()
 
     def heartbeat_line(self, high: bool) -> None:
-        """The heartbeat line has this level."""
+        """Set the level of the heartbeat line."""
         with self._lock:
             if "heartbeat" not in self._broken:
                 self._pulses.level(high)
             self._settle()
 
     def press_emergency_stop(self) -> None:
-        """It stays pressed."""
+        """Press the emergency stop, which latches."""
         self._change(lambda: setattr(self, "_emergency_stop", False))
 
     def release_emergency_stop(self) -> None:
-        """Turn it back."""
+        """Release the latched emergency stop."""
         self._change(lambda: setattr(self, "_emergency_stop", True))
 
     def trip_over_travel(self, end: int = 1) -> None:
         """Hold the switch of one end open: 1, where displacements are positive, or 2."""
         if end not in _ENDS:
-            raise RigError(f"over-travel at end {end!r} is refused: the table has the ends 1 and 2")
+            raise RigError(f"over-travel at end {end!r} is refused: the ends are 1 and 2")
         self._change(lambda: self._jammed.add(end))
 
     def reset_over_travel(self) -> None:
-        """Let go of the switches; they follow the table."""
+        """Release the switches; they follow the table again."""
         self._change(self._jammed.clear)
 
     def trip_amplifier(self) -> None:
-        """The amplifier finds a fault: its output is off until it is reset."""
+        """Trip the amplifier: its output is off until it is reset."""
         self._change(lambda: setattr(self, "_tripped", True))
 
     def reset_amplifier(self) -> None:
-        """The fault is gone."""
+        """Clear the amplifier's fault."""
         self._change(lambda: setattr(self, "_tripped", False))
 
     def break_wire(self, name: str) -> None:
-        """The wire of an input, or of the "heartbeat", is broken: its input reads low."""
+        """Break the wire of an input, or of the "heartbeat": its input reads low."""
         if name not in (*INPUTS, "heartbeat"):
-            raise RigError(f"wire {name!r} is refused: there are {', '.join(INPUTS)} and heartbeat")
+            raise RigError(f"wire {name!r} is refused: the wires are {', '.join(INPUTS)} and heartbeat")
         self._change(lambda: self._broken.add(name))
 
     def mend_wire(self, name: str) -> None:
-        """The wire is whole again."""
+        """Repair the wire."""
         self._change(lambda: self._broken.discard(name))
 
     def _change(self, change: Callable[[], object]) -> None:
@@ -156,16 +156,16 @@ class SafetyChain:
         return self._closed and time.monotonic() >= self._closed_since + _SOFT_START
 
     def _table_at(self, x: NDArray[np.float64]) -> None:
-        """The table was at displacements `x` [m] since it was last told; called with the bench's lock held."""
+        """Update the switches for the table's displacements `x` [m] since the last call; the bench's lock is held."""
         for end, reach in zip(_ENDS, (x.max(), -x.min()), strict=True):
             if reach > self._trip:
                 self._open_until[end] = time.monotonic() + _HOLD
         self._settle()
 
     def _settle(self) -> None:
-        """Enable the amplifier while everything is closed, and only then."""
+        """Enable the amplifier if and only if the whole chain is closed."""
         if self._settling:
-            # enabling moves the bench on, which calls again
+            # enabling advances the bench, which calls this method again
             return
         self._settling = True
         try:

@@ -1,36 +1,117 @@
-"""How the emulated laboratory is wired, as a client's configuration says it."""
+"""Wiring of the emulated laboratory as a client's configuration."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Literal
 
 from drivers.daqmx.parameters import AmplifierReady, Daq, EmergencyStop, Heartbeat, OverTravel, OverTravel2
+from drivers.emulation.daqmx.device import DeviceModel
+from drivers.emulation.daqmx.models import compact_rio, x_series
+from drivers.emulation.daqmx.zoo import build
 from drivers.hardware.parameters import Hardware, Laser1, Laser2, Lasers, TableAcceleration, TableDisplacement
+from sim.errors import InvalidInput
 from sim.virtual_bench import VirtualBenchParameters
 
 Connection = Literal["serial", "analogue"]
-Device = Literal["usb", "crio"]
+Device = Literal["usb", "crio", "cDAQ-9174", "cDAQ-9185", "cRIO-9045", "cRIO-9049", "PCIe-6351", "USB-6351"]
+"""Two sets with a calibration polynomial, USB-6363 and cRIO-9045 with NI 9239; and the devices of the zoo by name."""
 
 _VALUES = 4
-"""Values of a measurement on the serial line: distance, counter, and the two halves of the time stamp."""
+"""Number of values per measurement on the serial line: distance, counter, and the two halves of the time stamp."""
 _BAUD = 921_600
 _WATCHDOG = 1.0
 """Time-out of the device's watchdog on the enable line [s]."""
 HEARTBEAT = 1.5
-"""Time-out of the relay that the heartbeat keeps closed [s]; longer than the watchdog's, so that both can be seen."""
+"""Time-out of the heartbeat relay [s]; longer than the watchdog's, so that both can be observed."""
 _READY = 1.0
-"""What is said of the amplifier: ready so long after its enable at the latest [s]."""
-LINES: dict[Device, tuple[str, str, tuple[str, ...]]] = {
-    "usb": ("Dev1/port0/line0", "Dev1/port0/line5", tuple(f"Dev1/port0/line{k}" for k in range(1, 5))),
-    "crio": ("cRIO1Mod4/port0/line0", "cRIO1Mod4/port0/line1", tuple(f"cRIO1Mod5/port0/line{k}" for k in range(4))),
-}
-"""Enable line, heartbeat line, and the lines of the safety inputs in the order of INPUTS."""
+"""Declared delay of the amplifier: longest time from enable to ready [s]."""
+_RELAYS, _CONTACTS = 2, 4
+"""Lines of enable relay and heartbeat relay, and of the contacts of the safety chain."""
+
+
+@dataclass(frozen=True)
+class Site:
+    """Devices of a laboratory and the terminals in use.
+
+    `inputs` are those of displacement, acceleration and lasers; `contacts` the digital inputs in the order of INPUTS of
+    the safety chain, empty on a device without. `range` is the largest voltage of all inputs [V].
+    """
+
+    devices: tuple[DeviceModel, ...]
+    inputs: tuple[str, str, str, str]
+    output: str
+    enable: str
+    heartbeat: str
+    contacts: tuple[str, ...]
+    has_watchdog: bool
+    range: float
+
+
+def site_of(device: Device, modules: Sequence[str] = ()) -> Site:
+    """The wiring of a device, or of a chassis with `modules`.
+
+    With two input modules the accelerometer is on the first and everything else on the second. Raises InvalidInput for
+    a chassis without inputs, output or relays.
+    """
+    if device in ("usb", "crio"):
+        if modules:
+            raise InvalidInput("--modules", " ".join(modules), f"{device} is a fixed set; name a chassis")
+        devices = (x_series(calibrated=True),) if device == "usb" else compact_rio(calibrated=True)
+    else:
+        devices = build(device, modules)
+    analogue = [one for one in devices if one.inputs is not None]
+    if device == "crio":
+        # the second module has its own terminals
+        analogue = analogue[:1]
+    drive = _first(devices, "an analogue output (9263, 9269)", lambda one: one.output_names)
+    relays = _first(devices, "relays or digital outputs (9485, 9401)", lambda one: one.line_names)
+    contacts = _contacts(devices, relays)
+    first, *others = analogue or [
+        _first(devices, "analogue inputs (9205, 9215, 9234, 9239)", lambda one: one.input_names)
+    ]
+    rest = others[0] if others else first
+    ranges = [one.inputs.ranges[0] for one in (first, rest) if one.inputs is not None]
+    # the heartbeat of a single device is beside its contacts
+    heartbeat = relays.line_names[_CONTACTS + 1 if len(devices) == 1 else 1]
+    return Site(
+        devices=devices,
+        inputs=(rest.input_names[0], first.input_names[1], rest.input_names[2], rest.input_names[3]),
+        output=drive.output_names[0],
+        enable=relays.line_names[0],
+        heartbeat=heartbeat,
+        contacts=contacts,
+        has_watchdog=any(one.watchdog is not None for one in devices),
+        range=min(ranges),
+    )
+
+
+def _first(devices: Sequence[DeviceModel], what: str, has: Callable[[DeviceModel], Sequence[str]]) -> DeviceModel:
+    for one in sorted(devices, key=lambda one: one.input_lines > 0):
+        if has(one):
+            return one
+    raise InvalidInput("--modules", " ".join(one.product for one in devices), f"the laboratory needs {what}")
+
+
+def _contacts(devices: Sequence[DeviceModel], relays: DeviceModel) -> tuple[str, ...]:
+    """The lines of the safety inputs, on a module other than the relays' where there is one."""
+    for one in sorted(devices, key=lambda one: one is relays):
+        names = one.input_line_names
+        if one is not relays:
+            if names:
+                return names[:_CONTACTS]
+        elif names:
+            first = max(one.direction_group, 1)
+            return names[first : first + _CONTACTS]
+    return ()
+
+
 _PIPELINE = 3
 """Measurements from exposure to output (manual of the optoNCDT 1420, p. 52)."""
 
 
 def hardware_of(
     p: VirtualBenchParameters,
-    device: Device,
+    site: Site,
     connection: Connection,
     *,
     server: str,
@@ -38,9 +119,11 @@ def hardware_of(
     ports: Sequence[str | None],
 ) -> Hardware:
     """The configuration of a client, with the calibrations of the virtual bench; `ports` are those of the lasers."""
-    inputs, output = ("Dev1", "Dev1/ao0") if device == "usb" else ("cRIO1Mod1", "cRIO1Mod3/ao0")
-    line, heartbeat, (emergency_stop, over_travel, over_travel_2, ready) = LINES[device]
-    # what a person reads off the data sheets of filter and laser; what is left, the loop check measures
+    displacement, acceleration, laser_1, laser_2 = site.inputs
+    lines: tuple[str | None, ...] = site.contacts or (None,) * _CONTACTS
+    emergency_stop, over_travel, over_travel_2, ready = lines
+    span = min(p.converter.range, site.range)
+    # delay from the data sheets of filter and laser; the loop check measures the remainder
     latency = _PIPELINE / p.laser_1.rate + 30.0 * _VALUES / _BAUD
     delay = p.filter_unit.delay(p.sample_rate) - latency if connection == "serial" else 0.0
     return Hardware(
@@ -49,21 +132,21 @@ def hardware_of(
         hands=hands,
         daq=Daq(
             server=server,
-            output=output,
+            output=site.output,
             output_range=p.shaker.drive_range,
-            enable_line=line,
-            watchdog=_WATCHDOG if device == "usb" else None,
-            emergency_stop=EmergencyStop(line=emergency_stop),
-            over_travel=OverTravel(line=over_travel),
-            over_travel_2=OverTravel2(line=over_travel_2),
-            amplifier_ready=AmplifierReady(line=ready, delay=_READY),
-            heartbeat=Heartbeat(line=heartbeat, timeout=HEARTBEAT),
+            enable_line=site.enable,
+            watchdog=_WATCHDOG if site.has_watchdog else None,
+            emergency_stop=None if emergency_stop is None else EmergencyStop(line=emergency_stop),
+            over_travel=None if over_travel is None else OverTravel(line=over_travel),
+            over_travel_2=None if over_travel_2 is None else OverTravel2(line=over_travel_2),
+            amplifier_ready=None if ready is None else AmplifierReady(line=ready, delay=_READY),
+            heartbeat=Heartbeat(line=site.heartbeat, timeout=HEARTBEAT),
         ),
         table_displacement=TableDisplacement(
-            terminal=f"{inputs}/ai0", range=p.converter.range, sensitivity=1.0 / p.displacement_sensor.nominal[0]
+            terminal=displacement, range=span, sensitivity=1.0 / p.displacement_sensor.nominal[0]
         ),
         table_acceleration=TableAcceleration(
-            terminal=f"{inputs}/ai1", range=p.converter.range, sensitivity=1.0 / p.accelerometer.nominal[0]
+            terminal=acceleration, range=span, sensitivity=1.0 / p.accelerometer.nominal[0]
         ),
         lasers=Lasers(
             connection=connection,
@@ -72,16 +155,6 @@ def hardware_of(
             delay=round(delay, 6),
             load=p.laser_1.load,
         ),
-        laser_1=Laser1(
-            terminal=f"{inputs}/ai2",
-            range=p.converter.range,
-            port=ports[0],
-            measuring_range=p.laser_1.measuring_range,
-        ),
-        laser_2=Laser2(
-            terminal=f"{inputs}/ai3",
-            range=p.converter.range,
-            port=ports[1],
-            measuring_range=p.laser_2.measuring_range,
-        ),
+        laser_1=Laser1(terminal=laser_1, range=span, port=ports[0], measuring_range=p.laser_1.measuring_range),
+        laser_2=Laser2(terminal=laser_2, range=span, port=ports[1], measuring_range=p.laser_2.measuring_range),
     )

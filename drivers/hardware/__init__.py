@@ -1,1 +1,1 @@
-"""The bench in the laboratory: DAQ and lasers as one rig."""
+"""The laboratory bench: DAQ and lasers as one rig."""

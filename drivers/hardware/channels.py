@@ -1,26 +1,70 @@
-"""The channels of the laboratory's bench: converter, transducer and sign in one conversion."""
+"""Channels of the laboratory bench: converter, transducer and sign in one conversion."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Protocol
 
 from drivers.daqmx.parameters import AnalogInput
 from drivers.further import FurtherChannel
 from drivers.hardware.parameters import CalibratedInput, Hardware
-from drivers.optoncdt.analogue import laser_scaling
 from drivers.optoncdt.codec import MID_RANGE, count_size
-from sim.channel import Channel
+from sim.channel import COIL_CURRENT, TABLE_ACCELERATION, TABLE_DISPLACEMENT, TABLE_FORCE, Channel
+from sim.errors import InvalidInput
+
+_START, _END = 0.004, 0.020
+"""Current at the start and at the end of the measuring range [A] (manual, p. 116)."""
+_LOWEST, _HIGHEST = 0.0038, 0.0202
+"""Range of valid currents, including the reserve [A] (manual of the IFD2410, p. 71, of the same family).
+
+Without a valid distance the current is lower, 3 to 3.75 mA depending on the model.
+"""
+
+
+@dataclass(frozen=True)
+class AnalogueScaling:
+    """value = (volts - middle) * slope: from mid range [m], with `slope` in m/V.
+
+    `valid` is the voltage range of valid distances.
+    """
+
+    slope: float
+    middle: float
+    valid: tuple[float, float]
+
+
+def laser_scaling(measuring_range: float, load: float) -> AnalogueScaling:
+    """Scaling from volts over `load` [ohm] to metres, for the standard scaling of the output.
+
+    Source: d = (I - 4 mA) / 16 mA of the measuring range (manual of the IFD2410, p. 71; of the optoNCDT 1402, p. 31).
+    """
+    slope = measuring_range / ((_END - _START) * load)
+    return AnalogueScaling(slope, 0.5 * (_START + _END) * load, (_LOWEST * load, _HIGHEST * load))
+
+
+def require_input_range(item: str, input_range: float, load: float) -> None:
+    """Raise InvalidInput about `item` when an input of +-`input_range` [V] does not cover the measuring range.
+
+    The converter may saturate within the reserve beyond it: values there are then invalid.
+    """
+    if (needed := _END * load) > input_range * (1.0 + 1e-9):
+        allowed = (
+            f"the output of the laser reaches {needed:.4g} V over {load:g} ohm;"
+            f" choose a wider input range, or a load of {input_range / _END:.0f} ohm at most"
+        )
+        raise InvalidInput(item, input_range, allowed)
+
 
 _MEASURED = {
-    "table_displacement": ("displacement", "m"),
-    "table_acceleration": ("acceleration", "m/s2"),
-    "table_force": ("force", "N"),
-    "coil_current": ("current", "A"),
+    TABLE_DISPLACEMENT: ("displacement", "m"),
+    TABLE_ACCELERATION: ("acceleration", "m/s2"),
+    TABLE_FORCE: ("force", "N"),
+    COIL_CURRENT: ("current", "A"),
 }
 """Quantity and unit of the transducers."""
 
 
 class Scaling(Protocol):
-    """What a converter says of one input: volts = coefficients[0] + coefficients[1] counts + ..., between its rails."""
+    """Scaling of one input: volts = coefficients[0] + coefficients[1] counts + ..., within the converter's range."""
 
     @property
     def coefficients(self) -> tuple[float, ...]:
@@ -29,19 +73,19 @@ class Scaling(Protocol):
 
     @property
     def lowest(self) -> int:
-        """Lowest count that is a measurement."""
+        """Lowest valid count."""
         ...
 
     @property
     def highest(self) -> int:
-        """Highest count that is a measurement."""
+        """Highest valid count."""
         ...
 
 
 def analogue_channels(
     hardware: Hardware, scalings: Sequence[Scaling], devices: Mapping[str, str], further: Sequence[FurtherChannel] = ()
 ) -> tuple[Channel, ...]:
-    """The channels of the DAQ's inputs, in their order: transducers, lasers on their analogue outputs, further ones.
+    """The channels of the DAQ's inputs, in order: transducers, lasers on their analogue outputs, additional sensors.
 
     `devices` is the description of the DAQ, with the identity of each device.
     """
@@ -68,7 +112,7 @@ def _calibrated(
 
 
 def _device(devices: Mapping[str, str], given: AnalogInput) -> str:
-    # names of devices are the same in capitals
+    # device names are case-insensitive
     wanted = f"device {given.terminal.split('/')[0]}".lower()
     return next((identity for name, identity in devices.items() if name.lower() == wanted), "unknown device")
 
@@ -83,11 +127,11 @@ def _analogue(
     zero: float,
     volts: tuple[float, float] | None = None,
 ) -> Channel:
-    """A channel with value = (volts - zero) * slope in `unit`; outside the range `volts` [V] it says nothing."""
+    """A channel with value = (volts - zero) * slope in `unit`; outside the range `volts` [V] it is invalid."""
     c0, c1, *higher = scaling.coefficients
     valid = scaling.lowest, scaling.highest
     if volts is not None:
-        # the polynomial is straight to a part in a thousand: far better than the reserve of the sensor needs
+        # the polynomial is linear to 0.1 %, which is sufficient for the limits of the sensor's reserve
         ends = sorted(round((end - c0) / c1) for end in volts)
         valid = max(valid[0], ends[0]), min(valid[1], ends[1])
     terms = tuple(c * slope for c in higher)
@@ -95,6 +139,6 @@ def _analogue(
 
 
 def serial_laser(name: str, measuring_range: float, polarity: int, device: str, faults: Mapping[int, str]) -> Channel:
-    """A laser read serially: counts from mid range; `faults` says what those outside its range mean."""
+    """A laser read serially: counts from mid range; `faults` are the meanings of counts outside it."""
     scale, valid = polarity * count_size(measuring_range), (-MID_RANGE, MID_RANGE)
     return Channel(name, "displacement", "m", scale, 0.0, valid, device, faults=faults)

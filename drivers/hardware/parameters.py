@@ -1,10 +1,11 @@
-"""The bench in the laboratory as the configuration describes it."""
+"""Parameters of the laboratory bench: table `[hardware]` of a configuration."""
 
 from typing import Literal
 
 from pydantic import model_validator
 
 from drivers.daqmx.parameters import AnalogInput, Daq
+from sim.channel import COIL_CURRENT, STOREYS, TABLE_ACCELERATION, TABLE_DISPLACEMENT, TABLE_FORCE
 from sim.errors import InvalidInput
 from sim.parameters import Parameters, quantity
 
@@ -18,7 +19,7 @@ class CalibratedInput(AnalogInput):
     @model_validator(mode="after")
     def _a_calibration_that_tells_something(self) -> "CalibratedInput":
         if self.sensitivity == 0.0:
-            raise InvalidInput("sensitivity", self.sensitivity, "it divides the voltage: volts per unit, never 0")
+            raise InvalidInput("sensitivity", self.sensitivity, "volts per unit, not 0")
         if abs(self.zero) >= self.range:
             raise InvalidInput("zero", self.zero, f"it must lie within the input's range of {self.range:g} V")
         return self
@@ -59,39 +60,46 @@ Transducer = TableDisplacement | TableAcceleration | TableForce | CoilCurrent
 
 
 class Lasers(Parameters):
-    """What both lasers have in common."""
+    """Parameters of both lasers."""
 
     connection: Literal["serial", "analogue"] = quantity(
-        "serial", "", "how the lasers are read: the sensor cannot do both at once"
+        "serial", "", "connection of the lasers: a sensor cannot use both at once"
     )
     reference: Literal["ground", "table"] = quantity(
-        "ground", "", "where the lasers stand: on the ground they see x + u, on the table they see u"
+        "ground", "", "where the lasers are mounted: on the ground they measure x + u, on the table u"
     )
     rate: float = quantity(4000.0, "1/s", "measurements per second of each laser", gt=0, le=8000)
     delay: float = quantity(
         0.0,
         "s",
-        "by how much later the laser values are placed; `rockbench check` measures it",
+        "correction added to the time of the laser values; `rockbench check` measures it",
         ge=-0.1,
         le=0.1,
         usual=(1e-4, 0.05),
     )
     listening: float = quantity(
-        10.0, "s", "how long the lasers are listened to before the first run: their clocks are known then", ge=1, le=120
+        10.0, "s", "observation time of the lasers before the first run, to identify their clocks", ge=1, le=120
     )
-    load: float = quantity(500.0, "ohm", "resistor that turns the current of an analogue output into volts", gt=0)
+    load: float = quantity(500.0, "ohm", "load resistor of an analogue current output", gt=0)
 
 
 class LaserInput(AnalogInput):
     """A laser on a storey; terminal, wiring and range are for its analogue output."""
 
     port: str | None = quantity(
-        None, "", "serial port, such as COM5 or /dev/ttyUSB0; needed when it is read serially", example="COM5"
+        None, "", "serial port, such as COM5 or /dev/ttyUSB0; required for the serial connection", example="COM5"
+    )
+    serial_number: str | None = quantity(
+        None,
+        "",
+        "serial number of the sensor, to detect swapped ports; absent: any sensor of this measuring range",
+        min_length=1,
+        example="15030002",
     )
     baud: int | None = quantity(
-        None, "1/s", "baud rate; absent: it is searched for", ge=9600, le=1_000_000, example=921600
+        None, "1/s", "baud rate; absent: detected automatically", ge=9600, le=1_000_000, example=921600
     )
-    measuring_range: float = quantity(0.200, "m", "measuring range; checked with the sensor when read serially", gt=0)
+    measuring_range: float = quantity(0.200, "m", "measuring range; with serial connection checked by the sensor", gt=0)
     polarity: Literal[1, -1] = quantity(1, "", "1 when the distance grows with the displacement of the storey")
 
 
@@ -106,72 +114,92 @@ class Laser2(LaserInput):
 
     terminal: str = quantity("Dev1/ai3", "", "physical channel of the input")
     port: str | None = quantity(
-        None, "", "serial port, such as COM6 or /dev/ttyUSB1; needed when it is read serially", example="COM6"
+        None, "", "serial port, such as COM6 or /dev/ttyUSB1; required for the serial connection", example="COM6"
     )
 
 
 class Hardware(Parameters):
-    """The bench in the laboratory: DAQ device, transducers of the table, lasers."""
+    """The laboratory bench: DAQ device, transducers of the table, lasers."""
 
     sample_rate: float = quantity(2000.0, "1/s", "samples per second of drive and inputs", gt=0, le=20_000)
-    half_stroke: float = quantity(0.075, "m", "displacement from mid stroke at which the end stops touch", gt=0)
+    half_stroke: float = quantity(0.075, "m", "distance from mid stroke to each end stop", gt=0)
     band_low: float = quantity(1.0, "Hz", "lower end of the table's usable band", gt=0)
     band_high: float = quantity(100.0, "Hz", "upper end of the table's usable band", gt=0)
     moving_mass: float | None = quantity(
         None,
         "kg",
-        "armature, table and fixtures, to estimate force and current; absent: they are not estimated",
+        "mass of armature, table and fixtures, to estimate force and current; absent: no estimate",
         gt=0,
         usual=(2.0, 500.0),
         example=50.0,
     )
     force_constant: float | None = quantity(
-        None, "N/A", "of the coil, to estimate its current", gt=0, usual=(5.0, 200.0), example=50.0
+        None, "N/A", "force constant of the coil, to estimate its current", gt=0, usual=(5.0, 200.0), example=50.0
     )
     hands: str | None = quantity(
-        None, "", "host:port that is told of the operator's work; only an emulated bench has one"
+        None, "", "host:port of the control channel of an emulated laboratory; absent on a real bench"
     )
     daq: Daq = Daq()
     table_displacement: TableDisplacement = TableDisplacement()
     table_acceleration: TableAcceleration = TableAcceleration()
-    table_force: TableForce | None = quantity(None, "", "the load cell; absent when there is none")
-    coil_current: CoilCurrent | None = quantity(None, "", "the current monitor; absent when there is none")
+    table_force: TableForce | None = quantity(None, "", "the load cell; absent: none")
+    coil_current: CoilCurrent | None = quantity(None, "", "the current monitor; absent: none")
     lasers: Lasers = Lasers()
     laser_1: Laser1 = Laser1()
     laser_2: Laser2 = Laser2()
 
     @property
+    def drive_range(self) -> float:
+        """Largest magnitude of the drive [V]."""
+        return self.daq.output_range
+
+    @property
+    def suspension(self) -> float:
+        """Stiffness between table and ground [N/m]: unknown."""
+        return 0.0
+
+    @property
+    def laser_reference(self) -> Literal["ground", "table"]:
+        """Reference of the lasers: on the ground or on the table."""
+        return self.lasers.reference
+
+    @property
+    def laser_ranges(self) -> tuple[float, float]:
+        """Measuring ranges of the lasers on the first and the second storey [m]."""
+        return self.laser_1.measuring_range, self.laser_2.measuring_range
+
+    @property
     def transducers(self) -> tuple[tuple[str, Transducer], ...]:
-        """The analogue inputs that every way of reading the lasers has: name of the channel and its input."""
+        """The analogue inputs besides the lasers: name of the channel and its input."""
         given = (
-            ("table_displacement", self.table_displacement),
-            ("table_acceleration", self.table_acceleration),
-            ("table_force", self.table_force),
-            ("coil_current", self.coil_current),
+            (TABLE_DISPLACEMENT, self.table_displacement),
+            (TABLE_ACCELERATION, self.table_acceleration),
+            (TABLE_FORCE, self.table_force),
+            (COIL_CURRENT, self.coil_current),
         )
         return tuple((name, one) for name, one in given if one is not None)
 
     @property
     def analogue_lasers(self) -> tuple[tuple[str, LaserInput], ...]:
-        """The analogue inputs of the lasers; none when they are read serially."""
+        """The analogue inputs of the lasers; none with the serial connection."""
         return () if self.lasers.connection == "serial" else self._lasers
 
     @property
     def serial_lasers(self) -> tuple[tuple[str, LaserInput], ...]:
-        """The lasers on serial ports; none when they are read as analogue inputs."""
+        """The lasers on serial ports; none with the analogue connection."""
         return self._lasers if self.lasers.connection == "serial" else ()
 
     @property
     def _lasers(self) -> tuple[tuple[str, LaserInput], ...]:
-        return ("laser_1", self.laser_1), ("laser_2", self.laser_2)
+        return (STOREYS[0], self.laser_1), (STOREYS[1], self.laser_2)
 
     @model_validator(mode="after")
     def _no_terminal_twice(self) -> "Hardware":
         seen: dict[str, str] = {}
         for name, given in (*self.transducers, *self.analogue_lasers):
             if (other := seen.setdefault(given.terminal.lower(), name)) != name:
-                raise InvalidInput(f"{name}.terminal", given.terminal, f"{other} has this terminal already")
+                raise InvalidInput(f"{name}.terminal", given.terminal, f"{other} uses this terminal already")
         serial = self.lasers.connection == "serial"
         if serial and self.laser_1.port is not None and self.laser_1.port == self.laser_2.port:
-            raise InvalidInput("laser_2.port", self.laser_2.port, "laser_1 has this port already")
+            raise InvalidInput("laser_2.port", self.laser_2.port, "laser_1 uses this port already")
         return self

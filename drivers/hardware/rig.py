@@ -1,100 +1,74 @@
-"""The bench in the laboratory behind the interface of every rig: the DAQ is master, what has a clock of its own is
-placed on its clock."""
+"""The laboratory rig: DAQ and lasers. Values of free-running sensors are resampled to the DAQ's sample clock."""
 
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from enum import Enum
-from typing import Self
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.clock import Clock, WallClock, now
+from drivers.clock import WallClock, now
+from drivers.daqmx.delays import InputDelay
 from drivers.daqmx.session import DaqSession
-from drivers.drive import Drive, require_block
+from drivers.drive import REARM, RigBase, RigState, require_block
+from drivers.emulation.control import ask, place_of
 from drivers.errors import RigError
 from drivers.further import FurtherChannel
-from drivers.hands import Person, RemoteHands
-from drivers.hardware.channels import analogue_channels
+from drivers.hardware.channels import analogue_channels, require_input_range
 from drivers.hardware.parameters import Hardware
-from drivers.hardware.serial_lasers import open_serial_lasers
-from drivers.hardware.tracks import Tracks
-from drivers.optoncdt.analogue import require_input_range
-from drivers.rig import Alignment, Block, Channel, Counts, Handwork
+from drivers.hardware.tracks import Tracks, open_serial_lasers
+from drivers.rig import Alignment, Block, Channel, Counts, OperatorTask
+from drivers.timebase.deskew import Deskew
 
-_FIRST_LOOKS = 20
-"""How often the sample clock is read when it has just been started: it is then known to a fraction of a call."""
+_FIRST_READINGS = 20
+"""Number of readings of the sample clock after its start, which bound it to a fraction of a call's duration."""
 
 _GOLDEN = 0.6180339887498949
-"""Step between the phases of two looks: its multiples fill a period evenly."""
-_LOOKS = 6
-"""How often it is read after each block: the best of a few calls is much better than one."""
+"""Phase step between two readings, whose multiples are evenly distributed over a period."""
+_READINGS = 6
+"""Number of readings of the sample clock after each block: the best of several is much better than a single one."""
 
 
-class _State(Enum):
-    STOPPED = "not armed"
-    ARMED = "armed"
-    RUNNING = "running"
-    CLOSED = "closed"
-
-
-class HardwareRig:
+class HardwareRig(RigBase):
     """DAQ and lasers as one rig. The sample clock starts with the first block that is read.
 
-    `lead` is the number of drive samples that must be waiting, `further` are sensors besides those of every bench.
-    Raises InvalidInput or RigError when the bench is not as configured; nothing is left open then.
+    Samples are returned without the delays of filters and multiplexers: a block is complete when its most delayed input
+    is. That delay is added to `lead`, the number of drive samples that must be waiting. `further` are additional
+    sensors. Raises InvalidInput or RigError when the bench differs from the configuration; nothing is left open then.
     """
 
     def __init__(self, hardware: Hardware, *, lead: int, further: Sequence[FurtherChannel] = ()) -> None:
-        self._clock = WallClock()
         inputs = [*(one for _, one in (*hardware.transducers, *hardware.analogue_lasers)), *further]
         with ExitStack() as opened:
-            # the DAQ before all that can fail: opening it makes the bench safe, whatever an earlier program left
+            # the DAQ first: opening it makes the bench safe after any earlier program
             self._daq = DaqSession(hardware.daq, inputs, hardware.sample_rate, lead)
             opened.callback(self._daq.close)
-            self._drive = Drive(self._daq.drive_range, lead)
-            self._hands = RemoteHands(hardware.hands) if hardware.hands is not None else Person()
+            scaled = analogue_channels(hardware, self._daq.scalings, self._daq.description, further)
+            analogue = tuple(map(_with_delay, scaled, self._daq.delays))
+            delays = [channel.delay for channel in analogue]
+            self._deskew = Deskew(delays, self._daq.sample_rate, [channel.valid for channel in analogue])
+            # a block is complete when its most delayed input is
+            super().__init__(self._daq.drive_range, lead + self._deskew.latency, WallClock())
+            self._laboratory = hardware.hands
+            if self._laboratory is not None:
+                place_of(self._laboratory)
             for name, given in hardware.analogue_lasers:
                 require_input_range(f"hardware.{name}.range", given.range, hardware.lasers.load)
-            # a second kind of sensor with a clock of its own joins this list
+            # add further kinds of sensors with their own clocks here
             tracks = open_serial_lasers(hardware)
             self._tracks = Tracks(tracks) if tracks else None
             if self._tracks is not None:
                 opened.callback(self._tracks.close)
-            analogue = analogue_channels(hardware, self._daq.scalings, self._daq.description, further)
-            self._channels = analogue if self._tracks is None else (*analogue, *self._tracks.channels)
+            self.channels = analogue if self._tracks is None else (*analogue, *self._tracks.channels)
             self._opened = opened.pop_all()
-        self._state = _State.STOPPED
-        self._failed = False
-        self._phase = 0.0
-
-    @property
-    def channels(self) -> tuple[Channel, ...]:
-        return self._channels
-
-    @property
-    def sample_rate(self) -> float:
-        return self._daq.sample_rate
-
-    @property
-    def drive_range(self) -> float:
-        return self._daq.drive_range
-
-    @property
-    def lead(self) -> int:
-        return self._drive.lead
-
-    @property
-    def clock(self) -> Clock:
-        return self._clock
-
-    @property
-    def description(self) -> dict[str, str]:
-        return {
+        self.sample_rate = self._daq.sample_rate
+        self.description = {
             "backend": "hardware",
             **self._daq.description,
-            **{channel.name: channel.device for channel in self._channels},
+            **{channel.name: channel.device for channel in self.channels},
         }
+        self._failed = False
+        self._phase = 0.0
 
     @property
     def alignments(self) -> tuple[Alignment, ...]:
@@ -105,42 +79,42 @@ class HardwareRig:
             return self._daq.safety_inputs()
 
     def arm(self) -> None:
-        if self._state is not _State.STOPPED:
-            raise RigError(f"arm is refused: the rig is {self._state.value}; stop it first, or open a new one")
+        self.require_stopped("arm", REARM)
         if self._tracks is not None:
-            self._tracks.begin(self.sample_rate, self._clock)
+            self._tracks.begin(self.sample_rate, self.clock)
         with self._ending_on_failure():
             self._daq.prepare()
         self._drive.begin()
+        self._deskew.begin()
         self._failed = False
-        self._state = _State.ARMED
+        self._state = RigState.ARMED
 
     def write(self, volts: NDArray[np.float64]) -> None:
-        self._require_armed("write")
+        self.require_armed("write")
         with self._ending_on_failure():
             samples = self._drive.append(volts)
             if samples.size:
                 self._daq.write(samples)
 
     def read(self, n: int) -> Block:
-        self._require_armed("read")
+        self.require_armed("read")
         require_block(n)
         with self._ending_on_failure():
             self._drive.require(n)
-            if self._state is _State.ARMED:
+            if self._state is RigState.ARMED:
                 self._start()
             counts = self._read_all(n)
         return Block(self._drive.advance(n), counts)
 
     def stop(self) -> None:
-        if self._state is _State.CLOSED:
+        if self._state is RigState.CLOSED:
             return
-        self._state = _State.STOPPED
-        with self._told_once():
+        self._state = RigState.STOPPED
+        with self._raised_once():
             self._daq.stop()
 
     def halt(self) -> None:
-        if self._state is _State.CLOSED:
+        if self._state is RigState.CLOSED:
             return
         try:
             self._daq.cut()
@@ -148,74 +122,69 @@ class HardwareRig:
             self.stop()
 
     def close(self) -> None:
-        if self._state is _State.CLOSED:
+        if self._state is RigState.CLOSED:
             return
-        self._state = _State.CLOSED
-        with self._told_once(), self._opened:
+        self._state = RigState.CLOSED
+        with self._raised_once(), self._opened:
             self._daq.stop()
 
-    def handwork(self, work: Handwork, amount: float | None = None) -> None:
-        if self._state is not _State.STOPPED:
-            raise RigError(f"{work.value} is refused: the rig is {self._state.value}; hands belong on a stopped rig")
-        self._hands.do(work, amount)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
+    def perform(self, work: OperatorTask, amount: float | None = None) -> None:
+        self.require_stopped(work.value)
+        # on a real bench the operator has carried it out; an emulated laboratory changes its virtual specimen
+        if self._laboratory is not None:
+            ask(self._laboratory, "handwork", work=work.value, amount=amount)
 
     def _start(self) -> None:
         self._daq.start()
-        self._state = _State.RUNNING
+        self._state = RigState.RUNNING
         if self._tracks is not None:
-            self._look_at_clock(self._tracks, _FIRST_LOOKS)
+            self._observe_clock(self._tracks, _FIRST_READINGS)
 
-    def _look_at_clock(self, tracks: Tracks, times: int) -> None:
-        """Bound the sample clock between two looks at the machine's clock.
+    def _observe_clock(self, tracks: Tracks, times: int) -> None:
+        """Bound the sample clock between two readings of the machine's clock.
 
-        The looks are spread over the sample period: right after a block they would all fall on one phase of it, and
-        the bounds would be no tighter than a period.
+        The readings are spread over the sample period: right after a block all would have the same phase, and the
+        bounds would be no tighter than a period.
         """
         for _ in range(times):
             self._phase = (self._phase + _GOLDEN) % 1.0
-            self._clock.wait_until(now() + self._phase / self.sample_rate)
+            self.clock.wait_until(now() + self._phase / self.sample_rate)
             before = now()
             count = self._daq.acquired()
             tracks.observe(before, count, now())
 
     def _read_all(self, n: int) -> Counts:
         """Counts of all channels, shape (n, n_channels): from the DAQ, and from the tracks."""
-        counts = self._daq.read(n)
+        counts = self._deskew.moved(self._daq.read(self._deskew.missing(n)))
         if self._tracks is None:
             return counts
-        self._look_at_clock(self._tracks, _LOOKS)
+        self._observe_clock(self._tracks, _READINGS)
         return np.column_stack((counts, self._tracks.counts(self._drive.index, n)))
-
-    def _require_armed(self, what: str) -> None:
-        if self._state not in (_State.ARMED, _State.RUNNING):
-            raise RigError(f"{what} is refused: the rig is {self._state.value}; arm it first")
 
     @contextmanager
     def _ending_on_failure(self) -> Generator[None]:
-        """Whatever fails inside, the output is cut, and what failed is what is told."""
+        """Context manager that cuts the output on any failure; reports the original cause, not a follow-up error."""
         try:
             yield
         except BaseException as error:
             try:
                 self.halt()
             except RigError as second:
-                # that relay or output did not obey is part of what failed
+                # a relay or output that did not respond is part of the failure
                 error.args = (f"{error}; {second}", *error.args[1:])
             finally:
                 self._failed = True
             raise
 
     @contextmanager
-    def _told_once(self) -> Generator[None]:
-        """A device that has failed may fail again when it is stopped: that has been told."""
+    def _raised_once(self) -> Generator[None]:
+        """Context manager that suppresses errors of stopping a device whose failure has already been raised."""
         try:
             yield
         except RigError:
             if not self._failed:
                 raise
+
+
+def _with_delay(channel: Channel, delay: InputDelay) -> Channel:
+    return replace(channel, delay=delay.seconds, delay_uncertainty=delay.uncertainty)

@@ -1,4 +1,4 @@
-"""Instruments with clocks of their own: a list of tracks on the sample clock."""
+"""Instruments with their own clocks, resampled as tracks on the sample clock."""
 
 from collections.abc import Sequence
 from contextlib import ExitStack
@@ -10,18 +10,28 @@ from numpy.typing import NDArray
 
 from drivers.clock import Clock, now
 from drivers.errors import RigError
+from drivers.hardware.channels import serial_laser
+from drivers.hardware.parameters import Hardware, LaserInput, Lasers
+from drivers.optoncdt.codec import IMPLAUSIBLE, LATE, LOST, MEANINGS, MID_RANGE, count_size, marked
+from drivers.optoncdt.sensor import SerialLaser
 from drivers.rig import Alignment, Channel
-from drivers.timebase.sample_clock import SampleClock
-from drivers.timebase.sensor_track import SensorTrack
+from drivers.timebase.clocks import SampleClock
+from drivers.timebase.sensor_track import Marks, SensorTrack
+from sim.errors import InvalidInput
 
 _PATIENCE = 0.05
-"""How long a block waits for values to arrive before they count as lost [s],"""
+"""Longest wait of a block for late values [s]; values that arrive later count as lost."""
 _SHARE = 0.5
-"""and for which part of its own duration at most: the drive must be written meanwhile."""
+"""The same as a fraction of the block's duration, so that the drive is written in time."""
+
+
+_FASTEST = 5.0
+"""Speed of a target beyond which a change between two values is implausible [m/s]; the table has at most 1 m/s."""
+MARKS = Marks(LOST, LATE, IMPLAUSIBLE)
 
 
 class Readings(Protocol):
-    """Values in their order, each array of shape (n,); see `SensorTrack.add`."""
+    """Values in order, each array of shape (n,); see `SensorTrack.add`."""
 
     @property
     def index(self) -> NDArray[np.int64]:
@@ -35,33 +45,33 @@ class Readings(Protocol):
 
     @property
     def code(self) -> NDArray[np.int32]:
-        """The value as it came."""
+        """The raw value."""
         ...
 
     @property
     def arrival(self) -> NDArray[np.float64]:
-        """When the machine had read it [s of its clock]."""
+        """Arrival time [s of the machine's clock]."""
         ...
 
 
 class ClockedSensor(Protocol):
-    """A sensor that is open, and streams by its own clock from `start` on."""
+    """An open sensor that streams on its own clock from `start` on."""
 
     @property
     def silent(self) -> bool:
-        """Whether no value has arrived for long: it is not waited for then."""
+        """Whether no value has arrived for a long time, so that blocks do not wait for it."""
         ...
 
     def start(self) -> None:
-        """Begin to stream. Raises RigError."""
+        """Start the stream. Raises RigError."""
         ...
 
     def take(self) -> Readings:
-        """Everything that came since the last time; never waits. Raises ConnectionLost."""
+        """All values since the last call; never waits. Raises ConnectionLost."""
         ...
 
     def wait(self, timeout: float) -> bool:
-        """Wait until there is something to take, or a failure; False after `timeout` [s]."""
+        """Wait until values are available or a failure occurs; False after `timeout` [s]."""
         ...
 
     def close(self) -> None:
@@ -71,9 +81,9 @@ class ClockedSensor(Protocol):
 
 @dataclass(frozen=True)
 class Track:
-    """One instrument: its open sensor, its channel, and how its values are placed.
+    """One instrument: its open sensor, its channel, and the placement of its values.
 
-    `listening` is how long its clock is watched before the first run [s].
+    `listening` is the observation time of its clock before the first run [s].
     """
 
     sensor: ClockedSensor
@@ -83,9 +93,9 @@ class Track:
 
 
 class Tracks:
-    """Sensors that stream from the moment they are given; `begin` a run, then ask for blocks of counts.
+    """Tracks of sensors that stream from construction on; `begin` a run, then request blocks of counts.
 
-    The sensors are closed with it, also where one cannot be started.
+    Owns the sensors and closes them, even if one cannot be started.
     """
 
     def __init__(self, tracks: Sequence[Track]) -> None:
@@ -102,7 +112,7 @@ class Tracks:
         self.channels: tuple[Channel, ...] = tuple(track.channel for track in self._tracks)
 
     def begin(self, sample_rate: float, clock: Clock) -> None:
-        """A run begins: its sample clock is not known yet, the sensors' own clocks are."""
+        """Begin a run with a new sample clock; the history of the sensors' clocks is kept."""
         clock.wait_until(self._known_from)
         self._take()
         for track in self._tracks:
@@ -111,14 +121,17 @@ class Tracks:
         self._clock = SampleClock(sample_rate)
 
     def observe(self, before: float, count: int, after: float) -> None:
-        """The sample clock stood at `count` between two moments of the machine's clock [s]. RigError before a run."""
+        """Add a reading: the sample clock was at `count` between two times of the machine's clock [s].
+
+        Raises RigError before a run.
+        """
         self._running.observe(before, count, after)
 
     def counts(self, first: int, n: int) -> NDArray[np.int16]:
-        """Counts at `n` samples from `first` on, shape (n, n_tracks); waits a little for the last of them.
+        """Counts at `n` samples from `first` on, shape (n, n_tracks); waits briefly for late values.
 
-        What a sensor has not sent by then is lost, and one that is silent is not waited for. Raises ConnectionLost, and
-        RigError before a run.
+        Values that have not arrived by then are marked as late; does not wait for a silent sensor. Raises
+        ConnectionLost, and RigError before a run.
         """
         last = (first + n - 1) / self._sample_rate
         deadline = now() + min(_PATIENCE, _SHARE * n / self._sample_rate)
@@ -133,7 +146,7 @@ class Tracks:
 
     @property
     def alignments(self) -> tuple[Alignment, ...]:
-        """How the sensors were placed in this run; none before the first."""
+        """Alignments of the sensors in this run; empty before the first run."""
         clock = self._clock
         return () if clock is None else tuple(track.placing.alignment(clock) for track in self._tracks)
 
@@ -144,10 +157,48 @@ class Tracks:
     @property
     def _running(self) -> SampleClock:
         if self._clock is None:
-            raise RigError("sensors with clocks of their own have no sample clock: arm the rig first")
+            raise RigError("no sample clock is available for sensors with their own clocks: arm the rig first")
         return self._clock
 
     def _take(self) -> None:
         for track in self._tracks:
             readings = track.sensor.take()
             track.placing.add(readings.index, readings.time, readings.code, readings.arrival)
+
+
+def open_serial_lasers(hardware: Hardware) -> tuple[Track, ...]:
+    """Open the serial lasers; returns none with the analogue connection.
+
+    The caller closes them. Raises InvalidInput for a laser without port, RigError when one is missing or differs from
+    the configuration; none is left open then.
+    """
+    with ExitStack() as opened:
+        tracks: list[Track] = []
+        for name, given in hardware.serial_lasers:
+            track = _open(name, given, hardware.lasers)
+            opened.callback(track.sensor.close)
+            tracks.append(track)
+        opened.pop_all()
+    return tuple(tracks)
+
+
+def _open(name: str, given: LaserInput, lasers: Lasers) -> Track:
+    if given.port is None:
+        allowed = "give the serial port of the laser (`rockbench devices` lists them), or lasers.connection"
+        raise InvalidInput(f"hardware.{name}.port", given.port, allowed)
+    reach = given.measuring_range
+    step = _FASTEST / lasers.rate / count_size(reach)
+    sensor = SerialLaser(
+        name,
+        given.port,
+        baud=given.baud,
+        rate=lasers.rate,
+        measuring_range=reach,
+        serial_number=given.serial_number,
+    )
+    return Track(
+        sensor=sensor,
+        channel=serial_laser(name, reach, given.polarity, sensor.description, MEANINGS),
+        placing=SensorTrack(name, lasers.rate, lasers.delay, marked, MID_RANGE, MARKS, step),
+        listening=lasers.listening,
+    )

@@ -1,11 +1,18 @@
-"""The binary words of the sensor: 18 bits in three bytes, told apart by their top bits (manual, p. 84).
+"""Binary words of the sensor and their conversion to the counts of a block.
+
+A word has 18 bits in three bytes, distinguished by their top bits (manual, p. 84):
 
 L-byte  0 0 D5  D4  D3  D2  D1  D0
 M-byte  0 1 D11 D10 D9  D8  D7  D6
 H-byte  1 F D17 D16 D15 D14 D13 D12     F = 0: first value of a measurement
+
+A distance is stored as counts from mid range, n = code - `MID_RANGE`, so that the value from mid range is
+n * `count_size`. The eight 16-bit integers below -`MID_RANGE` are fault marks of samples without a distance.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TypeVar
 
 import numpy as np
@@ -15,13 +22,13 @@ FULL_SCALE = 65520
 """Largest word that is a distance, at 101 % of the measuring range (manual, p. 65)."""
 
 MID_RANGE = FULL_SCALE // 2
-"""The word at the middle of the measuring range."""
+"""Word at the middle of the measuring range."""
 
 Number = TypeVar("Number", float, NDArray[np.float64])
 
 
 def count_size(measuring_range: float) -> float:
-    """How far the target moves from one word to the next [m] (manual, p. 65)."""
+    """Distance per word [m] (manual, p. 65)."""
     return 1.02 * measuring_range / FULL_SCALE
 
 
@@ -46,27 +53,27 @@ def code_of(distance: Number, measuring_range: float) -> Number:
 
 @dataclass(frozen=True)
 class Words:
-    """Decoded words, all 18 bits of them: `code` and `first`, shape (n,)."""
+    """Decoded words: the 18-bit `code` and the flag `first`, shape (n,)."""
 
     code: NDArray[np.int32]
     first: NDArray[np.bool_]
 
 
 class Decoder:
-    """Finds the words in a stream that may be cut anywhere and may have lost bytes.
+    """Extracts words from a stream that may be split anywhere and may have lost bytes.
 
-    A word is an L-, an M- and an H-byte in a row; what does not belong to one is dropped.
+    A word is a sequence of L-, M- and H-byte; other bytes are dropped.
     """
 
     def __init__(self) -> None:
         self._begun = b""
 
     def restart(self) -> None:
-        """Forget the word that was begun: what follows on the line does not continue it."""
+        """Discard a partial word."""
         self._begun = b""
 
     def feed(self, chunk: bytes) -> Words:
-        """The words that end in `chunk`."""
+        """The words completed by `chunk`."""
         data = np.frombuffer(self._begun + chunk, dtype=np.uint8)
         kind = data >> 6
         low = kind == 0
@@ -81,3 +88,48 @@ class Decoder:
         high = data[end].astype(np.int32)
         code = (data[end - 2] & 0x3F) | (data[end - 1] & 0x3F).astype(np.int32) << 6 | (high & 0x3F) << 12
         return Words(code, (high & 0x40) == 0)
+
+
+LOST = -32768
+NO_PEAK = -32767
+TOO_CLOSE = -32766
+TOO_FAR = -32765
+NOT_CALCULABLE = -32764
+TOO_WIDE = -32763
+LASER_OFF = -32762
+OTHER = -32761
+LATE = 32767
+IMPLAUSIBLE = 32766
+
+MEANINGS: Mapping[int, str] = MappingProxyType(
+    {
+        LOST: "the value was lost on the line",
+        NO_PEAK: "no reflection detected",
+        TOO_CLOSE: "the target is in front of the measuring range",
+        TOO_FAR: "the target is beyond the measuring range",
+        NOT_CALCULABLE: "the value cannot be calculated",
+        TOO_WIDE: "the reflection is too large",
+        LASER_OFF: "the laser is off; its on/off wire must be grounded",
+        LATE: "the value arrived after its block was due, or not at all",
+        IMPLAUSIBLE: "the value differs from its predecessors by more than a moving target can",
+        OTHER: "no distance: the baud rate is too low for the data, or an unknown error",
+    }
+)
+"""Meanings of the fault marks."""
+
+_FIRST_ERROR = 262075
+_MARKS = np.array(
+    [OTHER, NO_PEAK, TOO_CLOSE, TOO_FAR, OTHER, NOT_CALCULABLE, TOO_WIDE, LASER_OFF, OTHER], dtype=np.int16
+)
+"""Fault marks of the error words from 262075 on (manual, p. 66, which lacks 262079); the last applies to all others."""
+
+
+def marked(codes: NDArray[np.integer]) -> NDArray[np.int16]:
+    """Counts from mid range, same shape, of 18-bit words; a fault mark for each word that is not a distance."""
+    counts = (codes - MID_RANGE).astype(np.int16)
+    bad = (codes < 0) | (codes > FULL_SCALE)
+    if bad.any():
+        place = codes[bad].astype(np.int64) - _FIRST_ERROR
+        known = (place >= 0) & (place < _MARKS.size)
+        counts[bad] = _MARKS[np.where(known, place, _MARKS.size - 1)]
+    return counts

@@ -1,16 +1,81 @@
-"""Commands to the sensor, one at a time, over an open serial port."""
+"""Commands to the sensor over an open serial port, one at a time, and the parsing of its replies."""
 
+import re
 import time
 
 from serial import Serial
 
 from drivers.errors import ConnectionLost, DeviceTimeout, RigError
-from drivers.optoncdt.reply import Reply, error_in, parameters_in
+
+_WORD = re.compile(rb"[\x00-\x3f][\x40-\x7f][\x80-\xff]")
+_PROMPT = re.compile(rb"(?:^|(?<=[\r\n\x80-\xff]))->")
+"""Prompt at the start of a line, since a minus sign in text or a value may resemble one. The rest of a truncated value
+may precede it.
+"""
+_NOT_TEXT = re.compile(rb"[^\t\r\n\x20-\x7e]")
+
+
+class Reply:
+    """Collects the bytes after a command up to the prompt.
+
+    Measured values that arrive during the answer are removed and lost: a value split by text would be misread.
+    """
+
+    def __init__(self) -> None:
+        self.complete = False
+        self.prompt_in_value = False
+        """Whether a possible prompt, which may be part of a value, was received; accepted if nothing follows."""
+        self.rest = b""
+        """Bytes after the prompt."""
+        self._text = b""
+
+    def feed(self, chunk: bytes) -> None:
+        """Process more bytes from the line; empty when the reply is complete."""
+        line, self._text = self._text + chunk, b""
+        self.prompt_in_value |= b"->" in line
+        place = 0
+        for start, end in (*(word.span() for word in _WORD.finditer(line)), (len(line), len(line))):
+            self._text += line[place:start]
+            place = end
+            if found := _PROMPT.search(self._text):
+                self.complete = True
+                self.rest = line[start - (len(self._text) - found.end()) :]
+                self._text = self._text[: found.start()]
+                return
+
+    @property
+    def lines(self) -> list[str]:
+        """The non-empty lines of text, stripped."""
+        text = _NOT_TEXT.sub(b"", _WORD.sub(b"", self._text)).decode("ascii")
+        return [line for part in re.split(r"[\r\n]+", text) if (line := part.strip())]
+
+
+def error_in(command: str, lines: list[str]) -> str | None:
+    """The sensor's error, code and text, in the lines that answer `command`; None when it succeeded.
+
+    A code is at the beginning of a line or after the echo of the command. Warnings, W and a number, do not prevent the
+    execution of the command (manual of the optoNCDT 1320, p. 82).
+    """
+    name = re.escape(command.split()[0])
+    for line in lines:
+        if found := re.match(rf"(?:{name}\b.*?\s)?(E\d{{2,3}}\b.*)", line, re.IGNORECASE):
+            return found[1].strip()
+    return None
+
+
+def parameters_in(name: str, lines: list[str]) -> list[str]:
+    """The parameters of the setting `name`, in capitals, from the lines that answer its query.
+
+    The answer is `<name> <parameter> ...`; an echo `<name> ok` may precede it, and a list may take several lines.
+    """
+    words = (word.upper() for line in lines for word in line.split())
+    return [word for word in words if word not in (name, "OK")]
+
 
 USUAL = 1.0
-"""How long the sensor may take for a command [s]."""
+"""Time-out of a command [s]."""
 SLOW = 3.0
-"""How long it may take where it waits for a measurement of its own, 2 s at most (manual, p. 108) [s]."""
+"""Time-out of a command that waits for a measurement, 2 s at most (manual, p. 108) [s]."""
 
 
 class CommandRefused(RigError):
@@ -20,17 +85,17 @@ class CommandRefused(RigError):
 
     def __init__(self, who: str, command: str, answer: str) -> None:
         if answer.startswith("E202"):
-            remedy = "switch it to the user level professional in its web interface"
+            remedy = "switch it to the professional user level in its web interface"
         else:
-            remedy = "compare the command with the manual of its firmware"
+            remedy = "check the command in the manual of its firmware"
         super().__init__(f"{who} refused {command}: {answer}; {remedy}")
         self.answer = answer
 
 
 class Dialogue:
-    """`who` names the sensor and its port in errors; `port` has a read time-out of a few hundredths of a second.
+    """Command dialogue with a sensor. `who` names sensor and port in errors; `port` has a read time-out of some 10 ms.
 
-    Every method raises ConnectionLost when the port is gone.
+    Every method raises ConnectionLost if the port has disappeared.
     """
 
     def __init__(self, who: str, port: Serial) -> None:
@@ -38,7 +103,10 @@ class Dialogue:
         self.port = port
 
     def ask(self, command: str, timeout: float = USUAL) -> list[str]:
-        """The lines that the sensor answers. Raises CommandRefused, and DeviceTimeout after `timeout` [s]."""
+        """Send a command; returns the lines of the answer.
+
+        Raises CommandRefused, and DeviceTimeout after `timeout` [s].
+        """
         reply = Reply()
         deadline = time.monotonic() + timeout
         self.discard()
@@ -48,21 +116,21 @@ class Dialogue:
         return self.judged(command, reply, timeout)
 
     def setting(self, name: str, timeout: float = USUAL) -> list[str]:
-        """The parameters of a setting as they are in the sensor, in capitals; raises as `ask` does."""
+        """The present parameters of a setting, in capitals; raises as `ask` does."""
         return parameters_in(name, self.ask(name, timeout))
 
     def send(self, command: str) -> None:
-        """Send a command and do not wait for the answer."""
+        """Send a command without waiting for the answer."""
         try:
             self.port.write(command.encode("ascii") + b"\r\n")
         except OSError as error:
             raise self.gone(error) from error
 
     def judged(self, command: str, reply: Reply, timeout: float) -> list[str]:
-        """The lines of a reply that was waited for. Raises CommandRefused, or DeviceTimeout when it is not complete."""
+        """The lines of a received reply. Raises CommandRefused, or DeviceTimeout when it is incomplete."""
         if not (reply.complete or reply.prompt_in_value):
             raise DeviceTimeout(
-                f"{self.who} did not answer {command} within {timeout:g} s; check its power and cable, and open it anew"
+                f"{self.who} did not answer {command} within {timeout:g} s; check its power and cable, and reopen it"
             )
         lines = reply.lines
         if (answer := error_in(command, lines)) is not None:
@@ -70,14 +138,14 @@ class Dialogue:
         return lines
 
     def discard(self) -> None:
-        """Drop what has arrived and was not read."""
+        """Discard all received, unread bytes."""
         try:
             self.port.read(self.port.in_waiting)
         except OSError as error:
             raise self.gone(error) from error
 
     def drain(self, quiet: float, limit: float) -> bool:
-        """Drop what arrives until nothing has for `quiet` [s]; False when that did not happen within `limit` [s]."""
+        """Discard input until the line has been quiet for `quiet` [s]; False if that takes longer than `limit` [s]."""
         begun = last = time.monotonic()
         while (now := time.monotonic()) - last < quiet:
             if now - begun > limit:
@@ -87,11 +155,11 @@ class Dialogue:
         return True
 
     def gone(self, error: Exception) -> ConnectionLost:
-        """What to raise when the port failed with `error`."""
-        return ConnectionLost(f"{self.who} is gone ({error}); plug it in, check its power, and open it anew")
+        """Error to raise when the port failed with `error`."""
+        return ConnectionLost(f"{self.who} was disconnected ({error}); plug it in, check its power, and reopen it")
 
     def _read(self) -> bytes:
-        """What has arrived; waits for the read time-out of the port when there is nothing."""
+        """Bytes received; waits for the read time-out of the port when there are none."""
         try:
             return self.port.read(max(1, self.port.in_waiting))
         except OSError as error:

@@ -1,27 +1,84 @@
-"""From words to measurements: which belong together, which measurement it was, when it was taken."""
+"""Assembly of measurements from words: layout, index and time of a measurement."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.errors import ConnectionLost
+from drivers.errors import ConnectionLost, RigError
 from drivers.optoncdt.codec import Words
-from drivers.optoncdt.layout import Layout
+from sim.errors import InvalidInput
+
+BITS_PER_VALUE = 30
+"""Bits of a value on the line: three bytes, each with a start and a stop bit."""
+
+_WISHES = (("COUNTER", "TIMESTAMP"), ("COUNTER",))
+"""Sets of additional signals, in order of preference."""
+_VALUES = {"TIMESTAMP": ("TIMESTAMP_LO", "TIMESTAMP_HI")}
+"""The time stamp takes two values, of 16 bits each (manual, p. 66)."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Positions of a measurement's values; the distance is at 0. `time` are the two halves of the time stamp."""
+
+    size: int
+    counter: int
+    time: tuple[int, int] | None
+
+
+def wanted(rate: float, baud: int) -> tuple[str, ...]:
+    """The additional signals that fit on the line at `rate` [1/s]: counter and time stamp, or the counter alone.
+
+    Raises InvalidInput when the counter does not fit: without it a lost value would go unnoticed.
+    """
+    for signals in _WISHES:
+        if (1 + len(_values(signals))) * rate * BITS_PER_VALUE <= baud:
+            return signals
+    most = baud / (2 * BITS_PER_VALUE)
+    allowed = (
+        f"{baud} baud allow {most:.0f} measurements/s with counter;"
+        " choose a lower rate, or a higher baud rate in the sensor's web interface"
+    )
+    raise InvalidInput("hardware.lasers.rate", rate, allowed)
+
+
+def layout_in(who: str, reported: list[str], signals: tuple[str, ...]) -> Layout:
+    """The layout that the sensor reports by GETOUTINFO_RS422, in the order of its output (manual, p. 109).
+
+    Raises RigError when it does not begin with the distance or lacks one of `signals`.
+    """
+    values = _values(tuple(reported))
+    needed = _values(signals)
+    if not values or not values[0].startswith("DIST") or any(values.count(value) != 1 for value in needed):
+        told, sent = ", ".join(signals).lower(), " ".join(reported) or "nothing"
+        raise RigError(
+            f"{who} sends {sent} instead of distance, {told};"
+            " its firmware is not supported: update it, or use the analogue output"
+        )
+    time = (values.index("TIMESTAMP_LO"), values.index("TIMESTAMP_HI")) if "TIMESTAMP" in signals else None
+    return Layout(len(values), values.index("COUNTER"), time)
+
+
+def _values(signals: tuple[str, ...]) -> list[str]:
+    return [value for signal in signals for value in _VALUES.get(signal, (signal,))]
+
 
 COUNTER_TURN = 2**18
-"""Measurements after which the counter begins anew (manual, p. 66)."""
+"""Period of the counter, in measurements (manual, p. 66)."""
 CLOCK_TURN = 2**32
-"""Ticks after which the time stamp begins anew."""
+"""Period of the time stamp, in ticks."""
 TICK = 10e-6
 """Resolution of the time stamp [s] (manual, p. 66)."""
 
 _LOCK = 8
-"""How many measurements must follow each other without a gap before values are trusted."""
+"""Number of consecutive measurements without a gap before values are accepted."""
+_FACTORY = 100
+"""Consecutive words that each begin a measurement after which the sensor is known to send distances alone."""
 _SLACK = 2.0
-"""By how many periods time stamp and counter may disagree from one measurement to the next."""
+"""Largest difference of time stamp and counter between consecutive measurements [periods]."""
 _RATE_SLACK = 0.01
-"""By which part of a longer gap they may disagree."""
+"""Largest relative difference of time stamp and counter over a longer gap."""
 
 
 @dataclass(frozen=True)
@@ -34,13 +91,12 @@ class Frames:
 
 
 class Assembler:
-    """Puts words together to measurements at nominally `rate` [1/s], each sent as `layout` says.
+    """Assembles words into measurements at nominally `rate` [1/s] with the given `layout`.
 
-    Bytes lost in a burst can join the beginning of one measurement to the end of a later one. Therefore a
-    measurement counts only when counter and time stamp follow from the one before it: a gap costs, besides what is
-    lost, the first measurement after it. Without time stamp the time is the index over the nominal rate.
-
-    `values` is how many measurements were handed out.
+    A burst of lost bytes can join the start of one measurement to the end of a later one. Therefore a measurement
+    is accepted only if counter and time stamp follow from the previous one: each gap costs one more measurement.
+    Without time stamp the time is the index divided by the nominal rate. `values` is the number of measurements
+    returned.
     """
 
     def __init__(self, who: str, layout: Layout, rate: float) -> None:
@@ -51,14 +107,15 @@ class Assembler:
         self._code = np.empty(0, dtype=np.int32)
         self._first = np.empty(0, dtype=np.bool_)
         self._run = 0
+        self._alone = 0
         self._neighbour: tuple[int, int] | None = None
         self._counter, self._ticks = -1, 0
         self._index, self._elapsed = 0, 0
 
     def feed(self, words: Words) -> Frames:
-        """The measurements that are complete with these words.
+        """The measurements completed by these words.
 
-        Raises ConnectionLost when counter and time stamp jump for good: the sensor was switched off in between.
+        Raises ConnectionLost if counter and time stamp jump permanently: the sensor was switched off in between.
         """
         code, counter, ticks = self._blocks(words)
         if not code.size:
@@ -71,7 +128,7 @@ class Assembler:
         return Frames(index, elapsed.astype(np.float64) * TICK, code)
 
     def _blocks(self, words: Words) -> tuple[NDArray[np.int32], NDArray[np.int64], NDArray[np.int64]]:
-        """Distance, counter and time stamp of the complete measurements; the last may have to wait for more words."""
+        """Distance, counter and time stamp of the complete measurements; an incomplete one waits for more words."""
         code = np.concatenate((self._code, words.code))
         first = np.concatenate((self._first, words.first))
         start = np.flatnonzero(first)
@@ -80,6 +137,7 @@ class Assembler:
         size[-1:] = code.size - start[-1:]
         kept = int(start[-1]) if start.size and size[-1] < self._layout.size else code.size
         self._code, self._first = code[kept:], first[kept:]
+        self._require_no_factory_stream(size)
         start = start[size >= self._layout.size]
         counter = code[start + self._layout.counter].astype(np.int64)
         if self._layout.time is None:
@@ -87,8 +145,18 @@ class Assembler:
         low, high = (code[start + place].astype(np.int64) & 0xFFFF for place in self._layout.time)
         return code[start], counter, high << 16 | low
 
+    def _require_no_factory_stream(self, size: NDArray[np.int64]) -> None:
+        """Raise ConnectionLost if the sensor sends distances alone, as it does with its factory settings."""
+        whole = np.flatnonzero(size != 1)
+        self._alone = size.size - 1 - int(whole[-1]) if whole.size else self._alone + size.size
+        if self._layout.size > 1 and self._alone >= _FACTORY:
+            raise ConnectionLost(
+                f"{self._who} sends distances without a counter: it has restarted with its factory settings; check its"
+                " power supply, and reopen it"
+            )
+
     def _trusted(self, counter: NDArray[np.int64], ticks: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Which measurements follow their neighbour, and come after `_LOCK` of such."""
+        """Mask of measurements at the end of a run of at least `_LOCK` consecutive ones."""
         before = self._neighbour or (int(counter[0]), int(ticks[0]))
         follows = _steps(counter, before[0], COUNTER_TURN) == 1
         if self._layout.time is not None:
@@ -97,7 +165,7 @@ class Assembler:
         self._neighbour = int(counter[-1]), int(ticks[-1])
         if self.values:
             return follows
-        # length of the run of followers that ends at each measurement
+        # number of consecutive measurements that end at each measurement
         place = np.arange(counter.size)
         run = place - np.maximum.accumulate(np.where(follows, -1 - self._run, place))
         self._run = int(run[-1])
@@ -106,7 +174,7 @@ class Assembler:
     def _unwrapped(
         self, counter: NDArray[np.int64], ticks: NDArray[np.int64]
     ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Index and ticks since the sensor's counts began, without their turns."""
+        """Index and ticks since the start of the sensor's counters, unwrapped."""
         if not counter.size:
             return counter, ticks
         if not self.values:
@@ -123,25 +191,25 @@ class Assembler:
         return index, elapsed
 
     def _checked(self, steps: NDArray[np.int64], passed: NDArray[np.int64]) -> NDArray[np.int64]:
-        """The steps of the index, with the turns that the counter made in gaps; `passed` are the ticks in between."""
+        """The steps of the index, plus the counter's full turns within gaps; `passed` are the ticks between values."""
         if self._layout.time is None:
             jump = steps > COUNTER_TURN // 2
         else:
             expected = passed * (TICK * self._rate)
             turns = np.maximum(np.rint((expected - steps) / COUNTER_TURN), 0.0).astype(np.int64)
             steps = steps + turns * COUNTER_TURN
-            # a gap in which the two may differ by a turn of the counter says nothing about its turns
+            # in a gap in which the two may differ by a full period of the counter, its wraps are ambiguous
             slack = 2.0 * _SLACK + _RATE_SLACK * expected
             jump = (np.abs(expected - steps) > slack) | (slack > COUNTER_TURN // 2)
         if jump.any():
             raise ConnectionLost(
-                f"{self._who} began to count anew or was silent for too long; check its power, and open it anew"
+                f"{self._who} restarted its counter or was silent for too long; check its power, and reopen it"
             )
         return steps
 
 
 def _steps(values: NDArray[np.int64], before: int, turn: int) -> NDArray[np.int64]:
-    """Forward steps from `before` to the first value and from each to the next, of counts that turn: a power of 2."""
+    """Forward steps from `before` to the first value and between values, for counts that wrap at a power of 2."""
     steps = np.empty_like(values)
     steps[0] = values[0] - before
     np.subtract(values[1:], values[:-1], out=steps[1:])

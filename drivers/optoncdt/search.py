@@ -1,29 +1,140 @@
-"""Finding the baud rate of a sensor, and who it is."""
+"""Serial ports of this machine, and the sensors on them: identity, baud rate, and the search for both."""
 
+import errno
+import re
+import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
-from drivers.errors import DeviceNotFound, DeviceTimeout
-from drivers.optoncdt import info
+from serial import Serial, SerialException
+from serial.tools import list_ports
+
+from drivers.errors import DeviceNotFound, DeviceTimeout, RigError
 from drivers.optoncdt.dialogue import CommandRefused, Dialogue
-from drivers.optoncdt.info import SensorInfo
-from drivers.optoncdt.port import BAUDS, has_baud
 from sim.errors import InvalidInput
+from sim.sweep import in_threads
+
+if sys.platform == "win32":
+    _PORT_ERRORS = (OSError, ValueError)
+else:
+    import termios
+
+    # raised by the system when it refuses a setting; the library does not translate it
+    _PORT_ERRORS = (OSError, ValueError, termios.error)
+
+FACTORY_BAUD = 921_600
+BAUDS = (FACTORY_BAUD, 1_000_000, 691_200, 460_800, 256_000, 230_400, 128_000, 115_200, 56_000, 19_200, 9_600)
+"""Baud rates of the sensor, the factory setting first (manual, p. 84 and p. 116)."""
+
+_READ_TIMEOUT = 0.02
+_WRITE_TIMEOUT = 1.0
+_WINDOWS_BUFFER = 1 << 18
+
+
+def listed_ports() -> list[str]:
+    """The serial ports that the system lists."""
+    return sorted(port.device for port in list_ports.comports())
+
+
+def open_port(name: str, port: str, baud: int) -> Serial:
+    """Open `port` for `name` with exclusive access, 8 data bits, no parity, one stop bit (manual, p. 84).
+
+    Raises DeviceNotFound when the port is absent, held by another program, not permitted or not a serial port.
+    """
+    try:
+        opened = Serial(port, baud, timeout=_READ_TIMEOUT, write_timeout=_WRITE_TIMEOUT, exclusive=True)
+    except _PORT_ERRORS as error:
+        raise DeviceNotFound(f"{name} cannot be opened: {_reason(port, error)}") from error
+    _hurry(opened)
+    return opened
+
+
+def has_baud(port: Serial, baud: int) -> bool:
+    """Set the baud rate of an open port; False when adapter or system does not support it."""
+    try:
+        port.baudrate = baud
+    except _PORT_ERRORS:
+        return False
+    return True
+
+
+def _hurry(port: Serial) -> None:
+    """Set the adapter's low-latency mode if supported, and enlarge the receive buffer where the default is small."""
+    if sys.platform == "win32":
+        port.set_buffer_size(rx_size=_WINDOWS_BUFFER)
+    elif sys.platform == "linux":
+        with suppress(ValueError):
+            port.set_low_latency_mode(True)
+
+
+def _reason(port: str, error: Exception) -> str:
+    number = error.errno if isinstance(error, OSError) else None
+    # on Windows the library gives the system's error only as text, and a port in use is reported as not permitted
+    windows = isinstance(error, SerialException) and number is None
+    if number in (errno.EBUSY, errno.EAGAIN) or (windows and "PermissionError" in str(error)):
+        return f"{port} is in use; close the program that holds it"
+    if number in (errno.EACCES, errno.EPERM):
+        return f"this account may not use {port}; add it to the group that owns the port (dialout, uucp)"
+    if number in (errno.ENOENT, errno.ENODEV, errno.ENXIO) or (windows and "FileNotFoundError" in str(error)):
+        there = ", ".join(listed_ports()) or "none"
+        return f"there is no port {port}; plug in the adapter or correct the name (available: {there})"
+    return f"{port} does not work as a serial port ({error}); check the name and the adapter's driver"
+
+
+_IDENTITY = "GETINFO"
+
+
+@dataclass(frozen=True)
+class SensorInfo:
+    """The identity of a sensor; `measuring_range` in m."""
+
+    model: str
+    serial: str
+    measuring_range: float
+    firmware: str
+    article: str
+    option: str
+
+    @property
+    def supported(self) -> bool:
+        """True for sensors whose commands and scaling this driver supports."""
+        return re.match(r"ILD\s?1420\b", self.model, re.IGNORECASE) is not None
+
+    @property
+    def identity(self) -> str:
+        """Model, measuring range, serial number and firmware in one line."""
+        return f"{self.model}, {self.measuring_range * 1e3:g} mm, serial number {self.serial}, firmware {self.firmware}"
+
+
+def info_in(lines: list[str]) -> SensorInfo | None:
+    """The identity in the lines that answer `GETINFO`; None unless they contain a sensor and its range.
+
+    Source: manual, p. 97: one `key: value` per line, the range with its unit.
+    """
+    pairs = (line.split(":", 1) for line in lines if ":" in line)
+    given = {key.strip().lower(): value.strip() for key, value in pairs}
+    measuring_range = re.match(r"(\d+(?:\.\d+)?)\s*mm\b", given.get("measuring range", ""), re.IGNORECASE)
+    if not given.get("name") or measuring_range is None:
+        return None
+    serial, firmware, article, option = (given.get(key, "") for key in ("serial", "version", "article", "option"))
+    return SensorInfo(given["name"], serial, float(measuring_range[1]) / 1e3, firmware, article, option)
+
 
 _PROBE = 0.3
-"""How long an answer is waited for at one baud rate [s]."""
+"""Time-out for an answer at one baud rate [s]."""
 _QUIET = 0.05
-"""The line is quiet when nothing came for so long: adapters hold back data for up to 16 ms [s]."""
+"""Time without input after which the line is quiet [s]: adapters delay data by up to 16 ms."""
 _SILENCE = "OUTPUT NONE"
 _TRIES = 3
-"""How often a command is given: what was heard at other baud rates spoils the first one that is understood."""
+"""Repetitions of a command: bytes sent at other baud rates corrupt the first command at the right rate."""
 _DRAINED = 1.0
-"""How long a line may take to become quiet [s]."""
+"""Longest wait for a quiet line [s]."""
 
 
 @dataclass(frozen=True)
 class Answer:
-    """The baud rate at which something answers, the sensor that it says it is, and whether it refused the command."""
+    """Baud rate of an answer, identity of the sensor, and whether it refused the command."""
 
     baud: int
     info: SensorInfo
@@ -31,21 +142,20 @@ class Answer:
 
 
 def silenced(dialogue: Dialogue, item: str, baud: int | None) -> Answer:
-    """Switch the output of the sensor off, at `baud` or at the baud rate that it turns out to have.
+    """Switch the output of the sensor off, at `baud` or at the detected baud rate.
 
-    The stream may be running, so that the first command may be lost. Raises DeviceNotFound when nothing answers,
-    InvalidInput about `item` when the sensor answers at another baud rate than `baud`, CommandRefused when it goes on
-    streaming.
+    A running stream may cause the loss of the first command. Raises DeviceNotFound when nothing answers, InvalidInput
+    about `item` when the sensor answers at another baud rate than `baud`, CommandRefused when it continues to stream.
     """
     first, *others = BAUDS if baud is None else (baud, *(other for other in BAUDS if other != baud))
     answer = _answer(dialogue, first, _SILENCE, tries=3) or _search(dialogue, others, _SILENCE)
     if answer is None:
         raise DeviceNotFound(
-            f"{dialogue.who} says nothing at any baud rate: switch the sensor on, check that the two RS422 pairs are"
+            f"{dialogue.who} does not answer at any baud rate: switch the sensor on, check that the two RS422 pairs are"
             " not swapped or reversed, and that the data output is not set to its web interface"
         )
     if baud is not None and answer.baud != baud:
-        allowed = f"{dialogue.who} answers at {answer.baud}: set the baud rate to that, or leave it out"
+        allowed = f"{dialogue.who} answers at {answer.baud}: set this baud rate, or omit it"
         raise InvalidInput(item, baud, allowed)
     if answer.refusal is not None:
         raise answer.refusal
@@ -53,7 +163,7 @@ def silenced(dialogue: Dialogue, item: str, baud: int | None) -> Answer:
 
 
 def asked(dialogue: Dialogue) -> Answer | None:
-    """Find out the baud rate and the sensor without changing its settings; None when nothing answers."""
+    """Detect baud rate and sensor without changing its settings; None when nothing answers."""
     return _search(dialogue, BAUDS, "GETUSERLEVEL")
 
 
@@ -70,14 +180,14 @@ def _answer(dialogue: Dialogue, baud: int, command: str, tries: int) -> Answer |
             refusal = _refusal(dialogue, command)
         except DeviceTimeout:
             continue
-        # noise may look like a prompt; only a name and a range are an answer
+        # noise may resemble a prompt; only a name and a range count as an answer
         if (found := _identity(dialogue)) is not None:
             return Answer(baud, found, refusal)
     return None
 
 
 def _refusal(dialogue: Dialogue, command: str) -> CommandRefused | None:
-    """What the sensor has against a command whenever it is given; None when it is carried out. DeviceTimeout."""
+    """Refusal of a command that the sensor repeats; None once it executes the command. Raises DeviceTimeout."""
     refusal = None
     for _ in range(_TRIES):
         try:
@@ -85,16 +195,51 @@ def _refusal(dialogue: Dialogue, command: str) -> CommandRefused | None:
         except CommandRefused as error:
             refusal = error
             continue
-        # an error that stands within a value is not seen: what counts is what the sensor does
+        # an error text within a value is not detected: only the sensor's reaction counts
         if command != _SILENCE or dialogue.drain(_QUIET, _DRAINED):
             return None
-        refusal = CommandRefused(dialogue.who, command, "values keep coming")
+        refusal = CommandRefused(dialogue.who, command, "values continue to arrive")
     return refusal
 
 
 def _identity(dialogue: Dialogue) -> SensorInfo | None:
     dialogue.drain(_QUIET, _DRAINED)
     try:
-        return info.info_in(dialogue.ask(info.COMMAND))
+        return info_in(dialogue.ask(_IDENTITY))
     except (CommandRefused, DeviceTimeout):
         return None
+
+
+@dataclass(frozen=True)
+class FoundLaser:
+    """One serial port: the sensor on it and its baud rate, or the reason why none can be used."""
+
+    port: str
+    baud: int | None
+    info: SensorInfo | None
+    problem: str | None
+
+
+def find_lasers(ports: Sequence[str] | None = None) -> list[FoundLaser]:
+    """The sensors on `ports`, or on all ports that the system lists.
+
+    Sends only queries, at each possible baud rate: no setting of a sensor is changed, and a stream continues. Takes
+    about 4 s, for all ports in parallel.
+    """
+    names = list(dict.fromkeys(listed_ports() if ports is None else ports))
+    if not names:
+        return []
+    return in_threads(_probed, names, threads=len(names))
+
+
+def _probed(port: str) -> FoundLaser:
+    try:
+        with open_port("the port", port, FACTORY_BAUD) as opened:
+            answer = asked(Dialogue(port, opened))
+    except RigError as error:
+        return FoundLaser(port, None, None, str(error))
+    if answer is None:
+        silent = "no sensor responds at any baud rate; check its power and the two RS422 pairs"
+        return FoundLaser(port, None, None, silent)
+    problem = None if answer.info.supported else "not an ILD1420: this driver does not support its data format"
+    return FoundLaser(port, answer.baud, answer.info, problem)

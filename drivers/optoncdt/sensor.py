@@ -1,34 +1,133 @@
-"""One sensor on its serial line: opened, identified, set up, read."""
+"""A sensor on its serial line: opening, identification, configuration, reading."""
 
 from contextlib import suppress
+from math import isclose
 from typing import Self
 
 from drivers.clock import now
-from drivers.errors import ConnectionLost, DeviceTimeout, RigError
-from drivers.optoncdt.dialogue import Dialogue
-from drivers.optoncdt.port import BAUDS, open_port
-from drivers.optoncdt.search import silenced
-from drivers.optoncdt.setup import configure, require_sensor
+from drivers.errors import ConnectionLost, DeviceNotFound, DeviceTimeout, RigError
+from drivers.optoncdt.dialogue import SLOW, CommandRefused, Dialogue
+from drivers.optoncdt.frames import Layout, layout_in, wanted
+from drivers.optoncdt.search import BAUDS, SensorInfo, open_port, silenced
 from drivers.optoncdt.stream import Readings, Stream
 from sim.errors import InvalidInput
 
+_FIXED = ("AVERAGE NONE", "TRIGGER NONE", "OUTHOLD NONE", "OUTREDUCEDEVICE NONE")
+"""Settings that disable filter, trigger, hold of old values and output reduction."""
+
+
+def require_sensor(
+    name: str, who: str, info: SensorInfo, measuring_range: float, serial_number: str | None = None
+) -> None:
+    """Raise DeviceNotFound for another model, InvalidInput for another measuring range [m] than configured."""
+    if not info.supported:
+        raise DeviceNotFound(
+            f"{who} is a {info.model}, whose data format is not supported; connect an ILD1420, or correct the port"
+        )
+    if not isclose(info.measuring_range, measuring_range, rel_tol=1e-4):
+        allowed = f"{who} has a range of {info.measuring_range:g} m: correct it here, or the port of this laser"
+        raise InvalidInput(f"hardware.{name}.measuring_range", measuring_range, allowed)
+    if serial_number is not None and serial_number != info.serial:
+        allowed = f"{who} is the sensor {info.serial or 'without serial number'}: swap the ports, or correct it here"
+        raise InvalidInput(f"hardware.{name}.serial_number", serial_number, allowed)
+
+
+def configure(dialogue: Dialogue, rate: float, baud: int) -> tuple[Layout, bool]:
+    """Configure all settings for measurements at `rate` [1/s], with the output switched off.
+
+    Raises InvalidInput for a rate that line or sensor do not support, RigError when the sensor refuses.
+    """
+    signals = wanted(rate, baud)
+    dialogue.ask("ECHO OFF")
+    _require_no_mastering(dialogue)
+    is_known = _set_rate(dialogue, rate)
+    for command in _FIXED:
+        dialogue.ask(command)
+    dialogue.ask(f"OUTADD_RS422 {' '.join(signals)}")
+    layout = layout_in(dialogue.who, dialogue.setting("GETOUTINFO_RS422"), signals)
+    dialogue.ask("LASERPOW FULL")
+    return layout, is_known
+
+
+def _require_no_mastering(dialogue: Dialogue) -> None:
+    """Refuse a sensor with mastering, which shifts the zero without an indication in the stream (manual, p. 65).
+
+    A sensor without the query, which the manual does not document, is told MASTERMV NONE, which it does (p. 108).
+    """
+    remedy = "set MASTERMV NONE in its web interface"
+    try:
+        mastering = dialogue.setting("MASTERMV", SLOW)
+    except CommandRefused:
+        try:
+            dialogue.ask("MASTERMV NONE", SLOW)
+        except CommandRefused as error:
+            raise RigError(
+                f"{dialogue.who} neither reports whether its zero is shifted nor resets it: {error.answer}; {remedy},"
+                " or use its analogue output"
+            ) from error
+        return
+    if mastering != ["NONE"]:
+        raise RigError(f"{dialogue.who} has its zero shifted (MASTERMV {' '.join(mastering) or '?'}); {remedy}")
+
+
+_RATE = "hardware.lasers.rate"
+_RATES = "sensors have 250, 500, 1000, 2000 and 4000 1/s, newer ones 8000 1/s"
+
+
+def _set_rate(dialogue: Dialogue, rate: float) -> bool:
+    """Set the rate, in kHz, and read it back: a rejected rate would only show as a wrong time scale.
+
+    False if the sensor has no such query, which the manual does not document: the values must be counted.
+    """
+    item, known = _RATE, _RATES
+    try:
+        dialogue.ask(f"MEASRATE {rate / 1e3:g}")
+    except CommandRefused as error:
+        raise InvalidInput(item, rate, f"{dialogue.who} does not accept it ({error.answer}); {known}") from error
+    try:
+        answer = " ".join(dialogue.setting("MEASRATE"))
+    except CommandRefused:
+        return False
+    try:
+        actual = float(answer.removesuffix("KHZ")) * 1e3
+    except ValueError:
+        raise RigError(
+            f"{dialogue.who} does not report its rate ({answer!r}); its firmware is not supported: use its analogue "
+            f"output"
+        ) from None
+    if not isclose(actual, rate, rel_tol=1e-6):
+        raise InvalidInput(item, rate, f"{dialogue.who} measures at {actual:g} 1/s instead; {known}")
+    return True
+
+
 _LOCK_TIME = 2.0
-"""How long the first trusted value may take after the stream was switched on [s]."""
+"""Longest wait for the first accepted value after the stream is switched on [s]."""
 _SILENT_PERIODS, _SILENT_TIME = 10.0, 0.1
-"""A sensor is silent when it has said nothing for so many periods, and for so long [s]."""
+"""Number of periods and time [s] without data after which a sensor is silent."""
 _QUIET, _DRAINED = 0.05, 0.5
+_COUNTING, _COUNTED = 0.5, 0.2
+"""Duration of counting values [s], and largest relative deviation from the rate: rates differ by a factor of two."""
 
 
 class SerialLaser:
     """A sensor that measures `rate` times a second over `measuring_range` [m], with its output off until `start`.
 
-    `baud` is the baud rate it is set to; None searches for it. `name` is the laser's name in the configuration.
+    `baud` is its baud rate; None detects it. `name` is the laser's name in the configuration.
 
     Raises DeviceNotFound when the port is absent or in use, or no sensor of this type answers; InvalidInput when
     sensor and configuration do not agree; RigError when the sensor refuses a setting. The port is released then.
     """
 
-    def __init__(self, name: str, port: str, *, baud: int | None, rate: float, measuring_range: float) -> None:
+    def __init__(
+        self,
+        name: str,
+        port: str,
+        *,
+        baud: int | None,
+        rate: float,
+        measuring_range: float,
+        serial_number: str | None = None,
+    ) -> None:
         if baud is not None and baud not in BAUDS:
             allowed = f"the sensor has {', '.join(str(one) for one in sorted(BAUDS))}"
             raise InvalidInput(f"hardware.{name}.baud", baud, allowed)
@@ -41,8 +140,8 @@ class SerialLaser:
         self._streaming = False
         try:
             answer = silenced(self._dialogue, f"hardware.{name}.baud", baud)
-            require_sensor(name, self._who, answer.info, measuring_range)
-            self._layout = configure(self._dialogue, rate, answer.baud)
+            require_sensor(name, self._who, answer.info, measuring_range, serial_number)
+            self._layout, self._is_rate_known = configure(self._dialogue, rate, answer.baud)
         except BaseException:
             self._port.close()
             raise
@@ -62,13 +161,13 @@ class SerialLaser:
         return now() - self._stream.last_arrival > max(_SILENT_PERIODS / self._rate, _SILENT_TIME)
 
     def start(self) -> None:
-        """Switch the stream on, with index and time at zero, and return when values are trusted.
+        """Switch the stream on, with index and time at zero, and return when values are accepted.
 
-        Raises DeviceTimeout when they do not come as the sensor said it would send them, ConnectionLost.
+        Raises DeviceTimeout when they do not arrive in the configured format, ConnectionLost.
         """
         self._require_open("start")
         if self._streaming:
-            raise RigError(f"start is refused: {self._who} streams already; stop it first")
+            raise RigError(f"start is refused: {self._who} is streaming; stop it first")
         self._dialogue.ask("RESETCNT TIMESTAMP MEASCNT")
         self._stream = Stream(self._dialogue, self._layout, self._rate)
         self._streaming = True
@@ -76,34 +175,37 @@ class SerialLaser:
             self._stream.ask("OUTPUT RS422")
             if not self._stream.wait(_LOCK_TIME):
                 raise DeviceTimeout(
-                    f"{self._who} sends no measurements at {self._rate:g} 1/s that follow each other; check the cable"
+                    f"{self._who} sends no consecutive measurements at {self._rate:g} 1/s; check the cable"
                     " and the trigger input, or lower the rate"
                 )
+            if not self._is_rate_known:
+                self._require_counted_rate(self._stream)
         except BaseException:
             self.stop()
             raise
 
     def take(self) -> Readings:
-        """Everything that came since the last time, 60 s at most; never waits.
+        """All values received since the last call, 60 s at most; never waits.
 
-        Raises ConnectionLost when the port is gone or the sensor was switched off in between, RigError before `start`.
+        Raises ConnectionLost if the port disappeared or the sensor was switched off in between, RigError before
+        `start`.
         """
         if self._stream is None:
             raise RigError(f"take is refused: {self._who} was not started; start it first")
         return self._stream.take()
 
     def wait(self, timeout: float) -> bool:
-        """Wait until there is something to take, or a failure to be told by `take`; False after `timeout` [s]."""
+        """Wait until `take` has values or a failure; False after `timeout` [s]."""
         return self._stream.wait(timeout) if self._stream is not None else False
 
     def laser(self, on: bool) -> None:
-        """Switch the beam. While values come, those that come with the sensor's answer are lost. Raises RigError."""
+        """Switch the beam on or off. Values that arrive with the sensor's answer are lost. Raises RigError."""
         self._require_open("laser")
         ask = self._stream.ask if self._stream is not None and self._streaming else self._dialogue.ask
         ask(f"LASERPOW {'FULL' if on else 'OFF'}")
 
     def stop(self) -> None:
-        """Switch the stream off; what came before can still be taken. Allowed any number of times, never raises."""
+        """Switch the stream off; earlier values can still be read. Allowed any number of times, never raises."""
         if self._stream is None or not self._streaming:
             return
         with suppress(RigError):
@@ -125,6 +227,21 @@ class SerialLaser:
     def __exit__(self, *_: object) -> None:
         self.close()
 
+    def _require_counted_rate(self, stream: Stream) -> None:
+        """Count the values of a sensor that does not report its rate. Raises InvalidInput for another rate."""
+        began, counted = now(), [stream.take()]
+        while now() - began < _COUNTING:
+            stream.wait(_COUNTING)
+            counted.append(stream.take())
+        values = [one for one in counted if len(one)]
+        first, last = values[0], values[-1]
+        # the first values may have waited in a buffer: only the differences of their arrivals from the last count
+        passed = float(last.arrival[-1] - first.arrival[-1])
+        steps = int(last.index[-1] - first.index[-1])
+        actual = steps / passed if passed > 0.0 else 0.0
+        if not isclose(actual, self._rate, rel_tol=_COUNTED):
+            raise InvalidInput(_RATE, self._rate, f"{self._who} sends {actual:.0f} 1/s instead; {_RATES}")
+
     def _require_open(self, what: str) -> None:
         if not self._port.is_open:
-            raise RigError(f"{what} is refused: {self._who} is closed; open it anew")
+            raise RigError(f"{what} is refused: {self._who} is closed; reopen it")

@@ -1,4 +1,4 @@
-"""The measurements of a sensor as they arrive: a thread reads the port, the values wait until they are taken."""
+"""Buffered stream of a sensor's measurements, with a thread that reads the port."""
 
 import time
 from collections import deque
@@ -11,25 +11,25 @@ from numpy.typing import NDArray
 from drivers.clock import now
 from drivers.errors import ConnectionLost
 from drivers.optoncdt.codec import Decoder
-from drivers.optoncdt.dialogue import USUAL, Dialogue
-from drivers.optoncdt.frames import Assembler, Frames
-from drivers.optoncdt.layout import Layout
-from drivers.optoncdt.reply import Reply
+from drivers.optoncdt.dialogue import USUAL, Dialogue, Reply
+from drivers.optoncdt.frames import Assembler, Frames, Layout
 
 _PACE = 0.0025
-"""How long the line is left alone between two reads [s]: each costs the same, however much there is. The more reads,
-the more often one of them comes just when values do, and the clock of the sensor is known by these."""
+"""Pause between two reads of the line [s]: the cost of a read does not depend on the number of bytes.
+
+More frequent reads more often coincide with an arrival, which identifies the sensor's clock better.
+"""
 _KEPT = 60.0
-"""How much is kept when nobody takes it [s]."""
+"""Length of the buffer of unread values [s]."""
 
 
 @dataclass(frozen=True)
 class Readings:
     """Measurements of one laser, each array of shape (n,).
 
-    `index` counts them since the stream was started, with gaps where some were lost. `time` is when they were taken,
-    on the sensor's own clock [s]. `code` are the words as they came. `arrival` is when the bytes that they came with
-    had been read, on the machine's clock [s]: they had arrived then, perhaps some time before.
+    `index` counts them since the start of the stream, with gaps where some were lost. `time` is the time of measurement
+    on the sensor's own clock [s]. `code` are the raw words. `arrival` is the time on the machine's clock [s] when their
+    bytes had been read: an upper bound of the arrival.
     """
 
     index: NDArray[np.int64]
@@ -42,7 +42,7 @@ class Readings:
 
 
 class Stream:
-    """Reads the port of `dialogue` from now on, until `end`. All methods may be called from any thread."""
+    """Reads the port of `dialogue` until `end`. All methods may be called from any thread."""
 
     def __init__(self, dialogue: Dialogue, layout: Layout, rate: float) -> None:
         self._dialogue = dialogue
@@ -61,11 +61,11 @@ class Stream:
 
     @property
     def last_arrival(self) -> float:
-        """When the last measurement arrived, or the stream was made [s]."""
+        """Arrival of the last measurement, or start of the stream [s]."""
         return self._last
 
     def ask(self, command: str, timeout: float = USUAL) -> list[str]:
-        """Give a command while values come; those that come with the answer are lost. Raises as `Dialogue.ask`."""
+        """Send a command during the stream; values that arrive with the answer are lost. Raises as `Dialogue.ask`."""
         reply = Reply()
         with self._changed:
             self._reply = reply
@@ -80,7 +80,7 @@ class Stream:
         return self._dialogue.judged(command, reply, timeout)
 
     def take(self) -> Readings:
-        """Everything that came since the last time, the last 60 s at most; does not wait. Raises ConnectionLost."""
+        """All values since the last call, 60 s at most; does not wait. Raises ConnectionLost."""
         self._raise_failure()
         with self._changed:
             held, self._held, self._holding = self._held, deque(), 0
@@ -95,12 +95,12 @@ class Stream:
         )
 
     def wait(self, timeout: float) -> bool:
-        """Wait until there is something to take, or a failure to be told; False when `timeout` [s] passed before."""
+        """Wait until `take` has values or an error; False after `timeout` [s]."""
         with self._changed:
             return self._changed.wait_for(lambda: self._holding > 0 or self._failure is not None, timeout)
 
     def end(self) -> None:
-        """Stop reading; no thread is left. Allowed any number of times."""
+        """Stop reading; no thread remains. Allowed any number of times."""
         self._over = True
         self._thread.join()
 
@@ -109,7 +109,7 @@ class Stream:
         try:
             while not self._over:
                 time.sleep(_PACE)
-                # what has waited may have come long ago; what comes next tells when it came
+                # bytes already received may be old; the arrival time of the next byte is known
                 chunk = port.read(port.in_waiting) + port.read(1)
                 chunk += port.read(port.in_waiting)
                 if chunk:
@@ -117,7 +117,7 @@ class Stream:
         except ConnectionLost as error:
             self._fail(error)
         except Exception as error:
-            # the library fails in many ways when a port goes, and whatever it is, nobody reads any more
+            # the library raises various errors when a port disappears; end reading after any of them
             self._fail(self._dialogue.gone(error))
 
     def _accept(self, chunk: bytes, arrival: float) -> None:
@@ -141,7 +141,7 @@ class Stream:
             self._changed.notify_all()
 
     def _fail(self, error: ConnectionLost) -> None:
-        """Have `error` told by everything that is asked from now on."""
+        """Raise `error` from every later call."""
         with self._changed:
             self._failure = error
             self._changed.notify_all()

@@ -1,1 +1,1 @@
-"""One time base: places sensors with clocks of their own on the sample clock."""
+"""Time base: alignment of sensors with free-running clocks to the sample clock."""

@@ -1,7 +1,7 @@
-"""How much later one sensor shows a motion than another that sees the same: delay, sign and scale.
+"""Delay, sign and scale between two sensors of the same motion.
 
-A pure delay turns the phase by an amount proportional to the frequency, so the slope of the phase over frequency is
-the delay, whatever the shape of the motion. What is left of the phase at frequency zero is the sign.
+A pure delay shifts the phase in proportion to the frequency, so the slope of the phase over frequency is the delay, for
+any motion. The phase at frequency zero determines the sign.
 """
 
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from sim.errors import InvalidInput
 
 _LEAST = 3
-"""Frequencies without which a scatter about the line says nothing."""
+"""Frequencies below which the scatter about the line is not meaningful."""
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class CommonMotion:
     """The second signal is `polarity * scale` times the first, `delay` [s] later.
 
     `uncertainty` is the standard uncertainty of the delay [s], from the scatter of the phases about a line;
-    `scatter` is that scatter [rad]: it is large when the two did not see the same motion.
+    `scatter` is that scatter [rad]: it is large if the two did not measure the same motion.
     """
 
     delay: float
@@ -35,9 +35,9 @@ def common_motion(
 ) -> CommonMotion:
     """Compare the complex amplitudes of two signals at `omega` [rad/s], shape (m,) each.
 
-    Frequencies must be so near to one another, and the lowest to zero, that the delay turns the phase by less than
-    half a turn from each to the next. A frequency counts with the square of the first signal's amplitude.
-    Raises InvalidInput for fewer than three frequencies, or where the first signal has none of them.
+    Frequencies must be dense enough, from zero on, that the delay shifts the phase by less than pi from each
+    to the next. Frequencies are weighted by the square of the first signal's amplitude. Raises InvalidInput for fewer
+    than three frequencies, or where a signal does not move.
     """
     if omega.size < _LEAST:
         raise InvalidInput("frequencies", omega.size, f"at least {_LEAST}")
@@ -52,7 +52,7 @@ def common_motion(
     moment = float(weight @ omega**2)
     return CommonMotion(
         delay=delay,
-        # weights are relative: the scatter gives their scale
+        # the weights are relative: the scatter determines their scale
         uncertainty=float(np.sqrt(variance * (weight**2 @ omega**2)) / moment),
         polarity=polarity,
         scale=float(abs(np.sum(weight * ratio * np.exp(1j * omega * delay)))),

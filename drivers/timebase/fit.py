@@ -1,10 +1,4 @@
-"""The line below delays that are never negative.
-
-Delays of USB, network and scheduler have a floor and a long tail, so a mean says little and the least ones nearly
-all. For delays that are exponentially distributed above a line, the most probable line touches the readings from
-below (S. B. Moon, P. Skelly, D. Towsley, "Estimation and removal of clock skew from network delay measurements",
-INFOCOM 1999). A normal prior on the rate carries the first seconds, when the readings say little about it.
-"""
+"""Bounds of a clock's error and the line fitted to them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,43 +6,93 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.timebase.bounds import Points
+_STRETCH = 0.2
+"""Length of an interval [s] of which the best reading is kept; clocks 50 ppm apart drift by 10 us in it."""
+_KEPT = 120.0
+"""Length of the history [s]: sufficient for the rate to 1e-6, short enough that a quartz hardly drifts."""
+
+
+@dataclass(frozen=True)
+class Points:
+    """Readings at ascending `seconds` of one clock with their `delay` on another, shape (n,) both [s]."""
+
+    seconds: NDArray[np.float64]
+    delay: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return int(self.seconds.size)
+
+
+class Bounds:
+    """Smallest delays of the last two minutes."""
+
+    def __init__(self) -> None:
+        self._points = Points(np.zeros(0), np.zeros(0))
+
+    @property
+    def points(self) -> Points:
+        """History: at most one reading per interval, 600 in total."""
+        return self._points
+
+    def add(self, seconds: NDArray[np.float64], delay: NDArray[np.float64]) -> None:
+        """Add readings, shape (n,) both [s], none older than the last stretch."""
+        kept = self._points
+        if seconds.size == 0:
+            return
+        seconds = np.concatenate((kept.seconds[-1:], seconds))
+        delay = np.concatenate((kept.delay[-1:], delay))
+        stretch: NDArray[np.float64] = np.floor(seconds / _STRETCH)
+        order: NDArray[np.intp] = np.lexsort((delay, stretch))
+        in_order: NDArray[np.float64] = stretch[order]
+        leads = np.ones(order.size, dtype=np.bool_)
+        leads[1:] = np.greater(in_order[1:], in_order[:-1])
+        best: NDArray[np.intp] = order[leads]
+        seconds = np.concatenate((kept.seconds[:-1], seconds[best]))
+        delay = np.concatenate((kept.delay[:-1], delay[best]))
+        begin = int(np.searchsorted(seconds, float(seconds[-1]) - _KEPT))
+        self._points = Points(seconds[begin:], delay[begin:])
+
+    def forget(self) -> None:
+        """Discard the older half."""
+        half = len(self._points) // 2
+        self._points = Points(self._points.seconds[half:], self._points.delay[half:])
+
 
 _RATE_SPREAD = 50e-6
 """Standard deviation of the rate error of a quartz clock against another one [1]."""
 _LARGEST = 1e-3
-"""Rate errors that are looked for [1]: a machine's clock is slewed by 500 ppm at most."""
+"""Largest rate error searched for [1]: a machine's clock is slewed by at most 500 ppm."""
 _HALVINGS = 18
-"""So that the rate is found to 4e-9: a quarter of a microsecond in a minute."""
+"""Number of bisections: the rate is then accurate to 4e-9, a quarter of a microsecond in a minute."""
 _STEPS = 2.0 ** np.arange(-30, -9)
-"""Steps from the most probable rate in which the width of its distribution is looked for: 1e-9 to 1e-3."""
+"""Steps from the most probable rate to find the width of its distribution: 1e-9 to 1e-3."""
 _NEGLIGIBLE = 8.0
-"""Slopes whose log posterior is this much lower do not count."""
+"""Slopes whose log posterior is lower by this much are neglected."""
 _GRID = 41
-"""Slopes over which the mean is taken."""
+"""Number of slopes over which the mean is taken."""
 _RESOLUTION = 1e-7
 """Mean delay below which readings count as exact [s]."""
 _FAR = 5.0
-"""A delay of so many typical ones is a stall of the machine: it says nothing of the others, and is left out."""
+"""A delay of this many typical ones is a stall of the machine and excluded as an outlier."""
 _QUARTER = 8
-"""How many readings a quarter of the history needs to be judged."""
+"""Least number of readings in a quarter of the history for the test."""
 _CHANCE = 4.0
-"""The least of n delays practically never exceeds this many times mean/sqrt(n), not even if short delays are as rare
-as in sums of two delays, such as those of burst and scheduler."""
+"""The least of n delays practically never exceeds this many times mean/sqrt(n), even for sums of two delays, such as
+those of burst and scheduler."""
 
 _GROWTH = 0.02
-"""A line is fitted anew when its history has grown by this share,"""
+"""Growth of the history, as a fraction, after which a line is refitted."""
 _PATIENCE = 1.0
-"""or by this many seconds: a turn of the loop that reads the bench has no time for more."""
+"""Growth of the history [s] after which a line is refitted; bounds the work per iteration of the acquisition loop."""
 
 
 def due(history: float, fitted: float) -> bool:
-    """Whether a line over `history` [s] is to be fitted anew when it was last fitted at `fitted` [s] of it."""
+    """Whether a line over `history` [s] must be refitted when last fitted at `fitted` [s]."""
     return history - fitted >= min(_GROWTH * history, _PATIENCE)
 
 
 def rate_error(sides: Sequence[tuple[Points, float]]) -> float:
-    """Slope of the lines below `sides`, as all together make it probable: the mean of its posterior.
+    """Common slope of the lines below `sides`: the mean of its joint posterior.
 
     Each side has a sign: its delays grow by sign times slope. Two-sided bounds have the signs +1 and -1.
     """
@@ -68,7 +112,7 @@ def rate_error(sides: Sequence[tuple[Points, float]]) -> float:
 
 @dataclass(frozen=True)
 class _Side:
-    """Delays over seconds from their mean."""
+    """Delays over centred seconds."""
 
     sign: float
     seconds: NDArray[np.float64]
@@ -81,7 +125,7 @@ def _side(seconds: NDArray[np.float64], delay: NDArray[np.float64], sign: float)
 
 
 def _without_stalls(side: _Side, slope: float) -> _Side:
-    """What is left of a side whose line has about this slope."""
+    """The side without outliers from a line of about this slope."""
     above = side.delay - side.sign * slope * side.seconds
     above -= above.min()
     kept = above <= _FAR * typical(above) + _RESOLUTION
@@ -104,7 +148,7 @@ def _most_probable(sides: Sequence[_Side]) -> float:
 
 
 def _log_posterior(sides: Sequence[_Side], slopes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Of slopes, shape (m,), but for a constant; the mean delay is the most probable one for each of them."""
+    """Log posterior of slopes, shape (m,), up to a constant, maximised over the mean delay."""
     level = -0.5 * (slopes / _RATE_SPREAD) ** 2
     for side in sides:
         floor = (side.delay - np.outer(side.sign * slopes, side.seconds)).min(axis=1)
@@ -118,14 +162,14 @@ def floor_below(points: Points, slope: float) -> float:
 
 
 def typical(above: NDArray[np.float64]) -> float:
-    """The mean of exponentially distributed delays [s], from their median: stalls of the machine do not move it."""
+    """Mean of exponentially distributed delays [s], estimated from their median, robust against stalls."""
     return float(np.median(above)) / np.log(2.0)
 
 
 def bends(points: Points, slope: float, tolerance: float) -> bool:
-    """Whether the points keep away from the line by more than `tolerance` [s] and chance: the rate has changed.
+    """Whether the points differ from the line by more than `tolerance` [s] and chance, as after a change of the rate.
 
-    Judged by the least delays of the last three quarters; the first may have been read in another way.
+    Uses the least delays of the last three quarters; the first may have been read differently.
     """
     size = len(points) // 4
     if size < _QUARTER:

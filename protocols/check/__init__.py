@@ -1,1 +1,1 @@
-"""The loop check of a bench: every path from drive to sample, at low level, before an experiment relies on it."""
+"""Loop check of a bench: a low-level test of every path from drive to sample before an experiment."""

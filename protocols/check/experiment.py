@@ -1,42 +1,83 @@
-"""The loop check on a bench: every channel and the path through the shaker, at low level.
+# pyright: reportUnknownMemberType=false
+"""Loop check of a bench: tests every channel and the path through the shaker at low level.
 
 1. The storeys are clamped to the table, so that every sensor measures one motion. All channels are acquired at rest.
-2. Only if every sensor measures: the drive is calibrated and sines of one velocity are driven.
-3. The clamps are taken off.
+2. If every sensor gives valid samples, the drive is calibrated and sines of equal velocity amplitude are driven.
+3. The clamps are removed.
 """
 
+import textwrap
 from collections.abc import Generator, Iterable, Sequence
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bench.analysis.check_line import CheckLine, Verdict, failed, untested
+from bench.analysis.signals import ACCELERATION, DISPLACEMENT, LASER_1, LASER_2, SIGNALS
 from bench.config.model import BenchConfiguration
-from bench.engine.steps import Arm, Handle, Heard, Listen, Outcome, RampOut, Say, Step
-from bench.events import PointFinished, StepStarted
+from bench.control.oscillator import Leg
+from bench.datafile.tables import Column, Table
+from bench.engine.steps import (
+    AcquireAtRest,
+    Arm,
+    Calibrate,
+    Dwell,
+    Fallen,
+    Measured,
+    OperatorAction,
+    Outcome,
+    Publish,
+    RampOut,
+    RestSamples,
+    Step,
+    Sweep,
+)
+from bench.events import PointFinished, Progress, StepStarted
+from bench.figures.style import BLUE, GREY, VERMILLION, new_figure, set_grid, write_figure
+from bench.figures.text_table import TextColumn, text_table
 from bench.protocol import Plan, Prepared, Result, Sources
-from bench.record.tables import Column, Table
-from bench.report.style import write_figure
-from drivers.rig import Handwork
-from protocols.check.comparison import delay_lines, scale_lines
-from protocols.check.drive import drive_lines, expected_drive
-from protocols.check.protocol import CheckParameters
-from protocols.check.resting import resting_lines, safety_lines
-from protocols.check.results import lines_table, margins
-from protocols.check.sines import measured_sines
-from protocols.common.calibrate import Unmeasurable
+from drivers.rig import OperatorTask
+from protocols.check.lines import (
+    Sines,
+    delay_lines,
+    drive_lines,
+    expected_drive,
+    input_lines,
+    resting_lines,
+    safety_lines,
+    scale_lines,
+    table_delay_lines,
+)
+from protocols.check.protocol import MARKS, CheckParameters, allowed_range, number
+from protocols.common.calibrate import CHANGE_TIME, SETTLING, Unmeasurable, calibrate_drive, need_cycles, probed_drive
 from sim.errors import InvalidInput
 from sim.parameters import Parameters
 
-REST = 2.0
-"""Time at rest before the table moves, over which the zero of the signals is taken [s]."""
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
-_CLAMP = "Take spring and block off the table and clamp both storeys to it; keep clear, the amplifier is switched on."
-_UNCLAMP = "Take the clamps off the storeys."
+REST = 2.0
+"""Time at rest before the table moves, for the zero of the signals [s]."""
+
+WIDTH = 118
+"""Width of a text line in characters."""
+
+_OUTSIDE = 1.5
+"""Position at which values far beyond their limits are drawn."""
+
+_DRIVE = len(SIGNALS)
+_FALLEN = "storey 1 has a permanent offset although no block is on the table: check lasers and specimen"
+
+_CLAMP = (
+    "Remove spring and block from the table and clamp both storeys to it. Keep clear: the amplifier will be enabled."
+)
+_UNCLAMP = "Remove the clamps from the storeys."
 
 
 class LoopCheck(Prepared[CheckParameters]):
-    """Refuses motions beyond limits, stroke or the lasers' ranges."""
+    """Loop check. Raises InvalidInput for motions beyond limits, stroke or the ranges of the lasers."""
 
     def __init__(
         self, parameters: CheckParameters, configuration: BenchConfiguration, stored: Sources | None = None
@@ -46,7 +87,7 @@ class LoopCheck(Prepared[CheckParameters]):
         slow, fast = min(self.parameters.omega), max(self.parameters.omega)
         reach = min(self.configuration.half_stroke, limits.displacement)
         if self.configuration.laser_reference == "ground":
-            reach = min(reach, 0.5 * min(self.configuration.laser_ranges))
+            reach = min(reach, min(self.configuration.laser_half_ranges))
         if velocity > limits.velocity:
             raise InvalidInput("velocity", velocity, f"limits.velocity = {limits.velocity:g} m/s")
         if velocity / slow > reach:
@@ -58,13 +99,13 @@ class LoopCheck(Prepared[CheckParameters]):
 
     @cached_property
     def prediction(self) -> Table:
-        """The drive that the simulated shaker needs; NaN for a real one."""
+        """Drive required by the simulated shaker; NaN for a real one."""
         omega = np.array(sorted(self.parameters.omega))
         expected = expected_drive(omega, self.configuration)
         drive = np.full(omega.shape, np.nan) if expected is None else expected
         return {
             "omega": Column(omega, "rad/s", "circular frequency of the table's motion"),
-            "drive": Column(drive, "V s2/m", "amplitude of the drive over that of the table's acceleration"),
+            "drive": Column(drive, "V s2/m", "amplitude of the drive relative to that of the table's acceleration"),
         }
 
     def plan(self) -> Plan:
@@ -74,37 +115,38 @@ class LoopCheck(Prepared[CheckParameters]):
         lines = [point for point in points if isinstance(point, CheckLine)]
         return Result(
             points=tuple(points),
-            text=lines_table(lines),
-            figures={"margins.png": lambda path: write_figure(path, margins(lines))},
+            text=_table(lines),
+            figures={"margins.png": lambda path: write_figure(path, _margins(lines))},
             passed=all(line.verdict is not Verdict.FAILED for line in lines),
         )
 
 
 def _steps(parameters: CheckParameters, configuration: BenchConfiguration) -> Generator[Step, Outcome, None]:
-    """The steps of the whole check; every line is published as a point as soon as it is measured."""
+    """Steps of the check; each line is published as a point when it is measured."""
     bare = configuration.known_specimen.bare()
-    yield Handle(Handwork.LOCK_FRAME, bare, _CLAMP)
-    yield Say(StepStarted("listen at rest"))
-    heard = yield Listen(parameters.rest)
-    if not isinstance(heard, Heard):
-        raise TypeError(f"acquiring at rest came to {heard}")
+    yield OperatorAction(OperatorTask.LOCK_FRAME, bare, _CLAMP)
+    yield Publish(StepStarted("acquire at rest"))
+    heard = yield AcquireAtRest(parameters.rest)
+    if not isinstance(heard, RestSamples):
+        raise TypeError(f"the acquisition at rest ended with {heard}")
     yield from _publish(safety_lines(configuration))
     resting = list(resting_lines(heard, parameters, configuration.analysis))
     if heard.violation is not None and all(line.verdict is not Verdict.FAILED for line in resting):
-        resting.append(failed("table", "rest", f"{heard.violation} without drive: see to amplifier and limits"))
+        resting.append(failed("table", "rest", f"{heard.violation} without drive: check amplifier and limits"))
     yield from _publish(resting)
+    yield from _publish(input_lines(heard.channels))
     if any(line.verdict is Verdict.FAILED for line in resting):
-        remedy = "the table was not moved: see to the failed lines, then check again"
+        remedy = "the table was not moved: correct the failed lines, then check again"
         yield from _publish([untested("bench", "motion", remedy)])
     else:
         yield from _motion(parameters, configuration)
-    yield Handle(Handwork.UNLOCK_FRAME, bare, _UNCLAMP)
+    yield OperatorAction(OperatorTask.UNLOCK_FRAME, bare, _UNCLAMP)
 
 
 def _motion(parameters: CheckParameters, configuration: BenchConfiguration) -> Generator[Step, Outcome, None]:
     yield Arm(REST)
     try:
-        sines = yield from measured_sines(parameters)
+        sines = yield from _measured_sines(parameters)
     except Unmeasurable as error:
         yield RampOut(fast=True)
         yield from _publish([failed("bench", "motion", str(error))])
@@ -113,13 +155,120 @@ def _motion(parameters: CheckParameters, configuration: BenchConfiguration) -> G
     on_ground = configuration.laser_reference == "ground"
     yield from _publish(drive_lines(sines, parameters, configuration))
     yield from _publish(scale_lines(sines, parameters, lasers=on_ground))
+    yield from _publish(table_delay_lines(sines, parameters, configuration.sample_rate, lasers=on_ground))
     if on_ground:
         yield from _publish(delay_lines(sines, parameters, configuration))
     else:
-        remedy = "lasers on the table do not see its motion: stand them on the ground for this"
+        remedy = "lasers on the table do not measure its motion: mount them on the ground for this test"
         yield from _publish([untested("lasers", "polarity, scale and delay", remedy)])
 
 
 def _publish(lines: Iterable[CheckLine]) -> Generator[Step, Outcome, None]:
     for line in lines:
-        yield Say(PointFinished(line))
+        yield Publish(PointFinished(line))
+
+
+def _measured_sines(parameters: CheckParameters) -> Generator[Step, Outcome, Sines]:
+    """Calibrate the drive carefully, then drive and measure. Raises Unmeasurable if the response is insufficient."""
+    omegas = sorted(parameters.omega)
+    yield Publish(StepStarted("calibrate the drive"))
+    # the travel of the table is smallest at the highest frequency
+    probed = yield from probed_drive(omegas[-1])
+    calibration = yield from calibrate_drive(omegas, parameters.velocity * omegas[0], probed)
+    if isinstance(calibration, Fallen):
+        raise Unmeasurable(_FALLEN)
+    yield Calibrate(calibration)
+    found: list[NDArray[np.complex128]] = []
+    for index, omega in enumerate(omegas):
+        yield Publish(StepStarted(f"common motion at {omega:g} rad/s"))
+        yield Publish(_progress(omegas, index, parameters))
+        yield Sweep((Leg(CHANGE_TIME, parameters.velocity * omega, omega),))
+        outcome = yield Dwell(SETTLING + parameters.cycles)
+        if not isinstance(outcome, Measured):
+            raise Unmeasurable(_FALLEN)
+        cycles = outcome.cycles[SETTLING:]
+        need_cycles(cycles, parameters.cycles)
+        found.append(np.mean([cycle.fundamental for cycle in cycles], axis=0))
+    yield Publish(Progress(1.0, 0.0, "finished the common motion"))
+    columns = np.array(found).T
+    return Sines(
+        omega=np.array(omegas),
+        drive=columns[_DRIVE],
+        acceleration=columns[ACCELERATION],
+        displacement=columns[DISPLACEMENT],
+        storey_1=columns[LASER_1],
+        storey_2=columns[LASER_2],
+    )
+
+
+def _progress(omegas: list[float], index: int, parameters: CheckParameters) -> Progress:
+    lengths = [CHANGE_TIME + (SETTLING + parameters.cycles) * 2.0 * np.pi / omega for omega in omegas]
+    left = float(sum(lengths[index:]))
+    return Progress(1.0 - left / float(sum(lengths)), left, f"common motion at {omegas[index]:g} rad/s")
+
+
+_COLUMNS = (
+    TextColumn("verdict", words=True),
+    TextColumn("of", words=True),
+    TextColumn("what", words=True),
+    TextColumn("measured"),
+    TextColumn("U (k=2)"),
+    TextColumn("expected"),
+    TextColumn("allowed"),
+    TextColumn("unit", words=True),
+)
+
+
+def _table(lines: Sequence[CheckLine]) -> str:
+    """Table with a row for each line, its remedy below, and the number of lines by verdict."""
+    title, rule, *rows = text_table(_COLUMNS, map(_cells, lines)).splitlines()
+    text = [title, rule]
+    for line, row in zip(lines, rows, strict=True):
+        text.append(row)
+        if line.remedy:
+            text += textwrap.wrap(line.remedy, WIDTH, initial_indent="    -> ", subsequent_indent="       ")
+    counted = [sum(line.verdict is verdict for line in lines) for verdict in Verdict]
+    summary = ", ".join(f"{number} {verdict}" for number, verdict in zip(counted, Verdict, strict=True) if number)
+    return "\n".join([*text, "", f"{summary or 'nothing was checked'}."])
+
+
+def _margins(lines: Sequence[CheckLine]) -> "Figure":
+    """Figure of all lines with limits, on a scale from the lowest (-1) to the highest allowed value (+1)."""
+    judged = [(line, position) for line in lines if (position := _position(line)) is not None]
+    figure = new_figure(8.0, 1.2 + 0.24 * len(judged))
+    panel = figure.subplots()
+    panel.axvspan(-1.0, 1.0, color=BLUE, alpha=0.08, linewidth=0.0)
+    for row, (line, position) in enumerate(judged):
+        passed = line.verdict is Verdict.PASSED
+        panel.plot(position, row, "o" if passed else "X", color=BLUE if passed else VERMILLION, markersize=6)
+    labels = [f"{line.subject}: {line.what}" for line, _ in judged]
+    panel.set_yticks(range(len(judged)), labels, fontsize=7)
+    panel.set_xlim(-1.1 * _OUTSIDE, 1.1 * _OUTSIDE)
+    panel.set_xticks([-1.0, 0.0, 1.0], ["lowest", "middle", "highest"])
+    panel.set_xlabel("position within the allowed range; circles passed, crosses failed", color=GREY)
+    panel.invert_yaxis()
+    set_grid(panel)
+    return figure
+
+
+def _cells(line: CheckLine) -> tuple[str, ...]:
+    return (
+        MARKS[line.verdict],
+        line.subject,
+        line.what,
+        number(line.measured),
+        number(line.uncertainty, 2),
+        number(line.expected),
+        allowed_range(line),
+        "" if line.measured is None or line.unit == "1" else line.unit,
+    )
+
+
+def _position(line: CheckLine) -> float | None:
+    """Measured value on a scale from -1 to 1 between its limits, clipped beyond; None without limits."""
+    if line.measured is None or line.lowest is None or line.highest is None:
+        return None
+    middle, half = 0.5 * (line.lowest + line.highest), 0.5 * (line.highest - line.lowest)
+    if half == 0.0:
+        return 0.0 if line.measured == middle else _OUTSIDE
+    return min(max((line.measured - middle) / half, -_OUTSIDE), _OUTSIDE)

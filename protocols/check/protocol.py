@@ -1,22 +1,18 @@
-"""The loop check: parameters with their tolerances, and the protocol."""
+"""Loop check of a bench: every path from drive to sample."""
 
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from pydantic import Field, field_validator
 
-from bench.analysis.check_line import CheckLine
-from bench.protocol import Prepared, Protocol, Sources
-from protocols.check.results import log_line
+from bench.analysis.check_line import CheckLine, Verdict
+from bench.protocol import Protocol, deferred
 from sim.parameters import Parameters, each_once, quantity
-
-if TYPE_CHECKING:
-    from bench.config.model import BenchConfiguration
 
 Frequency = Annotated[float, Field(gt=0, le=60)]
 
 
 class CheckParameters(Parameters):
-    """Loop check: the bench at rest, then sines of one velocity with the frame locked to the table."""
+    """Loop check: the bench at rest, then sines of equal velocity with the frame locked to the table."""
 
     omega: tuple[Frequency, ...] = quantity(
         (8.0, 12.0, 18.0, 27.0, 40.0), "rad/s", "circular frequencies of the sines", min_length=4
@@ -27,8 +23,8 @@ class CheckParameters(Parameters):
     velocity: float = quantity(
         0.06, "m/s", "amplitude of the table's velocity: the same at every frequency", gt=0, le=0.5
     )
-    cycles: int = quantity(8, "1", "cycles that are measured at each frequency", ge=4, le=200)
-    rest: float = quantity(2.0, "s", "time at rest over which noise and valid samples are counted", ge=0.5, le=60)
+    cycles: int = quantity(8, "1", "measured cycles at each frequency", ge=4, le=200)
+    rest: float = quantity(2.0, "s", "time at rest for noise and valid samples", ge=0.5, le=60)
     displacement_noise: float = quantity(
         1e-4, "m", "largest standard deviation of the table's displacement at rest", gt=0
     )
@@ -40,33 +36,60 @@ class CheckParameters(Parameters):
         0.25, "1", "largest relative difference between measured and expected drive", gt=0, lt=1
     )
     latency: float = quantity(0.02, "s", "longest dead time from drive to sample", gt=0, le=1)
-    u1_error: float = quantity(
-        0.01, "1", "largest error of u1, relative to itself, that a laser's delay may cause", gt=0, lt=0.5
+    delay_tolerance: float | None = quantity(
+        2e-4,
+        "s",
+        "largest difference between the delays of the table's two sensors, without the hold of the output; absent: not"
+        " compared",
+        gt=0,
+        le=0.1,
     )
+    u1_error: float = quantity(0.01, "1", "largest relative error of u1 that a laser's delay may cause", gt=0, lt=0.5)
     highest_omega: float = quantity(
-        20.0, "rad/s", "highest frequency of the tests to come: there a delay does most harm", gt=0, le=60
+        20.0, "rad/s", "highest frequency of later tests, where a delay has the largest effect", gt=0, le=60
     )
 
 
-def _prepare(
-    parameters: CheckParameters, configuration: "BenchConfiguration", stored: "Sources | None"
-) -> Prepared[CheckParameters]:
-    from protocols.check.experiment import LoopCheck
+MARKS = {Verdict.PASSED: "passed", Verdict.FAILED: "FAILED", Verdict.STATED: "stated", Verdict.UNTESTED: "untested"}
 
-    return LoopCheck(parameters, configuration, stored)
+
+def log_line(line: CheckLine) -> str:
+    """Log line of a check line."""
+    text = f"{MARKS[line.verdict]}: {line.subject}, {line.what}"
+    if line.measured is not None:
+        unit = "" if line.unit == "1" else f" {line.unit}"
+        text += f": {line.measured:.4g}{unit}"
+        text += f", allowed {allowed_range(line)}{unit}" if line.lowest is not None else ""
+    return text + (f" ({line.remedy})" if line.remedy else "")
+
+
+def allowed_range(line: CheckLine) -> str:
+    """Allowed range as text; "-" without limits."""
+    if line.lowest is None:
+        return "-"
+    if line.highest is None:
+        return f"{number(line.lowest, 3)} .."
+    if line.lowest == line.highest:
+        return number(line.lowest)
+    return f"{number(line.lowest, 3)} .. {number(line.highest, 3)}"
+
+
+def number(value: float | None, digits: int = 4) -> str:
+    """A value with the given number of significant digits; "-" if absent."""
+    return "-" if value is None else f"{value:.{digits}g}"
 
 
 PROTOCOL = Protocol(
     name="check",
-    summary="Check the loop of the configured bench at low level, line by line: passed or failed, and what to do.",
+    summary="Check the loop of the configured bench at low level, line by line: passed or failed, with the remedy.",
     details=(
-        "Listens to every channel at rest, then drives sines of one velocity with the frame locked to the table, and "
-        "compares polarity, scale and delay of all sensors, and the drive. The exit code is 1 also when a line failed."
+        "Records every channel at rest, then drives sines of equal velocity with the frame locked to the table, and "
+        "checks polarity, scale and delay of all sensors, and the drive. The exit code is also 1 when a line failed."
     ),
     example="--config bench.toml",
     parameters=CheckParameters,
     point=CheckLine,
-    prepare=_prepare,
+    prepare=deferred("protocols.check.experiment:LoopCheck"),
     figures=("margins.png",),
     log_line=log_line,
 )

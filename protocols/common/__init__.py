@@ -1,1 +1,1 @@
-"""Stages that several protocols share; none of them knows which one it serves."""
+"""Stages shared by several protocols."""

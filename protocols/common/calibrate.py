@@ -1,31 +1,36 @@
-"""Calibration of the drive by sines that leave the block at rest, and the evidence that measured cycles must show."""
+"""Probe and calibration of the drive by sines that leave the block at rest, and checks of the measured cycles."""
 
 from collections.abc import Generator, Sequence
 from math import ceil, log2
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bench.analysis.cycles import Cycle, mean_amplitude
 from bench.analysis.signals import ACCELERATION, SIGNALS
-from bench.control.calibration import DriveCalibration
-from bench.control.legs import Leg
-from bench.engine.steps import Calibrate, Dwell, Fallen, Follow, Measured, Outcome, Step
+from bench.control.oscillator import DriveCalibration, Leg
+from bench.engine.steps import Calibrate, Dwell, Fallen, Measured, Outcome, Step, Sweep
 from sim.errors import RockbenchError
 
 PROBE = 0.02
-"""First, careful amplitude [V] when nothing is known of the drive yet."""
+"""Amplitude of the first probe of an unknown table [V]."""
 
 CHANGE_TIME = 1.0
-"""Time in which frequency and level go from one calibration point to the next [s]."""
+"""Duration of the sweep from one calibration point to the next [s]."""
 
 SETTLING, MEASURED = 2, 4
-"""Cycles that are left out and used at each point."""
+"""Number of discarded and of used cycles at each point."""
 
 ENOUGH = 0.75
-"""Share of the asked cycles that must have come with nearly all their samples."""
+"""Minimum share of cycles with nearly complete samples."""
 
 AUDIBLE = 5.0
-"""How many standard deviations of its fit the table's acceleration must reach to count as an answer to the drive."""
+"""Least response of the table's acceleration to the drive, in standard uncertainties; the probability that noise
+exceeds it is 1e-5.
+"""
+
+_PROBED = 8
+"""Cycles of each probe: the noise is estimated from their scatter."""
 
 _DRIVE = len(SIGNALS)
 """Column of the drive in a cycle's arrays."""
@@ -36,8 +41,8 @@ def calibrate_drive(
 ) -> Generator[Step, Outcome, DriveCalibration | Fallen]:
     """Measure the table's response to the drive at `omegas` [rad/s] with table accelerations of `level` [m/s2].
 
-    Without a `start` the response is first probed in two steps, from a command too small to do harm, and what was
-    measured at one frequency serves as the start for the next.
+    Without a `start` the response is first probed in two steps, from a command too small to cause damage; the response
+    at one frequency serves as the start for the next.
     """
     known = start is not None
     if start is None:
@@ -47,7 +52,7 @@ def calibrate_drive(
             response = yield from _measure(omegas[0], volts * abs(start.response[0]))
             if isinstance(response, Fallen):
                 return response
-            yield Follow((Leg(CHANGE_TIME, 0.0, omegas[0]),))
+            yield Sweep((Leg(CHANGE_TIME, 0.0, omegas[0]),))
             start = DriveCalibration.flat(response)
     yield Calibrate(start)
     points: dict[float, complex] = {}
@@ -57,17 +62,45 @@ def calibrate_drive(
             return response
         points[omega] = response
         if not known:
-            # at rest, or the drive would jump
-            outcome = yield Follow((Leg(CHANGE_TIME, 0.0, omega),))
+            # starts from rest, so that the drive does not jump
+            outcome = yield Sweep((Leg(CHANGE_TIME, 0.0, omega),))
             if isinstance(outcome, Fallen):
                 return outcome
             yield Calibrate(_of(points))
-    outcome = yield Follow((Leg(CHANGE_TIME, 0.0, max(omegas)),))
+    outcome = yield Sweep((Leg(CHANGE_TIME, 0.0, max(omegas)),))
     return outcome if isinstance(outcome, Fallen) else _of(points)
 
 
+def probed_drive(omega: float) -> Generator[Step, Outcome, DriveCalibration]:
+    """Gain of the drive at `omega` [rad/s], from two commands too small to cause damage.
+
+    The mean over cycles is compared with their scatter, which separates a response from noise of any spectrum. Raises
+    Unmeasurable if the table does not respond.
+    """
+    yield Calibrate(DriveCalibration.flat(1.0))
+    answer = np.zeros(0, dtype=np.complex128)
+    for volts in (PROBE, 10.0 * PROBE):
+        yield Sweep((Leg(CHANGE_TIME, volts, omega),))
+        outcome = yield Dwell(SETTLING + _PROBED)
+        cycles = outcome.cycles[SETTLING:] if isinstance(outcome, Measured) else ()
+        need_cycles(cycles, _PROBED)
+        answer = np.array([cycle.fundamental[ACCELERATION] / cycle.fundamental[_DRIVE] for cycle in cycles])
+    yield Sweep((Leg(CHANGE_TIME, 0.0, omega),))
+    gain, doubt = abs(complex(answer.mean())), _standard_error(answer)
+    if not gain > AUDIBLE * doubt:
+        raise Unmeasurable(
+            f"the table does not respond to a drive of {10.0 * PROBE:g} V: {gain:.2g} m/s2 per volt, noise {doubt:.2g};"
+            " check the amplifier, the enable line, the emergency stop and the accelerometer"
+        )
+    return DriveCalibration.flat(gain)
+
+
+def _standard_error(values: NDArray[np.complex128]) -> float:
+    return float(np.std(values, ddof=1) / np.sqrt(values.size))
+
+
 def harmonic_frequencies(omega: float, highest: int) -> list[float]:
-    """Frequencies [rad/s] from `omega` up to its harmonic `highest`, `omega` itself left out, half an octave apart."""
+    """Frequencies [rad/s] above `omega` up to its harmonic `highest`, half an octave apart."""
     steps = ceil(2.0 * log2(highest))
     return [omega * highest ** (step / steps) for step in range(1, steps + 1)]
 
@@ -78,7 +111,7 @@ def _of(points: dict[float, complex]) -> DriveCalibration:
 
 def _measure(omega: float, amplitude: float) -> Generator[Step, Outcome, complex | Fallen]:
     """Response [m/s2 per V] at one frequency."""
-    outcome = yield Follow((Leg(CHANGE_TIME, amplitude, omega),))
+    outcome = yield Sweep((Leg(CHANGE_TIME, amplitude, omega),))
     if isinstance(outcome, Fallen):
         return outcome
     outcome = yield Dwell(SETTLING + MEASURED)
@@ -91,31 +124,33 @@ def _measure(omega: float, amplitude: float) -> Generator[Step, Outcome, complex
 
 
 def drive_response(cycles: Sequence[Cycle]) -> complex:
-    """Fundamental of the table's acceleration over that of the drive, over cycles [m/s2 per V]."""
+    """Ratio of the fundamentals of table acceleration and drive over several cycles [m/s2 per V]."""
     moved, driven = (np.array([cycle.harmonics(column)[0] for cycle in cycles]) for column in (ACCELERATION, _DRIVE))
     return complex(np.vdot(driven, moved) / np.vdot(driven, driven))
 
 
 class Unmeasurable(RockbenchError):
-    """The signals do not show what the protocol needs to go on."""
+    """The signals are insufficient to continue the protocol."""
 
     error_code = "not_measurable"
 
 
 def need_cycles(cycles: Sequence[Cycle], asked: int) -> None:
-    """Raise Unmeasurable when too many cycles lack samples."""
+    """Raise Unmeasurable if too many cycles have missing samples."""
     if len(cycles) < ENOUGH * asked:
         raise Unmeasurable(
-            f"{asked - len(cycles)} of {asked} cycles lack samples: a sensor leaves its range; move it or ask for less"
+            f"{asked - len(cycles)} of {asked} cycles have missing samples: a sensor leaves its range, or its values "
+            "are late; the file states the reason of each sample. Move the sensor, reduce the motion, or close other "
+            "programs"
         )
 
 
 def need_answer(cycles: Sequence[Cycle]) -> None:
-    """Raise Unmeasurable when the table does not follow the drive."""
+    """Raise Unmeasurable if the table does not respond to the drive."""
     moved = mean_amplitude(cycles, ACCELERATION)
     doubt = float(np.mean([cycle.noise[ACCELERATION] * np.sqrt(2.0 / cycle.samples) for cycle in cycles]))
     if not moved > AUDIBLE * doubt:
         raise Unmeasurable(
-            f"the table does not answer the drive: {moved:.2g} m/s2 measured, noise {doubt:.2g} m/s2;"
+            f"the table does not respond to the drive: {moved:.2g} m/s2 measured, noise {doubt:.2g} m/s2;"
             " check the amplifier, the enable line and the accelerometer"
         )

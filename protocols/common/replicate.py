@@ -1,4 +1,4 @@
-"""A stage of other protocols: play a drive again and again, each time corrected, until the table follows a motion."""
+"""Replication, a stage of other protocols: iterates the drive until the table follows a motion."""
 
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
@@ -12,14 +12,14 @@ from bench.control.passes import Pass
 from bench.control.replication import Replication, ReplicationParameters, Status
 from bench.control.table_model import TableModel
 from bench.control.target import Target
-from bench.engine.steps import Arm, Fallen, Outcome, Play, Played, RampOut, Say, Step
+from bench.engine.steps import Arm, Fallen, Outcome, Play, Played, Publish, RampOut, Step
 from bench.events import Event, PassFinished, StepStarted, Warned
 from bench.guard.limits import Limits
 
 Array = NDArray[np.float64]
 
 REST = 2.0
-"""Time at rest before each pass, over which the zero of the signals is taken [s]."""
+"""Time at rest before each pass, for the zero of the signals [s]."""
 
 
 Ending = Status | Literal["samples lost"]
@@ -27,14 +27,14 @@ Ending = Status | Literal["samples lost"]
 
 @dataclass(frozen=True, eq=False)
 class Replicated:
-    """What a replication came to: the best `drive` [V] and its table acceleration [m/s2], both of the target's shape.
+    """Result of a replication: the best `drive` [V] and its table acceleration [m/s2], both of the target's shape.
 
-    `acceleration` is as measured in the pass that was accepted last; None where no pass was. `repeatable` is the root
-    mean square error of the best drive without its noise, 1 where there is none; `spectrum_error` the largest deviation
-    of the response spectrum that noise does not explain, and its period [s].
+    `acceleration` is that measured in the last accepted pass; None without one. `repeatable` is the rms error of the
+    best drive without its noise, 1 without a pass; `spectrum_error` the largest deviation of the response spectrum that
+    noise does not explain, and its period [s].
 
-    `status` and `reason` say why no further pass was asked for; the status is "running" where the block `fell` before:
-    it lies in its catch then, and is the caller's to stand up.
+    `status` and `reason` are those of the end of the passes. The status is "running" if the block `fell` before: it
+    then lies in its catch, and the caller must have it set upright.
     """
 
     drive: Array
@@ -55,19 +55,18 @@ def replicate(
     name: str,
     progress: Callable[[], Event] | None = None,
 ) -> Generator[Step, Outcome, Replicated]:
-    """Find the drive that makes the table follow `target`; `name` is what the motion is called.
+    """Find the drive that makes the table follow `target`; `name` is that of the motion.
 
-    What `progress` returns is published after each pass. A pass in which the table's sensors lost samples is played
-    once more; after the second loss the best drive so far is what there is.
-
-    The rig is not armed before and after it. Raises InvalidInput when the model does not cover the target, or when
-    the first drive is beyond a limit and is not to be scaled.
+    The event from `progress` is published after each pass. A pass with lost samples of the table's sensors is repeated;
+    after a second loss the result is the best drive so far. The rig must not be armed before, and is not armed
+    afterwards. Raises InvalidInput if the model does not cover the target, or if the first drive exceeds a limit and
+    must not be scaled.
     """
     replication = Replication(target, model, limits, parameters)
     achieved: Array | None = None
     lost = 0
     while not replication.finished:
-        yield Say(StepStarted(f"{name}: pass {len(replication.passes) + 1} of {parameters.passes} at most"))
+        yield Publish(StepStarted(f"{name}: pass {len(replication.passes) + 1} of at most {parameters.passes}"))
         yield Arm(REST)
         outcome = yield Play(replication.drive)
         fell = isinstance((yield RampOut(fast=isinstance(outcome, Fallen))), Fallen)
@@ -78,14 +77,14 @@ def replicate(
         if lost:
             if again or fell:
                 return _replicated(replication, achieved, fell=fell, lost=lost)
-            yield Say(Warned(f"{name}: {lost} samples of the table's motion are missing, the pass is repeated"))
+            yield Publish(Warned(f"{name}: {lost} samples of the table's motion are missing, the pass is repeated"))
             continue
         report = replication.learn(moved[:, 0], moved[:, 1])
         if report.accepted:
             achieved = moved[:, 0]
-        yield Say(_finished(name, report))
+        yield Publish(_finished(name, report))
         if progress is not None:
-            yield Say(progress())
+            yield Publish(progress())
         if fell:
             return _replicated(replication, achieved, fell=True)
     return _replicated(replication, achieved, fell=False)
@@ -94,10 +93,10 @@ def replicate(
 def _replicated(replication: Replication, achieved: Array | None, *, fell: bool, lost: int = 0) -> Replicated:
     reasons: dict[Ending, str] = {
         "running": "the block fell",
-        "converged": "it is learned",
-        "out of passes": f"no more than {replication.parameters.passes} passes are allowed",
+        "converged": "the tolerances are met",
+        "out of passes": f"the limit of {replication.parameters.passes} passes was reached",
         "limited": f"the next correction is not played: {replication.verdict}",
-        "samples lost": f"{lost} samples of the table's motion were missing, and some when the pass was first played",
+        "samples lost": f"{lost} samples of the table's motion were missing, in both attempts at the pass",
     }
     status: Ending = "samples lost" if lost and not fell else replication.status
     return Replicated(

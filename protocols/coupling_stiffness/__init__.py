@@ -1,1 +1,1 @@
-"""Stiffness of mounted springs, from the shift of the modes of the frame with the block held."""
+"""Stiffness of mounted springs, from the shift of the frame's modes with the block clamped."""

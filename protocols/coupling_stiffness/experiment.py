@@ -1,8 +1,8 @@
-"""The stiffness of mounted springs on a bench, as a file that other runs load.
+"""Identification of the stiffness of mounted springs, written to a specimen file for other runs.
 
-1. The bare frame: decays after pulses, unless it was identified before and is not to be measured again.
-2. For each spring: it is mounted with its block clamped to the table, and the same is done.
-3. The difference of the first storeys' stiffnesses is the spring's.
+1. The bare frame: decays after pulses, unless a previous identification is used.
+2. Each spring: it is mounted with the block clamped to the table, and decays are measured again.
+3. The stiffness of the spring is the difference of the first storey's stiffnesses.
 """
 
 from collections.abc import Callable, Generator, Sequence
@@ -13,46 +13,47 @@ import numpy as np
 
 from bench.analysis.free_decay.decay import Setting
 from bench.config.model import BenchConfiguration
-from bench.config.specimen_file import write_specimen
-from bench.engine.steps import Handle, Outcome, Say, Step
+from bench.config.result_files import write_specimen
+from bench.datafile.tables import Column, Table
+from bench.engine.steps import OperatorAction, Outcome, Publish, Step
 from bench.events import PointFinished, SpecimenIdentified, Warned
-from bench.preflight.forecast import Forecast
+from bench.figures.style import write_figure
+from bench.preflight.margins import Forecast
 from bench.protocol import Plan, Prepared, Result, Sources
-from bench.record.tables import Column, Table
-from bench.report.style import write_figure
-from drivers.rig import Handwork
-from protocols.common.decays.decays import fit_setting, pulsed_decays, pulsed_duration
+from drivers.rig import OperatorTask
 from protocols.common.decays.findings import check_masses, mass_warning
 from protocols.common.decays.frame import SIGNIFICANT, FrameResult, frame_result, nonlinear_text
 from protocols.common.decays.pulse import frequencies, plan_pulse, pulse_forecast
-from protocols.common.decays.recording import Pace
-from protocols.coupling_stiffness.difference import (
+from protocols.common.decays.recording import Pace, fit_setting, pulsed_decays, pulsed_duration
+from protocols.coupling_stiffness.protocol import CouplingStiffnessParameters, SpringPoint
+from protocols.coupling_stiffness.results import springs_figure, springs_table
+from protocols.coupling_stiffness.springs import (
     Reference,
     SpringResult,
+    bare_point,
     frame_change,
     identified_reference,
     measured_reference,
+    spring_findings,
+    spring_point,
     spring_result,
 )
-from protocols.coupling_stiffness.findings import bare_point, spring_findings, spring_point
-from protocols.coupling_stiffness.protocol import CouplingStiffnessParameters, SpringPoint
-from protocols.coupling_stiffness.results import springs_figure, springs_table
 from sim.errors import InvalidInput, RockbenchError
 from sim.identified import Identified
 from sim.parameters import Parameters
 from sim.specimen import Specimen
 
 BARE, SPRING = "bare frame", "spring of beta = {:g}"
-"""Names of the specimens on the table."""
+"""Names of the mounted specimens."""
 
 BY_HAND = 120.0
 """Time to mount a spring [s]."""
 
-STILL_CLAMPED = "THE BLOCK IS STILL CLAMPED to the table: take clamp, spring and block off before it is driven."
+STILL_CLAMPED = "THE BLOCK IS STILL CLAMPED to the table: remove clamp, spring and block before the table is driven."
 
 
 class CouplingStiffness(Prepared[CouplingStiffnessParameters]):
-    """Refuses a run with nothing to compare with, and a pulse that this bench cannot make."""
+    """Spring identification. Raises InvalidInput without a reference frame, and for a pulse beyond the limits."""
 
     def __init__(
         self, parameters: CouplingStiffnessParameters, configuration: BenchConfiguration, stored: Sources | None = None
@@ -60,7 +61,7 @@ class CouplingStiffness(Prepared[CouplingStiffnessParameters]):
         super().__init__(parameters, configuration, stored)
         identified, known = configuration.identified, configuration.known_specimen
         if not parameters.reference and not (identified is not None and {"k1", "k2"} <= set(identified.names)):
-            allowed = "k1 and k2 are not identified: measure the bare frame along, or name a specimen file with them"
+            allowed = "k1 and k2 are not identified: include the bare frame, or give a specimen file with them"
             raise InvalidInput("reference", False, allowed)
         self._specimens: dict[str, Specimen] = {BARE: known.bare()} if parameters.reference else {}
         self._specimens |= {SPRING.format(beta): known.coupled(beta) for beta in parameters.beta}
@@ -80,20 +81,20 @@ class CouplingStiffness(Prepared[CouplingStiffnessParameters]):
 
     @cached_property
     def forecast(self) -> Forecast:
-        self.progress("predicting what the run asks of the bench")
+        self.progress("predicting the demands of the run")
         return pulse_forecast(self.configuration, self._pulses, self._duration)
 
     @cached_property
     def prediction(self) -> Table:
-        """The modes with every spring, as its label has it."""
+        """Modes with every spring, from its nominal stiffness."""
         known, beta = self.configuration.known_specimen, self.parameters.beta
         omega = np.array([np.sort(frequencies(known.coupled(each))) for each in beta])
         stiffness = np.array([known.coupled(each).nominal_k_c for each in beta])
         return {
             "beta": Column(np.array(beta), "1", "stiffness ratio on the label"),
-            "k_c": Column(stiffness, "N/m", "stiffness that the label promises"),
-            "omega1": Column(omega[:, 0], "rad/s", "first undamped circular frequency with the block held"),
-            "omega2": Column(omega[:, 1], "rad/s", "second undamped circular frequency with the block held"),
+            "k_c": Column(stiffness, "N/m", "nominal stiffness on the label"),
+            "omega1": Column(omega[:, 0], "rad/s", "first undamped circular frequency with the block clamped"),
+            "omega2": Column(omega[:, 1], "rad/s", "second undamped circular frequency with the block clamped"),
         }
 
     def plan(self) -> Plan:
@@ -121,14 +122,14 @@ class CouplingStiffness(Prepared[CouplingStiffnessParameters]):
         reference = identified_reference(configuration.identified)
         yield from mass_warning(configuration)
         if p.reference:
-            yield Handle(Handwork.REMOVE_BLOCK, bare, "Take the spring and the block off the table.")
+            yield OperatorAction(OperatorTask.REMOVE_BLOCK, bare, "Remove the spring and the block from the table.")
             found = self._bare = yield from self._decays(BARE, setting, pace)
             reference = measured_reference(found)
             if (off := frame_change(found, configuration.identified)) is not None:
-                yield Say(Warned(f"the bare frame is not what it was when it was identified: {off}"))
-            yield Say(PointFinished(bare_point(found, 0)))
+                yield Publish(Warned(f"the bare frame has changed since it was identified: {off}"))
+            yield Publish(PointFinished(bare_point(found, 0)))
         if reference is None:
-            raise AssertionError("a run without a reference is refused beforehand")
+            raise AssertionError("a run without a reference has been refused")
         failed: RockbenchError | None = None
         try:
             for beta in p.beta:
@@ -136,12 +137,14 @@ class CouplingStiffness(Prepared[CouplingStiffnessParameters]):
                 spring = yield from self._spring(beta, reference, setting, pace)
                 self._springs.append(spring)
                 identified = configuration.identified or Identified()
-                yield Say(
+                yield Publish(
                     SpecimenIdentified(identified.extended(*spring_findings(self._bare, self._springs, identified)))
                 )
         except RockbenchError as error:
             failed = error
-        yield Handle(Handwork.REMOVE_BLOCK, bare, "Take the clamp, the spring and the block off the table.")
+        yield OperatorAction(
+            OperatorTask.REMOVE_BLOCK, bare, "Remove the clamp, the spring and the block from the table."
+        )
         self._clamped = False
         if failed is not None:
             raise failed
@@ -152,10 +155,10 @@ class CouplingStiffness(Prepared[CouplingStiffnessParameters]):
         name = SPRING.format(beta)
         specimen = self._specimens[name]
         request = (
-            f"Stand the block on its base, mount the spring of beta = {beta:g}, and clamp the block to the table: it"
-            " must not lift, slide or turn."
+            f"Set the block upright on its base, mount the spring of beta = {beta:g}, and clamp the block to the "
+            "table: it must not lift, slide or turn."
         )
-        yield Handle(Handwork.HOLD_BLOCK, specimen, request)
+        yield OperatorAction(OperatorTask.HOLD_BLOCK, specimen, request)
 
         def point(result: FrameResult, number: int) -> SpringPoint:
             return spring_point(spring_result(beta, result, reference), specimen.nominal_k_c, number)
@@ -163,13 +166,14 @@ class CouplingStiffness(Prepared[CouplingStiffnessParameters]):
         held = yield from self._decays(name, setting, pace, point)
         spring = spring_result(beta, held, reference)
         if abs(spring.k2_apart) > SIGNIFICANT:
-            yield Say(
+            yield Publish(
                 Warned(
-                    f"{name}: k2 is {spring.k2_apart:+.1f} standard uncertainties off that of the bare frame: see"
-                    " whether the block, its clamp or the spring touch the second storey, or give under the spring",
+                    f"{name}: k2 differs from that of the bare frame by {spring.k2_apart:+.1f} standard "
+                    "uncertainties: check whether the block, its clamp or the spring touch the second storey, or "
+                    "whether the clamp yields under the spring",
                 )
             )
-        yield Say(PointFinished(point(held, 0)))
+        yield Publish(PointFinished(point(held, 0)))
         return spring
 
     def _decays(
@@ -179,11 +183,11 @@ class CouplingStiffness(Prepared[CouplingStiffnessParameters]):
         pace: Pace,
         point: Callable[[FrameResult, int], SpringPoint] = bare_point,
     ) -> Generator[Step, Outcome, FrameResult]:
-        """The decays of one frame, which has just been mounted, with a point for each."""
+        """Decays of the frame as mounted, with a point for each."""
         pace.elapsed += BY_HAND
         pulse = self._pulses[name]
         decays = yield from pulsed_decays(self.parameters, self.configuration, pulse, setting, pace, name, point)
         result = frame_result(decays, setting.masses, setting.weighed)
         if result.nonlinear.any():
-            yield Say(Warned(f"{name}: {nonlinear_text(result)}"))
+            yield Publish(Warned(f"{name}: {nonlinear_text(result)}"))
         return result

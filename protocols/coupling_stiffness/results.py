@@ -1,21 +1,22 @@
 # pyright: reportUnknownMemberType=false
-"""The springs as text for the terminal and as a figure: mounted against label, the decay of each, the budget.
-
-matplotlib's keyword arguments have no types, hence the first line.
-"""
+"""Results of the springs: text table, figure, and report section."""
 
 from collections.abc import Sequence
 from math import tau
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bench.analysis.gain import COVERAGE
-from bench.analysis.rounding import plus_minus
-from bench.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILLION, new_figure, set_grid
-from bench.report.text_table import TextColumn, text_table
-from protocols.coupling_stiffness.difference import SpringResult
+from bench.analysis.uncertainty import plus_minus
+from bench.document.campaign import Campaign
+from bench.document.document import Column, Part, Picture, Section, Table
+from bench.document.typography import plain
+from bench.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILLION, new_figure, set_grid
+from bench.figures.text_table import TextColumn, text_table
+from protocols.common.decays.report import EXPANDED, Rows, budget_parts, decay_label, expanded_text, relative_parts
 from protocols.coupling_stiffness.protocol import SpringPoint
+from protocols.coupling_stiffness.springs import SpringResult
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,11 +35,11 @@ _COLUMNS = (
 )
 
 SHOWN = 6.0
-"""Time of a decay that is drawn after the pulse [s]: enough to see its modes."""
+"""Drawn time of a decay after the pulse [s], long enough to show the modes."""
 
 
 def springs_table(points: Sequence[SpringPoint]) -> str:
-    """The bare frame and every spring, all decays together, with expanded uncertainties (k = 2)."""
+    """Table of the bare frame and every spring, from all decays, with expanded uncertainties (k = 2)."""
     together = [point for point in points if point.decay == 0]
     if not together:
         return "Nothing was identified."
@@ -47,7 +48,7 @@ def springs_table(points: Sequence[SpringPoint]) -> str:
 
 
 def springs_figure(springs: Sequence[SpringResult]) -> "Figure":
-    """Two rows for each spring below the comparison: decay and residual; without springs it is empty."""
+    """Comparison of the springs, and two rows for each: decay and residual. Empty without springs."""
     figure = new_figure(9.0, 3.6 + 3.2 * len(springs))
     grid = figure.add_gridspec(1 + 2 * len(springs), 2, height_ratios=(3.4, *[2.2, 1.0] * len(springs)))
     compared, budget = figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1])
@@ -85,11 +86,11 @@ def _draw_compared(panel: "Axes", springs: Sequence[SpringResult]) -> None:
     panel.errorbar(labels, 100.0 * (mounted / labels - 1.0), 100.0 * expanded / labels, fmt="o", ms=4, color=BLUE)
     panel.axhline(0.0, color=BLACK, linewidth=0.8)
     panel.set_xlabel(r"$\beta$ on the label [1]")
-    panel.set_ylabel(r"$\beta$ as mounted, off its label [%]")
+    panel.set_ylabel(r"$\beta$ as mounted, deviation from the label [%]")
 
 
 def _draw_budget(panel: "Axes", springs: Sequence[SpringResult]) -> None:
-    """Standard uncertainties of the stiffness relative to it, part by part, and the whole."""
+    """Draw the relative standard uncertainties of the stiffness, by contribution and in total."""
     positions = np.arange(len(springs))
     names = [*springs[0].parts, "together"]
     width = 0.8 / len(names)
@@ -117,8 +118,76 @@ def _draw_decay(panel: "Axes", below: "Axes", spring: SpringResult) -> None:
     panel.set_ylabel("drift [mm]")
     panel.legend(loc="upper right", fontsize=7, ncols=2)
     below.set_xlabel("time [s]")
-    below.set_ylabel("residual [um]")
+    below.set_ylabel("residual [µm]")
     found = plus_minus(spring.k_c, COVERAGE * spring.uncertainty)
     panel.set_title(rf"$\beta$ = {spring.label:g} on the label: $k_C$ = {found} N/m (k = 2)", loc="left", fontsize=8)
     set_grid(panel)
     set_grid(below)
+
+
+def springs_sections(campaign: Campaign) -> list[Section]:
+    """Report section: stiffness of the springs as mounted, decay by decay."""
+    points = campaign.points
+    if not points:
+        return []
+    text = (
+        "With the block clamped, the spring adds to the stiffness of the first storey: k_C is the difference from the "
+        f"bare frame. {EXPANDED}"
+    )
+    return [Section("springs", "Springs with the block clamped", [text, _springs(points), *_spring_pictures(points)])]
+
+
+def _springs(points: list[dict[str, Any]]) -> Table:
+    columns = [
+        Column("spring β", words=True),
+        Column("decay", words=True),
+        Column("k₁ + k_C", "N/m"),
+        Column("k_C", "N/m"),
+        Column("as labelled", "N/m"),
+        Column("β mounted", "1"),
+        Column("k₂", "N/m"),
+    ]
+    rows = [
+        [
+            "bare frame" if row["beta"] is None else f"{row['beta']:g}",
+            decay_label(row),
+            expanded_text(row, "k1_with_spring_n_m", "k1_with_spring"),
+            expanded_text(row, "k_c_n_m", "k_c"),
+            plain(row["k_c_nominal_n_m"], 5),
+            expanded_text(row, "beta_mounted", "beta"),
+            expanded_text(row, "k2_n_m", "k2"),
+        ]
+        for row in points
+    ]
+    return Table("Stiffness of the springs as mounted", columns, rows)
+
+
+def _spring_pictures(points: Rows) -> list[Part]:
+    """Figures of the deviation of the springs from their labels, and of their uncertainty budget."""
+    rows = [row for row in points if row["beta"] is not None and row["decay"] == 0]
+    if not rows:
+        return []
+    figure = _labels_figure(*([row[name] for row in rows] for name in ("beta", "beta_mounted", "beta_uncertainty")))
+    caption = "Deviation of the mounted springs from their labels, with expanded uncertainties (k = 2)."
+    parts: list[Part] = [Picture(figure, caption, "Deviation of every spring from its label.")]
+    known = [row for row in rows if row.get("k_c_parts")]
+    if not known:
+        return parts
+    shares = [relative_parts(row["k_c_parts"], row["k_c_n_m"]) for row in known]
+    expanded = [100.0 * row["k_c_uncertainty"] / abs(row["k_c_n_m"]) for row in known]
+    return parts + budget_parts("k_C", [f"β = {row['beta']:g}" for row in known], shares, expanded)
+
+
+def _labels_figure(labels: Sequence[float], mounted: Sequence[float], expanded: Sequence[float]) -> "Figure":
+    """Figure of the deviation of each spring from its label [%], with expanded uncertainties."""
+    figure = new_figure(6.8, 2.7)
+    panel = figure.subplots()
+    off = [100.0 * (value / label - 1.0) for value, label in zip(mounted, labels, strict=True)]
+    sizes = [100.0 * size / label for size, label in zip(expanded, labels, strict=True)]
+    panel.errorbar(labels, off, sizes, fmt="o", ms=4, capsize=3, color=BLUE)
+    panel.axhline(0.0, color=BLACK, linewidth=0.8)
+    panel.set_xlabel("β on the label  [1]", fontsize=8)
+    panel.set_ylabel("β as mounted, deviation from the label [%]", fontsize=8)
+    panel.tick_params(labelsize=8)
+    set_grid(panel)
+    return figure

@@ -1,1 +1,1 @@
-"""The seismic campaign of the paper, section 5."""
+"""Seismic campaign of the paper, section 5."""

@@ -1,46 +1,173 @@
 """Demands of a seismic campaign: every record with every specimen, over the uncertainty of the specimen."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bench.config.model import BenchConfiguration
-from bench.preflight.asked import UNKNOWN_SHAKER, Asked, demand
-from bench.preflight.bounds import bounds
-from bench.preflight.forecast import Forecast, Stage
-from bench.preflight.response import response_of
+from bench.control.starts import CATCH_ANGLE
+from bench.control.target import integrated
+from bench.guard.shaker import exponential_mean
+from bench.preflight.demands import (
+    UNKNOWN_SHAKER,
+    StageDemands,
+    TableResponse,
+    Travel,
+    demand,
+    response_of,
+    travel_demands,
+)
+from bench.preflight.margins import Forecast, Stage, bounds, margins
+from bench.preflight.motion import peaks, table_demands
 from bench.progress import Progress, counting, silent
-from protocols.earthquake.asked import Travel, load, travel
-from protocols.earthquake.pace import Pace
+from protocols.earthquake.plan import Pace
 from protocols.earthquake.protocol import EarthquakeParameters
-from protocols.earthquake.records import Shaking
+from protocols.earthquake.records import LeftOut, Shaking
 from protocols.earthquake.table import TableSource, table_warnings
+from sim.excitation import SampledRecord
 from sim.loading import load_model
+from sim.rocking import simulate
 from sim.specimen import Specimen
 from sim.sweep import in_threads
 
 Array = NDArray[np.float64]
 
+STEP = 0.005
+"""Sample interval of a simulated motion [s]: the error of a peak between samples is at most 0.2 %."""
+
+TOLERANCE = 1e-7
+
+
+def travel(specimen: Specimen, shaking: Shaking, factor: float, grounded: bool) -> Travel:
+    """Simulate the specimen from rest under `factor` times the record, until the end or the fall of the block."""
+    record = shaking.prepared.record
+    times = np.arange(0.0, record.duration, STEP)
+    motion = simulate(
+        specimen,
+        SampledRecord(factor * record.acceleration, record.dt),
+        sample_times=times,
+        peaks_from=None,
+        tolerance=TOLERANCE,
+        overturning_angle=CATCH_ANGLE,
+    )
+    moved = np.zeros((1, 6)) if motion.samples is None or not len(motion.samples) else motion.samples
+    u1, u2 = moved[:, 0], moved[:, 1]
+    table = np.zeros(len(moved))
+    if grounded:
+        places = np.arange(record.acceleration.size) * record.dt
+        table = factor * np.interp(times[: len(moved)], places, shaking.prepared.motion.displacement)
+    seen = (float(np.abs(each).max()) for each in (u1 + table, u2 + table, u2 - u1))
+    return Travel(*seen, toppled=None if motion.overturned is None else motion.end_time)
+
+
+def load(
+    shaking: Shaking, payload: float, configuration: BenchConfiguration, response: TableResponse | None
+) -> dict[str, float]:
+    """Peaks of the quantities of table and shaker with a `payload` [kg]; unknown ones are absent.
+
+    Raises InvalidInput where an identified table does not cover the record's band.
+    """
+    target = shaking.target
+    velocity, displacement = integrated(target.acceleration, target.sample_rate)
+    series = table_demands(displacement, velocity, target.acceleration, configuration.shaker_model)
+    found = peaks(series)
+    if "current" in series:
+        forget = float(np.exp(-1.0 / (configuration.limits.heating_time * target.sample_rate)))
+        mean, _ = exponential_mean(series["current"] ** 2, forget)
+        found["heating"] = float(np.sqrt(mean.max()))
+    if response is not None:
+        volts = _drive(shaking, payload, response)
+        slew = float(np.abs(np.diff(volts)).max()) * target.sample_rate
+        found |= {"drive_voltage": float(np.abs(volts).max()) + response.friction, "drive_slew": slew}
+    return found
+
+
+def _drive(shaking: Shaking, payload: float, response: TableResponse) -> Array:
+    """The drive [V] with which a linear table follows the record."""
+    target = shaking.target
+    low, high = target.support
+    frequency, spectrum = target.frequency, np.fft.rfft(target.acceleration)
+    inside = (frequency > low) & (frequency < high)
+    volts = np.zeros_like(spectrum)
+    volts[inside] = spectrum[inside] / response.transfer(2.0 * np.pi * frequency[inside], payload)
+    return np.fft.irfft(volts, target.acceleration.size)
+
+
 DRAWS, SEED = 32, 8
-"""Specimens that are drawn besides the assumed one, and their seed."""
+"""Number of specimens drawn in addition to the nominal one, and their seed."""
 
 OFF = 0.03
-"""Share by which the table's motion may be off, and every quantity of it above what was asked: noise, friction."""
+"""Relative error of the table's motion, and allowance of all quantities for noise and friction."""
 
 IMPACTS = 0.15
-"""The same for what is fast where a block rocks, for what its impacts raise: no drive cancels them."""
+"""Allowance of quantities that increase with the impacts of a rocking block, which the drive does not cancel."""
 
 OFF_MIDDLE = 0.015
-"""Share of half its range by which a storey may rest off the laser's middle."""
+"""Largest offset of a storey at rest from the middle of the laser's range, relative to half the range."""
 
 _RAISED = ("acceleration", "force", "current")
 
 _UNKNOWN = {
-    "drive_voltage": "nothing is known of this table yet: it is identified first",
-    "drive_slew": "nothing is known of this table yet: it is identified first",
+    "drive_voltage": "unknown table: identified at the start of the run",
+    "drive_slew": "unknown table: identified at the start of the run",
     **UNKNOWN_SHAKER,
 }
+
+
+@dataclass(frozen=True)
+class Combination:
+    """Record with the bare frame (`beta` None) or with a spring, and its demands."""
+
+    record: str
+    beta: float | None
+    demands: StageDemands
+
+
+def combinations(
+    parameters: EarthquakeParameters,
+    configuration: BenchConfiguration,
+    shakings: Sequence[Shaking],
+    progress: Progress = silent,
+) -> list[Combination]:
+    """Simulated demands of every record with the bare frame and every spring, and the probability that the block does
+    not topple.
+    """
+    load_model(progress)
+    specimens = [configuration.known_specimen.bare(), *map(configuration.known_specimen.coupled, parameters.beta)]
+    found, done = list[Combination](), counting(progress, f"simulating every record with {1 + DRAWS} specimens")
+    for shaking in shakings:
+        for specimen in specimens:
+            found.append(Combination(shaking.name, specimen.label, _asked(shaking, specimen, configuration)))
+            done(len(found), len(shakings) * len(specimens))
+    return found
+
+
+def beyond_limits(found: Sequence[Combination], configuration: BenchConfiguration) -> LeftOut:
+    """Combinations that the nominal specimen cannot play within the limits, with the reason. A record that the bare
+    frame cannot play is omitted for all springs, as is the bare frame of a record without springs. Empty if no
+    combination would remain: the campaign is then refused by its limits.
+    """
+    bound = bounds(configuration)
+    left = LeftOut()
+    for each in found:
+        exceeded = (
+            margin
+            for margin in margins((demand(quantity, [each.demands], _UNKNOWN) for quantity in bound), bound)
+            if margin.margin is not None and margin.margin < 0.0
+        )
+        if reason := "; ".join(margin.excess for margin in exceeded):
+            left[each.record, each.beta] = reason
+    for each in found:
+        bare = left.get((each.record, None))
+        if bare is not None and each.beta is not None:
+            left.setdefault((each.record, each.beta), f"with the bare frame {bare}")
+    for record in dict.fromkeys(each.record for each in found):
+        springs = [each.beta for each in found if each.record == record and each.beta is not None]
+        if all((record, beta) in left for beta in springs):
+            left.setdefault((record, None), "no spring remains")
+    return LeftOut() if len(left) == len(found) else left
 
 
 def forecast(
@@ -48,41 +175,37 @@ def forecast(
     configuration: BenchConfiguration,
     shakings: Sequence[Shaking],
     table: TableSource,
-    progress: Progress = silent,
+    found: Sequence[Combination],
+    left_out: LeftOut,
 ) -> Forecast:
-    """The demands of the identification and of every record with the bare frame and with every spring, and the chance
-    that the block stands.
-    """
-    load_model(progress)
-    first = _identification(table)
-    specimens = [configuration.known_specimen.bare(), *map(configuration.known_specimen.coupled, parameters.beta)]
-    asked, done = [*first], counting(progress, f"simulating every record with {1 + DRAWS} specimens")
-    for shaking in shakings:
-        for specimen in specimens:
-            asked.append(_asked(shaking, specimen, configuration))
-            done(len(asked) - len(first), len(shakings) * len(specimens))
+    """Demands of the identification and of the played combinations, with a warning for each omitted one."""
+    played = [each.demands for each in found if (each.record, each.beta) not in left_out]
+    asked = [*_identification(table), *played]
+    omitted = tuple(
+        f"{each.demands.name} is left out: {left_out[each.record, each.beta]}"
+        for each in found
+        if (each.record, each.beta) in left_out
+    )
     return Forecast(
         demands=tuple(demand(quantity, asked, _UNKNOWN) for quantity in bounds(configuration)),
         stages=tuple(Stage(each.name, (), each.chance) for each in asked),
-        duration=Pace(parameters, shakings, table.duration).total,
-        warnings=table_warnings(parameters, configuration, table.model),
+        duration=Pace(parameters, shakings, table.duration, left_out).total,
+        warnings=(*omitted, *table_warnings(parameters, configuration, table.model)),
         notes=tuple(f"{shaking.name}: {'; '.join(shaking.prepared.steps)}" for shaking in shakings),
     )
 
 
-def _identification(table: TableSource) -> list[Asked]:
-    """The demands of the identification at the campaign's begin: none with a stored model."""
-    if table.found is None:
+def _identification(table: TableSource) -> list[StageDemands]:
+    """Demands of the identification at the start of the campaign; none with a stored model."""
+    if table.plan is None:
         return []
-    # linear and at a level that keeps its distance: no specimen within its uncertainty changes much of it
-    values = {quantity: np.full(1 + DRAWS, value) for quantity, value in table.found.asked.items()}
-    return [Asked("the identification of the table", values, None)]
+    # the uncertainty of the specimen is neglected: the motion is linear, and its level has a margin
+    values = {quantity: np.full(1 + DRAWS, value) for quantity, value in table.plan.asked.items()}
+    return [StageDemands("the identification of the table", values, None)]
 
 
-def _asked(shaking: Shaking, specimen: Specimen, configuration: BenchConfiguration) -> Asked:
-    block = specimen.block.mass if specimen.beta is not None else 0.0
-    payload = specimen.frame.m1 + specimen.frame.m2 + block
-    loads = load(shaking, payload, configuration, response_of(configuration))
+def _asked(shaking: Shaking, specimen: Specimen, configuration: BenchConfiguration) -> StageDemands:
+    loads = load(shaking, specimen.mass, configuration, response_of(configuration))
     raised = _RAISED if specimen.beta is not None else ()
     factors = np.concatenate(([1.0], 1.0 + OFF * np.random.default_rng(SEED).uniform(-1.0, 1.0, DRAWS)))
     values = {
@@ -90,22 +213,17 @@ def _asked(shaking: Shaking, specimen: Specimen, configuration: BenchConfigurati
         for quantity, value in loads.items()
     }
     travels = _travels(shaking, specimen, factors, configuration)
-    halves = [0.5 * whole for whole in configuration.laser_ranges]
-    values |= {
-        "laser_1": np.array([each.storey_1 for each in travels]) / halves[0] + OFF_MIDDLE,
-        "laser_2": np.array([each.storey_2 for each in travels]) / halves[1] + OFF_MIDDLE,
-        "drift": np.array([each.drift for each in travels]),
-    }
+    values |= travel_demands(travels, configuration.laser_half_ranges, OFF_MIDDLE)
     mounted = "the bare frame" if specimen.beta is None else f"beta = {specimen.label:g}"
     stood = sum(each.toppled is None for each in travels[1:])
     chance = None if specimen.beta is None else (stood + 1) / (DRAWS + 2)
-    return Asked(f"{shaking.name} with {mounted}", values, chance)
+    return StageDemands(f"{shaking.name} with {mounted}", values, chance)
 
 
 def _travels(
     shaking: Shaking, specimen: Specimen, factors: Array, configuration: BenchConfiguration
 ) -> Sequence[Travel]:
-    """Motion of the specimen as assumed and as drawn, on all processors."""
+    """Motions of the nominal and the drawn specimens, computed on all processors."""
     drawn = [specimen, *configuration.known.draws(specimen, DRAWS, np.random.default_rng(SEED))]
     grounded = configuration.laser_reference == "ground"
 

@@ -1,31 +1,41 @@
-"""Tests under earthquake records: gains as in Fig. 8(a) and 9(a), motions as in 7, drifts as in 8(b) and 9(b)."""
+"""Report of tests under earthquake records: gains (Fig. 8(a), 9(a)), motions (Fig. 7), drifts (Fig. 8(b), 9(b))."""
 
+from bisect import bisect_left, bisect_right
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, cast
 
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.analysis.signals import ACCELERATION, DRIFT, SignalMap
 from bench.config.validation import validated
-from bench.publication.campaign import Campaign
-from bench.publication.numbers import ABSENT, percent, plain, with_uncertainty, yes_or_no
-from bench.publication.typography import counted, typeset
-from bench.record.tables import arrays
-from bench.report.earthquake_gains import gain_figure
-from bench.report.page.document import Column, Listing, Part, Picture, Section, Table
+from bench.datafile.reader import DataFile
+from bench.datafile.tables import arrays
+from bench.document.campaign import Campaign
+from bench.document.document import Column, Listing, Notice, Part, Picture, Section, Table
+from bench.document.typography import ABSENT, counted, percent, plain, typeset, with_uncertainty, yes_or_no
+from bench.events import RunningGain
+from bench.figures.earthquake_figure import DriftPicture, MotionPicture, drift_figure, gain_figure, motion_figure
+from protocols.earthquake.campaign import check_statement
+from protocols.earthquake.measurement import STEP, History, observe
 from protocols.earthquake.protocol import EarthquakeParameters
-from protocols.earthquake.records import band_used
-from protocols.earthquake.report_histories import histories_parts
-from protocols.earthquake.statement import check_statement
+from protocols.earthquake.records import FileSources, Shaking, band_used, shakings
+from sim.errors import InvalidInput
 
 
-def seismic_section(campaign: Campaign) -> Section:
-    """Measured against predicted for every record and stiffness."""
+def seismic_sections(campaign: Campaign) -> list[Section]:
+    """Report section: measured and predicted gains for every record and stiffness."""
     points = campaign.seismic_points
+    if not points:
+        return []
     compared = [row["agrees"] for row in points if row["agrees"] is not None]
     toppled = sum(row["status"] == "overturned" for row in points)
     parts: list[Part] = [
-        f"{counted(len(points), 'test')}; {sum(compared)} of {len(compared)} measured gains lie within what the model "
-        "and the uncertainties let expect for the motion that the table really made, and the block toppled in "
-        f"{toppled or 'none'}. Uncertainties of measured gains are expanded (k = 2); the interval holds 95 % of what "
-        "may be measured, by Monte Carlo over specimen and sensors.",
+        f"{counted(len(points), 'test')}; {sum(compared)} of {len(compared)} measured gains lie within the prediction "
+        f"interval for the achieved motion of the table, and the block toppled in {toppled or 'none'}. Uncertainties "
+        "of measured gains are expanded (k = 2); the interval is the 95 % interval of the measured value, by Monte "
+        "Carlo over specimen and sensors.",
         _gains(points),
         _first_storey(points),
         _conditions(points),
@@ -35,16 +45,17 @@ def seismic_section(campaign: Campaign) -> Section:
         parts.append(
             Picture(
                 gain_figure(points, arrays(table)),
-                "Gain α₂ over the stiffness ratio: measured (k = 2), and predicted for the asked and achieved motions.",
-                "A panel for each record: gain of the peak drift over the stiffness ratio, predicted and measured.",
+                "Gain α₂ against the stiffness ratio: measured (k = 2), and predicted for the requested and the "
+                "achieved motion.",
+                "One panel per record: gain of the peak drift against the stiffness ratio, predicted and measured.",
             )
         )
     parts += _statement(campaign, points)
     remarks = [f"{row['record']}, β = {row['beta']:g}: {typeset(row['reason'])}" for row in points if row["reason"]]
     if remarks:
-        parts += ["What was noticed at single tests:", Listing(remarks)]
+        parts += ["Remarks on single tests:", Listing(remarks)]
     parts += histories_parts(campaign)
-    return Section("seismic", "Earthquake records (as Fig. 7 to 9 of the paper)", parts)
+    return [Section("seismic", "Earthquake records (as Fig. 7 to 9 of the paper)", parts)]
 
 
 def _gains(points: Sequence[Mapping[str, Any]]) -> Table:
@@ -75,7 +86,9 @@ def _gains(points: Sequence[Mapping[str, Any]]) -> Table:
                 yes_or_no(row["agrees"]),
             ]
         )
-    caption = "Gains under earthquake records, measured and predicted; topples: predicted chance that the block falls"
+    caption = (
+        "Gains under earthquake records, measured and predicted; topples: predicted probability that the block topples"
+    )
     return Table(caption, columns, rows)
 
 
@@ -99,7 +112,7 @@ def _first_storey(points: Sequence[Mapping[str, Any]]) -> Table:
                 with_uncertainty(measured, row["alpha_1_uncertainty"]),
                 plain(predicted),
                 percent(measured / predicted - 1.0) if measured is not None and predicted else ABSENT,
-                # files of before these fields have the gain without a verdict
+                # older files without these fields have the gain without a verdict
                 _interval(row.get("alpha_1_low"), row.get("alpha_1_high")),
                 yes_or_no(row.get("alpha_1_agrees")),
             ]
@@ -142,12 +155,12 @@ def _conditions(points: Sequence[Mapping[str, Any]]) -> Table:
         ]
         for row in points
     ]
-    caption = "How the table followed: rms errors over the rms of the record, within the band; and the peaks"
+    caption = "Tracking of the table: rms errors relative to the rms of the record, within the band, and the peaks"
     return Table(caption, columns, rows)
 
 
 def _statement(campaign: Campaign, points: Sequence[Mapping[str, Any]]) -> list[Part]:
-    """The paper's statement, for the band that was used: model, measured and paper side by side."""
+    """The paper's statement for the band of the campaign, with the verdicts of model and measurement."""
     if campaign.configuration is None:
         return []
     parameters = validated(EarthquakeParameters, campaign.parameters)
@@ -166,3 +179,140 @@ def _statement(campaign: Campaign, points: Sequence[Mapping[str, Any]]) -> list[
         Column("towards 1 as β grows", words=True),
     ]
     return [Table(f"Statement 8 of the paper, with records limited to {low:g} to {high:g} Hz", columns, rows)]
+
+
+Floats = NDArray[np.float64]
+
+QUIET = 1.5
+"""Time at the start of a run for the zero of the signals [s]; the table is at rest for 2 s."""
+
+
+@dataclass(frozen=True)
+class Played:
+    """Played record: file rows from the start of the drive to its last gain; `run` is the first row of its run."""
+
+    name: str
+    beta: float | None
+    run: int
+    start: int
+    stop: int
+
+
+def played_records(record: DataFile) -> list[Played]:
+    """Every played record with running gains in the file, in order; `beta` is None for the bare frame."""
+    gains, blocks = record.columns_of(RunningGain), record.blocks
+    found: list[Played] = []
+    if not gains:
+        return found
+    rows, runs, times = (blocks[column] for column in ("row", "run", "time"))
+    for time, name, beta, seconds in zip(
+        *(gains[column] for column in ("time", "record", "beta", "seconds")), strict=True
+    ):
+        block = bisect_right(times, time + 1e-6) - 1
+        if block < 0:
+            continue
+        stop = int(rows[block + 1]) if block + 1 < rows.size else record.rows
+        begin = int(rows[bisect_left(runs, runs[block])])
+        samples = round(seconds * record.sample_rate)
+        one = Played(str(name), None if beta is None else float(beta), begin, stop - samples, stop)
+        # the gains of one played record have the same start
+        if found and (found[-1].run, found[-1].name, found[-1].beta) == (one.run, one.name, one.beta):
+            # the first gain is at the end of a block, which determines the start; the last one is within a block
+            start = found.pop().start
+            one = replace(one, start=start, stop=start + samples)
+        found.append(one)
+    return [one for one in found if one.start >= one.run]
+
+
+def signals_of(record: DataFile, signals: SignalMap, played: Played) -> Floats:
+    """Signals of a played record, shape (n, n_signals), relative to the zero at rest."""
+
+    def values(start: int, stop: int) -> Floats:
+        return np.column_stack([record.values(channel.name, slice(start, stop)) for channel in record.channels])
+
+    signals.tare(values(played.run, played.run + round(QUIET * record.sample_rate)))
+    return signals.of(values(played.start, played.stop))
+
+
+MOST = 7
+"""Largest number of records in a figure of histories."""
+
+
+def histories_parts(campaign: Campaign) -> list[Part]:
+    """Figures of the table's motions and of the drifts, from the raw channels."""
+    record, configuration = campaign.record, campaign.configuration
+    if configuration is None:
+        return [
+            Notice("Histories are not drawn: this version of the software cannot read the configuration of the file.")
+        ]
+    try:
+        signals = SignalMap(record.channels, configuration.laser_reference, configuration.calibrated)
+    except InvalidInput as refused:
+        return [Notice(f"Histories are not drawn: {refused}.")]
+    names = list(dict.fromkeys(row["record"] for row in campaign.seismic_points))
+    plays = played_records(record)
+    try:
+        known = {shaking.name: shaking for shaking in _shakings(campaign)}
+    except InvalidInput as refused:
+        return [Notice(f"Histories are not drawn, because records are missing: {refused}.")]
+    every = max(round(STEP * record.sample_rate), 1)
+    motions: list[MotionPicture] = []
+    drifts: list[DriftPicture] = []
+    for name in names:
+        shaking = known.get(name)
+        if shaking is None:
+            continue
+        for play in _bare_and_softest([play for play in plays if play.name == name]):
+            shown = signals_of(record, signals, play)
+            if play.beta is None:
+                asked = shaking.target.acceleration
+                achieved = shown[: asked.size : every, ACCELERATION]
+                motions.append(MotionPicture(name, STEP, asked[::every][: achieved.size], achieved))
+            drifts.append(
+                DriftPicture(
+                    name, play.beta, STEP, shown[::every, DRIFT], _predicted_drift(campaign, shaking, play, shown)
+                )
+            )
+    parts: list[Part] = []
+    for first in range(0, len(motions), MOST):
+        figure = motion_figure(motions[first : first + MOST])
+        caption = "Acceleration of the table under the records: as requested, and as measured with the bare frame."
+        parts.append(Picture(figure, caption, "Acceleration against time, one row per record."))
+    for first in range(0, len(names), MOST):
+        some = [drift for drift in drifts if drift.name in names[first : first + MOST]]
+        if some:
+            caption = (
+                "Drift of the bare frame and of the coupled one with the softest spring: measured, and predicted for "
+                "the achieved motion of the table."
+            )
+            parts.append(Picture(drift_figure(some), caption, "Drift against time, one row per record."))
+    return parts
+
+
+def _shakings(campaign: Campaign) -> tuple[Shaking, ...]:
+    """Records of the campaign from the data file, or read again for an older file without them.
+
+    Raises InvalidInput for missing records.
+    """
+    assert campaign.configuration is not None
+    parameters = validated(EarthquakeParameters, campaign.parameters)
+    return shakings(parameters, campaign.configuration, FileSources.stored(campaign.record.tables))
+
+
+def _bare_and_softest(plays: Sequence[Played]) -> list[Played]:
+    """Last test of the bare frame, and last test with the softest spring."""
+    bare = [play for play in plays if play.beta is None]
+    springs = sorted(
+        (play for play in plays if play.beta is not None), key=lambda play: (play.beta or 0.0, -play.start)
+    )
+    return [*bare[-1:], *springs[:1]]
+
+
+def _predicted_drift(campaign: Campaign, shaking: Shaking, play: Played, shown: Floats) -> Floats:
+    """Predicted drift [m] every STEP under the measured table motion; empty if samples of it are missing."""
+    specimen = campaign.specimen.bare() if play.beta is None else campaign.specimen.coupled(play.beta)
+    try:
+        base = observe(shown, shaking.target.rest, campaign.record.sample_rate).base
+    except InvalidInput:
+        return np.zeros(0)
+    return History.of(specimen, base).drift

@@ -1,12 +1,12 @@
-"""Measured against predicted gain: a Monte Carlo through the model, with the motions that the table achieved.
+"""Comparison of measured and predicted gain by Monte Carlo simulation under the achieved motions of the table.
 
-Both tests share the sensors and the specimen, so each draw has one specimen, one scale of the table's sensors and one
-pair of lasers for both; the noise is drawn for each. A draw of the measurement, coupled over bare, times a draw of the
-prediction over the predicted gain is what may be measured where the model holds (GUM Supplement 1).
+Both tests share sensors and specimen, so each draw has one specimen, one scale of the table's sensors and one pair of
+lasers for both; the noise is drawn separately. If the model holds, a draw of the measurement, coupled over bare, times
+a draw of the prediction over the predicted gain is distributed as the measured gain (GUM Supplement 1).
 
-The same is drawn with the specimen taken as exactly known: what the bench alone leaves open. Parts that are drawn one
-by one say which counts most, and no more: where the response is chaotic each of them alone moves the gain as far as all
-together do.
+A second set of draws with an exactly known specimen determines the uncertainty of the bench alone. Contributions drawn
+one by one only show which is the largest: where the response is chaotic, each alone changes the gain as much as all
+together.
 """
 
 from collections.abc import Callable
@@ -18,12 +18,12 @@ import numpy as np
 from numpy.random import SeedSequence
 from numpy.typing import NDArray
 
-from bench.analysis.budget import COVERAGE, Budget
+from bench.analysis.sensor_accuracy import Draws, PeakReadings, SensorUncertainty
 from bench.analysis.transient_base import BaseMotion
+from bench.analysis.uncertainty import COVERAGE, Budget
 from bench.config.model import BenchConfiguration
 from bench.control.starts import CATCH_ANGLE
-from protocols.earthquake.observed import Observed
-from protocols.earthquake.sensors import drift_errors, u1_errors
+from protocols.earthquake.measurement import TOLERANCE, Observed, PeakSeen
 from sim.excitation import SampledRecord
 from sim.knowledge import SpecimenKnowledge
 from sim.rocking import Status, simulate
@@ -32,33 +32,31 @@ from sim.sweep import in_threads
 
 Array = NDArray[np.float64]
 
-TOLERANCE = 1e-8
-"""Of the drawn simulations."""
-
 INTERVAL = (0.025, 0.975)
 
 HELD = 0.95
-"""Share of the draws that an expanded uncertainty holds."""
+"""Coverage of an expanded uncertainty."""
 
 CHAOTIC = 2.0
-"""Variance of all parts drawn one by one over that of one joint draw from which on they do not add up."""
+"""Ratio of the summed variances of single contributions to that of a joint draw above which they do not add up."""
 
 NONE = SpecimenKnowledge().only()
-"""A specimen that is exactly known."""
+"""An exactly known specimen."""
 
 _KEPT = {
     "stiffness and damping of the frame": ("stiffness", "damping"),
     "stiffness of the spring": ("spring",),
     "restitution of the block": ("restitution",),
 }
-"""Parts of the specimen's uncertainty, and the widths that make them."""
+"""Contributions of the specimen's uncertainty, and the knowledge fields that define them."""
 
 
 @dataclass(frozen=True)
 class Predicted:
-    """What the model says of a pair of motions; gains are NaN where the block topples with the specimen as assumed.
+    """Predicted gains under a pair of motions; NaN where the block topples with the nominal specimen.
 
-    `alpha_1` and `alpha_2`, shape (n,), are those drawn, NaN where they toppled; `times` [s] are those of overturning.
+    `alpha_1` and `alpha_2`, shape (n,), are those of the draws, NaN where they toppled; `times` [s] are the times of
+    overturning.
     """
 
     nominal: tuple[float, float]
@@ -68,18 +66,18 @@ class Predicted:
 
     @property
     def chance(self) -> float:
-        """Chance of toppling."""
+        """Probability of toppling."""
         return float(np.mean(np.isnan(self.alpha_2)))
 
 
 @dataclass(frozen=True)
 class Compared:
-    """Measured gains beside their predictions; `low` and `high` hold 95 % of what may be measured of alpha_2,
-    `alpha_1_low` and `alpha_1_high` of alpha_1.
+    """Measured and predicted gains; `low` and `high` are the bounds of the 95 % interval of a measured alpha_2,
+    `alpha_1_low` and `alpha_1_high` those of alpha_1.
 
-    `bench` holds 95 % of the magnitudes of measured minus predicted alpha_2 that the bench leaves open, were the
-    specimen known exactly; None where that specimen topples. `budget` has standard uncertainties of alpha_2, each drawn
-    alone, the largest first; `chaotic` says that they do not add up.
+    `bench` is the 95 % quantile of |measured - predicted| alpha_2 for an exactly known specimen; None if that specimen
+    topples. `budget` has standard uncertainties of alpha_2, each drawn alone, largest first; `chaotic` is set if they
+    do not add up.
     """
 
     alpha_1: float
@@ -99,12 +97,12 @@ class Compared:
 
     @property
     def agrees(self) -> bool | None:
-        """Whether alpha_2 is what may be measured; None where the model leaves nothing to compare with."""
+        """Whether alpha_2 is within its interval; None without an interval."""
         return _within(self.alpha_2, self.low, self.high)
 
     @property
     def alpha_1_agrees(self) -> bool | None:
-        """The same of alpha_1."""
+        """Whether alpha_1 is within its interval; None without an interval."""
         return _within(self.alpha_1, self.alpha_1_low, self.alpha_1_high)
 
 
@@ -119,7 +117,7 @@ def predict_draws(
     table_scale: float = 0.0,
     noisy: bool = True,
 ) -> Predicted:
-    """Gains of `n` specimens that `specimen` may be, under motions that the measured ones may be."""
+    """Gains of `n` draws of the specimen and of the motions, within their uncertainties."""
     import_module("sim.kernel.rocking")  # compiled once, before the threads start
     root = seed if isinstance(seed, SeedSequence) else SeedSequence(seed)
     specimens, scale, *seeds = root.spawn(2 + n)
@@ -139,7 +137,7 @@ def predict_draws(
 
 
 def gains(specimen: Specimen, bare: SampledRecord, coupled: SampledRecord) -> tuple[float, float, float]:
-    """alpha_1, alpha_2, and the time at which the block overturned [s]: NaN each where there is none."""
+    """alpha_1, alpha_2, and the time of overturning [s]; each NaN if there is none."""
     moved = simulate(specimen, coupled, tolerance=TOLERANCE, overturning_angle=CATCH_ANGLE)
     if moved.status is not Status.COMPLETED:
         return nan, nan, moved.end_time
@@ -150,7 +148,7 @@ def gains(specimen: Specimen, bare: SampledRecord, coupled: SampledRecord) -> tu
 def compare(
     bare: Observed, coupled: Observed, specimen: Specimen, configuration: BenchConfiguration, n: int, seed: int
 ) -> Compared:
-    """The gains of two tests with one specimen, which has its spring in the second."""
+    """Compare the gain of two tests, bare and coupled, with that of the model."""
     sensors = configuration.sensors
     drifts, firsts = (bare.drift, coupled.drift), (bare.u1, coupled.u1)
     of_drift, of_u1, of_all, of_bench, of_parts = SeedSequence(seed).spawn(5)
@@ -202,7 +200,7 @@ def _parts(
     table_scale: float,
     seed: SeedSequence,
 ) -> dict[str, float]:
-    """Standard deviation of the predicted alpha_2 by each part of the model's inputs alone."""
+    """Standard deviation of the predicted alpha_2 due to each contribution to the model's inputs alone."""
     of_noise, of_scale, *streams = seed.spawn(2 + len(_KEPT))
     runs = {
         "noise of the table's motion": predicted(NONE, n, 0.0, True, of_noise),
@@ -214,17 +212,17 @@ def _parts(
 
 
 def _ratio(errors: Array) -> Array:
-    """Coupled over bare, from relative errors of both, shape (2, n)."""
+    """Ratio of coupled to bare, from the relative errors of both, shape (2, n)."""
     return (1.0 + errors[1]) / (1.0 + errors[0])
 
 
 def _stood(gains: Array) -> Array:
-    """Without the draws that toppled."""
+    """Draws that did not topple."""
     return gains[np.isfinite(gains)]
 
 
 def _interval(stood: Array) -> tuple[float | None, float | None]:
-    """Where 95 % of the draws lie."""
+    """Central 95 % interval of the draws."""
     if not stood.size:
         return None, None
     low, high = np.quantile(stood, INTERVAL)
@@ -237,3 +235,59 @@ def _within(value: float, low: float | None, high: float | None) -> bool | None:
 
 def _known(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
+
+
+Array = NDArray[np.float64]
+
+NOISE = "noise of the peaks"
+"""Contribution that is independent in the two tests."""
+
+
+def drift_errors(
+    peaks: tuple[PeakSeen, PeakSeen], sensors: SensorUncertainty, n: int, seed: int | SeedSequence
+) -> dict[str, Array]:
+    """Drawn relative errors of the drift peaks, bare and coupled, by contribution; shapes (2, n)."""
+    random = np.random.default_rng(seed)
+    noise = np.array([_noise(peak, random, n) for peak in peaks])
+    drifts = np.array([[peak.peak.value] for peak in peaks])
+    errors = sensors.drift_errors([_sighting(peak) for peak in peaks], Draws(random, n))
+    return {NOISE: noise} | {name: each / drifts for name, each in errors.items()}
+
+
+def u1_errors(
+    peaks: tuple[PeakSeen, PeakSeen], sensors: SensorUncertainty, grounded: bool, n: int, seed: int | SeedSequence
+) -> Array:
+    """Drawn relative errors of the peaks of u1, shape (2, n); a laser on the ground also needs the displacement
+    sensor.
+    """
+    random = np.random.default_rng(seed)
+    seen = [_sighting(peak) for peak in peaks]
+    sides = np.array([[each.sign] for each in seen])
+    draws = Draws(random, n)
+    errors = sides * sensors.linearity(0, seen, draws)
+    if grounded:
+        errors += np.outer([peak.table for peak in peaks], sensors.table_scale * random.standard_normal(n))
+    for row, each in zip(errors, seen, strict=True):
+        row += sensors.late(each, 0, draws) + sensors.steps(each, 0, draws)
+    errors /= np.array([[peak.peak.value] for peak in peaks])
+    return errors + np.array([_noise(peak, random, n) for peak in peaks])
+
+
+def _noise(seen: PeakSeen, random: np.random.Generator, n: int) -> Array:
+    peak = seen.peak
+    return (peak.uncertainty * random.standard_normal(n) + peak.bias * random.uniform(-1.0, 1.0, n)) / peak.value
+
+
+def _sighting(seen: PeakSeen) -> PeakReadings:
+    """Readings at a peak, relative to the readings at rest."""
+    sign = float(seen.peak.sign)
+    return PeakReadings(
+        drift=seen.peak.value,
+        sign=sign,
+        lasers=(sign * seen.lasers[0], sign * seen.lasers[1]),
+        speeds=seen.speeds,
+        zero=np.zeros((2, 1)),
+        swings=seen.swings,
+        terms=1.0,
+        at_rest=True,
+    )

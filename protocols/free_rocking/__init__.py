@@ -1,1 +1,1 @@
-"""Free rocking: the stand-alone block tilted by hand and let go, a laser on its face."""
+"""Free rocking: the stand-alone block is tilted and released by hand while a laser measures its face."""

@@ -1,4 +1,4 @@
-"""Evaluation of the recorded tilts: the result of each, the fits that the data file keeps, the identified specimen."""
+"""Evaluation of the recorded tilts: results, fits for the data file, and identified specimen."""
 
 from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
@@ -8,9 +8,8 @@ from math import hypot
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.analysis.free_rocking.findings import SCATTERED, Findings
+from bench.analysis.free_rocking.findings import SCATTERED, Findings, Tilt
 from bench.analysis.free_rocking.fit import NAMES, R
-from bench.analysis.free_rocking.tilt import Tilt
 from bench.analysis.gain import COVERAGE
 from bench.events import FitFinished, FittedParameter, Series
 from protocols.free_rocking.protocol import FreeRockingParameters, RockingPoint
@@ -34,7 +33,7 @@ def rocking_point(
     push: float | None = None,
     remarks: str = "",
 ) -> RockingPoint:
-    """The result of `part`, a tilt or all of them, for the block of `specimen`."""
+    """Point of `part`, a tilt or all tilts, for the block of `specimen`."""
     block, theory = specimen.block, theoretical_restitution(specimen.block)
     r, birge = found.restitution, found.motion.birge
     return RockingPoint(
@@ -72,24 +71,26 @@ def rocking_point(
 
 
 def inconsistencies(combined: RockingPoint) -> list[str]:
-    """Contradictions within the combined result, one sentence each, with what to check at the bench."""
+    """Inconsistencies of the combined result, one sentence each, with checks at the bench."""
     found: list[str] = []
     if abs(combined.trend) > combined.trend_uncertainty:
         found.append(
-            f"r changes with the impact's speed by {combined.trend:+.2g} +- {combined.trend_uncertainty:.2g} over the"
-            " whole range: one value is a mean over these tilts"
+            f"r changes with impact velocity by {combined.trend:+.2g} +- {combined.trend_uncertainty:.2g} over the"
+            " whole range: the stated value is a mean over these tilts"
         )
     motion, motion_uncertainty = combined.r_motion or combined.r_exp, combined.r_motion_uncertainty or 0.0
     apart = motion - combined.r_amplitudes
     if abs(apart) > hypot(motion_uncertainty, combined.r_amplitudes_uncertainty):
-        found.append(f"the whole motion and its amplitudes alone differ by {apart:+.2g} in r: see to the block's base")
+        found.append(
+            f"r from the whole motion and r from the amplitudes alone differ by {apart:+.2g}: check the block's base"
+        )
     if combined.birge is not None and combined.birge > SCATTERED:
         found.append(
-            f"the tilts scatter {combined.birge:.1f} times as much as each of them promises, which is counted: impacts"
-            " differ from one another. r_exp is that of the amplitudes, which depend less on that"
+            f"the scatter of the tilts is {combined.birge:.1f} times that expected from their uncertainties, and is "
+            "included: the impacts differ. r_exp is from the amplitudes, which are less sensitive to the differences"
         )
     if combined.birge is None:
-        found.append("a single tilt does not tell how much r scatters between tilts: let the block go several times")
+        found.append("a single tilt does not show the scatter of r between tilts: release the block several times")
     for name, seen, sides, uncertainty in (
         (
             "alpha",
@@ -106,29 +107,29 @@ def inconsistencies(combined: RockingPoint) -> list[str]:
     ):
         if abs(seen - sides) > uncertainty:
             found.append(
-                f"{name} is {seen:.5g} by the motion and {sides:.5g} by the sides, {100 * (seen / sides - 1):+.2g} %:"
-                " see to edges that are not sharp, to the laser's height and scale, to sides and density"
+                f"{name} is {seen:.5g} from the motion and {sides:.5g} from the sides, {100 * (seen / sides - 1):+.2g} "
+                "%: check for blunt edges, the laser's height and scale, the sides and the density"
             )
     return found
 
 
 def fit_events(tilt: Tilt, alone: Findings, uncertain: Array, number: int) -> Iterator[FitFinished]:
-    """Two fits of tilt `number`: the exact motion over time, and the impacts in their order.
+    """Two fit events of tilt `number`: the exact motion over time, and the impacts in order.
 
-    `alone` are the findings from this tilt alone, `uncertain`, shape (8,), the standard uncertainties of the fit's
-    values.
+    `alone` are the findings from this tilt alone; `uncertain`, shape (8,), the standard uncertainties of the fit.
     """
     yield _motion(tilt, uncertain, number)
     yield _impacts(tilt, alone, number)
 
 
 def identified_specimen(found: Findings, tilts: int, block: Block, known: Identified | None) -> Identified:
-    """The identified specimen with the restitution factor of `block`: measured over theoretical, by its sides.
+    """Identified specimen with the restitution factor of `block`: measured over theoretical restitution.
 
-    The factor is valid with these sides only, so its source names them, and the restitution itself.
+    The theoretical value follows from the sides of the block, so that the source of the factor states the sides and the
+    restitution.
     """
     theory, r = theoretical_restitution(block), found.restitution
-    by = "sizes of the swings" if found.by_amplitudes else "exact motion"
+    by = "amplitudes of the swings" if found.by_amplitudes else "exact motion"
     sides = f"2b = {2.0 * block.b:.6g} m, 2h_b = {2.0 * block.h_b:.6g} m"
     finding = Finding(
         name="restitution_factor",
@@ -144,10 +145,10 @@ def _motion(tilt: Tilt, uncertain: Array, number: int) -> FitFinished:
     fit = tilt.fit
     r, u = float(fit.motion.restitution), float(uncertain[R])
     columns = {
-        "time": Series(fit.times, "s", "since the recording began"),
+        "time": Series(fit.times, "s", "time since the start of the recording"),
         "measured": Series(fit.displacement, "m", "displacement of the block's face at the laser's height"),
         "fitted": Series(fit.fitted, "m", "the exact nonlinear motion"),
-        "residual": Series(fit.residual, "m", "measured less fitted"),
+        "residual": Series(fit.residual, "m", "measured minus fitted"),
     }
     parameters = {
         name: FittedParameter(float(value), float(uncertainty), _UNITS[name])
@@ -160,15 +161,19 @@ def _motion(tilt: Tilt, uncertain: Array, number: int) -> FitFinished:
 def _impacts(tilt: Tilt, alone: Findings, number: int) -> FitFinished:
     relation, points = tilt.relation, tilt.points
     count = relation.each.size
-    # the first impact has no turning point before it but the hand
+    # the first impact follows the release, not a turning point
     columns = {
-        "time": Series(points.impacts[1 : count + 1], "s", "instant of the impact"),
+        "time": Series(points.impacts[1 : count + 1], "s", "time of the impact"),
         "restitution": Series(relation.each, "1", "r of this impact, from the largest angles before and after"),
-        "restitution_uncertainty": Series(relation.each_uncertainty, "1", "its standard uncertainty by noise"),
-        "speed": Series(relation.speed, "1", "angular velocity before, over that of a fall from the critical angle"),
-        "angle_before": Series(relation.angles[:-1], "rad", "largest angle before"),
-        "angle_after": Series(relation.angles[1:], "rad", "largest angle after"),
-        "time_uncertainty": Series(points.impact_uncertainty[1 : count + 1], "s", "standard uncertainty by noise"),
+        "restitution_uncertainty": Series(
+            relation.each_uncertainty, "1", "standard uncertainty of the restitution from noise"
+        ),
+        "speed": Series(
+            relation.speed, "1", "angular velocity before impact relative to that of a fall from the critical angle"
+        ),
+        "angle_before": Series(relation.angles[:-1], "rad", "largest angle before the impact"),
+        "angle_after": Series(relation.angles[1:], "rad", "largest angle after the impact"),
+        "time_uncertainty": Series(points.impact_uncertainty[1 : count + 1], "s", "standard uncertainty from noise"),
     }
     text = f"impacts of tilt {number}: r = {relation.restitution:.5f} +- {alone.relation.uncertainty:.1g} (k = 1)"
     found = {"restitution": FittedParameter(relation.restitution, alone.relation.uncertainty, "1")}
@@ -176,7 +181,7 @@ def _impacts(tilt: Tilt, alone: Findings, number: int) -> FitFinished:
 
 
 def _by_sides(value: Callable[[Block], float], block: Block, parameters: FreeRockingParameters) -> float:
-    """Standard uncertainty of a quantity that follows from the measured width and height, which are uncorrelated."""
+    """Standard uncertainty of a quantity computed from the measured width and height, which are uncorrelated."""
     half = 0.5 * parameters.side_uncertainty
     wider = Block.model_validate(block.model_dump() | {"b": block.b + half})
     higher = Block.model_validate(block.model_dump() | {"h_b": block.h_b + half})

@@ -8,34 +8,35 @@ import numpy as np
 
 from bench.analysis.free_rocking.points import AFTER
 from bench.config.model import BenchConfiguration
-from bench.config.specimen_file import write_specimen
-from bench.preflight.bounds import bounds
-from bench.preflight.forecast import Demand, Forecast
+from bench.config.result_files import write_specimen
+from bench.datafile.tables import Column, Table
+from bench.figures.style import write_figure
+from bench.preflight.margins import Demand, Forecast, bounds
 from bench.protocol import Plan, Prepared, Result, Sources
-from bench.record.tables import Column, Table
-from bench.report.style import write_figure
-from protocols.free_rocking.plan import RockingRun
+from protocols.free_rocking.plan import RockingRun, beam_heights, planned_tilts
 from protocols.free_rocking.protocol import FreeRockingParameters, RockingPoint
 from protocols.free_rocking.results import rocking_figure, rocking_table
-from protocols.free_rocking.tilts import beam_heights, planned_tilts
+from sim.channel import STOREYS
 from sim.errors import InvalidInput
 from sim.free_rocking import FreeRocking, critical_angle, frequency_parameter
 from sim.parameters import Parameters
 
 LOWEST_CUTOFF = 1.25 / AFTER
-"""Cutoff of a Butterworth low-pass of fourth order [Hz] that keeps 5 % of an impact's kink for `AFTER`: some 2 um."""
+"""Cutoff [Hz] of a fourth-order Butterworth low-pass at which 5 % of the kink of an impact, about 2 um, remains after
+`AFTER`.
+"""
 
-_MEETS = "the beam must meet the face of the tilted block: between {:.4f} and {:.4f} m at these tilts"
+_MEETS = "the beam must hit the face of the tilted block: between {:.4f} and {:.4f} m at these tilts"
 
-_NOT_WATCHED = "laser 2 looks at the block: it shows no drift, and none is watched"
+_NOT_WATCHED = "laser 2 points at the block: the drift is neither measured nor monitored"
 
-_LASER_ON_BLOCK = "Laser 2 still looks at the block: turn it back to storey 2."
+_LASER_ON_BLOCK = "Laser 2 still points at the block: turn it back to storey 2."
 
-_TABLE_LOCKED = "THE TABLE IS STILL LOCKED: take the clamps off before anything is driven."
+_TABLE_LOCKED = "THE TABLE IS STILL LOCKED: remove the clamps before the table is driven."
 
 
 class FreeRockingTest(Prepared[FreeRockingParameters]):
-    """The restitution of the block. Refuses tilts that the laser cannot follow."""
+    """Identification of the block's restitution. Raises InvalidInput for tilts beyond the laser's capabilities."""
 
     def __init__(
         self, parameters: FreeRockingParameters, configuration: BenchConfiguration, stored: Sources | None = None
@@ -47,18 +48,18 @@ class FreeRockingTest(Prepared[FreeRockingParameters]):
 
     @cached_property
     def forecast(self) -> Forecast:
-        """No drive; the laser's share of its range; the duration."""
-        self.progress("predicting what the run asks of the bench")
+        """Demands (used range of the laser, no drive) and duration."""
+        self.progress("predicting the demands of the run")
         largest = max(abs(tilt.displacement) for tilt in self.tilts)
-        where = f"{1e3 * largest:.0f} mm of the block's face"
+        where = f"{1e3 * largest:.0f} mm of displacement of the block's face"
         demands: list[Demand] = []
         for quantity in bounds(self.configuration):
-            if quantity == "laser_2":
-                demands.append(Demand(quantity, largest / (0.5 * self.configuration.laser_ranges[1]), None, where))
+            if quantity == STOREYS[1]:
+                demands.append(Demand(quantity, largest / self.configuration.laser_half_ranges[1], None, where))
             elif quantity == "drift":
                 demands.append(Demand(quantity, None, None, _NOT_WATCHED))
             else:
-                demands.append(Demand(quantity, 0.0, None, "nothing is driven"))
+                demands.append(Demand(quantity, 0.0, None, "the table is not driven"))
         return Forecast(
             demands=tuple(demands),
             duration=sum(tilt.duration for tilt in self.tilts),
@@ -67,7 +68,7 @@ class FreeRockingTest(Prepared[FreeRockingParameters]):
 
     @cached_property
     def prediction(self) -> Table:
-        """The half swings of each tilt for the specimen as known."""
+        """Predicted impacts of each tilt for the nominal specimen."""
         specimen = self.configuration.known_specimen
         alpha, p = critical_angle(specimen.block), frequency_parameter(specimen.block, specimen.g)
         motions = [FreeRocking(alpha, p, specimen.block.restitution, tilt.angle) for tilt in self.tilts]
@@ -77,10 +78,12 @@ class FreeRockingTest(Prepared[FreeRockingParameters]):
         ]
         pairs = list(zip(motions, used, strict=True))
         return {
-            "tilt": Column(np.concatenate([np.full(n, m.tilt) for m, n in pairs]), "rad", "tilt that is let go"),
-            "impact": Column(np.concatenate([m.impacts[:n] for m, n in pairs]), "s", "instant since the release"),
+            "tilt": Column(np.concatenate([np.full(n, m.tilt) for m, n in pairs]), "rad", "tilt before the release"),
+            "impact": Column(np.concatenate([m.impacts[:n] for m, n in pairs]), "s", "time since the release"),
             "angle": Column(
-                np.concatenate([(m.sides * m.amplitudes)[:n] for m, n in pairs]), "rad", "largest angle before"
+                np.concatenate([(m.sides * m.amplitudes)[:n] for m, n in pairs]),
+                "rad",
+                "largest angle before the impact",
             ),
         }
 
@@ -110,21 +113,21 @@ class FreeRockingTest(Prepared[FreeRockingParameters]):
         )
 
     def _check(self) -> None:
-        """Raise InvalidInput where the laser cannot follow the block."""
+        """Raise InvalidInput if the laser cannot follow the block."""
         p, configuration = self.parameters, self.configuration
         low, high = beam_heights(self.tilts, configuration.specimen)
         for tilt in self.tilts:
             if tilt.displacement != tilt.displacement:
                 raise InvalidInput("height", p.height, _MEETS.format(low, high))
-            share = abs(tilt.displacement) / (0.5 * configuration.laser_ranges[1])
+            share = abs(tilt.displacement) / configuration.laser_half_ranges[1]
             allowed = configuration.limits.laser_range
             if share > allowed:
                 needs = f"the face moves by {1e3 * abs(tilt.displacement):.1f} mm there, {share:.2f} of half the range"
                 raise InvalidInput(
-                    "height", p.height, f"{needs} of laser 2; limits.laser_range = {allowed:g}: look lower"
+                    "height", p.height, f"{needs} of laser 2; limits.laser_range = {allowed:g}: aim lower"
                 )
         if configuration.backend == "simulated":
             cutoff = configuration.simulation.bench.filter_unit.cutoff
             if cutoff < LOWEST_CUTOFF:
-                allowed = f"impacts must be forgotten within {1e3 * AFTER:.0f} ms: at least {LOWEST_CUTOFF:g} Hz"
+                allowed = f"the effect of impacts must decay within {1e3 * AFTER:.0f} ms: at least {LOWEST_CUTOFF:g} Hz"
                 raise InvalidInput("simulation.bench.filter_unit.cutoff", cutoff, allowed)

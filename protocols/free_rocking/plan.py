@@ -1,45 +1,112 @@
-"""The steps of free rocking. The drive stays at zero from the first to the last.
+"""Steps of free rocking. The drive is zero throughout.
 
-1. The table is locked: one that gives way takes part of the impact. The laser of storey 2 is turned to the block.
-2. For each tilt, the operator holds the block and lets it go while it is recorded; a recording that shows no free
-   rocking is repeated.
-3. The tilts are combined. The laser is turned back, the table unlocked.
+1. The table is locked, since a moving table absorbs part of the impact. Laser 2 is aimed at the block.
+2. For each tilt, the operator holds and releases the block during the recording; a recording without free rocking is
+   repeated.
+3. The tilts are combined. The laser is aimed at storey 2 again, and the table unlocked.
 """
 
 from collections.abc import Callable, Generator, Sequence
+from dataclasses import dataclass
 from math import degrees
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.analysis.free_rocking.findings import Findings, findings, uncertainties
-from bench.analysis.free_rocking.laser_errors import LaserErrors
-from bench.analysis.free_rocking.swings import NotRocking, Seen
-from bench.analysis.free_rocking.tilt import PUSH, Tilt, analysed
+from bench.analysis.free_rocking.findings import (
+    PUSH,
+    Findings,
+    LaserErrors,
+    Tilt,
+    analyse_tilt,
+    findings,
+    uncertainties,
+)
+from bench.analysis.free_rocking.swings import REST as STANDING
+from bench.analysis.free_rocking.swings import NotRocking, Recording
 from bench.analysis.signals import LASER_2
 from bench.config.model import BenchConfiguration
-from bench.engine.steps import Arm, Handle, Outcome, Play, Played, RampOut, Say, Step
+from bench.engine.steps import Arm, OperatorAction, Outcome, Play, Played, Publish, RampOut, Step
 from bench.events import Event, PointFinished, Progress, SpecimenIdentified, StepStarted, Warned
-from drivers.rig import Handwork
+from drivers.rig import OperatorTask
 from protocols.common.calibrate import Unmeasurable
 from protocols.free_rocking.evaluation import fit_events, identified_specimen, inconsistencies, rocking_point
 from protocols.free_rocking.protocol import ALL, FreeRockingParameters
-from protocols.free_rocking.tilts import REST, PlannedTilt
+from sim import block_face
 from sim.errors import RockbenchError
+from sim.free_rocking import FreeRocking, critical_angle, frequency_parameter, theoretical_restitution
 from sim.identified import Identified
+from sim.specimen import Specimen
 
 Array = NDArray[np.float64]
 
 STILL = 2e-3
-"""Scatter of the signals at rest [m]: a hand trembles."""
+"""Allowed scatter of the signals at rest [m], for a block held by hand."""
 
-LOCK = "Clamp the table to the ground, so that no impact can move it. Nothing will be driven: leave the amplifier off."
-UNLOCK = "Take the clamps off the table."
-BACK = "Turn laser 2 back to storey 2."
+LOCK = "Clamp the table to the ground: no impact must move it. It is not driven: leave the amplifier off."
+UNLOCK = "Remove the clamps from the table."
+BACK = "Aim laser 2 at storey 2 again."
+
+REST = 1.0
+"""Time at the start for the zero of the signals [s], while the operator holds the block."""
+
+_OVERHEAD = 20.0
+"""Time for a tilt in addition to its recording: the operator tilts the block and starts the recording [s]."""
+
+_LEAST_LOSS = 0.8
+"""Smallest velocity loss per impact, relative to theory, for which the recording is long enough."""
+
+
+@dataclass(frozen=True)
+class PlannedTilt:
+    """A tilt by `angle` [rad], positive towards the frame, recorded for `recording` [s]. `displacement` [m] is that of
+    the point of the face that the laser measures, NaN if the beam misses the face.
+    """
+
+    angle: float
+    displacement: float
+    recording: float
+
+    @property
+    def before(self) -> float:
+        """Expected time until the recording begins [s]."""
+        return _OVERHEAD + REST
+
+    @property
+    def duration(self) -> float:
+        """Expected time of the whole tilt, with one recording [s]."""
+        return self.recording + REST + _OVERHEAD
+
+
+def planned_tilts(parameters: FreeRockingParameters, specimen: Specimen) -> tuple[PlannedTilt, ...]:
+    """The tilts in order, smallest first, towards the frame before away from it."""
+    signs = {"both": (1.0, -1.0), "towards": (1.0,), "away": (-1.0,)}[parameters.sides]
+    alpha = critical_angle(specimen.block)
+    return tuple(
+        _planned(parameters, specimen, sign * share * alpha) for share in sorted(parameters.tilts) for sign in signs
+    )
+
+
+def beam_heights(tilts: Sequence[PlannedTilt], specimen: Specimen) -> tuple[float, float]:
+    """Lowest and greatest height [m] at which the beam hits the face at every tilt."""
+    faces = [block_face.heights(tilt.angle, specimen.block) for tilt in tilts]
+    return max(float(low) for low, _ in faces), min(float(high) for _, high in faces)
+
+
+def _planned(parameters: FreeRockingParameters, specimen: Specimen, angle: float) -> PlannedTilt:
+    """Plan a tilt; the recording is long enough for a block released as late as allowed to come to rest."""
+    block = specimen.block
+    r = 1.0 - _LEAST_LOSS * (1.0 - theoretical_restitution(block))
+    motion = FreeRocking(critical_angle(block), frequency_parameter(block, specimen.g), r, angle)
+    return PlannedTilt(
+        angle=angle,
+        displacement=float(block_face.displacement(angle, parameters.height, block)),
+        recording=parameters.release_within + motion.rest_time + 1.5 * STANDING,
+    )
 
 
 class RockingRun:
-    """One run: its steps, its findings so far, and the state of table and laser."""
+    """Steps of a run, its findings so far, and the state of table and laser."""
 
     def __init__(
         self, parameters: FreeRockingParameters, configuration: BenchConfiguration, tilts: Sequence[PlannedTilt]
@@ -53,24 +120,24 @@ class RockingRun:
         self.laser_on_block = False
 
     def steps(self) -> Generator[Step, Outcome, None]:
-        """The whole run. Raises Unmeasurable, with the bench as it was, when no tilt could be used."""
+        """Steps of the run. Raises Unmeasurable, with the bench restored, if no tilt is usable."""
         alone = self._specimen.coupled(0.0)
         self.table_locked = True
-        yield Handle(Handwork.LOCK_TABLE, self._specimen.bare(), LOCK)
+        yield OperatorAction(OperatorTask.LOCK_TABLE, self._specimen.bare(), LOCK)
         self.laser_on_block = True
-        yield Handle(Handwork.WATCH_BLOCK, alone, self._watching, self._parameters.height)
+        yield OperatorAction(OperatorTask.WATCH_BLOCK, alone, self._watching, self._parameters.height)
         failed: RockbenchError | None = None
         try:
             for number, tilt in enumerate(self._planned, 1):
                 yield from self._tilt(number, tilt)
             if not self.tilts:
-                raise Unmeasurable("no tilt could be used: see to what the warnings say")
+                raise Unmeasurable("no tilt was usable: see the warnings")
             yield from self._combine()
         except RockbenchError as error:
             failed = error
-        yield Handle(Handwork.WATCH_STOREYS, alone, BACK)
+        yield OperatorAction(OperatorTask.WATCH_STOREYS, alone, BACK)
         self.laser_on_block = False
-        yield Handle(Handwork.UNLOCK_TABLE, alone, UNLOCK)
+        yield OperatorAction(OperatorTask.UNLOCK_TABLE, alone, UNLOCK)
         self.table_locked = False
         if failed is not None:
             raise failed
@@ -78,23 +145,23 @@ class RockingRun:
     @property
     def _watching(self) -> str:
         return (
-            "Take the spring off and stand the block alone on its base, free of everything. Let laser 2 look at its"
-            f" face, square to it, {1e3 * self._parameters.height:.0f} mm above the table, near"
-            " the middle of its range."
+            "Remove the spring and set the block upright on its base, without contact to other parts. Aim laser 2 at "
+            f"its face, square to it, {1e3 * self._parameters.height:.0f} mm above the table, near the middle of its "
+            "range."
         )
 
     def _tilt(self, number: int, tilt: PlannedTilt) -> Generator[Step, Outcome, None]:
-        """Record a tilt until a recording shows free rocking, or the attempts are used up."""
+        """Record a tilt until a recording is usable or no attempts are left."""
         request = self._request(number, tilt)
         for attempt in range(self._parameters.attempts):
-            yield Say(StepStarted(f"tilt {number}: {degrees(tilt.angle):+.1f} degrees, block held and let go"))
-            again = "" if attempt == 0 else "The last recording could not be used. "
-            yield Handle(Handwork.TILT_BLOCK, self._specimen.coupled(0.0), again + request, tilt.angle)
+            yield Publish(StepStarted(f"tilt {number}: {degrees(tilt.angle):+.1f} degrees, block held and released"))
+            again = "" if attempt == 0 else "The last recording was not usable.  "
+            yield OperatorAction(OperatorTask.TILT_BLOCK, self._specimen.coupled(0.0), again + request, tilt.angle)
             played = yield from self._record(number, tilt)
             try:
                 found = self._analyse(played, tilt.angle)
             except NotRocking as error:
-                yield Say(Warned(f"tilt {number} could not be used: {error}"))
+                yield Publish(Warned(f"tilt {number} is not usable: {error}"))
                 continue
             self.tilts.append(found)
             yield from self._publish(found, number)
@@ -104,9 +171,9 @@ class RockingRun:
         where = "towards the frame" if tilt.angle > 0.0 else "away from the frame"
         return (
             f"Tilt {number} of {len(self._planned)}: tilt the block {where} until its face has moved by about"
-            f" {1e3 * abs(tilt.displacement):.0f} mm where the laser meets it ({degrees(abs(tilt.angle)):.1f} degrees),"
-            " and hold it still on its edge. Then answer. When the recording runs, count to three and let go at once,"
-            " without a push; then touch nothing until the block stands still."
+            f" {1e3 * abs(tilt.displacement):.0f} mm at the laser beam ({degrees(abs(tilt.angle)):.1f} degrees),"
+            " and hold it still on its edge. Then answer. When the recording runs, count to three and release it at "
+            "once, without a push; then touch nothing until the block is at rest."
         )
 
     def _record(self, number: int, tilt: PlannedTilt) -> Generator[Step, Outcome, Played]:
@@ -115,11 +182,11 @@ class RockingRun:
         outcome = yield Play(volts, self._progress(number))
         yield RampOut()
         if not isinstance(outcome, Played):
-            raise TypeError(f"a recording without drive came to {outcome}")
+            raise TypeError(f"a recording without drive ended with {outcome}")
         return outcome
 
     def _progress(self, number: int) -> Callable[[Array], Event]:
-        """Makes the progress from each block of a recording."""
+        """Callback that updates the progress with each block of a recording."""
         total, samples = sum(tilt.duration for tilt in self._planned), 0
         begin = sum(tilt.duration for tilt in self._planned[: number - 1]) + self._planned[number - 1].before
 
@@ -127,55 +194,55 @@ class RockingRun:
             nonlocal samples
             samples += len(signals)
             elapsed = min(begin + samples / self._configuration.sample_rate, total)
-            return Progress(elapsed / total, total - elapsed, f"recording tilt {number}: let go, then touch nothing")
+            return Progress(
+                elapsed / total, total - elapsed, f"recording tilt {number}: release the block, then touch nothing"
+            )
 
         return progress
 
     def _analyse(self, played: Played, angle: float) -> Tilt:
         p = self._parameters
-        seen = Seen(played.signals[:, LASER_2], self._configuration.sample_rate, self._specimen.block, p.height)
-        found = analysed(seen, self._specimen, p.least_swing * abs(angle))
+        seen = Recording(played.signals[:, LASER_2], self._configuration.sample_rate, self._specimen.block, p.height)
+        found = analyse_tilt(seen, self._specimen, p.least_swing * abs(angle))
         if found.swings.held * angle < 0.0:
             raise NotRocking(
-                f"the laser shows {found.swings.held:+.3f} rad where {angle:+.3f} rad are asked for: tilt it to the"
-                " other side, or see to hardware.laser_2.polarity: displacements towards the frame are positive"
+                f"the laser measures {found.swings.held:+.3f} rad, {angle:+.3f} rad are requested: tilt the block to "
+                "the other side, or check hardware.laser_2.polarity: displacements towards the frame are positive"
             )
         return found
 
     def _publish(self, tilt: Tilt, number: int) -> Generator[Step, Outcome, None]:
-        """The fits and the point of one tilt."""
+        """Publish the fits and the point of one tilt."""
         p, alone = self._parameters, self._findings([tilt])
         uncertain = uncertainties(tilt.fit, self._laser, p.height, p.height_uncertainty)
         for event in fit_events(tilt, alone, uncertain, number):
-            yield Say(event)
+            yield Publish(event)
         remarks = ""
         if abs(tilt.push) > PUSH:
-            remarks = (
-                f"not let go from rest: the motion is that of a tilt {100.0 * tilt.push:+.0f} % larger than the hand's"
-            )
-            yield Say(Warned(f"tilt {number}: {remarks}; the impacts count all the same"))
+            remarks = f"not released from rest: equivalent to a tilt larger by {100.0 * tilt.push:+.0f} %"
+            yield Publish(Warned(f"tilt {number}: {remarks}; the impacts are still used"))
         held, residual, name = tilt.swings.held, tilt.fit.rms, f"tilt {number}"
         point = rocking_point(name, alone, self._specimen, p, residual, tilt=held, push=tilt.push, remarks=remarks)
-        yield Say(PointFinished(point))
+        yield Publish(PointFinished(point))
 
     def _combine(self) -> Generator[Step, Outcome, None]:
-        """The point of all tilts, and the identified specimen."""
+        """Publish the point of all tilts and the identified specimen."""
         self.findings = found = self._findings(self.tilts)
         residual = float(np.sqrt(np.mean([tilt.fit.rms**2 for tilt in self.tilts])))
         point = rocking_point(ALL, found, self._specimen, self._parameters, residual)
         remarks = inconsistencies(point)
         for remark in remarks:
-            yield Say(Warned(remark))
+            yield Publish(Warned(remark))
         point = point.model_copy(update={"remarks": "; ".join(remarks)})
-        yield Say(PointFinished(point))
+        yield Publish(PointFinished(point))
         block, known = self._specimen.block, self._configuration.identified
         self.identified = identified_specimen(found, len(self.tilts), block, known)
-        yield Say(SpecimenIdentified(self.identified))
+        yield Publish(SpecimenIdentified(self.identified))
 
     def _findings(self, tilts: Sequence[Tilt]) -> Findings:
         return findings(tilts, self._laser, self._parameters.height, self._parameters.height_uncertainty)
 
     @property
     def _laser(self) -> LaserErrors:
-        """By the data sheet: a calibration applies to displacements of the storeys, from where they rest."""
+        """Laser errors from the data sheet, since a calibration applies to displacements of the storeys from rest."""
         return LaserErrors(self._configuration.sensors.accuracy, self._configuration.laser_ranges[1])

@@ -1,22 +1,24 @@
 # pyright: reportUnknownMemberType=false
-"""The results as text for the terminal and as a figure: motion with fit, residual, restitution by impact, budget.
+"""Results of free rocking: text table, figures, and report section."""
 
-matplotlib's keyword arguments have no types, hence the first line.
-"""
-
-from collections.abc import Sequence
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from math import degrees, log10
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from bench.analysis.free_rocking.findings import Findings
+from bench.analysis.free_rocking.findings import Findings, Tilt
 from bench.analysis.free_rocking.fit import ZERO
-from bench.analysis.free_rocking.tilt import Tilt
 from bench.analysis.gain import COVERAGE
-from bench.report.rocking_figure import Impacts, draw_impacts
-from bench.report.style import BLACK, BLUE, VERMILLION, new_figure, set_grid
-from bench.report.text_table import TextColumn, text_table
+from bench.document.campaign import Campaign
+from bench.document.document import Column, Listing, Notice, Part, Picture, Section, Table
+from bench.document.typography import plain, typeset, with_uncertainty
+from bench.figures.budget_figure import budget_figure
+from bench.figures.style import BLACK, BLUE, GREY, MARKERS, SERIES, VERMILLION, new_figure, set_grid
+from bench.figures.text_table import TextColumn, text_table
 from protocols.free_rocking.protocol import ALL, RockingPoint
 
 if TYPE_CHECKING:
@@ -36,31 +38,52 @@ _COLUMNS = (
     TextColumn("residual", "um"),
 )
 
+_FIT = "impacts of "
+"""Name prefix of the fits of single impacts."""
+
+_MOTION = (("r_motion", "r_exp"), ("r_motion_uncertainty", "r_exp_uncertainty"))
+"""Fields of the result in older files, where it is always that of the fit, by their present names."""
+
+
+@dataclass(frozen=True, eq=False)
+class Impacts:
+    """Impacts after one tilt [rad]: `speed` relative to that of a fall from the critical angle, r and its expanded
+    uncertainty from noise, each of shape (n,).
+    """
+
+    tilt: float
+    speed: NDArray[np.float64]
+    restitution: NDArray[np.float64]
+    uncertainty: NDArray[np.float64]
+
 
 def rocking_table(points: Sequence[RockingPoint]) -> str:
-    """One row for each tilt and one for all, and below them the block's parameters from its motion."""
+    """Table with a row for each tilt and one for all tilts, followed by the block's parameters from its motion."""
     if not points:
-        return "No tilt could be used."
+        return "No tilt was usable."
     table = text_table(_COLUMNS, map(_cells, points))
     combined = next((point for point in points if point.part == ALL), None)
     return "\n".join([table] if combined is None else [table, "", *_combined(combined)])
 
 
 def rocking_figure(points: Sequence[RockingPoint], tilts: Sequence[Tilt], found: Findings | None) -> "Figure":
-    """Four panels; empty ones where nothing was found. The motion is that of the largest tilt."""
+    """Figure of four panels, empty without a result; shows the motion of the largest tilt."""
     figure = new_figure(8.0, 11.0)
     motion, left, single, parts = figure.subplots(4, 1, height_ratios=(3, 1.5, 3, 1.6))
     for panel in (motion, left, single, parts):
         set_grid(panel)
     combined = next((point for point in points if point.part == ALL), None)
     if not tilts or found is None or combined is None:
-        motion.set_title("no tilt could be used", loc="left")
+        motion.set_title("no tilt was usable", loc="left")
         return figure
     _motion(motion, left, max(tilts, key=lambda tilt: abs(tilt.swings.held)))
-    draw_impacts(single, [_impacts(tilt) for tilt in tilts], combined.r_exp, combined.r_th)
+    _draw_impacts(single, [_impacts(tilt) for tilt in tilts], combined.r_exp, combined.r_th)
     _parts(parts, found)
     ratio, expanded = combined.ratio, combined.ratio_uncertainty
-    motion.set_title(f"r_exp / r_th = {ratio:.6f} +- {expanded:.1g} (k = 2), {combined.impacts} impacts", loc="left")
+    motion.set_title(
+        rf"$r_\mathrm{{exp}}/r_\mathrm{{th}}$ = {ratio:.6f} ± {expanded:.1g} (k = 2), {combined.impacts} impacts",
+        loc="left",
+    )
     return figure
 
 
@@ -79,20 +102,20 @@ def _cells(point: RockingPoint) -> tuple[str, ...]:
 def _combined(point: RockingPoint) -> list[str]:
     trend, alpha = _pair(point.trend, point.trend_uncertainty), _pair(point.alpha_rad, point.alpha_uncertainty_rad)
     p = _pair(point.p_rad_s, point.p_uncertainty_rad_s)
-    birge = "" if point.birge is None else f"; the tilts scatter {point.birge:.2f} times what is expected"
-    by = f", by the {point.estimator}" if point.estimator else ""
+    birge = "" if point.birge is None else f"; scatter of the tilts: {point.birge:.2f} times that expected"
+    by = f", from the {point.estimator}" if point.estimator else ""
     return [
         f"r_exp / r_th = {point.ratio:.6f} +- {point.ratio_uncertainty:.1g} (k = 2){by}, r_th = {point.r_th:.6f}"
         f"{birge}",
-        f"change of r over the impacts' speeds: {trend[0]} +- {trend[1]}",
-        f"alpha = {alpha[0]} +- {alpha[1]} rad, by the sides {point.alpha_sides_rad:.6f} rad",
-        f"p = {p[0]} +- {p[1]} rad/s, by the sides {point.p_sides_rad_s:.5f} rad/s",
-        *([f"see to: {point.remarks}"] if point.remarks else []),
+        f"change of r with impact velocity: {trend[0]} +- {trend[1]}",
+        f"alpha = {alpha[0]} +- {alpha[1]} rad, from the sides {point.alpha_sides_rad:.6f} rad",
+        f"p = {p[0]} +- {p[1]} rad/s, from the sides {point.p_sides_rad_s:.5f} rad/s",
+        *([f"check: {point.remarks}"] if point.remarks else []),
     ]
 
 
 def _pair(value: float, uncertainty: float) -> tuple[str, str]:
-    """A value and its uncertainty, both to two digits of the uncertainty."""
+    """A value and its uncertainty, rounded to two digits of the uncertainty."""
     places = min(max(1 - int(log10(uncertainty) // 1), 0), 8) if uncertainty > 0.0 else 8
     return f"{value:.{places}f}", f"{uncertainty:.{places}f}"
 
@@ -102,7 +125,7 @@ def _motion(motion: "Axes", left: "Axes", tilt: Tilt) -> None:
     end = float(fit.times[-1]) + 1.0
     shown = slice(None, int(end * seen.sample_rate), max(round(seen.sample_rate / 500.0), 1))
     motion.plot(seen.times[shown], 1e3 * (seen.displacement[shown] - zero), color=BLACK, lw=0.9, label="measured")
-    # the fit has no samples between its pieces: NaN breaks the line there
+    # NaN interrupts the line between the parts of the fit
     broken = np.insert(1e3 * (fit.fitted - zero), np.flatnonzero(np.diff(fit.swing)) + 1, np.nan)
     times = np.insert(fit.times, np.flatnonzero(np.diff(fit.swing)) + 1, np.nan)
     motion.plot(times, broken, "--", color=VERMILLION, lw=1.2, label="exact motion, fitted")
@@ -110,7 +133,7 @@ def _motion(motion: "Axes", left: "Axes", tilt: Tilt) -> None:
     motion.legend(loc="upper right", fontsize=8)
     motion.set_xlim(0.0, end)
     left.plot(fit.times, 1e6 * fit.residual, ".", ms=1.5, color=BLUE)
-    left.set_ylabel("residual [um]")
+    left.set_ylabel("residual [µm]")
     left.set_xlabel("time [s]")
     left.set_xlim(0.0, end)
 
@@ -126,3 +149,147 @@ def _parts(panel: "Axes", found: Findings) -> None:
     panel.barh(names, [1e6 * value for value in parts.values()], color=[BLUE] * (len(names) - 1) + [BLACK])
     panel.invert_yaxis()
     panel.set_xlabel("standard uncertainty of r [1e-6]")
+
+
+def _impacts_figure(tilts: Sequence[Impacts], mean: float, theory: float) -> "Figure":
+    """Figure of single impacts."""
+    figure = new_figure(7.0, 3.4)
+    panel = figure.subplots()
+    set_grid(panel)
+    _draw_impacts(panel, tilts, mean, theory)
+    return figure
+
+
+def _draw_impacts(panel: "Axes", tilts: Sequence[Impacts], mean: float, theory: float) -> None:
+    """Draw the single impacts, the identified `mean` restitution, and the theoretical one."""
+    for number, tilt in enumerate(tilts):
+        panel.errorbar(
+            tilt.speed,
+            tilt.restitution,
+            tilt.uncertainty,
+            fmt=MARKERS[number % len(MARKERS)],
+            ms=3.5,
+            lw=0.7,
+            color=SERIES[number % len(SERIES)],
+            label=f"{1e3 * tilt.tilt:+.0f} mrad",
+        )
+    panel.axhline(mean, color=BLACK, lw=1.2, label="all tilts")
+    panel.axhline(theory, color=GREY, ls="--", lw=1.2, label="theory")
+    panel.set_ylabel("r of single impacts,\nby amplitudes (k = 2, noise)")
+    panel.set_xlabel("angular velocity at the impact relative to that of a fall from the critical angle")
+    panel.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8)
+
+
+def rocking_sections(campaign: Campaign) -> list[Section]:
+    """Report section: result, tilts and single impacts, as available in the file."""
+    if not campaign.points:
+        return []
+    tilts = [row for row in campaign.points if row["part"] != ALL]
+    combined = next((row for row in campaign.points if row["part"] == ALL), None)
+    parts: list[Part] = []
+    if combined is None:
+        parts.append(Notice("The run ended before its tilts could be combined."))
+    else:
+        parts += [_result_text(combined), _shape_table(combined)]
+    parts.append(_tilts_table([*tilts, combined] if combined else tilts))
+    parts += _budget([*tilts, combined] if combined else tilts)
+    remarks = [f"{row['part']}: {row['remarks']}" for row in campaign.points if row["remarks"]]
+    if remarks:
+        parts += ["Remarks:", Listing(remarks)]
+    if combined and (impacts := _recorded_impacts(campaign, tilts)):
+        caption = "Restitution of every impact from the largest angles before and after it (measured), with the mean"
+        figure = _impacts_figure(impacts, combined["r_exp"], combined["r_th"])
+        parts.append(Picture(figure, f"{caption} and theory.", "Restitution against impact velocity."))
+    return [Section("free-rocking", "Free rocking of the block", parts)]
+
+
+def _result_text(row: Mapping[str, Any]) -> str:
+    ratio = with_uncertainty(row["ratio"], row["ratio_uncertainty"])
+    theory = with_uncertainty(row["r_th"], row["r_th_uncertainty"])
+    by = (
+        "The restitution is that from the amplitudes: the impacts differ so much that the exact nonlinear motion, "
+        "fitted from the release on, gives the worse estimate."
+        if row.get("estimator") == "amplitudes"
+        else "The restitution is that from the exact nonlinear motion, fitted from the release on; the "
+        "amplitudes alone are a check."
+    )
+    return (
+        f"r_exp / r_th = {ratio}, from {row['impacts']} impacts of the stand-alone block on a table clamped to the"
+        f" ground, with r_th = {theory} from the block's sides. Uncertainties are expanded (k = 2). {by}"
+    )
+
+
+def _shape_table(row: Mapping[str, Any]) -> Table:
+    names = (("alpha", "rad", "critical angle"), ("p", "rad_s", "frequency parameter, √(M g R / J)"))
+    rows = [
+        [
+            typeset(name),
+            meaning,
+            with_uncertainty(row[f"{name}_{unit}"], row[f"{name}_uncertainty_{unit}"]),
+            with_uncertainty(row[f"{name}_sides_{unit}"], row[f"{name}_sides_uncertainty_{unit}"]),
+            "rad" if unit == "rad" else "rad/s",
+        ]
+        for name, unit, meaning in names
+    ]
+    rows.append(["r", "change over all speeds", with_uncertainty(row["trend"], row["trend_uncertainty"]), "0", "1"])
+    columns = [
+        Column("symbol", words=True),
+        Column("meaning", words=True),
+        Column("from the motion"),
+        Column("expected"),
+        Column("unit", words=True),
+    ]
+    return Table("Shape of the block, and dependence of r on the speed (k = 2)", columns, rows)
+
+
+def _tilts_table(rows: list[dict[str, Any]]) -> Table:
+    cells = [
+        [
+            str(row["part"]),
+            plain(None if row["tilt_rad"] is None else degrees(row["tilt_rad"])),
+            str(row["impacts"]),
+            with_uncertainty(*(row.get(name, row[other]) for name, other in _MOTION)),
+            with_uncertainty(row["r_amplitudes"], row["r_amplitudes_uncertainty"]),
+            plain(1e6 * row["residual_m"], 3),
+        ]
+        for row in rows
+    ]
+    columns = [
+        Column("part", words=True),
+        Column("tilt", "°"),
+        Column("impacts"),
+        Column("r, motion"),
+        Column("r, amplitudes"),
+        Column("residual", "µm"),
+    ]
+    return Table("Tilts, positive towards the frame (measured, k = 2)", columns, cells)
+
+
+def _budget(rows: list[dict[str, Any]]) -> list[Part]:
+    """Bars of the uncertainty budget of r; absent from older files."""
+    known = [row for row in rows if row.get("uncertainty_parts")]
+    if not known:
+        return []
+    figure = budget_figure(
+        [str(row["part"]) for row in known],
+        [json.loads(row["uncertainty_parts"]) for row in known],
+        [100.0 * row["r_exp_uncertainty"] / row["r_exp"] for row in known],
+        "expanded uncertainty of r",
+    )
+    text = (
+        "Contributions to the uncertainty of r: each bar is the expanded uncertainty (k = 2), divided in "
+        "proportion to the contributions to the variance."
+    )
+    return [Picture(figure, text, "Horizontal bars of the expanded uncertainty, divided by contribution.")]
+
+
+def _recorded_impacts(campaign: Campaign, tilts: list[dict[str, Any]]) -> list[Impacts]:
+    fits = {fit.name.removeprefix(_FIT): fit for fit in campaign.record.fits if fit.name.startswith(_FIT)}
+    found: list[Impacts] = []
+    for row in tilts:
+        if (fit := fits.get(str(row["part"]))) is not None:
+            speed, each, doubt = (
+                fit.columns[name].values for name in ("speed", "restitution", "restitution_uncertainty")
+            )
+            found.append(Impacts(float(row["tilt_rad"]), speed, each, COVERAGE * doubt))
+    return found

@@ -1,9 +1,10 @@
-"""Free vibration on a bench: stiffness and damping of the bare frame, as a file that other runs load.
+"""Identification of stiffness and damping of the bare frame from free vibration, written to a specimen file for other
+runs.
 
-1. The block is taken off. By hand: the table is locked, the frame pulled aside before each decay, and let go.
-2. By a pulse: the table is probed from a drive too small to do harm up to the drift.
-3. Each decay is recorded, fitted, and published; a decay that cannot be used is repeated once.
-4. All decays together make the result.
+1. The block is removed. By hand: the table is locked, and storey 2 is displaced and released for each decay.
+2. By a pulse: the table is probed from a drive too small to cause damage up to the required drift.
+3. Each decay is recorded, fitted, and published; an unusable decay is repeated once.
+4. The result combines all decays.
 """
 
 from collections.abc import Generator, Sequence
@@ -12,37 +13,57 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.analysis.free_decay.decay import Decay, Setting
+from bench.analysis.free_decay.decay import Decay, Setting, released_decay
 from bench.config.model import BenchConfiguration
-from bench.config.specimen_file import write_specimen
-from bench.engine.steps import Handle, Outcome, Say, Step
+from bench.config.result_files import write_specimen
+from bench.datafile.tables import Column, Table
+from bench.engine.steps import OperatorAction, Outcome, Publish, Step
 from bench.events import PointFinished, SpecimenIdentified, Warned
-from bench.preflight.forecast import Forecast
+from bench.figures.style import write_figure
+from bench.preflight.demands import demands_of
+from bench.preflight.margins import Forecast, bounds
+from bench.preflight.motion import laser_demands
 from bench.protocol import Plan, Prepared, Result, Sources
-from bench.record.tables import Column, Table
-from bench.report.style import write_figure
-from drivers.rig import Handwork
-from protocols.common.decays.decays import fit_setting, pulsed_decays, pulsed_duration
+from drivers.rig import OperatorTask
 from protocols.common.decays.findings import check_masses, frame_findings, impossible_values, mass_warning
 from protocols.common.decays.frame import FrameResult, decay_point, frame_result, nonlinear_text
 from protocols.common.decays.parameters import DecayPoint
-from protocols.common.decays.pulse import PlannedPulse, frequencies, plan_pulse, pulse_forecast
-from protocols.common.decays.recording import Pace
+from protocols.common.decays.pulse import (
+    LEAST,
+    SHARE,
+    PlannedPulse,
+    decay_window,
+    frequencies,
+    plan_pulse,
+    pulse_forecast,
+)
+from protocols.common.decays.recording import (
+    WAITING,
+    Pace,
+    fit_setting,
+    pulsed_decays,
+    pulsed_duration,
+    record,
+    repeat_decays,
+)
 from protocols.free_vibration.protocol import FreeVibrationParameters
-from protocols.free_vibration.release import check_pull, hand_forecast, release_duration, released_decays
 from protocols.free_vibration.results import decay_figure, decays_table
-from sim.errors import RockbenchError
+from sim.errors import InvalidInput, RockbenchError
 from sim.identified import Identified
 from sim.parameters import Parameters
 from sim.specimen import Specimen
 
+RELEASE = 6.0
+"""Time within which the frame is released by hand [s]."""
+
+
 LOCK = "Clamp the table to the ground: it must not move, and it is not driven."
 
-STILL_LOCKED = "THE TABLE IS STILL LOCKED: take the clamp off before anything is driven."
+STILL_LOCKED = "THE TABLE IS STILL LOCKED: remove the clamp before the table is driven."
 
 
 class FreeVibration(Prepared[FreeVibrationParameters]):
-    """Refuses a pulse or a pull that this bench cannot make."""
+    """Identification of the frame. Raises InvalidInput for a pulse or displacement that the bench cannot produce."""
 
     def __init__(
         self, parameters: FreeVibrationParameters, configuration: BenchConfiguration, stored: Sources | None = None
@@ -51,10 +72,10 @@ class FreeVibration(Prepared[FreeVibrationParameters]):
         self._specimen = configuration.known_specimen.bare()
         check_masses(parameters, configuration)
         self._pulse: PlannedPulse | None = None
-        """The pulse that sets the frame ringing; None where it is released by hand."""
+        """Excitation pulse; None for a release by hand."""
         if parameters.excitation == "hand":
-            check_pull(parameters, configuration)
-            self._duration = release_duration(parameters, self._specimen)
+            _check_pull(parameters, configuration)
+            self._duration = _release_duration(parameters, self._specimen)
         else:
             self._pulse = plan_pulse(parameters, configuration, self._specimen)
             self._duration = pulsed_duration(parameters, self._pulse.pulse)
@@ -64,14 +85,14 @@ class FreeVibration(Prepared[FreeVibrationParameters]):
 
     @cached_property
     def forecast(self) -> Forecast:
-        self.progress("predicting what the run asks of the bench")
+        self.progress("predicting the demands of the run")
         if self._pulse is None:
-            return hand_forecast(self.configuration, self.parameters.pull, self._duration)
+            return _hand_forecast(self.configuration, self.parameters.pull, self._duration)
         return pulse_forecast(self.configuration, {"bare frame": self._pulse}, self._duration)
 
     @cached_property
     def prediction(self) -> Table:
-        """The assumed modes."""
+        """Modes of the nominal frame."""
         frame = self.configuration.known_specimen.frame
         omega = np.sort(frequencies(self._specimen))
         return {
@@ -87,19 +108,19 @@ class FreeVibration(Prepared[FreeVibrationParameters]):
         p, specimen = self.parameters, self._specimen
         setting, pace = fit_setting(p, self.configuration), Pace(self._duration)
         yield from mass_warning(self.configuration)
-        yield Handle(Handwork.REMOVE_BLOCK, specimen, "Take the spring and the block off the table.")
+        yield OperatorAction(OperatorTask.REMOVE_BLOCK, specimen, "Remove the spring and the block from the table.")
         if self._pulse is None:
             decays = yield from self._locked_decays(specimen, setting, pace)
         else:
             decays = yield from pulsed_decays(p, self.configuration, self._pulse, setting, pace, "free vibration")
         found = self._frame = frame_result(decays, setting.masses, setting.weighed)
         if found.nonlinear.any():
-            yield Say(Warned(nonlinear_text(found)))
-        yield Say(PointFinished(decay_point(found, 0)))
+            yield Publish(Warned(nonlinear_text(found)))
+        yield Publish(PointFinished(decay_point(found, 0)))
         if (left_out := impossible_values(found)) is not None:
-            yield Say(Warned(left_out))
+            yield Publish(Warned(left_out))
         known = self.configuration.identified or Identified()
-        yield Say(SpecimenIdentified(known.extended(*frame_findings(found, known))))
+        yield Publish(SpecimenIdentified(known.extended(*frame_findings(found, known))))
 
     def result(self, points: Sequence[Parameters]) -> Result:
         found, known = self._frame, self.configuration.identified or Identified()
@@ -117,17 +138,66 @@ class FreeVibration(Prepared[FreeVibrationParameters]):
         )
 
     def _locked_decays(self, specimen: Specimen, setting: Setting, pace: Pace) -> Generator[Step, Outcome, list[Decay]]:
-        """Decays on a table that is clamped for them, and not left so where they cannot be used."""
+        """Decays with the table clamped; requests removal of the clamp even if the decays are not usable."""
         self._locked = True
-        yield Handle(Handwork.LOCK_TABLE, specimen, LOCK)
+        yield OperatorAction(OperatorTask.LOCK_TABLE, specimen, LOCK)
         decays: list[Decay] = []
         failed: RockbenchError | None = None
         try:
-            decays = yield from released_decays(self.parameters, specimen, setting, pace)
+            decays = yield from _released_decays(self.parameters, specimen, setting, pace)
         except RockbenchError as error:
             failed = error
-        yield Handle(Handwork.UNLOCK_TABLE, specimen, "Take the clamp off the table.")
+        yield OperatorAction(OperatorTask.UNLOCK_TABLE, specimen, "Remove the clamp from the table.")
         self._locked = False
         if failed is not None:
             raise failed
         return decays
+
+
+def _check_pull(parameters: FreeVibrationParameters, configuration: BenchConfiguration) -> None:
+    """Raise InvalidInput for a displacement beyond the lasers' range or the drift limit, or too small to measure."""
+    # after the release the storeys swing to the other side
+    room = min(
+        SHARE * 0.5 * configuration.limits.drift,
+        *(0.5 * SHARE * min(configuration.limits.laser_range, 1.0) * half for half in configuration.laser_half_ranges),
+    )
+    if not LEAST <= parameters.pull <= room:
+        allowed = f"{LEAST:g} to {room:.3g} m: limits.drift and the lasers' ranges allow no more"
+        raise InvalidInput("pull", parameters.pull, allowed)
+
+
+def _hand_forecast(configuration: BenchConfiguration, pull: float, duration: float) -> Forecast:
+    """Demands of releases by hand: without drive, the storeys swing to either side by up to the initial displacement of
+    storey 2.
+    """
+    swing = 2.0 * pull
+    moved = dict.fromkeys(bounds(configuration), 0.0)
+    moved |= laser_demands(swing, swing, swing, configuration.laser_half_ranges)
+    where = "release of storey 2 on a locked table"
+    return Forecast(demands=demands_of(moved, where, configuration), duration=duration)
+
+
+def _release_duration(parameters: FreeVibrationParameters, specimen: Specimen) -> float:
+    """Expected length of the decays after releases by hand [s]."""
+    return parameters.repeats * (RELEASE + decay_window(parameters, specimen) + WAITING)
+
+
+def _released_decays(
+    parameters: FreeVibrationParameters, specimen: Specimen, setting: Setting, pace: Pace
+) -> Generator[Step, Outcome, list[Decay]]:
+    """Decays after releases by hand. Raises Unmeasurable if none is usable."""
+    pull, window = parameters.pull, decay_window(parameters, specimen)
+    silence = np.zeros(round((RELEASE + window) * setting.sample_rate))
+
+    def once(activity: str) -> Generator[Step, Outcome, Decay]:
+        request = (
+            f"Displace storey 2 by {1e3 * pull:g} mm without touching storey 1, hold it, and release it without a push "
+            "after the recording has begun."
+        )
+        yield OperatorAction(OperatorTask.PULL_FRAME, specimen, request, pull)
+        signals = yield from record(silence, setting.sample_rate, pace, activity)
+        return released_decay(signals, setting)
+
+    how = f"released by hand, {window:.0f} s"
+    planned = RELEASE + window + WAITING
+    return (yield from repeat_decays(parameters, setting, pace, planned, once, "free vibration", how))

@@ -1,25 +1,22 @@
-"""Free vibration of the bare frame: parameters and the protocol."""
+"""Free vibration of the bare frame."""
 
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from pydantic import model_validator
 
-from bench.protocol import Prepared, Protocol, Sources
+from bench.protocol import Protocol, deferred
 from protocols.common.decays.parameters import DecayParameters, DecayPoint
 from sim.errors import InvalidInput
 from sim.parameters import quantity
 
-if TYPE_CHECKING:
-    from bench.config.model import BenchConfiguration
-
 
 class FreeVibrationParameters(DecayParameters):
-    """Free decays of the bare frame, after a pulse of the table or let go by hand on a locked table."""
+    """Free decays of the bare frame after a pulse of the table, or after a release by hand on a locked table."""
 
     excitation: Literal["pulse", "hand"] = quantity(
-        "pulse", "", "what sets the frame in motion: a short motion of the table, or a hand that lets storey 2 go"
+        "pulse", "", "excitation: a short motion of the table (pulse), or release of storey 2 by hand"
     )
-    pull: float = quantity(0.020, "m", "how far storey 2 is held aside before it is let go by hand", gt=0, le=0.2)
+    pull: float = quantity(0.020, "m", "displacement of storey 2 before the release by hand", gt=0, le=0.2)
 
     @model_validator(mode="after")
     def _hands_make_no_pulse_and_pulses_do_not_pull(self) -> "FreeVibrationParameters":
@@ -28,31 +25,24 @@ class FreeVibrationParameters(DecayParameters):
             value, default = getattr(self, item), FreeVibrationParameters.model_fields[item].default
             if value != default:
                 other = "pulse" if self.excitation == "hand" else "hand"
-                raise InvalidInput(item, value, f'it belongs to the excitation "{other}"; leave it out')
+                raise InvalidInput(item, value, f'it applies to the excitation "{other}" only; omit it')
         return self
-
-
-def _prepare(
-    parameters: FreeVibrationParameters, configuration: "BenchConfiguration", stored: "Sources | None"
-) -> Prepared[FreeVibrationParameters]:
-    from protocols.free_vibration.experiment import FreeVibration
-
-    return FreeVibration(parameters, configuration, stored)
 
 
 PROTOCOL = Protocol(
     name="free-vibration",
     summary="Free decay of the bare frame: stiffness and damping with their covariance, given the weighed masses.",
     details=(
-        "A short pulse of the table, or a hand on a locked table, sets the bare frame ringing. The exact response "
-        "to the measured motion of the table is fitted to both lasers, several times. The result, specimen.json, "
-        "is what other runs load in place of what is assumed of the specimen. Without options: five decays after "
-        "pulses, about ten minutes."
+        "A short pulse of the table, or a release by hand on a locked table, excites the bare frame. The exact "
+        "response to the measured motion of the table is fitted to both lasers for each of several decays. Other runs "
+        "load the result, specimen.json, instead of the assumed values. Without options: five decays after pulses, "
+        "about ten minutes."
     ),
     example="--config bench.toml --operator Weber",
     parameters=FreeVibrationParameters,
     point=DecayPoint,
-    prepare=_prepare,
+    prepare=deferred("protocols.free_vibration.experiment:FreeVibration"),
     figures=("free_vibration.png",),
     files=("specimen.json",),
+    report=deferred("protocols.free_vibration.report:vibration_sections"),
 )

@@ -1,8 +1,5 @@
 # pyright: reportUnknownMemberType=false
-"""The results as text for the terminal and as a figure: decay, residual, spectrum, budget, damping over amplitude.
-
-matplotlib's keyword arguments have no types, hence the first line.
-"""
+"""Results as a text table and a figure: decay, residual, spectrum, budget, damping against amplitude."""
 
 from collections.abc import Sequence
 from math import tau
@@ -10,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bench.analysis.free_decay.modal import OMEGA1, XI1
+from bench.analysis.free_decay.response import OMEGA1, XI1
 from bench.analysis.gain import COVERAGE
-from bench.analysis.rounding import plus_minus
-from bench.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION, new_figure, set_grid
-from bench.report.text_table import TextColumn, text_table
+from bench.analysis.uncertainty import plus_minus
+from bench.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION, new_figure, set_grid
+from bench.figures.text_table import TextColumn, text_table
 from protocols.common.decays.frame import FrameResult
 from protocols.common.decays.parameters import DecayPoint
 
@@ -48,7 +45,7 @@ QUANTITIES = ("$k_1$", "$k_2$", r"$\xi_1$", r"$\xi_2$")
 
 
 def decays_table(points: Sequence[DecayPoint], result: FrameResult | None) -> str:
-    """One row for each decay, the last for all of them, with expanded uncertainties (k = 2); then the correlations."""
+    """Table with a row for each decay and one for all, with expanded uncertainties (k = 2); then correlations."""
     if not points:
         return "Nothing was identified."
     table = text_table(_COLUMNS, map(_cells, points))
@@ -56,7 +53,7 @@ def decays_table(points: Sequence[DecayPoint], result: FrameResult | None) -> st
 
 
 def decay_figure(result: FrameResult | None, title: str) -> "Figure":
-    """Six panels; without a result they are empty."""
+    """Figure of six panels, empty without a result."""
     figure = new_figure(9.0, 10.5)
     grid = figure.add_gridspec(4, 2, height_ratios=(3, 2, 2.6, 2.6))
     decay, rest = figure.add_subplot(grid[0, :]), figure.add_subplot(grid[1, :])
@@ -96,14 +93,14 @@ def _notes(point: DecayPoint, result: FrameResult) -> list[str]:
         if point.damping_is_linear
         else "The damping depends on the amplitude: see the figure; the stated value is its mean over the decays."
     )
-    # parts of one decay and of all, by the name of the largest
+    # largest contributions in single decays and in their combination
     largest = {
         name: max(result.parts, key=lambda part: float(result.parts[part][index]))
         for index, name in enumerate(("k1", "k2", "xi1", "xi2"))
     }
     most = ", ".join(f"{name}: {part}" for name, part in largest.items())
     birge = "" if point.birge is None else f" Birge ratio at most {point.birge:.2f}."
-    return ["", f"+- is the expanded uncertainty, k = 2. Largest part of it: {most}.{birge}", damping]
+    return ["", f"+- is the expanded uncertainty, k = 2. Largest contribution: {most}.{birge}", damping]
 
 
 def _draw_decay(decay: "Axes", rest: "Axes", result: FrameResult) -> None:
@@ -117,7 +114,7 @@ def _draw_decay(decay: "Axes", rest: "Axes", result: FrameResult) -> None:
     decay.legend(loc="upper right", fontsize=8)
     for row, colour in enumerate((BLUE, GREEN)):
         rest.plot(time, 1e6 * fit.residual[row], color=colour, linewidth=0.5, label=f"laser {row + 1}")
-    rest.set_ylabel("measured - fitted\n[um]")
+    rest.set_ylabel("measured − fitted\n[µm]")
     rest.set_xlabel("time [s]")
     rest.legend(loc="upper right", fontsize=8, ncols=2)
 
@@ -146,11 +143,11 @@ def _draw_spectrum(panel: "Axes", result: FrameResult) -> None:
         panel.axvline(omega / (2.0 * np.pi), color=BLACK, linewidth=0.7, linestyle=":", label=name)
     panel.legend(loc="lower left", fontsize=7)
     panel.set_xlabel("frequency [Hz]")
-    panel.set_ylabel(r"residual [um/$\sqrt{\mathrm{Hz}}$]")
+    panel.set_ylabel("residual [µm/√Hz]")
 
 
 def _draw_budget(panel: "Axes", result: FrameResult) -> None:
-    """Standard uncertainties relative to the values, part by part, and the whole."""
+    """Draw the relative standard uncertainties, by contribution and in total."""
     width = 0.8 / (len(result.parts) + 1)
     positions = np.arange(len(QUANTITIES))
     relative = np.abs(result.frame.values[: len(QUANTITIES)])

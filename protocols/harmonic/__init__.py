@@ -1,1 +1,1 @@
-"""The harmonic campaign of the paper, section 4.3."""
+"""Harmonic campaign of the paper, section 4.3."""

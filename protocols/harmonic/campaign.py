@@ -1,83 +1,105 @@
-"""The harmonic campaign on a bench (section 4.3 of the paper): its starts, forecast, predicted spectra and result."""
+"""Harmonic campaign (section 4.3 of the paper): checks, forecast, predicted spectra and result."""
 
+import textwrap
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from functools import cached_property
+from math import tau
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bench.analysis.steady import WINDOW
 from bench.config.model import BenchConfiguration
-from bench.control.starts import Start, plan_starts
+from bench.control.starts import OVERSHOOTS, Start, plan_starts
+from bench.datafile.tables import Column, Table, arrays
+from bench.figures.summary import PointLike, plain
+from bench.figures.text_table import TextColumn, text_table
 from bench.prediction.bands import bands
-from bench.preflight.forecast import Forecast
+from bench.preflight.demands import Travel
+from bench.preflight.margins import Forecast
 from bench.progress import counting
 from bench.protocol import Plan, Prepared, Result, Sources
-from bench.record.tables import Column, Table, arrays
+from bench.result_cache import cached
 from protocols.harmonic.forecast import forecast
+from protocols.harmonic.plan import HarmonicPlan
 from protocols.harmonic.protocol import HarmonicParameters
-from protocols.harmonic.reach import Reach
-from protocols.harmonic.sheet import HarmonicSheet
 from sim.errors import InvalidInput
 from sim.gain import gain_spectrum, predict_gain
 from sim.knowledge import SpecimenKnowledge
+from sim.linear import steady_response
 from sim.loading import load_model
 from sim.parameters import Parameters
 from sim.specimen import Specimen
+from sim.steady import NoOrbit, rocking_orbit
 
 STEP = 0.05
-"""Distance of the frequencies of a spectrum [rad/s]."""
+"""Frequency step of a spectrum [rad/s]."""
 
 MARGIN = 1.0
-"""How far a spectrum goes beyond the measured frequencies [rad/s]."""
+"""Extension of a spectrum beyond the measured frequencies [rad/s]."""
 
 
 class HarmonicCampaign(Prepared[HarmonicParameters]):
-    """Refuses what table, lasers or limits of the bench do not allow, as far as closed forms tell."""
+    """Harmonic campaign.
+
+    Raises InvalidInput if closed-form or steady motions exceed table, lasers or limits of the bench. These immediate
+    checks name the parameter; the forecast simulates the whole run, including starts.
+    """
 
     def __init__(
         self, parameters: HarmonicParameters, configuration: BenchConfiguration, stored: Sources | None = None
     ) -> None:
         super().__init__(parameters, configuration, stored)
-        self._reach = Reach(parameters, configuration)
-        self._reach.check()
+        self._specimen = configuration.known_specimen
+        self._amplitude = parameters.amplitude_factor * self._specimen.uplift_acceleration
+        self._motions: dict[tuple[float | None, float], Travel | None] = {}
+        self._check_table()
+        self._check_storeys()
 
     @cached_property
     def starts(self) -> Mapping[tuple[float, float], tuple[Start, ...]]:
-        """The starts that are tried at each stiffness ratio and frequency [rad/s], best first: forecast and plan share
-        them, and nothing is planned while the bench is armed.
+        """Starts to try at each stiffness ratio and frequency [rad/s], best first.
+
+        Forecast and plan share them, so that none has to be planned while the bench is armed.
         """
-        p, configuration = self.parameters, self.configuration
-        specimen = configuration.known_specimen
-        amplitude = p.amplitude_factor * specimen.uplift_acceleration
+        p, amplitude = self.parameters, self._amplitude
         found: dict[tuple[float, float], tuple[Start, ...]] = {}
         load_model(self.progress)
         done = counting(self.progress, "planning the starts")
         for beta in p.beta:
-            coupled = specimen.coupled(beta)
+            coupled = self._specimen.coupled(beta)
             for omega in p.omega:
                 layer = predict_gain(coupled, omega, amplitude).rocking
                 orbit = layer.orbit if layer else None
-                planned = plan_starts(coupled, omega, amplitude, orbit, p.starts, configuration.known)
+                planned = plan_starts(coupled, omega, amplitude, orbit, p.starts, self.configuration.known)
                 found[beta, omega] = tuple(planned)
                 done(len(found), len(p.beta) * len(p.omega))
         return found
 
     @cached_property
     def forecast(self) -> Forecast:
-        return forecast(self.parameters, self.configuration, self.starts, self._reach, self.progress)
+        return forecast(self.parameters, self.configuration, self.starts, self._steady_motion, self.progress)
 
     @cached_property
     def prediction(self) -> Table:
-        return gain_spectra(self.parameters, self.configuration.known_specimen, self.configuration.known_on_table)
+        known = self.configuration.known_on_table
+        inputs = [each.model_dump(mode="json") for each in (self.parameters, self._specimen, known)]
+
+        def spectra() -> dict[str, Any]:
+            table = gain_spectra(self.parameters, self._specimen, known)
+            return {name: [each.values.tolist(), each.unit, each.description] for name, each in table.items()}
+
+        stored = cached("gain_spectra", inputs, spectra)
+        return {name: Column(np.array(values), unit, text) for name, (values, unit, text) in stored.items()}
 
     def plan(self) -> Plan:
-        points = yield from HarmonicSheet(self.parameters, self.configuration, self.starts).plan()
+        points = yield from HarmonicPlan(self.parameters, self.configuration, self.starts).steps()
         return self.result(points)
 
     def result(self, points: Sequence[Parameters]) -> Result:
-        from bench.report.figure import gain_spectra as drawn
-        from bench.report.figure import write_figure
-        from protocols.harmonic.table import points_table
+        from bench.figures.spectra_figure import gain_spectra as drawn
+        from bench.figures.style import write_figure
 
         return Result(
             points=tuple(points),
@@ -85,14 +107,79 @@ class HarmonicCampaign(Prepared[HarmonicParameters]):
             figures={"gain_spectra.png": lambda path: write_figure(path, drawn(points, arrays(self.prediction)))},
         )
 
+    def _steady_motion(self, beta: float | None, omega: float) -> Travel | None:
+        """Peaks of the storeys, as measured by the lasers, and of the drift in the steady state at `omega` [rad/s].
+
+        For the bare frame if `beta` is None, else for the rocking motion; None if no orbit was found.
+        """
+        if (beta, omega) not in self._motions:
+            grounded = self.configuration.laser_reference == "ground"
+            specimen = self._specimen if beta is None else self._specimen.coupled(beta)
+            peaks = _bare_peaks if beta is None else _rocking_peaks
+            self._motions[beta, omega] = peaks(specimen, omega, self._amplitude, grounded)
+        return self._motions[beta, omega]
+
+    def _check_table(self) -> None:
+        """Refuse table motions beyond limits or stroke, including the overshoot of a start (x = a / Omega^2 etc.)."""
+        parameters, configuration = self.parameters, self.configuration
+        limits, stroke = configuration.limits, configuration.half_stroke
+        peak = max(OVERSHOOTS) * self._amplitude
+        if peak > limits.acceleration:
+            allowed = f"a start needs {peak:.3g} m/s2, limits.acceleration = {limits.acceleration:g} m/s2"
+            raise InvalidInput("amplitude_factor", parameters.amplitude_factor, allowed)
+        start = f"a start of {peak:.3g} m/s2"
+        reach, owner = min((stroke, "the shaker's stroke"), (limits.displacement, "limits.displacement"))
+        for omega in parameters.omega:
+            travel, speed = peak / omega**2, peak / omega
+            at = f"{start} at {omega / tau:.2f} Hz"
+            if travel > reach:
+                needs = f"{at} needs {1e3 * travel:.1f} mm, {owner} allows {1e3 * reach:.1f} mm"
+                raise InvalidInput("omega", omega, needs)
+            if speed > limits.velocity:
+                needs = f"{at} needs {speed:.3g} m/s, limits.velocity = {limits.velocity:g} m/s"
+                raise InvalidInput("omega", omega, needs)
+            if parameters.settle_limit < 2 * WINDOW * tau / omega:
+                needs = f"judging a steady state at {omega:g} rad/s takes {2 * WINDOW * tau / omega:.1f} s at least"
+                raise InvalidInput("settle_limit", parameters.settle_limit, needs)
+
+    def _check_storeys(self) -> None:
+        """Refuse frequencies at which a storey would leave its laser's range, bare or on the steady rocking motion."""
+        halves = self.configuration.laser_half_ranges
+        for omega in self.parameters.omega:
+            for beta in (None, *self.parameters.beta):
+                motion = self._steady_motion(beta, omega)
+                peaks = () if motion is None else (motion.storey_1, motion.storey_2)
+                for number, (peak, half) in enumerate(zip(peaks, halves, strict=False), 1):
+                    if peak > half:
+                        what = "the bare frame" if beta is None else f"beta = {beta:g}"
+                        moves = f"storey {number} of {what} moves {1e3 * peak:.0f} mm there"
+                        needs = f"{moves}, its laser sees {1e3 * half:.0f} mm"
+                        raise InvalidInput("omega", omega, needs)
+
+
+def _bare_peaks(specimen: Specimen, omega: float, amplitude: float, grounded: bool) -> Travel:
+    u1, u2 = steady_response(specimen, omega, amplitude)
+    table = -amplitude / omega**2 if grounded else 0.0
+    return Travel(abs(u1 + table), abs(u2 + table), abs(u2 - u1))
+
+
+def _rocking_peaks(specimen: Specimen, omega: float, amplitude: float, grounded: bool) -> Travel | None:
+    try:
+        phase, u1, u2, _ = rocking_orbit(specimen, omega, amplitude).samples(64).T
+    except NoOrbit:
+        return None
+    table = -amplitude / omega**2 * np.sin(phase) if grounded else np.zeros_like(phase)
+    return Travel(*(float(np.abs(each).max()) for each in (u1 + table, u2 + table, u2 - u1)))
+
 
 def gain_spectra(parameters: HarmonicParameters, specimen: Specimen, known: SpecimenKnowledge) -> Table:
-    """alpha_2 against Omega for every spring and layer, at the asked amplitude: one row per layer that exists.
+    """alpha_2 against Omega for every spring at the given amplitude, one row for each existing branch.
 
-    Its band, k = 2 and to first order, is what is left open of the specimen.
+    Its band (k = 2, first order) follows from the uncertainty of the specimen.
     """
     amplitude = parameters.amplitude_factor * specimen.uplift_acceleration
-    omegas = _frequencies(parameters.omega)
+    low, high = max(min(parameters.omega) - MARGIN, STEP), max(parameters.omega) + MARGIN
+    omegas = np.linspace(low, high, round((high - low) / STEP) + 1)
     rows = [
         (prediction.omega, beta, layer, name)
         for beta in parameters.beta
@@ -100,7 +187,7 @@ def gain_spectra(parameters: HarmonicParameters, specimen: Specimen, known: Spec
         for name, layer in prediction.layers.items()
     ]
     if not rows:
-        raise InvalidInput("specimen", "as configured", "no steady motion of it is known at the asked frequencies")
+        raise InvalidInput("specimen", "as configured", "no steady motion exists at the frequencies of the campaign")
     omega, beta, layers, names = (list(column) for column in zip(*rows, strict=True))
     alpha_2 = np.array([layer.alpha_2 for layer in layers])
     band = bands([layer.orbit for layer in layers], alpha_2, known)
@@ -109,14 +196,91 @@ def gain_spectra(parameters: HarmonicParameters, specimen: Specimen, known: Spec
         "beta": Column(np.array(beta), "1", "stiffness ratio of the coupling spring"),
         "alpha_1": Column(np.array([layer.alpha_1 for layer in layers]), "1", "gain of the peak of u1"),
         "alpha_2": Column(alpha_2, "1", "gain of the peak drift"),
-        "alpha_2_uncertainty": Column(band.uncertainty, "1", "expanded uncertainty of alpha_2 (k = 2), specimen's"),
-        "alpha_2_low": Column(band.low, "1", "where the band of alpha_2 begins"),
-        "alpha_2_high": Column(band.high, "1", "where the band of alpha_2 ends"),
+        "alpha_2_uncertainty": Column(
+            band.uncertainty, "1", "expanded uncertainty of alpha_2 (k = 2) from that of the specimen"
+        ),
+        "alpha_2_low": Column(band.low, "1", "lower bound of the band of alpha_2"),
+        "alpha_2_high": Column(band.high, "1", "upper bound of the band of alpha_2"),
         "stable": Column(np.array([layer.stable for layer in layers]), "1", "whether the motion is stable"),
-        "layer": Column(np.array(names), "", "rocking, or resting where the block never lifts"),
+        "layer": Column(np.array(names), "", "branch: rocking, or resting if the block never lifts"),
     }
 
 
-def _frequencies(measured: tuple[float, ...]) -> NDArray[np.float64]:
-    low, high = max(min(measured) - MARGIN, STEP), max(measured) + MARGIN
-    return np.linspace(low, high, round((high - low) / STEP) + 1)
+WIDTH = 118
+ABSENT = "-"
+
+_COLUMNS = (
+    TextColumn("beta", "1"),
+    TextColumn("omega", "rad/s"),
+    TextColumn("status", words=True),
+    TextColumn("layer", words=True),
+    TextColumn("alpha_2", "1"),
+    TextColumn("U (k=2)", "1"),
+    TextColumn("predicted", "1"),
+    TextColumn("diff.", "%"),
+    TextColumn("orbit", words=True),
+    TextColumn("starts", "1"),
+    TextColumn("chance", "1"),
+    TextColumn("settled", "s"),
+    TextColumn("agrees", words=True),
+)
+
+
+def points_table(points: Sequence[PointLike]) -> str:
+    """A table of harmonic points, at most 118 columns wide, followed by remarks on single points. Absent values are
+    "-"; a disagreement with the prediction is marked "NO <" in the last column.
+    """
+    rows = plain(points)
+    return "\n".join([text_table(_COLUMNS, map(_cells, rows)), *_remarks(rows)])
+
+
+def _cells(row: dict[str, Any]) -> list[str]:
+    def number(name: str, form: str) -> str:
+        value = row.get(name)
+        return ABSENT if value is None else format(value, form)
+
+    def verdict(name: str, yes: str, no: str) -> str:
+        value = row.get(name)
+        return ABSENT if value is None else yes if value else no
+
+    measured, predicted = row.get("alpha_2"), row.get("alpha_2_predicted")
+    # a motion that is not steady is not on the predicted orbit
+    compared = row.get("status") in ("steady", "resting")
+    return [
+        number("beta", ".3f"),
+        number("omega_rad_s", ".3f"),
+        str(row.get("status") or ABSENT),
+        str(row.get("layer") or ABSENT),
+        number("alpha_2", ".4f"),
+        number("alpha_2_uncertainty", ".4f"),
+        number("alpha_2_predicted", ".4f"),
+        f"{100.0 * (measured / predicted - 1.0):+.2f}" if compared and measured is not None and predicted else ABSENT,
+        verdict("predicted_stable", "stable", "unstable"),
+        number("starts_tried", "d"),
+        number("start_chance", ".2f"),
+        number("settle_time_s", ".1f"),
+        verdict("agrees", "yes", "NO <"),
+    ]
+
+
+def _remarks(rows: list[dict[str, Any]]) -> list[str]:
+    compared = [row["agrees"] for row in rows if row.get("agrees") is not None]
+    disagreeing = len(compared) - sum(compared)
+    lines = ["", f"{len(compared)} of {len(rows)} points compared with the prediction, {disagreeing} disagree."]
+    if orbits := [row["orbit_agrees"] for row in rows if row.get("orbit_agrees") is not None]:
+        differing = len(orbits) - sum(orbits)
+        lines.append(f"{len(orbits)} more compared by the orbit about which the motion turns, {differing} disagree.")
+    known = [row for row in rows if row.get("dominating") and row.get("alpha_2")]
+    if known:
+        shares = [100.0 * row["alpha_2_uncertainty"] / row["alpha_2"] for row in known]
+        most = Counter(str(row["dominating"]) for row in known).most_common()
+        named = ", ".join(f"{name} ({number})" for name, number in most)
+        text = (
+            f"alpha_2 is uncertain by {min(shares):.2f} to {max(shares):.2f} % (k = 2); largest contributions: {named}."
+        )
+        lines += textwrap.wrap(text, WIDTH)
+    for row in rows:
+        if row.get("reason"):
+            head = f"omega {row['omega_rad_s']:g} rad/s, beta {row['beta']:g}: "
+            lines += textwrap.wrap(head + str(row["reason"]), WIDTH, subsequent_indent="    ")
+    return lines

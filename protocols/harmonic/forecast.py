@@ -1,48 +1,171 @@
-"""Demands of a harmonic campaign: predicted for every stage, over the uncertainty of the specimen."""
+"""Stages of a harmonic campaign, and their demands over the uncertainty of the specimen."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import astuple, dataclass, replace
+from math import tau
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bench.config.model import BenchConfiguration
-from bench.control.legs import program
+from bench.control.oscillator import Leg, program
 from bench.control.starts import CATCH_ANGLE, DRIVE, SEED, Start
-from bench.preflight.asked import UNKNOWN_SHAKER, Asked, demand
-from bench.preflight.bounds import bounds
-from bench.preflight.forecast import Forecast
-from bench.preflight.load import load
-from bench.preflight.motion import Travel, travel
-from bench.preflight.response import TableResponse, response_of
+from bench.preflight.demands import (
+    UNKNOWN_SHAKER,
+    StageDemands,
+    TableResponse,
+    Travel,
+    demand,
+    load,
+    response_of,
+    stage_travels,
+)
+from bench.preflight.margins import Forecast, Stage, bounds
 from bench.progress import Progress, counting, silent
+from bench.result_cache import cached
+from protocols.common.calibrate import CHANGE_TIME, MEASURED, PROBE, SETTLING, harmonic_frequencies
+from protocols.harmonic.plan import BARE_CHANGE, Pace, spring_calibration
 from protocols.harmonic.protocol import HarmonicParameters
-from protocols.harmonic.reach import Reach
-from protocols.harmonic.sheet import Pace
-from protocols.harmonic.stages import Trial, payload_of, trials
+from sim.channel import STOREYS
 from sim.specimen import Specimen
 from sim.sweep import Done, in_threads
+
+HOLD, BARE_HOLD = 20.0, 40.0
+"""Simulated time of the last sine of a stage [s], longer than the transients of a rocking block."""
+
+PROBES = (PROBE, 10.0 * PROBE)
+"""Amplitudes [V] of the probes of an unknown table."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A simulated stage: the segments `before` it, which are not evaluated, the stage, and its last sine, held.
+
+    The sine is simulated for `hold` [s] and may last `longest` [s]. `beta` is the stiffness ratio with which the block
+    rocks, None if it rests. `steady` is the frequency [rad/s] whose steady state is also evaluated.
+    """
+
+    stage: Stage
+    specimen: Specimen
+    before: tuple[Leg, ...] = ()
+    hold: float = 0.0
+    longest: float = 0.0
+    beta: float | None = None
+    steady: float | None = None
+
+    @property
+    def legs(self) -> tuple[Leg, ...]:
+        """All simulated segments."""
+        legs = (*self.before, *self.stage.legs)
+        return (*legs, replace(legs[-1], duration=self.hold)) if self.hold > 0.0 else legs
+
+    @property
+    def begin(self) -> float:
+        """Start of the evaluation [s]."""
+        return sum(leg.duration for leg in self.before)
+
+
+def trials(
+    parameters: HarmonicParameters,
+    configuration: BenchConfiguration,
+    response: TableResponse | None,
+    starts: Mapping[tuple[float, float], Sequence[Start]],
+) -> Iterator[Trial]:
+    """Every stage that the plan may reach, with each of the planned `starts` (by stiffness and frequency).
+
+    Without a `response` of the table, the calibration of the bare frame is assumed to reach its level exactly.
+    """
+    specimen = configuration.known_specimen
+    yield _bare_calibration(parameters, specimen, response)
+    yield from _bare_tests(parameters, specimen)
+    longest = _longest_dwell(parameters)
+    for beta in parameters.beta:
+        coupled = specimen.coupled(beta)
+        plans = {omega: starts[beta, omega] for omega in parameters.omega}
+        wanted, level = spring_calibration(parameters, coupled, [start for each in plans.values() for start in each])
+        legs = _calibration_legs([(omega, level) for omega in wanted])
+        yield Trial(Stage(f"calibration of the drive with beta = {beta:g}", legs), coupled)
+        for omega, planned in plans.items():
+            for number, start in enumerate(planned, 1):
+                name = f"start {number} of beta = {beta:g} at omega = {omega:g} rad/s"
+                stage = Stage(name, start.legs, start.chance)
+                yield Trial(stage, coupled, hold=HOLD, longest=longest, beta=beta, steady=omega)
+
+
+def _bare_calibration(parameters: HarmonicParameters, specimen: Specimen, response: TableResponse | None) -> Trial:
+    """Calibration of the bare frame: each drive follows from the response at the previous frequency, the first one from
+    that of the probe.
+
+    Friction reduces the response to a small probe considerably, so that the resulting drive moves the table more than
+    intended.
+    """
+    level = parameters.calibration_level * parameters.amplitude_factor * specimen.uplift_acceleration
+    first = parameters.omega[0]
+    wanted = sorted({*parameters.omega, *harmonic_frequencies(max(parameters.omega), parameters.harmonics)})
+    legs: list[Leg] = []
+    if response is None:
+        levels = [(omega, level) for omega in wanted]
+    else:
+        gains = response.gain(np.array([first, *wanted]), specimen.bare().mass)
+        for volts in PROBES:
+            legs += [*_measured(first, volts * float(gains[0])), Leg(CHANGE_TIME, 0.0, first)]
+        probed = gains[0] * (1.0 - response.friction / PROBES[-1])
+        before = [probed, *gains[1:-1]]
+        levels = [(w, level * float(gain / by)) for w, gain, by in zip(wanted, gains[1:], before, strict=True)]
+    for omega, moved in levels:
+        legs += [*_measured(omega, moved), Leg(CHANGE_TIME, 0.0, omega)]
+    legs.append(Leg(CHANGE_TIME, 0.0, wanted[-1]))
+    return Trial(Stage("calibration of the drive with the bare frame", tuple(legs)), specimen.bare())
+
+
+def _bare_tests(parameters: HarmonicParameters, specimen: Specimen) -> Iterator[Trial]:
+    amplitude = parameters.amplitude_factor * specimen.uplift_acceleration
+    before: tuple[Leg, ...] = ()
+    for omega in parameters.omega:
+        leg = Leg(BARE_CHANGE if before else parameters.ramp_time, amplitude, omega)
+        stage = Stage(f"the bare frame at omega = {omega:g} rad/s", (leg,))
+        longest = _longest_dwell(parameters)
+        yield Trial(stage, specimen.bare(), before, hold=BARE_HOLD, longest=longest, steady=omega)
+        # the next stage starts from this motion, which the hold leaves as steady as the damping allows
+        before = (Leg(parameters.ramp_time, amplitude, omega), replace(leg, duration=BARE_HOLD))
+
+
+def _calibration_legs(levels: Sequence[tuple[float, float]]) -> tuple[Leg, ...]:
+    """Segments of the calibration through all (frequency [rad/s], level [m/s2]), ending at zero level."""
+    legs = [leg for omega, level in levels for leg in _measured(omega, level)]
+    return (*legs, Leg(CHANGE_TIME, 0.0, levels[-1][0]))
+
+
+def _measured(omega: float, level: float) -> tuple[Leg, Leg]:
+    return Leg(CHANGE_TIME, level, omega), Leg((SETTLING + MEASURED) * tau / omega, level, omega)
+
+
+def _longest_dwell(parameters: HarmonicParameters) -> float:
+    return parameters.settle_limit + parameters.measured_cycles * tau / min(parameters.omega)
+
 
 Array = NDArray[np.float64]
 
 DRAWS = 16
-"""Specimens that are drawn besides the assumed one: their 95 % lies close below the worst of them."""
+"""Number of specimens drawn in addition to the nominal one; their 95 % quantile is close to the maximum."""
 
 RIPPLE = 0.03
-"""Share by which every quantity of the table and its drive may exceed the asked one: noise, and what a calibration at
-half the level leaves open of the friction."""
+"""Allowance of the demands of table and drive for noise, and for friction that a calibration at half the level does not
+detect.
+"""
 
 IMPACTS = 0.15
-"""The same where the block rocks, for what its impacts raise until the table's harmonics are cancelled."""
+"""Allowance with a rocking block, for quantities increased by its impacts until the table's harmonics are cancelled."""
 
 OFF_MIDDLE = 0.015
-"""Share of half its range by which a storey may rest off the laser's middle."""
+"""Largest offset of a storey at rest from the middle of the laser's range, relative to half the range."""
 
 _RAISED = ("acceleration", "force", "current", "drive_slew")
-"""Quantities that impacts raise: what is fast."""
+"""Quantities increased by impacts."""
 
 _UNKNOWN = {
-    "drive_voltage": "nothing is known of this table: give table_model",
-    "drive_slew": "nothing is known of this table: give table_model",
+    "drive_voltage": "unknown table: give table_model",
+    "drive_slew": "unknown table: give table_model",
     **UNKNOWN_SHAKER,
 }
 
@@ -51,13 +174,14 @@ def forecast(
     parameters: HarmonicParameters,
     configuration: BenchConfiguration,
     starts: Mapping[tuple[float, float], Sequence[Start]],
-    reach: Reach,
+    steady: Callable[[float | None, float], Travel | None],
     progress: Progress = silent,
 ) -> Forecast:
-    """The campaign's stages with the demands of them all.
+    """Stages of the campaign with their demands.
 
-    A drawn specimen is the same one throughout the campaign, and so is how far its drive is off.
-    Raises InvalidInput when a table model is named that cannot be read or does not reach far enough.
+    `steady` returns the steady motion at a stiffness and frequency [rad/s]. Each drawn specimen, and the error of its
+    drive, is kept throughout the campaign. Raises InvalidInput for a table model that cannot be read or does not cover
+    the frequencies.
     """
     response = response_of(configuration)
     found = list(trials(parameters, configuration, response, starts))
@@ -65,7 +189,14 @@ def forecast(
     simulating = counting(progress, f"simulating every stage with {1 + DRAWS} specimens")
     moved = _travels(found, factors, configuration, simulating)
     asked = [
-        _asked(trial, travels, factors, reach, configuration, response)
+        _asked(
+            trial,
+            travels,
+            None if trial.steady is None else steady(trial.beta, trial.steady),
+            factors,
+            configuration,
+            response,
+        )
         for trial, travels in zip(found, moved, strict=True)
     ]
     return Forecast(
@@ -78,38 +209,43 @@ def forecast(
 def _travels(
     found: Sequence[Trial], factors: Array, configuration: BenchConfiguration, done: Done
 ) -> list[list[Travel]]:
-    """Motion of the specimen in each trial, as assumed and as drawn, on all processors."""
+    """Motions of the nominal and the drawn specimens in each trial, computed on all processors."""
     drawn: dict[Specimen, list[Specimen]] = {}
     for trial in found:
         if trial.specimen not in drawn:
             others = configuration.known.draws(trial.specimen, DRAWS, np.random.default_rng(SEED))
             drawn[trial.specimen] = [trial.specimen, *others]
+    reference = configuration.laser_reference
+    models = {specimen: [each.model_dump(mode="json") for each in drawn[specimen]] for specimen in drawn}
 
-    def one(run: tuple[Trial, int]) -> Travel:
-        trial, i = run
-        legs = [type(leg)(leg.duration, float(factors[i]) * leg.amplitude, leg.omega) for leg in trial.legs]
-        specimen = drawn[trial.specimen][i]
-        return travel(specimen, program(legs), trial.begin, configuration.laser_reference, CATCH_ANGLE)
+    def one(trial: Trial) -> list[Travel]:
+        def simulated() -> list[list[float]]:
+            programs = [program(legs) for legs in driven]
+            moved = stage_travels(drawn[trial.specimen], programs, trial.begin, reference, CATCH_ANGLE)
+            return [[*astuple(each)] for each in moved]
 
-    n = len(factors)
-    every = in_threads(one, [(trial, i) for trial in found for i in range(n)], done)
-    return [every[k * n : (k + 1) * n] for k in range(len(found))]
+        driven = [[replace(leg, amplitude=float(factor) * leg.amplitude) for leg in trial.legs] for factor in factors]
+        legs = [[astuple(leg) for leg in each] for each in driven]
+        inputs = [models[trial.specimen], legs, trial.begin, reference, CATCH_ANGLE]
+        return [Travel(*each) for each in cached("travel", inputs, simulated)]
+
+    return in_threads(one, found, done)
 
 
 def _asked(
     trial: Trial,
     travels: Sequence[Travel],
+    steady: Travel | None,
     factors: Array,
-    reach: Reach,
     configuration: BenchConfiguration,
     response: TableResponse | None,
-) -> Asked:
+) -> StageDemands:
     loads = load(
         program(trial.legs),
         trial.begin,
         trial.longest,
-        payload=payload_of(trial.specimen),
-        mover=configuration.mover,
+        payload=trial.specimen.mass,
+        shaker=configuration.shaker_model,
         response=response,
         heating_time=configuration.limits.heating_time,
     )
@@ -118,13 +254,12 @@ def _asked(
         quantity: factors * value * (1.0 + (IMPACTS if quantity in raised else RIPPLE))
         for quantity, value in loads.items()
     }
-    # a simulation of limited length may not have reached the steady state
-    steady = None if trial.steady is None else reach.steady(trial.beta, trial.steady)
+    # a simulation of limited length may not reach the steady state
     steady = steady or Travel(0.0, 0.0, 0.0)
-    halves = [0.5 * whole for whole in configuration.laser_ranges]
+    halves = configuration.laser_half_ranges
     values |= {
-        "laser_1": np.array([max(each.storey_1, steady.storey_1) for each in travels]) / halves[0] + OFF_MIDDLE,
-        "laser_2": np.array([max(each.storey_2, steady.storey_2) for each in travels]) / halves[1] + OFF_MIDDLE,
+        STOREYS[0]: np.array([max(each.storey_1, steady.storey_1) for each in travels]) / halves[0] + OFF_MIDDLE,
+        STOREYS[1]: np.array([max(each.storey_2, steady.storey_2) for each in travels]) / halves[1] + OFF_MIDDLE,
         "drift": np.array([max(each.drift, steady.drift) for each in travels]),
     }
-    return Asked(trial.stage.name, values)
+    return StageDemands(trial.stage.name, values)

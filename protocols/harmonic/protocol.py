@@ -1,17 +1,12 @@
-"""The harmonic protocol: what it asks for, the result of a point, and the object that others find."""
+"""Harmonic protocol: measured against predicted gain in steady sine tests."""
 
 from enum import StrEnum
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, field_validator
 
-from bench.protocol import Prepared, Protocol, Reanalysis, Sources
+from bench.protocol import Protocol, Reanalysis, deferred
 from sim.parameters import COUPLING, Parameters, each_once, quantity
-
-if TYPE_CHECKING:
-    from bench.config.model import BenchConfiguration
-    from bench.protocol import Follower
-    from bench.record.reader import Record
 
 Frequency = Annotated[float, Field(gt=0, le=40)]
 Stiffness = Annotated[float, Field(gt=0, le=100)]
@@ -30,7 +25,7 @@ class HarmonicParameters(Parameters):
     _each_once = field_validator("omega", "beta")(each_once)
 
     amplitude_factor: float = quantity(
-        1.01, "1", "amplitude of the table acceleration over the uplift acceleration g/lambda", ge=0.1, le=5
+        1.01, "1", "amplitude of the table acceleration, relative to the uplift acceleration g/lambda", ge=0.1, le=5
     )
     amplitude_tolerance: float = quantity(
         0.001, "1", "largest relative error of the measured table amplitude before a point is measured", gt=0, le=0.1
@@ -38,30 +33,32 @@ class HarmonicParameters(Parameters):
     phase_tolerance: float = quantity(
         0.00175,
         "rad",
-        "largest error of the table's phase against the oscillator before a point is measured",
+        "largest error of the table's phase relative to the oscillator before a point is measured",
         gt=0,
         le=1,
     )
     distortion_tolerance: float = quantity(
-        0.01, "1", "largest rms of the table's harmonics over its fundamental before a point is measured", gt=0, le=1
+        0.01,
+        "1",
+        "largest rms of the table's harmonics relative to its fundamental before a point is measured",
+        gt=0,
+        le=1,
     )
-    harmonics: int = quantity(
-        10, "1", "highest harmonic of the table's acceleration that is cancelled; 1 for none", ge=1, le=10
-    )
+    harmonics: int = quantity(10, "1", "highest cancelled harmonic of the table's acceleration; 1: none", ge=1, le=10)
     calibration_level: float = quantity(
         0.5, "1", "level of the drive calibration relative to the test; below 1 so that the block rests", gt=0, lt=1
     )
     ramp_time: float = quantity(8.0, "s", "length of the ramp that starts the bare frame", gt=0, le=120)
     settle_tolerance: float = quantity(
-        0.002, "1", "relative change still expected when a channel counts as steady", gt=0, le=0.1
+        0.002, "1", "remaining relative change at which a channel counts as steady", gt=0, le=0.1
     )
     settle_limit: float = quantity(240.0, "s", "longest wait for the steady state", gt=0, le=3600)
-    measured_cycles: int = quantity(24, "1", "cycles over which a steady point is measured", ge=4, le=1000)
-    starts: int = quantity(6, "1", "starts that are tried before a point is given up", ge=1, le=32)
+    measured_cycles: int = quantity(24, "1", "measured cycles of a steady point", ge=4, le=1000)
+    starts: int = quantity(6, "1", "number of starts before a point is abandoned", ge=1, le=32)
 
 
 class PointStatus(StrEnum):
-    """How the coupled system moved at a point."""
+    """Motion of the coupled system at a point."""
 
     STEADY = "steady"
     MODULATED = "modulated"
@@ -72,82 +69,95 @@ class PointStatus(StrEnum):
 class HarmonicPoint(Parameters):
     """Measured and predicted gain at one frequency and stiffness.
 
-    What was not measured or does not exist is absent (None), never zero. Uncertainties are expanded (k = 2).
-    The prediction is for the layer on which the point lies, at the achieved amplitudes.
+    Values that were not measured or do not exist are None, never zero. Uncertainties are expanded (k = 2). The
+    prediction is for the branch of the point, at the achieved amplitudes.
     """
 
     omega_rad_s: float = quantity(..., "rad/s", "circular frequency of the base motion")
     beta: float = quantity(..., "1", "stiffness ratio of the coupling spring")
-    status: PointStatus = quantity(..., "", "how the coupled system moved")
-    layer: str = quantity(..., "", "steady state that the prediction is for: rocking or resting")
+    status: PointStatus = quantity(..., "", "motion of the coupled system")
+    layer: str = quantity(..., "", "predicted branch: rocking or resting")
     alpha_2: float | None = quantity(None, "1", "measured gain of the peak drift, coupled over bare")
     alpha_2_uncertainty: float | None = quantity(None, "1", "expanded uncertainty of alpha_2 (k = 2)")
-    dominating: str = quantity("", "", "the largest part of the uncertainty of alpha_2")
-    uncertainty_parts: str = quantity("", "", "standard uncertainty of alpha_2 by each part, largest first, as JSON")
+    alpha_2_least: float | None = quantity(
+        None, "1", "gain of the smallest peak of a cycle, for an unsteady motion; alpha_2 is that of the largest"
+    )
+    alpha_2_mean: float | None = quantity(None, "1", "gain of the mean peak of a cycle, for an unsteady motion")
+    alpha_2_orbit: float | None = quantity(
+        None, "1", "gain of the mean cycle of a motion that turns about a periodic one: that of the orbit itself"
+    )
+    alpha_2_orbit_uncertainty: float | None = quantity(None, "1", "expanded uncertainty of alpha_2_orbit (k = 2)")
+    orbit_agrees: bool | None = quantity(
+        None, "1", "whether alpha_2_orbit and its prediction differ by no more than their combined uncertainty"
+    )
+    repeats_cycles: int | None = quantity(
+        None, "1", "number of cycles after which an unsteady motion repeats, up to 24; absent: it does not repeat"
+    )
+    multiplier: float | None = quantity(
+        None,
+        "1",
+        "measured modulus of the slowest multiplier of an unsteady motion; below 1: it becomes periodic",
+    )
+    multiplier_uncertainty: float | None = quantity(None, "1", "expanded uncertainty of the multiplier (k = 2)")
+    dominating: str = quantity("", "", "largest contribution to the uncertainty of alpha_2")
+    uncertainty_parts: str = quantity("", "", "standard uncertainty of alpha_2 by contribution, largest first, as JSON")
     alpha_2_predicted: float | None = quantity(None, "1", "predicted gain at the achieved amplitude")
     alpha_2_predicted_uncertainty: float | None = quantity(
-        None, "1", "expanded uncertainty of the predicted gain (k = 2): what is left open of the specimen"
+        None, "1", "expanded uncertainty of the predicted gain (k = 2), from that of the specimen"
     )
-    predicted_stable: bool | None = quantity(None, "1", "whether the predicted orbit is stable")
-    agrees: bool | None = quantity(None, "1", "difference within the uncertainties of both, root of their squares")
+    predicted_stable: bool | None = quantity(None, "1", "whether the predicted orbit is stable on fixed ground")
+    table_multiplier: float | None = quantity(
+        None,
+        "1",
+        "predicted modulus of the slowest multiplier on the simulated table, where the motion or the orbit on fixed "
+        "ground is not steady",
+    )
+    agrees: bool | None = quantity(
+        None, "1", "whether the difference is within the combined uncertainty of both (root sum of squares)"
+    )
     drift_peak_m: float | None = quantity(None, "m", "peak drift of the coupled frame")
     bare_drift_peak_m: float | None = quantity(None, "m", "peak drift of the bare frame")
     amplitude_m_s2: float | None = quantity(None, "m/s2", "achieved amplitude of the table, coupled")
     bare_amplitude_m_s2: float | None = quantity(None, "m/s2", "achieved amplitude of the table, bare")
     amplitude_error: float | None = quantity(None, "1", "relative error of the table's amplitude, coupled")
-    phase_error_rad: float | None = quantity(None, "rad", "how far the table is ahead of the oscillator, coupled")
+    phase_error_rad: float | None = quantity(None, "rad", "phase lead of the table relative to the oscillator, coupled")
     table_harmonics: float | None = quantity(
-        None, "1", "total harmonic distortion: rms of the table's harmonics 2 to 10 over its fundamental, coupled"
+        None,
+        "1",
+        "total harmonic distortion: rms of the table's harmonics 2 to 10 relative to its fundamental, coupled",
     )
-    table_updates: int = quantity(0, "1", "corrections of the drive until the table moved as asked, coupled")
+    table_updates: int = quantity(
+        0, "1", "number of drive corrections until the table's motion met the tolerances, coupled"
+    )
     starts_tried: int = quantity(0, "1", "starts tried")
     start_chance: float | None = quantity(
-        None, "1", "estimated chance of success of the start that was measured, or of the best where all fell"
+        None, "1", "estimated probability of success of the measured start, or of the best if the block fell in all"
     )
-    cycles_measured: int = quantity(0, "1", "cycles over which the peaks were measured")
-    settle_time_s: float | None = quantity(None, "s", "time from the dwell's begin to the steady state")
-    reason: str = quantity("", "", "why the point is not steady, or what was noticed")
+    cycles_measured: int = quantity(0, "1", "number of cycles evaluated for the peaks")
+    settle_time_s: float | None = quantity(None, "s", "time from the start of the dwell to the steady state")
+    reason: str = quantity("", "", "reason why the point is not steady, or remarks")
 
 
 class HarmonicSettings(Parameters):
-    """What can be chosen after the measurement; the defaults are what the campaign itself does."""
+    """Settings of a re-analysis; the defaults are those of the campaign."""
 
     measured_cycles: int | None = quantity(
         None,
         "1",
-        "cycles at the end of each dwell that are used, back to the last change of its drive; absent: as measured",
+        "used cycles at the end of each dwell, after the last change of its drive; absent: as measured",
         ge=4,
         le=10000,
     )
-    # bench.analysis.cycles.HARMONICS, which a list of flags does not load
-    harmonics: int = quantity(10, "1", "harmonics that are fitted to each cycle", ge=1, le=60)
+    # bench.analysis.cycles.HARMONICS, not imported, to keep the listing of flags fast
+    harmonics: int = quantity(10, "1", "number of harmonics fitted to each cycle", ge=1, le=60)
     peak: Literal["judged", "mean", "largest"] = quantity(
         "judged",
         "",
-        "peak of the mean cycle, largest peak met, or judged: the first where the motion is steady, else the second",
+        "mean: peak of the mean cycle; largest: largest single peak; judged: mean for a steady motion, else largest",
     )
     settle_tolerance: float | None = quantity(
-        None, "1", "relative change still expected when a channel counts as steady; absent: as measured", gt=0, le=0.1
+        None, "1", "remaining relative change at which a channel counts as steady; absent: as measured", gt=0, le=0.1
     )
-
-
-def _prepare(
-    parameters: HarmonicParameters, configuration: "BenchConfiguration", stored: "Sources | None"
-) -> Prepared[HarmonicParameters]:
-    from protocols.harmonic.campaign import HarmonicCampaign
-
-    return HarmonicCampaign(parameters, configuration, stored)
-
-
-def _follower(
-    settings: HarmonicSettings,
-    parameters: HarmonicParameters,
-    configuration: "BenchConfiguration",
-    record: "Record",
-) -> "Follower":
-    from protocols.harmonic.reanalysis import HarmonicFollower
-
-    return HarmonicFollower(settings, parameters, configuration, record.sample_rate)
 
 
 PROTOCOL = Protocol(
@@ -161,7 +171,8 @@ PROTOCOL = Protocol(
     example="--omega 14:18:5 --beta 0.25 0.64 --yes",
     parameters=HarmonicParameters,
     point=HarmonicPoint,
-    prepare=_prepare,
+    prepare=deferred("protocols.harmonic.campaign:HarmonicCampaign"),
     figures=("gain_spectra.png",),
-    reanalysis=Reanalysis(HarmonicSettings, _follower),
+    reanalysis=Reanalysis(HarmonicSettings, deferred("protocols.harmonic.reanalysis:HarmonicFollower")),
+    report=deferred("protocols.harmonic.report:harmonic_sections"),
 )

@@ -1,4 +1,4 @@
-"""Every point of a recorded harmonic campaign anew: other cycles, harmonics, peaks, accuracies, another specimen."""
+"""Re-analysis of a recorded harmonic campaign with other cycles, harmonics, peaks, accuracies or another specimen."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -7,24 +7,24 @@ from math import tau
 import numpy as np
 
 from bench.analysis.cycles import Cycle, CycleAnalyser, mean_amplitude
-from bench.analysis.gain import SteadyPeak, modulated_peak, steady_peak
+from bench.analysis.free_motion import CYCLES, KEPT, free_motion, orbit_peak
+from bench.analysis.gain import modulated_peak, steady_peak
 from bench.analysis.signals import ACCELERATION, SIGNALS
-from bench.analysis.steady import Steadiness, SteadyDetector
+from bench.analysis.steady import SteadyDetector
 from bench.config.model import BenchConfiguration
-from bench.control.answer import Answer, Sine
-from bench.control.calibration import DriveCalibration
-from bench.engine.steps import Arm, Calibrate, Dwell, Follow, Measured, Outcome, Say, Step, Trim
+from bench.control.oscillator import DriveCalibration
+from bench.control.sine import Sine, SineResponse
+from bench.datafile.reader import DataFile
+from bench.engine.steps import Arm, Calibrate, Dwell, Measured, Outcome, Publish, SetHarmonics, Step, Sweep
 from bench.events import Acquired, Estimate, Event, PointFinished
-from bench.prediction.model_uncertainty import expanded_uncertainty
-from protocols.harmonic.judge import judge
+from protocols.harmonic.measurement import JUDGED, LASERS, REMAINING, TRANSIENT, Settled, judge, predicted_fields
 from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, HarmonicSettings, PointStatus
-from protocols.harmonic.settle import JUDGED, KIN, LEFT, TURNING, Settled
 from sim.gain import predict_gain
 
 
 @dataclass
 class _Series:
-    """The dwells at one frequency between two changes of it. `recent` are the cycles since the drive last changed."""
+    """Consecutive dwells at one frequency. `recent` are the cycles since the last change of the drive."""
 
     sine: Sine
     analyser: CycleAnalyser
@@ -39,22 +39,22 @@ class _Series:
 
 
 class HarmonicFollower:
-    """A `bench.replaying.analysis.Follower` of the lab sheet."""
+    """A `bench.protocol.Follower` of the harmonic plan."""
 
     def __init__(
         self,
         settings: HarmonicSettings,
         parameters: HarmonicParameters,
         configuration: BenchConfiguration,
-        sample_rate: float,
+        record: DataFile,
     ) -> None:
         self._settings, self._parameters, self._configuration = settings, parameters, configuration
-        self._rate = sample_rate
+        self._rate = record.sample_rate
         self._cycles = settings.measured_cycles or parameters.measured_cycles
         self._tolerance = settings.settle_tolerance or parameters.settle_tolerance
         self._calibration = DriveCalibration.flat(1.0)
         self._read = 0
-        self._last: Follow | None = None
+        self._last: Sweep | None = None
         self._series: _Series | None = None
         self._dwelling = False
         self._tries: list[_Series] = []
@@ -63,15 +63,14 @@ class HarmonicFollower:
 
     @property
     def points(self) -> Sequence[HarmonicPoint]:
-        """The results so far."""
         return self._points
 
     def before(self, step: Step) -> None:
-        """Begin a series where a dwell begins one."""
+        """Start a new series at its first dwell."""
         match step:
-            case Arm() | Follow():
+            case Arm() | Sweep():
                 self._end_series()
-                self._last = step if isinstance(step, Follow) else None
+                self._last = step if isinstance(step, Sweep) else None
             case Calibrate():
                 self._calibration = step.calibration
             case Dwell() if self._last is not None:
@@ -85,28 +84,28 @@ class HarmonicFollower:
                 pass
 
     def after(self, step: Step, outcome: Outcome) -> None:
-        """Take note of what came of a step."""
+        """Record the outcome of a step."""
         series = self._series
         match step:
             case Dwell() if series is not None:
                 self._dwelling = False
                 series.waited += step.cycles * tau / series.sine.omega
                 series.measured = outcome.cycles if isinstance(outcome, Measured) else ()
-            case Trim() if series is not None:
+            case SetHarmonics() if series is not None:
                 series.updates += 1
                 series.recent.clear()
                 series.trimmed = True
-            case Say(event=Estimate(beta=beta)) if series is not None:
+            case Publish(event=Estimate(beta=beta)) if series is not None:
                 series.tested, series.beta = True, beta
-            case Say(event=PointFinished(point=HarmonicPoint() as point)):
+            case Publish(event=PointFinished(point=HarmonicPoint() as point)):
                 self._end_series()
-                self._points.append(self._again(point))
+                self._points.append(self._recomputed(point))
                 self._tries.clear()
             case _:
                 pass
 
     def __call__(self, event: Event) -> None:
-        """Fit the cycles of a dwell as they come."""
+        """Fit the cycles of a dwell as its blocks arrive."""
         if not isinstance(event, Acquired):
             return
         self._read = event.block.first + len(event.block)
@@ -126,7 +125,7 @@ class HarmonicFollower:
         else:
             self._tries.append(series)
 
-    def _again(self, point: HarmonicPoint) -> HarmonicPoint:
+    def _recomputed(self, point: HarmonicPoint) -> HarmonicPoint:
         omega = point.omega_rad_s
         specimen = self._configuration.known_specimen.coupled(point.beta)
         known = self._configuration.known_on_table
@@ -134,47 +133,42 @@ class HarmonicFollower:
         if point.status is PointStatus.OVERTURNED:
             asked = self._parameters.amplitude_factor * self._configuration.known_specimen.uplift_acceleration
             layer = predict_gain(specimen, omega, asked, bare.peak.amplitude).rocking
-            return point.model_copy(
-                update={
-                    "layer": "rocking" if layer else "none",
-                    "alpha_2_predicted": layer.alpha_2 if layer else None,
-                    "alpha_2_predicted_uncertainty": expanded_uncertainty(layer, known) if layer else None,
-                    "predicted_stable": layer.stable if layer else None,
-                    "bare_drift_peak_m": bare.peak.drift,
-                    "bare_amplitude_m_s2": bare.peak.amplitude,
-                }
-            )
+            peaks = {"bare_drift_peak_m": bare.peak.drift, "bare_amplitude_m_s2": bare.peak.amplitude}
+            return point.model_copy(update=predicted_fields("rocking", layer, known) | peaks)
         settled = self._settled(min(self._tries, key=lambda series: self._unlike(series, point)))
-        found = judge(settled, bare, omega, specimen, known, self._configuration.sensors, point.starts_tried)
+        sensors, shaker = self._configuration.sensors, self._configuration.simulated_shaker
+        harmonics = self._parameters.harmonics
+        found = judge(settled, bare, omega, specimen, known, sensors, point.starts_tried, shaker, harmonics)
         return found.model_copy(update={"start_chance": point.start_chance})
 
     def _unlike(self, series: _Series, point: HarmonicPoint) -> float:
-        """How far the dwell is from the one that the point was made of: of several that stood, one was taken."""
+        """Difference between the table amplitudes of a dwell and the point [m/s2], to find the dwell of the point."""
         used = series.measured[-self._parameters.measured_cycles :]
         return abs(mean_amplitude(used, ACCELERATION) - (point.amplitude_m_s2 or 0.0))
 
     def _settled(self, series: _Series) -> Settled:
         omega = series.sine.omega
         jitter = omega * self._configuration.analysis.laser_timing
-        detector = SteadyDetector(self._tolerance, JUDGED, KIN, jitter)
+        detector = SteadyDetector(self._tolerance, JUDGED, LASERS, jitter)
         for cycle in series.recent:
             detector.push(cycle)
         steadiness = detector.judge(allowance=2.0)
-        # the first cycles after a change of the drive are on their way to it
-        still = series.recent[TURNING:] if series.trimmed else series.recent
-        used = still[-self._cycles :]
-        table = Answer.of(used, series.sine, series.turn or 1.0 + 0.0j)
+        # the first cycles after a correction of the drive are transient
+        constant = series.recent[TRANSIENT:] if series.trimmed else series.recent
+        used = constant[-self._cycles :]
+        table = SineResponse.of(used, series.sine, series.turn or 1.0 + 0.0j)
+        how = self._settings.peak
+        mean = how == "mean" or (how == "judged" and steadiness.steady)
+        if not steadiness.steady and self._settings.measured_cycles is None:
+            used = constant[-CYCLES:]
+        motion = None if steadiness.steady else free_motion(constant[-KEPT:])
         return Settled(
-            self._peak(used, omega, steadiness),
+            steady_peak(used, omega, REMAINING * self._tolerance) if mean else modulated_peak(used, omega),
             steadiness,
             series.waited,
             table.amplitude_error,
             table.phase_error,
             series.updates,
+            motion,
+            None if motion is None else orbit_peak(constant, motion, omega),
         )
-
-    def _peak(self, used: Sequence[Cycle], omega: float, steadiness: Steadiness) -> SteadyPeak:
-        how = self._settings.peak
-        if how == "mean" or (how == "judged" and steadiness.steady):
-            return steady_peak(used, omega, LEFT * self._tolerance)
-        return modulated_peak(used, omega)

@@ -1,1 +1,1 @@
-"""The identification of the table: what motion a volt of drive makes at each frequency."""
+"""Identification of the table: acceleration per volt of drive against frequency."""

@@ -1,39 +1,39 @@
-"""The identification on a bench: its level and demands, its plan, and the response in thirds of an octave."""
+# pyright: reportUnknownMemberType=false
+"""Identification of the table: level and demands, plan, and response in third-octave bands with its figure."""
 
 from collections.abc import Iterator, Sequence
 from functools import cached_property
 from math import ceil, degrees, floor, log2
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bench.analysis.gain import COVERAGE
 from bench.config.model import BenchConfiguration
 from bench.control.table_model import TableModel
-from bench.engine.steps import Say
+from bench.datafile.tables import Column, Table
+from bench.engine.steps import Publish
 from bench.events import PointFinished
-from bench.preflight.asked import UNKNOWN_SHAKER
-from bench.preflight.bounds import bounds
-from bench.preflight.forecast import Demand, Forecast
+from bench.figures.style import BLACK, BLUE, GREEN, VERMILLION, new_figure, set_grid, ticks_1_2_5, write_figure
+from bench.figures.text_table import TextColumn, text_table
+from bench.preflight.demands import demands_of
+from bench.preflight.margins import Forecast
 from bench.protocol import Plan, Prepared, Result, Sources
-from bench.record.tables import Column, Table
-from bench.report.style import write_figure
-from bench.report.text_table import TextColumn, text_table
-from protocols.common.identification.level import planned
 from protocols.common.identification.parameters import IdentifyParameters
 from protocols.common.identification.plan import expected_duration, identified
-from protocols.identify.figure import response_figure
+from protocols.common.identification.signal import planned
 from protocols.identify.protocol import IdentifiedBand
 from sim.parameters import Parameters
 
-_UNKNOWN = {
-    "drive_voltage": "nothing is known of this table: the probes find out, within limits.drive_voltage",
-    "drive_slew": "nothing is known of this table: the probes find out, within limits.drive_slew",
-    **UNKNOWN_SHAKER,
-}
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 class Identification(Prepared[IdentifyParameters]):
-    """The table's response to its drive, as a file that other runs load. Refuses a band that this bench cannot make."""
+    """Identification of the table's response to its drive, written to a file for other runs.
+
+    Raises InvalidInput for a band that the bench cannot produce.
+    """
 
     def __init__(
         self, parameters: IdentifyParameters, configuration: BenchConfiguration, stored: Sources | None = None
@@ -44,25 +44,20 @@ class Identification(Prepared[IdentifyParameters]):
 
     @cached_property
     def forecast(self) -> Forecast:
-        """The demands of the strongest multisine: its motions are known beforehand, and linear."""
-        self.progress("predicting what the run asks of the bench")
+        """Demands of the strongest multisine, computed in advance since all motions are linear."""
+        self.progress("predicting the demands of the run")
         found = self._found
         where = f"a multisine of {found.level:.3g} m/s2"
-        demands = [
-            Demand(quantity, found.asked[quantity], None, where)
-            if quantity in found.asked
-            else Demand(quantity, None, None, _UNKNOWN[quantity])
-            for quantity in bounds(self.configuration)
-        ]
-        return Forecast(demands=tuple(demands), duration=expected_duration(self.parameters, found))
+        demands = demands_of(found.asked, where, self.configuration)
+        return Forecast(demands=demands, duration=expected_duration(self.parameters, found))
 
     @cached_property
     def prediction(self) -> Table:
-        """The motion that is wanted of the table, line by line."""
+        """Requested motion of the table, line by line."""
         peak = np.abs(self._found.motions[0])
         return {
             "frequency": Column(self._found.grid.frequency, "Hz", "lines of the multisines"),
-            "acceleration": Column(peak, "m/s2", "amplitude of the table's acceleration that is asked for"),
+            "acceleration": Column(peak, "m/s2", "requested amplitude of the table's acceleration"),
         }
 
     def plan(self) -> Plan:
@@ -70,7 +65,7 @@ class Identification(Prepared[IdentifyParameters]):
         self._model = yield from identified(self.parameters, self.configuration, self._found)
         points = list(thirds(self._model))
         for point in points:
-            yield Say(PointFinished(point))
+            yield Publish(PointFinished(point))
         return self.result(points)
 
     def result(self, points: Sequence[Parameters]) -> Result:
@@ -78,13 +73,13 @@ class Identification(Prepared[IdentifyParameters]):
         return Result(
             points=tuple(points),
             text=_table([point for point in points if isinstance(point, IdentifiedBand)]),
-            figures={"table_response.png": lambda path: write_figure(path, response_figure(model))},
+            figures={"table_response.png": lambda path: write_figure(path, _response_figure(model))},
             files={} if model is None else {"table_model.json": model.write},
         )
 
 
 def thirds(model: TableModel) -> Iterator[IdentifiedBand]:
-    """The model in thirds of an octave around 1 Hz times powers of 2^(1/3); those without a line are left out."""
+    """Table model in third-octave bands centred at 1 Hz times powers of 2^(1/3); bands without a line are omitted."""
     frequency = np.array(model.frequency)
     response = np.array(model.real) + 1j * np.array(model.imaginary)
     low, high = model.band
@@ -124,7 +119,7 @@ _COLUMNS = (
 
 
 def _table(points: Sequence[IdentifiedBand]) -> str:
-    """One row for each third of an octave."""
+    """Table with a row for each third-octave band."""
     if not points:
         return "Nothing was identified."
     return text_table(_COLUMNS, map(_cells, points))
@@ -141,3 +136,41 @@ def _cells(point: IdentifiedBand) -> tuple[str, ...]:
         f"{point.coherence:.5f}",
         f"{point.lines}",
     )
+
+
+def _response_figure(model: TableModel | None) -> "Figure":
+    """Figure of five panels against frequency, empty without a model."""
+    figure = new_figure(8.0, 10.5)
+    panels = figure.subplots(5, 1, sharex=True, height_ratios=(3, 2, 2, 3, 2))
+    magnitude, phase, coherence, uncertain, noise = panels
+    magnitude.set_ylabel("acceleration per drive\n[m/s²/V]")
+    phase.set_ylabel("phase [°]")
+    coherence.set_ylabel("1 − coherence [1]")
+    uncertain.set_ylabel("of the response\n[m/s²/V]")
+    noise.set_ylabel("noise\n[m/s²/√Hz]")
+    noise.set_xlabel("frequency [Hz]")
+    for panel in panels:
+        set_grid(panel)
+    if model is None:
+        magnitude.set_title("nothing was identified", loc="left")
+        return figure
+    f = np.array(model.frequency)
+    response = np.array(model.real) + 1j * np.array(model.imaginary)
+    gain, spread = np.abs(response), COVERAGE * np.array(model.uncertainty)
+    magnitude.fill_between(f, np.maximum(gain - spread, 1e-3 * gain), gain + spread, color=BLUE, alpha=0.3, linewidth=0)
+    magnitude.loglog(f, gain, color=BLUE)
+    phase.plot(f, np.degrees(np.unwrap(np.angle(response))), color=BLUE)
+    coherence.semilogy(f, np.maximum(1.0 - np.array(model.coherence), 1e-12), color=BLUE)
+    uncertain.loglog(f, gain, color=BLUE, label="response")
+    uncertain.loglog(f, np.array(model.uncertainty), color=BLACK, label="standard uncertainty")
+    # distortion is not stated where it does not exceed the noise
+    distortion = np.array(model.distortion)
+    uncertain.loglog(f, np.where(distortion > 0.0, distortion, np.nan), ".", ms=2, color=VERMILLION, label="distortion")
+    uncertain.legend(loc="best", fontsize=8)
+    noise.loglog(f, np.array(model.noise), color=GREEN)
+    ticks_1_2_5(noise.xaxis)
+    ticks_1_2_5(magnitude.yaxis)
+    noise.set_xlim(f[0], f[-1])
+    dated = f"{model.date:%Y-%m-%d %H:%M} UTC"
+    magnitude.set_title(f"{model.specimen}, {model.level:.3g} m/s² rms, {dated}", loc="left", fontsize=10)
+    return figure

@@ -1,1 +1,1 @@
-"""Both lasers held against one motion: the frame locked, the table moving slowly."""
+"""Calibration of both lasers against a common slow motion of the table with the frame locked."""

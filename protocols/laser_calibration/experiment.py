@@ -1,42 +1,59 @@
-"""The laser calibration on a bench: both lasers against one motion, as a file that other runs load."""
+# pyright: reportUnknownMemberType=false
+"""Laser calibration: checks, forecast, and results as a table, a figure and a file for other runs."""
 
-from collections.abc import Sequence
+from collections.abc import Generator, Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bench.analysis.laser_calibration import LaserCalibration
-from bench.config.calibration_file import write_calibration
+from bench.analysis.uncertainty import COVERAGE
 from bench.config.model import BenchConfiguration
-from bench.control.legs import Leg, program
-from bench.preflight.asked import UNKNOWN_SHAKER
-from bench.preflight.bounds import bounds
-from bench.preflight.forecast import Demand, Forecast
-from bench.preflight.load import load
-from bench.preflight.response import response_of
+from bench.config.result_files import write_calibration
+from bench.control.oscillator import Leg, program
+from bench.datafile.tables import Column, Table
+from bench.engine.steps import OperatorAction, Outcome, Publish, Step
+from bench.events import FitFinished, FittedParameter, PointFinished, Series
+from bench.figures.style import BLACK, BLUE, GREY, new_figure, set_grid, write_figure
+from bench.figures.text_table import TextColumn, text_table
+from bench.preflight.demands import demands_of, load, response_of
+from bench.preflight.margins import Forecast
+from bench.preflight.motion import laser_demands
 from bench.protocol import Plan, Prepared, Result, Sources
-from bench.record.tables import Column, Table
-from bench.report.style import write_figure
+from drivers.rig import OperatorTask
 from protocols.laser_calibration.fit import ErrorCurve
-from protocols.laser_calibration.plan import START, calibration_steps, expected_duration, planned_passes
+from protocols.laser_calibration.plan import START, expected_duration, measure, planned_passes
 from protocols.laser_calibration.protocol import CalibratedSensor, LaserCalibrationParameters
-from protocols.laser_calibration.results import errors_figure, sensors_table
 from sim.errors import InvalidInput
 from sim.parameters import Parameters
 
-MARGIN = 1.05
-"""Share of the amplitude that must be allowed: the drive is calibrated below it."""
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
-_UNKNOWN = {
-    "drive_voltage": "nothing is known of this table: the probes find out, within limits.drive_voltage",
-    "drive_slew": "nothing is known of this table: the probes find out, within limits.drive_slew",
-    **UNKNOWN_SHAKER,
-}
+MARGIN = 1.05
+"""Largest calibration level of the drive relative to the amplitude; it must be within the limits."""
+
+_COLUMNS = (
+    TextColumn("sensor", words=True),
+    TextColumn("scale - 1", "%"),
+    TextColumn("U (k=2)", "%"),
+    TextColumn("covered", "mm"),
+    TextColumn("order", "1"),
+    TextColumn("largest error", "um"),
+    TextColumn("left, U", "um"),
+    TextColumn("delay", "ms"),
+)
+
+_CLAMP = (
+    "Remove spring and block from the table and clamp both storeys to it. Keep clear: the amplifier will be enabled."
+)
+_UNCLAMP = "Remove the clamps from the storeys."
 
 
 class LaserCalibrationRun(Prepared[LaserCalibrationParameters]):
-    """Refuses lasers that do not see the table, and motions that the bench does not allow."""
+    """Laser calibration. Raises InvalidInput for lasers that do not measure the table, and motions beyond limits."""
 
     def __init__(
         self, parameters: LaserCalibrationParameters, configuration: BenchConfiguration, stored: Sources | None = None
@@ -49,16 +66,16 @@ class LaserCalibrationRun(Prepared[LaserCalibrationParameters]):
             raise InvalidInput(
                 "lasers.reference",
                 "table",
-                "lasers on the table do not measure its motion: stand both on the ground, and set this to ground",
+                "lasers on the table do not measure its motion: mount both on the ground, and set this to ground",
             )
         if configuration.calibrated is not None:
             raise InvalidInput(
                 "laser_calibration",
                 f"{configuration.calibrated.date:%Y-%m-%d}",
-                "an older calibration would be applied to the new one: leave it out of the configuration",
+                "an older calibration would affect the new one: remove it from the configuration",
             )
         reach = min(configuration.half_stroke, limits.displacement)
-        reach = min(reach, 0.5 * limits.laser_range * min(configuration.laser_ranges))
+        reach = min(reach, limits.laser_range * min(configuration.laser_half_ranges))
         if MARGIN * p.amplitude > reach:
             raise InvalidInput("amplitude", p.amplitude, f"the bench allows {reach / MARGIN:.4g} m")
         for quantity, unit, value in (
@@ -72,47 +89,48 @@ class LaserCalibrationRun(Prepared[LaserCalibrationParameters]):
 
     @cached_property
     def forecast(self) -> Forecast:
-        """The demands of the largest pass: sines of the table with the clamped storeys as a rigid load."""
-        self.progress("predicting what the run asks of the bench")
-        amplitude, omega, frame = (
-            self.parameters.amplitude,
-            self.parameters.omega,
-            self.configuration.known_specimen.frame,
-        )
+        """Demands of the largest pass: sines of the table with the clamped storeys as a rigid load."""
+        self.progress("predicting the demands of the run")
+        amplitude, omega = self.parameters.amplitude, self.parameters.omega
         duration = expected_duration(self.parameters)
         level = amplitude * omega**2
         asked = load(
             program((Leg(START, level, omega), Leg(duration, level, omega))),
             START,
             duration,
-            payload=frame.m1 + frame.m2,
-            mover=self.configuration.mover,
+            payload=self.configuration.known_specimen.bare().mass,
+            shaker=self.configuration.shaker_model,
             response=response_of(self.configuration),
             heating_time=self.configuration.limits.heating_time,
         )
-        halves = [0.5 * whole for whole in self.configuration.laser_ranges]
-        asked |= {"laser_1": amplitude / halves[0], "laser_2": amplitude / halves[1], "drift": 0.0}
-        where = f"the pass of {1e3 * amplitude:.1f} mm"
-        demands = [
-            Demand(quantity, asked[quantity], None, where)
-            if quantity in asked
-            else Demand(quantity, None, None, _UNKNOWN[quantity])
-            for quantity in bounds(self.configuration)
-        ]
-        return Forecast(demands=tuple(demands), duration=duration)
+        asked |= laser_demands(amplitude, amplitude, 0.0, self.configuration.laser_half_ranges)
+        where = f"pass with an amplitude of {1e3 * amplitude:.1f} mm"
+        return Forecast(demands=demands_of(asked, where, self.configuration), duration=duration)
 
     @cached_property
     def prediction(self) -> Table:
-        """The planned passes."""
+        """Planned passes."""
         omega, amplitude = np.array(planned_passes(self.parameters)).T
         return {
             "omega": Column(omega, "rad/s", "circular frequency of each pass"),
-            "amplitude": Column(amplitude, "m", "amplitude of the table in it"),
+            "amplitude": Column(amplitude, "m", "amplitude of the table in the pass"),
         }
 
     def plan(self) -> Plan:
         self._found = self._curves = None
-        return self.collected(calibration_steps(self.parameters, self.configuration, self._keep))
+        return self.collected(self._steps())
+
+    def _steps(self) -> Generator[Step, Outcome, None]:
+        """Steps: clamp the storeys to the table, measure, publish, remove the clamps."""
+        bare = self.configuration.known_specimen.bare()
+        yield OperatorAction(OperatorTask.LOCK_FRAME, bare, _CLAMP)
+        found, curves = yield from measure(self.parameters, self.configuration)
+        self._found, self._curves = found, curves
+        for number, (curve, laser) in enumerate(zip(curves, found.lasers, strict=True), 1):
+            yield Publish(_fit_event(f"laser_{number}", curve, laser.delay, laser.delay_uncertainty))
+        for point in _calibrated_sensors(found):
+            yield Publish(PointFinished(point))
+        yield OperatorAction(OperatorTask.UNLOCK_FRAME, bare, _UNCLAMP)
 
     def result(self, points: Sequence[Parameters]) -> Result:
         found, curves = self._found, self._curves
@@ -123,10 +141,112 @@ class LaserCalibrationRun(Prepared[LaserCalibrationParameters]):
 
         return Result(
             points=tuple(points),
-            text=sensors_table([point for point in points if isinstance(point, CalibratedSensor)]),
-            figures={"laser_errors.png": lambda path: write_figure(path, errors_figure(curves))},
+            text=_sensors_table([point for point in points if isinstance(point, CalibratedSensor)]),
+            figures={"laser_errors.png": lambda path: write_figure(path, _errors_figure(curves))},
             files={} if found is None else {"laser_calibration.json": write},
         )
 
-    def _keep(self, found: LaserCalibration, curves: tuple[ErrorCurve, ErrorCurve]) -> None:
-        self._found, self._curves = found, curves
+
+def _fit_event(name: str, curve: ErrorCurve, delay: float, uncertainty: float) -> FitFinished:
+    at = np.linspace(curve.low, curve.high, curve.without.shape[1])
+    fit = np.polynomial.chebyshev.chebval(np.linspace(-1.0, 1.0, at.size), curve.error)
+    passes = {
+        f"without_{number}": Series(each - each.mean(), "m", f"the same without pass {number}")
+        for number, each in enumerate(curve.without, 1)
+    }
+    return FitFinished(
+        f"error of {name}",
+        f"{name}: order {curve.error.size - 1}, standard uncertainty {1e6 * curve.uncertainty:.1f} um at one reading",
+        {
+            "reading": Series(at, "m", "reading from the middle of the range"),
+            "error": Series(fit - fit.mean(), "m", "reading minus displacement measured by the table's sensor"),
+            **passes,
+        },
+        {"delay": FittedParameter(delay, uncertainty, "s")},
+    )
+
+
+def _calibrated_sensors(found: LaserCalibration) -> Iterator[CalibratedSensor]:
+    """One row for each sensor, and one for the ratio of the lasers."""
+    for name, laser in (("laser_1", found.laser_1), ("laser_2", found.laser_2)):
+        at = np.linspace(laser.lowest, laser.highest, 201)
+        error = at - laser.corrected(at)
+        yield CalibratedSensor(
+            sensor=name,
+            scale=laser.scale,
+            scale_uncertainty=COVERAGE * found.differential_uncertainty,
+            lowest_m=laser.lowest,
+            highest_m=laser.highest,
+            order=len(laser.error) - 1,
+            largest_error_m=float(np.abs(error - error.mean()).max()),
+            residual_m=COVERAGE * laser.uncertainty,
+            delay_s=laser.delay,
+            delay_uncertainty_s=COVERAGE * laser.delay_uncertainty,
+        )
+    yield CalibratedSensor(
+        sensor="laser_2 / laser_1",
+        scale=found.differential_scale,
+        scale_uncertainty=COVERAGE * found.differential_uncertainty,
+    )
+    for name, factor in (
+        ("table_displacement", found.table_displacement),
+        ("table_acceleration", found.table_acceleration),
+    ):
+        uncertainty = COVERAGE * found.table_uncertainty / factor
+        yield CalibratedSensor(sensor=name, scale=1.0 / factor, scale_uncertainty=uncertainty)
+
+
+def _sensors_table(points: Sequence[CalibratedSensor]) -> str:
+    """Table with a row for each sensor; absent values are "-"."""
+    if not points:
+        return "Nothing was calibrated."
+    return text_table(_COLUMNS, map(_cells, points))
+
+
+def _errors_figure(curves: tuple[ErrorCurve, ErrorCurve] | None) -> "Figure":
+    """Figure with two panels for each laser, empty without curves."""
+    figure = new_figure(9.0, 6.5)
+    panels = figure.subplots(2, 2, width_ratios=(3, 1), squeeze=False)
+    for number, (over, orders) in enumerate(panels, 1):
+        over.set_title(f"laser {number}", loc="left", fontsize=10)
+        over.set_xlabel("reading [mm]")
+        over.set_ylabel("reading minus displacement [µm]")
+        orders.set_xlabel("order [1]")
+        orders.set_ylabel("prediction error [µm]")
+        set_grid(over)
+        # an order is a whole number
+        orders.xaxis.get_major_locator().set_params(integer=True)
+        set_grid(orders)
+        if curves is None:
+            continue
+        curve = curves[number - 1]
+        at = np.linspace(-1.0, 1.0, curve.without.shape[1])
+        reading = 1e3 * np.linspace(curve.low, curve.high, at.size)
+        for each in curve.without:
+            over.plot(reading, 1e6 * (each - each.mean()), color=GREY, linewidth=0.6)
+        error = np.polynomial.chebyshev.chebval(at, curve.error)
+        over.plot(reading, 1e6 * (error - error.mean()), color=BLUE)
+        tried = np.arange(1, curve.scores.size + 1)
+        orders.semilogy(tried, 1e6 * curve.scores, "o-", color=BLACK, markersize=4)
+        orders.axvline(curve.error.size - 1, color=BLUE)
+    return figure
+
+
+def _cells(point: CalibratedSensor) -> tuple[str, ...]:
+    covered = "-"
+    if point.lowest_m is not None and point.highest_m is not None:
+        covered = f"{1e3 * point.lowest_m:.1f} .. {1e3 * point.highest_m:.1f}"
+    return (
+        point.sensor,
+        f"{100.0 * (point.scale - 1.0):+.3f}",
+        f"{100.0 * point.scale_uncertainty:.3f}",
+        covered,
+        "-" if point.order is None else f"{point.order}",
+        _number(point.largest_error_m, 1e6),
+        _number(point.residual_m, 1e6),
+        _number(point.delay_s, 1e3),
+    )
+
+
+def _number(value: float | None, factor: float) -> str:
+    return "-" if value is None else f"{factor * value:.3g}"

@@ -1,17 +1,17 @@
-"""Errors of the lasers from cycles of one common motion.
+"""Errors of the lasers from cycles of a common motion.
 
-Under a slow sine of the table a laser's reading is r = x + e(r) - d v + c omega^2 x: its error e by the place, its
-delay d, and the compliance of the clamps, c, as the storeys are accelerated; passes at two frequencies separate c from
-a scale. All are fitted by least squares to the mean cycles of the passes, at even steps of the phase, with e as
-Chebyshev polynomials of the reading. The table's motion need not be a pure sine: both sensors measure it.
+Under a slow sine of the table a laser's reading is r = x + e(r) - d v + c omega^2 x: with its position-dependent error
+e, its delay d, and the compliance c of the clamps, which accelerate the storeys; passes at two frequencies separate c
+from a scale error. All are fitted by least squares to the mean cycles of the passes, at equal steps of the phase, with
+e as Chebyshev polynomials of the reading. The table's motion need not be a pure sine, since both sensors measure it.
 
-The order is the lowest whose curve, fitted to all passes but one, predicts the one left out as well as the best does,
-within one standard error. The uncertainty of the curve is the scatter of the curves found without each pass in turn
-(jackknife), and the contribution of higher orders.
+The order is chosen by cross-validation: the lowest whose curves, fitted to all passes but one, predict the omitted pass
+as well as the best order, within one standard error. The uncertainty of the curve combines the scatter of the curves
+that omit each pass in turn (jackknife) and the contribution of higher orders.
 
-The lasers are the standards of length: data sheets allow a laser a smooth error of some share of its whole range, which
-over the span of the passes determines a scale better than the table's sensors do. So the mean of the spans of both
-lasers is taken as true; the table's sensors and each laser are compared with it.
+The lasers are the length standard: the smooth linearity error on their data sheets, relative to the span of the passes,
+determines the scale better than the table's sensors. So the mean span of both lasers is the reference; the table's
+sensors and each laser are compared with it.
 """
 
 from collections.abc import Sequence
@@ -31,16 +31,16 @@ from bench.analysis.signals import ACCELERATION, DISPLACEMENT, LASER_1, LASER_2
 Array = NDArray[np.float64]
 
 HIGHEST = 9
-"""Highest order that is tried: above it the cycles, fitted with ten harmonics, show less and less."""
+"""Highest order of the fit; cycles with ten harmonics contain little information on higher orders."""
 
 READINGS = 201
-"""Readings at which curves are compared."""
+"""Number of readings at which curves are compared."""
 
 
 @dataclass(frozen=True, eq=False)
 class Pass:
-    """The mean cycle of one pass at `omega` [rad/s], shape (k,) each: displacement of the table [m] and its rate [m/s],
-    both lasers [m].
+    """Mean cycle of a pass at `omega` [rad/s]: table displacement [m] and its rate [m/s], and both lasers [m], each
+    shape (k,).
     """
 
     omega: float
@@ -48,17 +48,15 @@ class Pass:
     speed: Array
     lasers: tuple[Array, Array]
     ratio: float
-    """Amplitude of the table's displacement over that which its acceleration shows, a / omega^2."""
+    """Ratio of the table's displacement amplitude to that from its acceleration, a / omega^2."""
 
 
 @dataclass(frozen=True, eq=False)
 class ErrorCurve:
-    """The curve of one laser against the table's displacement as shown, as Chebyshev coefficients `error` [m] over the
-    readings from `low` to `high` [m]; `delay` [s].
-
-    `scores` are the root mean squares [m] of the prediction errors of each order from 1 on; `residual` [m] is that of
-    the contribution of higher orders. `without`, shape (passes, READINGS) [m], are the curves, and `delays` [s] the
-    delays, found without each pass in turn.
+    """Error curve of one laser relative to the measured table displacement, as Chebyshev coefficients `error` [m] over
+    the readings from `low` to `high` [m]; `delay` [s]. `scores` are the rms prediction errors [m] of each order from 1;
+    `residual` [m] is the rms contribution of higher orders. `without`, shape (passes, READINGS) [m], are the curves,
+    and `delays` [s] the delays, fitted without each pass in turn.
     """
 
     low: float
@@ -72,31 +70,31 @@ class ErrorCurve:
 
     @property
     def uncertainty(self) -> float:
-        """Standard uncertainty of the curve at one reading [m], its mean left out."""
+        """Standard uncertainty of the curve at one reading [m], without its mean."""
         bent = self.without - self.without.mean(axis=1)[:, None]
         variance = float(np.mean([jackknife(place) ** 2 for place in bent.T]))
         return sqrt(variance + self.residual**2)
 
     @property
     def slope(self) -> float:
-        """Span of its readings in excess of that of the displacement, relative to the former."""
+        """Relative excess of the span of the readings over the span of the displacement."""
         ends = chebyshev.chebval(np.array([-1.0, 1.0]), self.error)
         return float(ends[1] - ends[0]) / (self.high - self.low)
 
     @property
     def slopes(self) -> Array:
-        """The same without each pass in turn, shape (passes,)."""
+        """Slopes without each pass in turn, shape (passes,)."""
         spans: Array = self.without[:, -1] - self.without[:, 0]
         return spans / (self.high - self.low)
 
 
 def jackknife(found: Array) -> float:
-    """Standard uncertainty of a value from n passes, by the values found without each in turn, shape (n,)."""
+    """Jackknife standard uncertainty of a value from n passes, from the estimates without each pass, shape (n,)."""
     return sqrt((found.size - 1) / found.size * float(np.sum((found - found.mean()) ** 2)))
 
 
 def mean_pass(cycles: Sequence[Cycle], omega: float) -> Pass:
-    """A pass at `omega` [rad/s] from its cycles; their signals are counted from the rest."""
+    """Pass at `omega` [rad/s] from its cycles, whose signals are relative to the values at rest."""
     waves = mean_waves(cycles)
     moved = np.mean([cycle.fundamental for cycle in cycles], axis=0)
     return Pass(
@@ -109,9 +107,9 @@ def mean_pass(cycles: Sequence[Cycle], omega: float) -> Pass:
 
 
 def fit_curve(passes: Sequence[Pass], laser: int, rest: float) -> ErrorCurve:
-    """The curve of laser 0 or 1 that rests at the reading `rest` [m]; the passes have two frequencies or more."""
+    """Error curve of laser 0 or 1 with the reading `rest` [m] at rest; at least two frequencies among the passes."""
     readings = [rest + each.lasers[laser] for each in passes]
-    # the range that all passes cover
+    # range covered by all passes
     low, high = max(float(r.min()) for r in readings), min(float(r.max()) for r in readings)
     rows = [_columns(r, each, low, high) for r, each in zip(readings, passes, strict=True)]
     errors = [r - each.displacement for r, each in zip(readings, passes, strict=True)]
@@ -127,7 +125,7 @@ def fit_curve(passes: Sequence[Pass], laser: int, rest: float) -> ErrorCurve:
 
     def missed(order: int, out: int) -> float:
         wrong = errors[out] - rows[out][:, [*range(order + 1), -2, -1]] @ solved(order, out)
-        # a pass has its own rounding of the zero
+        # the rounding of the zero differs between passes
         return float(np.var(wrong))
 
     squares: Array = np.array([[missed(order, out) for out in every] for order in range(1, HIGHEST + 1)])
@@ -162,11 +160,13 @@ def calibration(
     valid_days: float,
     date: datetime,
 ) -> LaserCalibration:
-    """The calibration of all sensors. `reference_linearity` is that of the displacement sensor, relative to the covered
-    range; `accuracy` and `ranges` [m] are those of the lasers' data sheets.
+    """Calibration of all sensors.
+
+    `reference_linearity` is that of the displacement sensor, relative to the covered range; `accuracy` and `ranges` [m]
+    are those of the lasers' data sheets.
     """
     slopes = [curve.slope for curve in curves]
-    # the mean span of the lasers is true: shown displacements times this factor
+    # true displacement, by the mean span of the lasers: measured displacement times this factor
     factor = 1.0 / (1.0 - 0.5 * sum(slopes))
     found = [
         LaserCurve(
@@ -186,7 +186,7 @@ def calibration(
     ratios = np.array([each.ratio for each in passes])
     standard = np.sqrt(np.mean([_span_uncertainty(span, accuracy, whole) ** 2 for whole in ranges]) / 2.0)
     scatter = np.hypot(np.std(ratios, ddof=1) / sqrt(len(passes)), jackknife((curves[0].slopes + curves[1].slopes) / 2))
-    # the uncertainty of the curves tilts them, too
+    # the uncertainty of the curves includes their slope
     bent = np.hypot(curves[0].uncertainty, curves[1].uncertainty) / (0.5 * span)
     return LaserCalibration(
         date=date,
@@ -205,8 +205,9 @@ def calibration(
 def _span_uncertainty(span: float, accuracy: SensorAccuracy, whole: float) -> float:
     """Standard relative uncertainty of a `span` [m] measured by one laser with the range `whole` [m].
 
-    Of its scale, half the variance of the difference of two; of its linearity, a sine of any phase and some waves: the
-    difference of two of its values, span apart, is 2 sin(pi w span / R) cos(phase) of its height.
+    The contribution of the scale is half the variance of the difference of two lasers; that of the linearity is
+    modelled as a sine of random phase with w waves over the range R: the difference of two of its values, one span
+    apart, is 2 sin(pi w span / R) cos(phase) times its amplitude.
     """
     waves = np.linspace(*WAVES, 101)
     bent = sqrt(2.0 * float(np.mean(np.sin(pi * waves * span / whole) ** 2)))
@@ -214,14 +215,14 @@ def _span_uncertainty(span: float, accuracy: SensorAccuracy, whole: float) -> fl
 
 
 def _rescaled(curve: ErrorCurve, factor: float) -> Array:
-    """The error against the true displacement, `factor` times the shown one: r - factor (r - e), as coefficients."""
+    """Coefficients of the error relative to the true displacement, `factor` times the measured: r - factor (r - e)."""
     error = factor * curve.error
     error[:2] += (1.0 - factor) * np.array([0.5 * (curve.high + curve.low), 0.5 * (curve.high - curve.low)])
     return error
 
 
 def _columns(readings: Array, each: Pass, low: float, high: float) -> Array:
-    """Chebyshev polynomials up to HIGHEST, and the effects of a delay and a yielding clamp; shape (k, HIGHEST + 3)."""
+    """Chebyshev polynomials up to HIGHEST, effect of a delay, and effect of compliant clamps; (k, HIGHEST + 3)."""
     place = (2.0 * readings - high - low) / (high - low)
     columns = (chebyshev.chebvander(place, HIGHEST), -each.speed, each.omega**2 * each.displacement)
     return np.column_stack(columns).astype(np.float64)

@@ -1,8 +1,9 @@
-"""The folder of the kernel's compiled code: named by a hash of what it was compiled from, writable by this user only.
+"""Folder of the kernel's compiled code, named after a hash of its sources and writable only by this user.
 
-numba compares only the file of the function itself, so that a caller in another file would keep its old callee; and
-where that file's folder cannot be written, it uses a folder in the user's home. Here every place has the hash.
-The files in it are pickles, which run code when they are loaded: a folder that others can write is not used.
+numba checks only the source file of the function itself, so that a caller in another file would keep an outdated
+callee; if that file's folder is not writable, numba uses a folder in the user's home. Here the hash is in the name of
+every folder. The cached files are pickles, which execute code on loading: a folder to which others can write is not
+used.
 """
 
 import hashlib
@@ -21,25 +22,25 @@ if sys.platform != "win32":
     import pwd
 
 KEPT = 6
-"""Folders of other states of the kernel that stay, besides those in use: going back to one costs no compilation."""
+"""Number of unused folders of other kernel versions that are kept, so that returning to one needs no compilation."""
 
 PREFIX = "rockbench-"
 IN_USE = "in-use"
-"""File in a folder that every process which uses it keeps open; its time is that of the last use."""
+"""File that every process using the folder keeps open; its modification time is that of the last use."""
 
 TOLD = "ROCKBENCH_KERNEL_IN_MEMORY"
-"""Environment variable by which child processes do not repeat the notice."""
+"""Environment variable that keeps child processes from repeating the notice."""
 
 
 KERNEL = Path(__file__).parent
 
 
 class KernelCache:
-    """Finds the folder for the compiled kernel once, and gives it up for good when it turns out to be unusable.
+    """Finds the folder for the compiled kernel once, and stops using it if it fails.
 
-    given : folder that the user named for numba's caches, or empty: then it is the installation, or the user's folder
-    for caches.  versions : whatever else decides about the compiled code.  sources : folder of the compiled functions,
-    the kernel's own or another one.
+    given : folder that the user set for numba's caches; when empty, the installation's or the user's cache folder.
+    versions : further dependencies of the compiled code.  sources : folder of the compiled functions, the kernel's own
+    or another one.
     """
 
     def __init__(self, given: str, versions: Sequence[object], sources: Path = KERNEL) -> None:
@@ -50,8 +51,8 @@ class KernelCache:
         self.name = ""
         """Name of the folder, with the hash; empty without sources."""
         if not self._stamp:
-            # in an archive: numba's locator needs files, and without sources nothing says when the code has changed
-            self.give_up(f"{self._sources} is no folder of source files")
+            # for example in an archive: numba's locator needs files, and changes are not detectable without sources
+            self.give_up(f"{self._sources} is not a folder of source files")
             return
         content = [(name, (self._sources / name).read_bytes()) for name, *_ in self._stamp]
         self.name = name = PREFIX + hashlib.sha256(repr([content, *versions, self._sources]).encode()).hexdigest()[:12]
@@ -67,13 +68,13 @@ class KernelCache:
         self.give_up("; ".join(reasons) or "there is no home folder")
 
     def folder(self) -> Path | None:
-        """The folder to load from and save to; None when the kernel is to be compiled in memory."""
+        """The folder to load from and save to; None for compilation in memory."""
         if self._folder is not None and _stamp(self._sources) != self._stamp:
             self.give_up(f"the sources in {self._sources} changed while they were loaded")
         return self._folder
 
     def give_up(self, why: str) -> None:
-        """From now on compile in memory, and say so: once, on standard error, for this process and its children."""
+        """Switch to compilation in memory, with one notice on standard error for this process and its children."""
         self._folder = None
         self.release()
         _say(
@@ -82,14 +83,14 @@ class KernelCache:
         )
 
     def release(self) -> None:
-        """Let the folder be removed when it is old."""
+        """Allow the folder to be removed once it is old."""
         if self._handle is not None:
             os.close(self._handle)
             self._handle = None
 
 
 class NotPrivate(OSError):
-    """Others can write there."""
+    """Other users can write to the folder."""
 
 
 def _say(what: str) -> None:
@@ -99,7 +100,7 @@ def _say(what: str) -> None:
 
 
 def _stamp(folder: Path) -> list[tuple[str, int, int]]:
-    # cheap enough to be asked before each function: an update in the middle of loading mixes two states
+    # checked before each function: an update during loading would mix two versions
     with suppress(OSError), os.scandir(folder) as entries:
         sources = [entry for entry in entries if entry.name.endswith(".py")]
         return sorted((entry.name, entry.stat().st_mtime_ns, entry.stat().st_size) for entry in sources)
@@ -122,9 +123,9 @@ def _places(sources: Path) -> list[Path]:
 
 
 def _claim(base: Path, name: str) -> tuple[Path, int]:
-    """Make or take the folder `name` in `base`; returns it with the open file that keeps it from being removed.
+    """Create or reuse the folder `name` in `base`; returns it with the open file that prevents its removal.
 
-    Raises OSError that says what stands in the way.
+    Raises OSError with the obstacle.
     """
     existing = base
     while not existing.exists() and existing != existing.parent:
@@ -143,18 +144,18 @@ def _claim(base: Path, name: str) -> tuple[Path, int]:
                 pass
             handle = os.open(folder / IN_USE, os.O_RDWR | os.O_CREAT, 0o600)
         except FileNotFoundError:
-            continue  # another process removes it just now
+            continue  # another process is removing it
         if _hold(handle, folder / IN_USE):
             if new:
                 _remove_old(base, folder)
             return folder, handle
         os.close(handle)
-    raise OSError(None, "is removed again and again", str(folder))
+    raise OSError(None, "is removed repeatedly", str(folder))
 
 
 def _hold(handle: int, path: Path) -> bool:
-    """Mark the open file as in use now; False when it is no longer the one at `path`."""
-    with suppress(OSError):  # a file system without locks: then nothing is removed on it either
+    """Mark the open file as in use; False when `path` is no longer this file."""
+    with suppress(OSError):  # on a file system without locks nothing is removed either
         if sys.platform != "win32":
             fcntl.flock(handle, fcntl.LOCK_SH)
     with suppress(OSError):
@@ -164,7 +165,7 @@ def _hold(handle: int, path: Path) -> bool:
 
 
 def _remove_old(base: Path, own: Path) -> None:
-    """Remove all but the last used KEPT of the folders in `base`, never one in use."""
+    """Remove all folders in `base` but the KEPT last used ones and those in use."""
     with suppress(OSError):
         others = [(_last_use(path), path) for path in base.glob(f"{PREFIX}*") if path != own]
         for _, path in sorted(others, reverse=True)[KEPT:]:
@@ -187,13 +188,13 @@ def _remove_unused(folder: Path) -> None:
         finally:
             os.close(handle)
         if sys.platform == "win32":
-            # an open file can be neither removed nor its folder renamed
+            # an open file cannot be removed, nor its folder renamed
             (folder / IN_USE).unlink()
             shutil.rmtree(folder)
 
 
 def _require_private(path: Path, *, parents: bool) -> None:
-    """Raises OSError when another user than root could put files there. Windows' user folders are private already."""
+    """Raise OSError when a user other than root could put files there. Windows' user folders are private already."""
     if sys.platform == "win32":
         return
     info = path.lstat()
@@ -201,7 +202,7 @@ def _require_private(path: Path, *, parents: bool) -> None:
     if not stat.S_ISDIR(info.st_mode):
         raise OSError(None, "is not a folder", str(path))
     if info.st_uid not in ((us, 0) if parents else (us,)):
-        raise OSError(None, "belongs to another user", str(path))
+        raise OSError(None, "is owned by another user", str(path))
     for each in (path, *path.parents) if parents else (path,):
         if _others_write(each.stat(), parents):
             raise NotPrivate(None, "can be written by others", str(each))
@@ -211,14 +212,14 @@ def _others_write(info: os.stat_result, is_parent: bool) -> bool:
     if sys.platform == "win32":
         return False
     if is_parent and info.st_mode & stat.S_ISVTX:
-        return False  # others cannot replace what is in it, and what is in it is looked at on its own
+        return False  # others cannot replace its contents, and its contents are checked separately
     if info.st_mode & stat.S_IWOTH:
         return True
     return bool(info.st_mode & stat.S_IWGRP) and not (is_parent and _own_group(info.st_gid))
 
 
 def _own_group(gid: int) -> bool:
-    """Whether a group is the private one of this user, as where new folders are writable by the group."""
+    """Whether a group is this user's private group, as on systems where new folders are group-writable."""
     if sys.platform == "win32":
         return True
     with suppress(KeyError):

@@ -1,9 +1,10 @@
-"""The one decorator that compiles the kernel, so that its rules are the same everywhere.
+"""Decorators that compile the kernel with uniform settings.
 
 Signatures are explicit: a function is compiled once, when its module is imported, and kept in numba's cache.
 `nogil` lets a thread pool run many simulations; division by zero gives inf, as in numpy, and is caught by the
 integrator's check of its state. There is no fastmath: it would make results depend on the processor and break
-the test for non-finite numbers. Nobody calls them as C functions: without that wrapper they compile faster.
+the test for non-finite numbers; products are fused with sums where the source says `fma` (`sim.kernel.lanes`).
+The wrapper for calls from C is omitted, since it is unused and slow to compile.
 """
 # pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
 # pyright: reportPrivateImportUsage=false, reportAttributeAccessIssue=false
@@ -15,12 +16,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-# the loops here are short recurrences: vectorising them and the last level of optimisation cost a fifth of the
-# time of compilation and win nothing. numba reads these once, when it is imported; who sets them himself is obeyed
+# the loops here are short recurrences: vectorising them and the highest level of optimisation take a fifth of the
+# compile time without benefit. numba reads these once, on import; the user's own settings have priority
 for name, value in (("NUMBA_OPT", "2"), ("NUMBA_LOOP_VECTORIZE", "0"), ("NUMBA_SLP_VECTORIZE", "0")):
     os.environ.setdefault(name, value)
 
-import llvmlite  # noqa: E402
+import llvmlite.binding  # noqa: E402
 import numba  # noqa: E402
 import numpy as np  # noqa: E402
 
@@ -29,7 +30,7 @@ from sim.kernel.cache import KERNEL, KernelCache  # noqa: E402
 F = TypeVar("F", bound=Callable[..., Any])
 
 OPTIONS = ("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "BOUNDSCHECK", "DEBUGINFO_DEFAULT", "DISABLE_INTEL_SVML")
-"""numba's settings that change the compiled code and are not in the key of its own index, as the processor is."""
+"""numba's settings that change the compiled code but, unlike the processor, are not part of its index key."""
 
 _SETTINGS = [(option, str(getattr(numba.config, option, None))) for option in OPTIONS]
 _VERSIONS = [numba.__version__, llvmlite.__version__, np.__version__, *_SETTINGS, __debug__]
@@ -40,11 +41,16 @@ _one_at_a_time = threading.RLock()
 
 
 def inlined(function: F) -> F:
-    """Write a thin function out in each compiled caller; on its own it is compiled only when Python calls it.
+    """Inline a small function into each compiled caller; it is compiled separately only when Python calls it.
 
-    Every level of calls between compiled functions costs seconds of compilation, because each is optimised anew.
+    Each level of calls between compiled functions costs seconds of compilation, because each is optimised separately.
     """
     return cast(F, numba.njit(nogil=True, error_model="numpy", inline="always")(function))
+
+
+def generic(function: F) -> F:
+    """Compile a function inside its compiled callers, once for each type of number passed by them."""
+    return cast(F, cast(Any, numba.njit)(nogil=True, error_model="numpy", no_cfunc_wrapper=True)(function))
 
 
 def compiled(signature: str) -> Callable[[F], F]:
@@ -55,7 +61,7 @@ def compiled(signature: str) -> Callable[[F], F]:
             cache = _cache_of(function)
             folder = cache.folder()
             if folder is not None:
-                # numba reads this once for each function; it is set for ours only, and other code keeps its caches
+                # numba reads this once for each function; set only for the kernel's, so other code keeps its caches
                 before, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(folder)
                 try:
                     made = _njit(signature, function, cache=True)
@@ -65,8 +71,8 @@ def compiled(signature: str) -> Callable[[F], F]:
                 except numba.core.errors.NumbaError:
                     raise
                 except Exception as error:
-                    # a file that a power cut left empty, a full disk: reading and writing pickles raises what it likes
-                    cache.give_up(f"{folder} cannot be used ({type(error).__name__}: {error}), remove it")
+                    # after a power cut or on a full disk, reading and writing pickles may raise any exception
+                    cache.give_up(f"{folder} cannot be used ({type(error).__name__}: {error}); remove it")
                 finally:
                     numba.config.CACHE_DIR = before
             return _njit(signature, function, cache=False)
@@ -75,20 +81,30 @@ def compiled(signature: str) -> Callable[[F], F]:
 
 
 def is_compiled(module: str) -> bool:
-    """Whether the cache holds compiled code of `module` of the kernel, such as "rocking"."""
+    """Whether the cache has compiled code of the kernel's `module`, such as "rocking"."""
     folder = _cache.folder()
     return folder is not None and any(folder.rglob(f"{module}.*.nbi"))
 
 
+def cache_folder() -> Path | None:
+    """Folder of the compiled kernel, writable by this user only; None where the kernel is compiled in memory."""
+    return _cache.folder()
+
+
+def processor() -> str:
+    """Name of the processor as the compiler knows it: the last digits of the kernel depend on it."""
+    return str(llvmlite.binding.get_host_cpu_name())
+
+
 def _is_within(made: Callable[..., Any], folder: Path) -> bool:
-    # where numba finds the folder unusable, as on a disk that is full, it goes on to others without a word; without
-    # compilation (NUMBA_DISABLE_JIT) there is no cache
+    # where the folder is unusable, as on a full disk, numba silently uses others; without compilation
+    # (NUMBA_DISABLE_JIT) there is no cache
     stats = getattr(made, "stats", None)
     return stats is None or Path(stats.cache_path).is_relative_to(folder)
 
 
 def _cache_of(function: Callable[..., Any]) -> KernelCache:
-    """The cache for the folder of a function; one outside the kernel calls it, and has its hash in the name."""
+    """Cache for a function's folder; for a folder outside the kernel its name includes the kernel's hash."""
     folder = Path(function.__code__.co_filename).parent
     if folder not in _caches:
         _caches[folder] = KernelCache(_GIVEN, [*_VERSIONS, _cache.name], folder)

@@ -1,4 +1,4 @@
-"""The equations of motion, Eq. (8) and (A.1), and the mechanical energy.
+"""Equations of motion, Eq. (8) and (A.1), and mechanical energy.
 
 Both corners share one form. With sg = +1 and B2 = 0 about corner A (theta > 0), sg = -1 and B2 = 2b about corner B
 (theta < 0), s = sin(theta), c = cos(theta):
@@ -11,7 +11,7 @@ Both corners share one form. With sg = +1 and B2 = 0 about corner A (theta > 0),
     J theta'' = M g (h_b s - sg b c) + M a_g (h_b c + sg b s) - k_C q G
     G = ((B2 + d) B2 + h1^2) s - h1 d c + u1 (h1 c - B2 s)
 
-The printed forms cancel at small theta and small u1: here 1 - c = 2 sin^2(theta/2), and with e = dx - d,
+The printed forms suffer from cancellation at small theta and u1: here 1 - c = 2 sin^2(theta/2), and with e = dx - d,
 L - d = (2 d e + e^2 + dy^2) / (L + d).
 """
 

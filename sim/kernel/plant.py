@@ -1,4 +1,4 @@
-"""Table and specimen as one mechanical system: the rates of its state in every contact mode.
+"""Table and specimen as one mechanical system: rates of its state in every contact mode.
 
 State y = [x, v, u1, u2, v1, v2, theta, omega] with x, v of the table and u, v relative to it, and a contact mode.
 The specimen acts back on the table: horizontal momentum of everything that moves gives
@@ -26,14 +26,14 @@ from sim.kernel.compiled import compiled
 Array = NDArray[np.float64]
 
 REST, ROCK_A, ROCK_B, FALLEN = 0, 1, 2, 3
-"""Contact modes: standing, rocking about A (theta > 0), about B (theta < 0), hanging in the catch."""
+"""Contact modes: at rest, rocking about A (theta > 0), about B (theta < 0), held by the catch."""
 
 STATES = 8
 """Numbers in the state."""
 
 
 class Plant(NamedTuple):
-    """Every constant of the moving system in SI units; `mass` = 0 and `k_c` = 0 make the frame bare."""
+    """Constants of the moving system in SI units; `mass` = 0 and `k_c` = 0 for the bare frame."""
 
     m1: float
     m2: float
@@ -80,7 +80,7 @@ GRID: Any = FLOAT[:, ::1]
 def table_force(x: float, v: float, request: float, p: Plant) -> float:
     """Force [N] of coil, suspension, friction and end stops on the table.
 
-    `request` is what the amplifier would hold: coil volts, or amperes if `holds_current`. In both cases the coil
+    `request` is the amplifier's command: coil volts, or amperes if `holds_current`. In both cases the coil
     voltage R i + Bl v and the current are kept within the amplifier's limits.
     """
     current = request if p.holds_current > 0.0 else (request - p.bl * v) / p.resistance
@@ -88,7 +88,7 @@ def table_force(x: float, v: float, request: float, p: Plant) -> float:
     current = max(current, (-p.voltage_limit - back_emf) / p.resistance)
     current = min(current, (p.voltage_limit - back_emf) / p.resistance)
     current = min(max(current, -p.current_limit), p.current_limit)
-    # tanh by one exponential: twice as fast as the library's, and exact to rounding of the friction force
+    # tanh from one exponential: twice as fast as the library function, and exact to rounding of the friction force
     friction = p.friction * (1.0 - 2.0 / (math.exp(2.0 * v / p.friction_velocity) + 1.0))
     force = p.bl * current - p.k_s * x - p.c_s * v - friction
     over = abs(x) - p.half_stroke
@@ -102,7 +102,7 @@ def table_force(x: float, v: float, request: float, p: Plant) -> float:
 def rates(mode: int, y: Array, request: float, noise: float, p: Plant, dy: Array) -> None:
     """Write the time derivative of the state `y`, shape (8,), into `dy`; dy[1] is the table's acceleration.
 
-    `noise` is a force on the table [N]. In REST the spring is linear and the block's mass rides on the table.
+    `noise` is a force on the table [N]. In REST the spring is linear and the block's mass is added to the table.
     """
     u1, u2, v1, v2, theta, omega = y[2], y[3], y[4], y[5], y[6], y[7]
     sg = 1.0
@@ -138,17 +138,17 @@ def rates(mode: int, y: Array, request: float, noise: float, p: Plant, dy: Array
 
 @compiled(FLOAT(ROW, ROW, PLANT))
 def overturning_moment(y: Array, dy: Array, p: Plant) -> float:
-    """h_b M a - k_c h1 u1 [N m] of the standing block: it lifts when the magnitude passes b g M (Eqs. 9, A.3)."""
+    """h_b M a - k_c h1 u1 [N m] of the standing block: it lifts when the magnitude exceeds b g M (Eqs. 9, A.3)."""
     return p.h_b * p.mass * dy[1] - p.k_c * p.h1 * y[2]
 
 
 @compiled(FLOAT(PLANT))
 def restitution_on_table(p: Plant) -> float:
-    """Angular velocity after over before an impact when the table may give way.
+    """Ratio of the angular velocities after and before an impact on a table that can move.
 
     Housner's balance of angular momentum about the new corner with the table's share of the horizontal momentum:
-    (J - mu) omega+ = (r J - mu) omega-, mu = (M h_b)^2 / (m_t + M). r is that of a block on fixed ground, to which a
-    heavy table tends; a light one loses more at the impact and is given it back by the drive that holds it.
+    (J - mu) omega+ = (r J - mu) omega-, mu = (M h_b)^2 / (m_t + M). r is that of a block on fixed ground, the limit for
+    a heavy table. A light table takes up momentum at the impact, which is returned by the drive that holds it.
     """
     give = (p.mass * p.h_b) ** 2 / (p.moving_mass + p.mass)
     return (p.restitution * p.inertia - give) / (p.inertia - give)
@@ -156,9 +156,9 @@ def restitution_on_table(p: Plant) -> float:
 
 @compiled(VOID(ROW, FLOAT, PLANT))
 def turn(y: Array, omega: float, p: Plant) -> None:
-    """Give the block the angular velocity `omega` at once: the table takes the horizontal impulse.
+    """Set the block's angular velocity to `omega` instantly: the table takes the horizontal impulse.
 
-    m_t v + M (v - G omega) is kept; the columns carry no impulse, so the storeys keep their absolute velocity.
+    m_t v + M (v - G omega) is conserved; the columns transmit no impulse, so the storeys keep their absolute velocity.
     """
     lever = p.h_b * math.cos(y[6]) + math.copysign(p.b, y[6]) * math.sin(y[6])
     jump = p.mass * lever * (omega - y[7]) / (p.moving_mass + p.mass)

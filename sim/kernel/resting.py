@@ -1,11 +1,11 @@
-"""The exact step of a resting block's frame, and what proves that nothing happens inside it.
+"""Exact integration step of the frame under a resting block, with proof that no event lies within it.
 
-At rest everything is linear. With y = [u1, u2, v1, v2, a_g, a_g'] and a base acceleration that goes straight,
+At rest everything is linear. With y = [u1, u2, v1, v2, a_g, a_g'] and a linear base acceleration,
 y' = A y, so a step of length h is y(h) = exp(A h) y(0): [Phi | Gamma0 | Gamma1] are the first four rows (Van Loan,
-1978; Nigam and Jennings, 1969). The matrix is made once per length.
+1978; Nigam and Jennings, 1969). The matrix is computed once per length.
 
 A quantity f y stays within h^2 / 8 max |f y''| of the chord between its ends, and |f y''| <= |f A^2| exp(|A| h) |y(0)|
-entry by entry. So six products bound the moment, a peak or a velocity over the whole step.
+elementwise. Thus six products bound the moment, a peak or a velocity over the whole step.
 """
 
 import numpy as np
@@ -18,18 +18,18 @@ TABLE_ROWS = 9
 """Rows of a propagator: u1, u2, v1, v2, then the bounds of moment, u1, drift and of their velocities."""
 
 MUST_STEP, GLIDED, LOOK_INSIDE, ANOTHER_KIND = range(4)
-"""What `glide` found: the block may lift; nothing; no uplift, but a peak may lie inside; a segment that is a sine or
-of another length."""
+"""Results of `glide`: the block may lift; all taken; no uplift, but a peak may lie inside; a segment that is a sine or
+has another length."""
 
 
 @compiled("void(float64[::1], float64, int64, float64, float64[:,::1])")
 def propagator(p: NDArray[np.float64], h: float, n: int, tolerance: float, table: NDArray[np.float64]) -> None:
     """Write the exact step of length `h` [s] and its bounds to `table`, shape (TABLE_ROWS, 6).
 
-    Its first number, cos-like and positive, is 0 where the table is of no use: where a Taylor polynomial of order `n`
-    would not cover the step to `tolerance`, because looking inside takes one.
+    Its first number, cos-like and positive, is 0 where the table cannot be used: where a Taylor polynomial of order
+    `n`, needed to look inside the step, does not reach `tolerance`.
     """
-    # plain loops: expressions of arrays would take numba seconds to compile
+    # plain loops: array expressions would add seconds of compilation
     system = np.zeros((2, 6, 6))
     linear = system[0]
     linear[0, 2] = linear[1, 3] = linear[4, 5] = 1.0
@@ -100,16 +100,16 @@ def glide(
     samples: NDArray[np.float64],
     filled: int,
 ) -> tuple[int, int]:
-    """Take the exact step of `table` through segment `i` and on, as long as there is nothing to do but go on.
+    """Apply the exact step of `table` to segment `i` and the following ones, until one needs closer inspection.
 
-    Returns the segment where that ended and what was found there: its start is `x`, shape (6,), its exact end, which
-    has not been taken, `following`. The number of segments and GLIDED mean that all were taken.
-    until : time [s] of the next sample; the segment that holds it is not taken.
+    Returns the segment where that ended and the result: `x`, shape (6,), is the state at its start and `following` the
+    exact state at its end, which is not yet taken. The number of segments and GLIDED mean that all were taken.
+    until : time [s] of the next sample; the segment that contains it is not taken.
     peaks : of |u1| and |u2 - u1| from `peaks_from` [s] on; raised where the ends of a segment suffice, because the
     motion between them is proved monotone.
     samples, filled : the state after each segment taken goes to the rows of `samples`, shape (m, 6), from `filled` on,
-    as long as there are any; the caller keeps them apart from `until`.
-    clock : shape (2,), start of the segment [s] and what rounding took from it; moved on, as x and `peaks` are.
+    as long as there are any; unlike those of `until`, which the caller handles.
+    clock : shape (2,), start of the segment [s] and its rounding error; updated, as x and `peaks` are.
     """
     h, coupled, holding = segments[i, 0], p[COUPLED] != 0.0, p[B] * p[GRAVITY] * p[MASS]
     forth, back = p[H_B] * p[MASS], p[K_C] * p[H1]

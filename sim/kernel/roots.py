@@ -1,7 +1,7 @@
 """First root and greatest magnitude of a polynomial on an interval, by certified subdivision.
 
-An interval is discarded only when a bound on the derivatives proves that it holds nothing, and searched only when a
-bound proves that it holds one thing: no grazing dip falls between samples.
+An interval is discarded only when a bound on the derivatives proves that it has no root or extremum, and searched only
+when a bound proves that it has exactly one: a grazing dip cannot be missed between samples.
 """
 
 import numpy as np
@@ -10,14 +10,13 @@ from numpy.typing import NDArray
 from sim.kernel.compiled import compiled
 
 SMALLEST_PART, FLOOR_GROWTH = 1e-9, 1.1
-"""Part of the interval below which a double root is taken as a touch and not subdivided further.
-
-That floor grows whenever it is reached: the work stays bounded for polynomials whose bounds say nothing.
+"""Fraction of the interval below which a double root counts as a touch and is not subdivided further. The limit is
+raised each time it is reached, which limits the work for polynomials with inconclusive bounds.
 """
 
 ROUNDING, NOTHING = 2e-15, 1e-300
-"""Rounding of a polynomial's value in parts of the sum of its terms' magnitudes, and what is smaller than any motion:
-among denormal numbers relative bounds fail."""
+"""Rounding error of a polynomial relative to the sum of its terms' magnitudes, and a value far below any motion:
+relative bounds fail for denormal numbers."""
 
 
 @compiled("Tuple((float64, float64, float64))(float64[::1], int64, float64)")
@@ -48,30 +47,39 @@ def first_root(p: NDArray[np.float64], n: int, h: float) -> float:
         half = 0.5 * (right - left)
         t = left + half
         value, slope, _ = evaluate(p, n, t)
-        if value <= steepest * half:  # else: positive all over this part
+        if value <= steepest * half:  # else: positive throughout this part
             if abs(slope) <= sharpest * half:
                 if width > floor:
                     width *= 0.5
                     continue
                 floor *= FLOOR_GROWTH
-            # monotone here (or too small to matter): the sign at the right end is the whole question
+            # monotone here (or negligible): the sign at the right end decides
             if evaluate(p, n, right)[0] <= 0.0:
                 break
         left, width = right, 2.0 * width
     if left >= h:
         return -1.0
     for _ in range(100):
-        value, slope, _ = evaluate(p, n, t)
+        value, slope, half_bend = evaluate(p, n, t)
         if value > 0.0:
             left = t
         else:
             right = t
-        trial = t - value / slope if slope < 0.0 else left
-        if not left < trial < right:
+        # Halley's step, which triples the digits; else bisection
+        trial = left
+        if slope < 0.0:
+            trial = t - value * slope / (slope * slope - value * half_bend)
+            # relative to the root, not the step: errors of short phases accumulate over hundreds of bounces
+            if abs(trial - t) <= 4e-16 * t:
+                break
+        inside = left < trial < right
+        if not inside:
             trial = 0.5 * (left + right)
         moved, t = abs(trial - t), trial
-        # of the root itself, not of the step: errors of a short flight add up over hundreds of bounces
+        # the next step of Newton would move by the bend times the square of this one, Halley's by far less
         if moved <= 4e-16 * t:
+            break
+        if inside and moved <= 1e-6 * t and abs(half_bend) * moved * moved <= 1e-13 * t * -slope:
             break
     return t
 
@@ -79,15 +87,16 @@ def first_root(p: NDArray[np.float64], n: int, h: float) -> float:
 @compiled("float64(float64[::1], int64, float64, float64, float64)")
 def greatest_magnitude(p: NDArray[np.float64], n: int, start: float, h: float, best: float) -> float:
     """The greater of `best` and the greatest |sum p_k t^k|, k = 0..n, for t in [start, h]."""
-    # the ends first: a step that is long for its motion rises like a high power of t, and all before its end is small
+    # the ends first: over a step that is long for its motion the polynomial grows like a high power of t and is small
+    # before
     best = max(best, abs(evaluate(p, n, start)[0]), abs(evaluate(p, n, h)[0]))
     most = sharpest = jerkiest = bounded = 0.0
     left, width, floor = start, h - start, SMALLEST_PART * h
     while left < h:
         right = min(left + width, h)
         if right != bounded:
-            # bounds on [0, right], of the value and the second and third derivatives: those on all of [0, h] would
-            # divide the beginning of such a step into thousands of parts
+            # bounds on [0, right], of the value and the second and third derivatives: those on the whole of [0, h]
+            # would divide the beginning of such a step into thousands of parts
             bounded = right
             most = sharpest = jerkiest = 0.0
             for k in range(n, -1, -1):
@@ -100,7 +109,7 @@ def greatest_magnitude(p: NDArray[np.float64], n: int, start: float, h: float, b
         t = left + half
         value, slope, half_bend = evaluate(p, n, t)
         best = max(best, abs(value))
-        # more than `best` by rounding alone, here or in the sum, is not searched for, nor what is nothing
+        # skip an excess over `best` by rounding alone, here or in the sum, and negligible values
         above = best * (1.0 + 1e-14) + ROUNDING * most + NOTHING
         if abs(value) + half * (abs(slope) + 0.5 * sharpest * half) > above:
             if abs(slope) <= sharpest * half and 2.0 * abs(half_bend) <= jerkiest * half:
@@ -108,7 +117,7 @@ def greatest_magnitude(p: NDArray[np.float64], n: int, start: float, h: float, b
                     width *= 0.5
                     continue
                 floor *= FLOOR_GROWTH
-            # at most one extremum here: both ends count, and the zero of the slope between them if there is one
+            # at most one extremum here: evaluate both ends, and the zero of the slope between them if there is one
             low, high = left, right
             low_value, low_slope, _ = evaluate(p, n, low)
             high_value, high_slope, _ = evaluate(p, n, high)

@@ -1,7 +1,7 @@
-"""The bench's moving parts streamed tick by tick under a drive that is held between ticks.
+"""Motion of the bench's moving parts, tick by tick, under a drive held between ticks.
 
-Integration: classical Runge-Kutta of order 4; uplift, impact and catch end a step at their own instant, found on
-the step itself, so that the order is kept across them. The end stops are stiff springs, not events.
+Integration: classical Runge-Kutta of order 4; uplift, impact and catch end a step at their instant, located on the step
+itself, which preserves the order across them. The end stops are stiff springs, not events.
 """
 # pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
 # pyright: reportUnknownArgumentType=false
@@ -33,22 +33,23 @@ from sim.kernel.plant import (
 )
 
 COLUMNS = 9
-"""Columns of the samples: the state and, last, the table's mean acceleration over the tick before."""
+"""Columns of the samples: the state, then the table's mean acceleration over the previous tick."""
 
 _NONE, _IMPACT, _CATCH, _UPLIFT = 0, 1, 2, 3
 _REST_ANGLE = 1.0e-7
-"""A bounce that would stay below this angle [rad] ends in rest: at most 4e-6 m at the top of the block is lost."""
+"""Bounces that stay below this angle [rad] end at rest: the error at the block's top is at most 4e-6 m."""
 _BOUNCES = 100
-"""Events within one step after which the block is put to rest; the rest angle keeps real motions far below it."""
+"""Events within one step after which the block is set to rest; with the rest angle real motions have far fewer.
+"""
 _INSTANT = 1.0e-14
 """Accuracy to which the instant of an event is found [s]."""
 
 
 @compiled(VOID(INT, ROW, FLOAT, FLOAT, FLOAT, FLOAT, PLANT, GRID))
 def advance(mode: int, y: Array, h: float, held: float, request: float, noise: float, p: Plant, work: Array) -> None:
-    """One Runge-Kutta step of length `h` from `y` into work[4]; work[0] holds the rates at `y` already.
+    """One Runge-Kutta step of length `h` from `y` into work[4]; work[0] already holds the rates at `y`.
 
-    The amplifier goes from `held` towards `request` with its lag, exactly.
+    The amplifier's first-order lag from `held` towards `request` is exact.
     """
     decay = math.exp(-0.5 * h / p.lag) if p.lag > 0.0 else 0.0
     middle = request + (held - request) * decay
@@ -69,7 +70,7 @@ def advance(mode: int, y: Array, h: float, held: float, request: float, noise: f
 
 @compiled(FLOAT(INT, INT, ROW, FLOAT, FLOAT, PLANT, GRID))
 def margin(event: int, mode: int, y: Array, request: float, noise: float, p: Plant, work: Array) -> float:
-    """How far the state `y` is from `event`: positive before it, negative past it."""
+    """Distance of the state `y` from `event`: positive before it, negative past it."""
     if event == _IMPACT:
         return y[6] if mode == ROCK_A else -y[6]
     if event == _CATCH:
@@ -84,8 +85,8 @@ def locate(
 ) -> float:
     """Instant of the first `event` within (0, h], the state then in work[4]; -1 if the step ends before it.
 
-    Illinois iteration on Runge-Kutta steps of varying length. A motion that starts on the ground has a root at 0
-    already: dividing it out leaves the return, however short the bounce.
+    Illinois iteration on Runge-Kutta steps of varying length. A motion that starts on the ground already has a root at
+    0, which is divided out to find the return, however short the bounce.
     """
     power, low_value = 0, 1.0
     if event == _IMPACT and y[6] == 0.0:
@@ -123,7 +124,7 @@ def locate(
 
 @compiled(INT(INT, ROW, FLOAT, FLOAT, PLANT, GRID))
 def impact(mode: int, y: Array, request: float, noise: float, p: Plant, work: Array) -> int:
-    """The block passes from one corner to the other (Housner), or comes to rest: returns the mode that follows."""
+    """Transfer the block from one corner to the other (Housner), or to rest. Returns the new mode."""
     y[6] = 0.0
     turn(y, restitution_on_table(p) * y[7], p)
     other = ROCK_B if mode == ROCK_A else ROCK_A
@@ -139,7 +140,7 @@ def impact(mode: int, y: Array, request: float, noise: float, p: Plant, work: Ar
 
 @compiled(INT(INT, ROW, FLOAT, FLOAT, PLANT, GRID))
 def passed(mode: int, y: Array, request: float, noise: float, p: Plant, work: Array) -> int:
-    """The event that a step which ended in `y` has gone past."""
+    """Event that a step ending in `y` has passed."""
     if mode == REST:
         return _UPLIFT if p.mass > 0.0 and margin(_UPLIFT, mode, y, request, noise, p, work) < 0.0 else _NONE
     if mode == FALLEN:
@@ -153,7 +154,7 @@ def passed(mode: int, y: Array, request: float, noise: float, p: Plant, work: Ar
 def substep(
     mode: int, y: Array, h: float, held: float, request: float, noise: float, p: Plant, work: Array
 ) -> tuple[int, float]:
-    """Move `y` on by `h` through every event; returns the mode and what the amplifier then holds."""
+    """Advance `y` by `h` through every event; returns the mode and the amplifier's output."""
     left = h
     for bounce in range(_BOUNCES + 1):
         last = bounce == _BOUNCES
@@ -171,7 +172,7 @@ def substep(
         reached = request + (held - request) * math.exp(-left / p.lag) if p.lag > 0.0 else request
         event, limit, instant = passed(mode, work[4], reached, noise, p, work), left, -1.0
         if event == _NONE and y[6] * y[7] < 0.0 and work[4, 7] * y[7] < 0.0:
-            # the block turned round within the step: did it touch the ground at the lowest point?
+            # the block reversed within the step: check for contact at the lowest point
             event, limit = _IMPACT, left * y[7] / (y[7] - work[4, 7])
         if event != _NONE and not last:
             instant = locate(event, mode, y, limit, held, request, noise, p, work)
@@ -208,11 +209,10 @@ def stream(
 ) -> int:
     """Sample the plant, then hold the next request for one tick [s]; again for every request.
 
-    requests, noise : shape (n,), what the amplifier is asked for [V or A] and force noise [N], held for a tick each.
-    y : state, shape (8,), moved on; carried : shape (2,), [held by the amplifier, last mean acceleration], moved on.
-    samples : shape (n, 9), row i is the state at tick i before request i acts, and the mean
-        acceleration over the tick before.
-    Returns the mode. Rows do not depend on how the requests are cut into calls.
+    requests, noise : shape (n,), commands to the amplifier [V or A] and force noise [N], held for a tick each.
+    y : state, shape (8,), updated; carried : shape (2,), [amplifier output, last mean acceleration], updated.
+    samples : shape (n, 9), row i is the state at tick i before request i acts, and the mean acceleration over the
+    previous tick. Returns the mode. Rows do not depend on how the requests are divided among calls.
     """
     work = np.empty((6, STATES))
     h = tick / substeps
@@ -222,7 +222,7 @@ def stream(
         held, velocity = carried[0] if p.lag > 0.0 else requests[i], y[1]
         for _ in range(substeps):
             mode, held = substep(mode, y, h, held, requests[i], noise[i], p, work)
-        # the mean over the tick: an instant would miss the impulse of an impact, and always hit the same
-        # place of the sawtooth that a held drive makes (1.5 % low with the default shaker)
+        # mean over the tick: an instantaneous value would miss the impulse of an impact, and always sample the same
+        # phase of the sawtooth of a held drive (1.5 % low with the default shaker)
         carried[0], carried[1] = held, (y[1] - velocity) / tick
     return mode

@@ -1,4 +1,4 @@
-"""What is read off a step's polynomials: samples, peaks and the first event.
+"""Evaluation of a step's polynomials: samples, peaks and the first event.
 
 `c` holds the Taylor coefficients of u1, u2, v1, v2, theta, omega, shape (6, n + 1), `a` those of the base
 acceleration; a step lasts from 0 to `h`. `e` is scratch space, shape (n + 1,).
@@ -7,53 +7,132 @@ acceleration; a step lasts from 0 to `h`. `e` is scratch space, shape (n + 1,).
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.kernel.compiled import compiled
+from sim.kernel.compiled import compiled, generic
+from sim.kernel.lanes import fma, get2, magnitude, put, zero
 from sim.kernel.packing import COUPLED, GRAVITY, H1, H_B, K_C, MASS, B
 from sim.kernel.roots import first_root, greatest_magnitude
 
 NO_EVENT, IMPACT, OVERTURNING, UPLIFT = range(4)
-"""What ends a step."""
+"""Endings of a step."""
 
 UPLIFT_MARGIN = 1e-12
 """Relative excess of |m| over b g M that counts as uplift: rounding alone never lifts a block."""
 
 
-@compiled("void(float64[:,::1], int64, float64, float64[::1])")
+@generic
 def state_at(c: NDArray[np.float64], n: int, t: float, out: NDArray[np.float64]) -> None:
-    """The six polynomials at time `t` of the step, written to `out`, shape (6,)."""
-    # six sums side by side: each alone would wait for its own last product
-    u1 = u2 = v1 = v2 = theta = omega = 0.0
-    for k in range(n, -1, -1):
-        u1, u2 = u1 * t + c[0, k], u2 * t + c[1, k]
-        v1, v2 = v1 * t + c[2, k], v2 * t + c[3, k]
-        theta, omega = theta * t + c[4, k], omega * t + c[5, k]
-    out[0], out[1], out[2], out[3], out[4], out[5] = u1, u2, v1, v2, theta, omega
+    """Write the six polynomials at time `t` of the step to `out`, shape (6,), or those of many members."""
+    # six interleaved sums: each alone would wait for its previous product
+    u1, u2, v1, v2 = get2(c, 0, n), get2(c, 1, n), get2(c, 2, n), get2(c, 3, n)
+    theta, omega = get2(c, 4, n), get2(c, 5, n)
+    for k in range(n - 1, -1, -1):
+        u1, u2 = fma(u1, t, get2(c, 0, k)), fma(u2, t, get2(c, 1, k))
+        v1, v2 = fma(v1, t, get2(c, 2, k)), fma(v2, t, get2(c, 3, k))
+        theta, omega = fma(theta, t, get2(c, 4, k)), fma(omega, t, get2(c, 5, k))
+    put(out, 0, u1)
+    put(out, 1, u2)
+    put(out, 2, v1)
+    put(out, 3, v2)
+    put(out, 4, theta)
+    put(out, 5, omega)
 
 
-@compiled("void(float64[:,::1], int64, float64, float64, boolean, float64[::1], float64[::1])")
+@generic
+def bends(c: NDArray[np.float64], n: int, h: float, out: NDArray[np.float64]) -> None:
+    """Bounds of |u1''|, |u2'' - u1''| and |theta''| over a step of length `h`, written to `out`, shape (3,)."""
+    bend_1 = bend_2 = bend_3 = zero(out)
+    for k in range(n, 1, -1):
+        factor = float(k * (k - 1))
+        bend_1 = fma(bend_1, h, factor * magnitude(get2(c, 0, k)))
+        bend_2 = fma(bend_2, h, factor * magnitude(get2(c, 1, k) - get2(c, 0, k)))
+        bend_3 = fma(bend_3, h, factor * magnitude(get2(c, 4, k)))
+    put(out, 0, bend_1)
+    put(out, 1, bend_2)
+    put(out, 2, bend_3)
+
+
+@generic
+def tail(c: NDArray[np.float64], n: int, h: float, out: NDArray[np.float64]) -> None:
+    """Sum of |theta_k| h^(k - 5) for k = 5..n, written to `out`, shape (1,)."""
+    total = magnitude(get2(c, 4, n))
+    for k in range(n - 1, 4, -1):
+        total = fma(total, h, magnitude(get2(c, 4, k)))
+    put(out, 0, total)
+
+
+@compiled("void(float64[:,::1], int64, float64, float64, float64[::1], boolean, float64[::1], float64[::1])")
 def raise_peaks(
     c: NDArray[np.float64],
     n: int,
     start: float,
     h: float,
+    following: NDArray[np.float64],
     rocking: bool,
     e: NDArray[np.float64],
     peaks: NDArray[np.float64],
 ) -> None:
-    """Raise `peaks` = [|u1|, |u2 - u1|, |theta|], shape (3,), to the greatest values in [start, h]."""
-    # most steps raise nothing: the three bounds together, and a polynomial on its own only where its bound says so
-    most_1 = most_2 = most_3 = 0.0
-    for k in range(n, -1, -1):
-        most_1 = most_1 * h + abs(c[0, k])
-        most_2 = most_2 * h + abs(c[1, k] - c[0, k])
-        most_3 = most_3 * h + abs(c[4, k])
-    if most_1 <= peaks[0] and most_2 <= peaks[1] and most_3 <= peaks[2]:
-        return
+    """Raise `peaks` = [|u1|, |u2 - u1|, |theta|], shape (3,), to the greatest values in [start, h].
+
+    following : the state at `h`, shape (6,).
+    """
+    bends(c, n, h, e)
+    bend_1, bend_2, bend_3 = e[0], e[1], e[2]
     for which in range(3 if rocking else 2):
-        if (most_1 if which == 0 else (most_2 if which == 1 else most_3)) > peaks[which]:
+        if which == 0:
+            bend, begin, end, slope, last = bend_1, c[0, 0], following[0], c[2, 0], following[2]
+        elif which == 1:
+            bend, begin, end = bend_2, c[1, 0] - c[0, 0], following[1] - following[0]
+            slope, last = c[3, 0] - c[2, 0], following[3] - following[2]
+        else:
+            bend, begin, end, slope, last = bend_3, c[4, 0], following[4], c[5, 0], following[5]
+        most = max(abs(begin), abs(end))
+        if start == 0.0 and most > peaks[which] and slope * last > 0.0 and abs(slope) + abs(last) > bend * h:
+            peaks[which] = most  # the slope has no zero: the largest value is at one of the ends
+        # most steps raise no peak: the distance from the chord is at most h^2 / 8 of the largest second derivative
+        elif most + 0.125 * h * h * bend > peaks[which]:
             for k in range(n + 1):
                 e[k] = c[0, k] if which == 0 else (c[1, k] - c[0, k] if which == 1 else c[4, k])
             peaks[which] = greatest_magnitude(e, n, start, h, peaks[which])
+
+
+@compiled("float64(float64, float64, float64)")
+def least_of_parabola(first: float, line: float, bend: float) -> float:
+    """Minimum of first + line s + bend s^2 for s in [0, 1]."""
+    if bend > 0.0 and -2.0 * bend < line < 0.0:
+        return first - 0.25 * line * line / bend
+    return min(first, first + line + bend)
+
+
+@compiled(
+    "boolean(float64, float64, float64, float64, float64, float64, float64, float64, int64, float64)",
+)
+def is_clear(
+    sg: float,
+    theta_0: float,
+    theta_1: float,
+    theta_2: float,
+    theta_3: float,
+    theta_4: float,
+    rest: float,
+    h: float,
+    known: int,
+    theta_limit: float,
+) -> bool:
+    """Whether a bound proves that a step of a rocking block holds no event: from the first coefficients of theta and
+    the `tail` of the others. The first three left after division by the known roots are a parabola with an exact
+    minimum.
+    """
+    if known == 0:
+        first, line, bend, rest = theta_0, theta_1, theta_2, fma(fma(rest, h, abs(theta_4)), h, abs(theta_3))
+    elif known == 1:
+        first, line, bend, rest = theta_1, theta_2, theta_3, fma(rest, h, abs(theta_4))
+    else:
+        first, line, bend = theta_2, theta_3, theta_4
+    first, line, bend, rest = sg * first, sg * line * h, sg * bend * h * h, rest * h * h * h
+    most = first + abs(line) + abs(bend) + rest
+    for _ in range(known):
+        most *= h
+    return least_of_parabola(first, line, bend) > rest and most < theta_limit
 
 
 @compiled(
@@ -73,18 +152,17 @@ def first_event(
 ) -> tuple[float, int, float]:
     """Time, kind and direction (+1 to A, -1 to B; of an uplift) of the first event in [0, h]; NO_EVENT at h.
 
-    known : how many roots theta = 0 of a rocking phase lie at the start of the step and are divided out.
+    known : number of roots theta = 0 of a rocking phase at the start of the step, which are divided out.
     Source: uplift Eq. (9) and (A.3).
     """
     event, direction = NO_EVENT, 0.0
     if sg == 0.0 and p[COUPLED] == 0.0:
         return h, event, direction
     if sg != 0.0:
-        # most steps hold no event: one bound for both, before anything is searched
-        first, spread = sg * c[4, known], 0.0
-        for k in range(n, known, -1):
-            spread = (spread + abs(c[4, k])) * h
-        if first > spread and (first + spread) * h**known < theta_limit:
+        # most steps contain no event: test one bound for both before searching
+        tail(c, n, h, e)
+        rest = e[0]
+        if n > 4 and is_clear(sg, c[4, 0], c[4, 1], c[4, 2], c[4, 3], c[4, 4], rest, h, known, theta_limit):
             return h, event, direction
     for candidate in range(2):
         degree = n
@@ -101,10 +179,10 @@ def first_event(
             for k in range(n + 1):
                 e[k] = -sg * c[4, k]
             e[0] += theta_limit
-        spread = 0.0
-        for k in range(degree, 0, -1):
-            spread = (spread + abs(e[k])) * h
-        if e[0] > spread:
+        rest = 0.0
+        for k in range(degree, 2, -1):
+            rest = fma(rest, h, abs(e[k]))
+        if least_of_parabola(e[0], e[1] * h, e[2] * h * h) > rest * h * h * h:
             continue
         t = first_root(e, degree, h)
         if t >= 0.0:

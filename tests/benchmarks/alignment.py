@@ -16,10 +16,10 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.config.dump import as_toml
 from bench.config.model import BenchConfiguration
+from bench.config.toml import as_toml
+from drivers.emulation.control import ask
 from drivers.hardware.rig import HardwareRig
-from drivers.laboratory_client import ask
 from drivers.rig import Alignment
 from tests.emulated import emulated
 

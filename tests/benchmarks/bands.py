@@ -19,7 +19,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from bench.prediction.model_uncertainty import expanded_uncertainty
+from bench.prediction.bands import expanded_uncertainty
 from sim.ensemble import record_gains, steady_gains
 from sim.excitation import SampledRecord
 from sim.gain import predict_gain

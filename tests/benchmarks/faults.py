@@ -26,7 +26,7 @@ from time import perf_counter
 
 import numpy as np
 
-from bench.engine.ending import SEVERITY
+from bench.engine.interface import SEVERITY
 from tests.faults.audit import Verdict, judge
 from tests.faults.catalogue import catalogue
 from tests.faults.places import PLACES

@@ -21,10 +21,10 @@ import h5py  # pyright: ignore[reportMissingTypeStubs]
 import numpy as np
 from numpy.typing import NDArray
 
-import bench.record
+import bench.datafile
+from bench.datafile.inspection import verify
+from bench.datafile.recorder import Recorder
 from bench.events import Acquired
-from bench.record.recorder import Recorder
-from bench.record.verification import verify
 from drivers.rig import Block, Channel
 from sim.parameters import Parameters, quantity
 
@@ -154,7 +154,7 @@ def opening(folder: Path) -> bool:
     seconds = float("inf")
     for _ in range(3):
         start = time.perf_counter()
-        with bench.record.open(path) as record:
+        with bench.datafile.open(path) as record:
             (run,) = record.runs
             seconds = min(seconds, time.perf_counter() - start)
             middle = len(run.rows) // 2
@@ -167,15 +167,15 @@ def opening(folder: Path) -> bool:
 
 def kill(folder: Path, count: int) -> bool:
     """Kill so many writers, and recover every file."""
-    from bench.record.recovery import recover
-    from tests.bench.test_record_killed import as_fast_as_it_can, check, killed
+    from bench.datafile.recovery import recover
+    from tests.bench.datafile.living import as_fast_as_it_can, check, killed
 
     rng = np.random.default_rng()
     for number in range(count):
         path, clean = folder / f"{number}.h5", folder / f"{number} clean.h5"
         rows, points = killed(path, as_fast_as_it_can, float(rng.uniform(0.0, 0.3)))
         recover(path, clean)
-        with bench.record.open(clean) as record:
+        with bench.datafile.open(clean) as record:
             check(record, rows, points)
     print(f"killed {count} writers: {count} files recovered with all that was told to be written")
     return True

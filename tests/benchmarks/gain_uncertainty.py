@@ -21,13 +21,12 @@ import numpy as np
 from bench.accelerograms.reference import RecordReference
 from bench.analysis.gain import gain, steady_peak
 from bench.analysis.laser_calibration import LaserCalibration
-from bench.analysis.sensor_accuracy import SensorDoubt
+from bench.analysis.sensor_accuracy import SensorUncertainty
 from bench.analysis.table_motion import at_rest_in_the_end, table_motion
-from protocols.earthquake.observed import observe
-from protocols.earthquake.sensors import drift_errors
-from protocols.harmonic.judge import AMPLITUDE_STEP
+from protocols.earthquake.measurement import observe
+from protocols.earthquake.uncertainty import drift_errors
+from protocols.harmonic.measurement import AMPLITUDE_STEP, LEFT
 from protocols.harmonic.protocol import HarmonicParameters
-from protocols.harmonic.settle import LEFT
 from sim.excitation import SampledRecord
 from sim.gain import predict_gain
 from sim.rocking import simulate
@@ -64,7 +63,7 @@ def harmonic(trials: int) -> None:
                 true = moved.drift / bare.drift
                 sizes, largest, errors, here = [], Counter[str](), [], []
                 for each, one, reference_ in zip(sensors, calibrations, references, strict=True):
-                    doubt = SensorDoubt(ACCURACY, RANGES, one)
+                    doubt = SensorUncertainty(ACCURACY, RANGES, one)
                     peak = steady_peak(cycles_of(each.signals(moved, one), omega)[: asked.measured_cycles], omega)
                     result = gain(peak, reference_, doubt, slope)
                     # the gain that belongs to the amplitude that is stated
@@ -130,7 +129,7 @@ def seismic(trials: int, name: str) -> None:
                 each = Sensors(seed)
                 one = each.calibrated() if calibrated else None
                 seen = tuple(observe(each.signals(motion, one), REST, RATE).drift for motion in (bare, coupled))
-                drawn = drift_errors((seen[0], seen[1]), SensorDoubt(ACCURACY, RANGES, one), 4000, seed)
+                drawn = drift_errors((seen[0], seen[1]), SensorUncertainty(ACCURACY, RANGES, one), 4000, seed)
                 parts = {part: float(np.std((1 + e[1]) / (1 + e[0]))) for part, e in drawn.items()}
                 together = np.sum(list(drawn.values()), axis=0)
                 u = float(np.std((1.0 + together[1]) / (1.0 + together[0])))

@@ -5,8 +5,8 @@
 
 Each repeat is a bench of its own seed, a laser with a scale error within 0.2 % and a linearity error of the size that
 the data sheet allows with any phase, and a block of the size that is stated whose r / r_th is drawn from 0.98 to 1. Its
-tilts are recorded one after the other, without the engine, and analysed as a session does. With --as-drawn, waves of
-the linearity error and the difference of the clocks are drawn as well, from the distributions that the analysis
+tilts are recorded one after the other, without the engine, and analyse_tilt as a session does. With --as-drawn, waves
+of the linearity error and the difference of the clocks are drawn as well, from the distributions that the analysis
 assumes: that is what its intervals promise. Without, they are the default bench's, which the analysis does not know.
 
 With --scatter the restitution of each impact is drawn about its mean, relative, and the motion is that of the closed
@@ -21,13 +21,11 @@ from multiprocessing import get_context
 
 import numpy as np
 
-from bench.analysis.free_rocking.findings import findings
-from bench.analysis.free_rocking.laser_errors import CLOCK, WAVES, LaserErrors
-from bench.analysis.free_rocking.swings import Seen
-from bench.analysis.free_rocking.tilt import Tilt, analysed
+from bench.analysis.free_rocking.findings import CLOCK, WAVES, LaserErrors, Tilt, analyse_tilt, findings
+from bench.analysis.free_rocking.swings import Recording
 from bench.analysis.gain import SensorAccuracy
+from protocols.free_rocking.plan import PlannedTilt, planned_tilts
 from protocols.free_rocking.protocol import FreeRockingParameters
-from protocols.free_rocking.tilts import PlannedTilt, planned_tilts
 from sim import block_face
 from sim.arrangement import Arrangement
 from sim.free_rocking import FreeRocking, critical_angle, energy, frequency_parameter, theoretical_restitution
@@ -92,8 +90,8 @@ def scattered(seed: int, *, scatter: float) -> list[tuple[float, float]]:
         times = np.arange(round((min(motion.rest_time, 40.0) + 1.25) * rate)) / rate
         seen = block_face.displacement(motion.angle(times), asked.height, nominal.block)
         seen += 1e-5 * random.standard_normal(times.size)
-        taken = Seen(seen, rate, nominal.block, asked.height)
-        tilts.append(analysed(taken, nominal, asked.least_swing * abs(angle)))
+        taken = Recording(seen, rate, nominal.block, asked.height)
+        tilts.append(analyse_tilt(taken, nominal, asked.least_swing * abs(angle)))
     found = findings(tilts, LaserErrors(SensorAccuracy(), 0.2), asked.height, asked.height_uncertainty)
     pairs = [(each.value - r, each.uncertainty) for each in (found.restitution, found.motion, found.relation)]
     shape = [(found.trend, 0.0), (found.alpha, alpha), (found.p, p)]
@@ -109,7 +107,9 @@ def _recorded(
     bench.arm()
     counts = bench.run(np.zeros(round(tilt.recording * rate)))
     values = bench.channels[3].to_unit(counts[:, 3])
-    return analysed(Seen(values, rate, nominal.block, asked.height), nominal, asked.least_swing * abs(tilt.angle))
+    return analyse_tilt(
+        Recording(values, rate, nominal.block, asked.height), nominal, asked.least_swing * abs(tilt.angle)
+    )
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -19,19 +19,18 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.analysis.free_decay.covariance import CLOCKS, WAVES
 from bench.analysis.free_decay.decay import Decay, pulsed_decay, released_decay
-from bench.analysis.free_decay.doubt import CLOCKS, WAVES
-from bench.analysis.free_decay.modal import NAMES, quantities
-from bench.analysis.free_decay.response import Constants
+from bench.analysis.free_decay.response import NAMES, Constants, quantities
 from bench.analysis.sensor_accuracy import SensorAccuracy
 from bench.analysis.signals import SignalMap
 from bench.config.model import BenchConfiguration
-from protocols.common.decays.decays import fit_setting
 from protocols.common.decays.frame import frame_result
 from protocols.common.decays.pulse import QUIET, decay_pulse
-from protocols.coupling_stiffness.difference import measured_reference, spring_result
+from protocols.common.decays.recording import fit_setting
+from protocols.coupling_stiffness.springs import measured_reference, spring_result
+from protocols.free_vibration.experiment import RELEASE
 from protocols.free_vibration.protocol import FreeVibrationParameters
-from protocols.free_vibration.release import RELEASE
 from sim.arrangement import Arrangement
 from sim.sensors import Laser
 from sim.specimen import Frame, Specimen

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from bench.comparators.case import AMPLITUDE, END, IMPACTS, OMEGA, PEAKS, PHASE, SPECIMEN, START
-from bench.comparators.heyoka import HeyokaPeer
+from bench.comparators.libraries import HeyokaPeer
 
 DIGITS = 30
 

@@ -7,7 +7,7 @@ The same as `rockbench benchmark`, for a checkout without the command installed.
 
 import sys
 
-from bench.cli.main import main
+from bench.app.cli.main import main
 
 if __name__ == "__main__":
     sys.exit(main(["benchmark", *sys.argv[1:]]))

@@ -19,14 +19,14 @@ from numpy.typing import NDArray
 
 from bench.analysis.signals import SignalMap
 from bench.comparators.catalogue import solve
-from bench.config.model import BenchConfiguration, Simulation
-from bench.engine.requests import Requests
-from bench.engine.stream import Stream
+from bench.config.model import BenchConfiguration
+from bench.config.sections import Simulation
+from bench.engine.interface import EventStream, Requests
 from bench.events import Acquired, Event, SpecimenMounted, State, StateChanged, TwinEstimate
-from bench.twin.beside import twin_beside
-from bench.twin.ensemble import Ensemble, candidates
+from bench.twin.ensemble import Ensemble, draw_members
+from bench.twin.live import live_twin
 from drivers.clock import WallClock
-from drivers.rig import Alignment, Block, Channel, Counts, Handwork
+from drivers.rig import Alignment, Block, Channel, Counts, OperatorTask
 from drivers.simulated import SimulatedRig
 from sim.excitation import SampledRecord
 from sim.specimen import Specimen
@@ -95,13 +95,13 @@ def paced(bench: Recorded, enabled: bool) -> Paced:
             delays.append(time.perf_counter() - due[event.time])
             members.append(event.members)
 
-    stream = Stream(bench.clock, [hear])
+    stream = EventStream(bench.clock, [hear])
     signals = SignalMap(bench.channels, configuration.laser_reference)
     rest = bench.counts[: round(REST * rate)]
     signals.tare(np.column_stack([each.to_unit(rest[:, k]) for k, each in enumerate(bench.channels)]))
     every = signals.of(np.column_stack([each.to_unit(bench.counts[:, k]) for k, each in enumerate(bench.channels)]))
-    with twin_beside(stream, bench, configuration, Requests(), patient=False):  # type: ignore[arg-type]
-        stream.publish(SpecimenMounted(COUPLED, Handwork.MOUNT_SPRING, time=0.0))
+    with live_twin(stream, bench, configuration, Requests(), patient=False):  # type: ignore[arg-type]
+        stream.publish(SpecimenMounted(COUPLED, OperatorTask.MOUNT_SPRING, time=0.0))
         time.sleep(2.0)
         stream.publish(StateChanged(State.ARMED, State.RUNNING, "at rest, zero taken", time=0.0))
         begin, before = time.perf_counter(), time.process_time()
@@ -124,7 +124,7 @@ def against_scipy(bench: Recorded, seconds: float = 3.0) -> tuple[float, float, 
     every = round(dt * bench.sample_rate)
     values = bench.channels[column].to_unit(bench.counts[:, column])
     values = values[: round(seconds * bench.sample_rate)].reshape(-1, every).mean(axis=1)
-    those = candidates(COUPLED, bench.configuration)
+    those = draw_members(COUPLED, bench.configuration)
     ensemble, before = Ensemble(those, dt), time.process_time()
     motions = np.concatenate([ensemble.feed(part) for part in np.split(values, len(values) // 100)], axis=2)
     ours = time.process_time() - before

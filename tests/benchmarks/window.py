@@ -29,15 +29,14 @@ from PySide6.QtCore import QEvent, QEventLoop, QObject
 from PySide6.QtWidgets import QApplication
 
 from bench.analysis.signals import SignalMap
-from bench.catalogue import all_protocols
-from bench.config.model import BenchConfiguration, Simulation
+from bench.app.catalogue import all_protocols
+from bench.app.gui.controller import Controller
+from bench.app.gui.palette import LIGHT, dress
+from bench.app.gui.window import Window
+from bench.app.ipc.messages import Reduction, Traces
+from bench.config.model import BenchConfiguration
+from bench.config.sections import Simulation
 from bench.events import Acquired
-from bench.gui.app import dress
-from bench.gui.controller import Controller
-from bench.gui.palette import LIGHT
-from bench.gui.window import Window
-from bench.link.messages import Traces
-from bench.link.reduction import Reduction
 from drivers.clock import now
 from drivers.rig import Block
 from drivers.simulated import SimulatedRig
@@ -50,14 +49,14 @@ HOUR, TOGETHER = 3600.0, 30
 """Seconds of the soak, and how many of its blocks are drawn at once."""
 
 OURS = """
-from bench.catalogue import all_protocols
-from bench.cli.inputs import configuration_from
+from bench.app.catalogue import all_protocols
+from bench.app.cli.inputs import configuration_from
 configuration = configuration_from(None, None)
 from PySide6.QtWidgets import QApplication
-from bench.gui.app import dress
-from bench.gui.controller import Controller
-from bench.gui.palette import LIGHT
-from bench.gui.window import Window
+from bench.app.gui.palette import dress
+from bench.app.gui.controller import Controller
+from bench.app.gui.palette import LIGHT
+from bench.app.gui.window import Window
 application = QApplication([])
 dress(application, LIGHT)
 controller = Controller()
@@ -121,9 +120,9 @@ class Paints(QObject):
 
 
 class Fed:
-    """Stands in for `bench.link.client.Link`: a process that reduces, a thread that hears it, as a real link has."""
+    """Stands in for `bench.app.ipc.client.SessionClient`: a process that reduces, a thread that receives."""
 
-    standing: Literal["linked"] = "linked"
+    status: Literal["linked"] = "linked"
     silence = 0.0
 
     def __init__(self, length: float, seconds: float) -> None:

@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from bench.config.model import Acquisition, BenchConfiguration, Simulation
+from bench.config.model import BenchConfiguration
+from bench.config.sections import Acquisition, Simulation
+from bench.datafile.reader import open_datafile
+from bench.datafile.recorder import Recorder
 from bench.events import Acquired
-from bench.record.reader import open_record
-from bench.record.recorder import Recorder
-from bench.record.replayed import ReplayedRecord
+from bench.replay.recording import DataFileRecording
+from bench.testing.conformance import RigConformance, RigFactory, play, samples, started
 from drivers.clock import VirtualClock, WallClock
 from drivers.replay import RecordedRun, ReplayRig
 from drivers.rig import Block, Channel, Counts, Rig, RigError
@@ -19,7 +21,6 @@ from drivers.simulated import SimulatedRig
 from sim.errors import InvalidInput
 from sim.parameters import Parameters
 from sim.virtual_bench import VirtualBenchParameters
-from tests.drivers.conformance import RigConformance, RigFactory, play, samples, started
 
 BENCH = BenchConfiguration(
     acquisition=Acquisition(lead=0.05), simulation=Simulation(bench=VirtualBenchParameters(sample_rate=1000.0))
@@ -61,13 +62,13 @@ class TestReplay(RigConformance):
     @pytest.fixture
     def make_rig(self, path: Path) -> Iterator[RigFactory]:
         with ExitStack() as opened:
-            recording = ReplayedRecord(opened.enter_context(open_record(path)))
+            recording = DataFileRecording(opened.enter_context(open_datafile(path)))
             yield lambda: opened.enter_context(ReplayRig(recording))
 
 
 def test_the_recorded_blocks_come_again_run_by_run(tmp_path: Path) -> None:
     given = recorded(tmp_path / "runs.h5", 0.4 * np.sin(9.0 * np.arange(2000) / 1000.0), runs=2)
-    with open_record(tmp_path / "runs.h5") as record, ReplayRig(ReplayedRecord(record)) as rig:
+    with open_datafile(tmp_path / "runs.h5") as record, ReplayRig(DataFileRecording(record)) as rig:
         assert rig.channels == simulated().channels
         assert (rig.sample_rate, rig.drive_range, rig.lead) == (1000.0, simulated().drive_range, 50)
         for run in given:
@@ -80,8 +81,8 @@ def test_the_recorded_blocks_come_again_run_by_run(tmp_path: Path) -> None:
 
 def test_a_file_without_the_configuration_of_its_bench_is_refused(tmp_path: Path) -> None:
     recorded(tmp_path / "bare.h5", np.zeros(100), runs=1, configured=False)
-    with open_record(tmp_path / "bare.h5") as record, pytest.raises(InvalidInput, match="configured"):
-        ReplayedRecord(record)
+    with open_datafile(tmp_path / "bare.h5") as record, pytest.raises(InvalidInput, match="configuration"):
+        DataFileRecording(record)
 
 
 def test_gaps_between_recorded_blocks_are_gaps_between_stretches(tmp_path: Path) -> None:
@@ -94,8 +95,8 @@ def test_gaps_between_recorded_blocks_are_gaps_between_stretches(tmp_path: Path)
     for block in (*blocks[:2], *blocks[4:]):
         recorder(Acquired(1, block, np.zeros(len(block)), time=0.0))
     recorder.close("completed")
-    with open_record(tmp_path / "gap.h5") as record:
-        (run,) = ReplayedRecord(record).runs
+    with open_datafile(tmp_path / "gap.h5") as record:
+        (run,) = DataFileRecording(record).runs
         assert run.stretches == [(0, 200), (400, 200)]
         np.testing.assert_array_equal(run.counts(450, 150), np.concatenate([b.counts for b in blocks])[450:])
         for first, n in ((199, 2), (300, 1), (599, 2)):
@@ -148,7 +149,7 @@ def test_a_run_that_is_over_ends_the_replay_of_it() -> None:
     rig.arm()
     rig.write(np.zeros(500))
     assert len(rig.read(100)) == 50
-    with pytest.raises(RigError, match="over at sample 50"):
+    with pytest.raises(RigError, match="at sample 50"):
         rig.read(1)
     with pytest.raises(RigError, match="not armed"):
         rig.write(np.zeros(1))
@@ -175,7 +176,7 @@ def test_what_the_channels_say_of_their_counts_is_kept(tmp_path: Path) -> None:
     )
     recorder(Acquired(1, Block(0, np.array([[70_000], [100_001]], dtype=np.int32)), np.zeros(2), time=0.0))
     recorder.close("completed")
-    with open_record(tmp_path / "wide.h5") as record, ReplayRig(ReplayedRecord(record), lead=0) as rig:
+    with open_datafile(tmp_path / "wide.h5") as record, ReplayRig(DataFileRecording(record), lead=0) as rig:
         assert rig.channels == made.channels
         assert rig.description["backend"] == "replay"
         rig.arm()

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from bench.testing.conformance import RigConformance, RigFactory, play, started
 from drivers.clock import VirtualClock, WallClock
-from drivers.rig import Counts, DriveUnderflow, Handwork, Rig, RigError
+from drivers.rig import Counts, DriveUnderflow, OperatorTask, Rig, RigError
 from drivers.simulated import SimulatedRig
 from sim.block_face import rotation
 from sim.errors import InvalidInput
 from sim.sensors import Laser
 from sim.specimen import Specimen
 from sim.virtual_bench import VirtualBenchParameters
-from tests.drivers.conformance import RigConformance, RigFactory, play, started
 
 COUPLED = Specimen(beta=0.64)
 
@@ -88,7 +88,7 @@ def test_a_refused_drive_ends_the_run() -> None:
 def test_underflow_says_what_was_missing() -> None:
     rig = started(simulated(), 20)
     rig.read(20)
-    with pytest.raises(DriveUnderflow, match="sample 20: 100 samples were waiting and 105 are needed"):
+    with pytest.raises(DriveUnderflow, match="sample 20: 100 samples were queued and 105"):
         rig.read(5)
 
 
@@ -125,7 +125,7 @@ def test_a_toppled_block_shows_in_laser_1_until_it_is_stood_up() -> None:
     rig = toppled(simulated(COUPLED, laser_1=Laser(reference="table"), laser_2=Laser(reference="table")))
     fallen = measured(started(rig), np.zeros(400), "laser_1").mean()
     rig.stop()
-    rig.handwork(Handwork.STAND_BLOCK_UP)
+    rig.perform(OperatorTask.STAND_BLOCK_UP)
     upright = measured(started(rig), np.zeros(400), "laser_1").mean()
     assert abs(fallen) > 0.01
     assert abs(upright) < 1e-3
@@ -133,11 +133,11 @@ def test_a_toppled_block_shows_in_laser_1_until_it_is_stood_up() -> None:
 
 def test_removing_the_block_leaves_the_bare_frame_and_mounting_a_spring_couples_it() -> None:
     rig = simulated(COUPLED)
-    rig.handwork(Handwork.REMOVE_BLOCK)
+    rig.perform(OperatorTask.REMOVE_BLOCK)
     assert rig.bench.specimen == Specimen()
     with pytest.raises(RigError, match="no block"):
-        rig.handwork(Handwork.STAND_BLOCK_UP)
-    rig.handwork(Handwork.MOUNT_SPRING, 0.25 * 213.44)
+        rig.perform(OperatorTask.STAND_BLOCK_UP)
+    rig.perform(OperatorTask.MOUNT_SPRING, 0.25 * 213.44)
     assert rig.bench.specimen == Specimen(beta=0.25)
 
 
@@ -145,8 +145,8 @@ def test_a_locked_frame_moves_with_the_table_until_it_is_unlocked() -> None:
     rig = simulated(laser_1=Laser(reference="table"), laser_2=Laser(reference="table"))
     volts = 0.4 * np.sin(6.3 * np.arange(2000) / 2000.0)
     moved: list[float] = []
-    for work in (Handwork.LOCK_FRAME, Handwork.UNLOCK_FRAME):
-        rig.handwork(work)
+    for work in (OperatorTask.LOCK_FRAME, OperatorTask.UNLOCK_FRAME):
+        rig.perform(work)
         moved.append(float(np.ptp(measured(started(rig), volts, "laser_2"))))
         rig.stop()
     assert moved[0] < 0.05 * moved[1]
@@ -154,15 +154,15 @@ def test_a_locked_frame_moves_with_the_table_until_it_is_unlocked() -> None:
 
 def test_mounting_a_spring_needs_its_stiffness() -> None:
     with pytest.raises(InvalidInput, match="stiffness"):
-        simulated().handwork(Handwork.MOUNT_SPRING)
+        simulated().perform(OperatorTask.MOUNT_SPRING)
 
 
 def test_a_tilted_block_is_let_go_seconds_after_arming_and_tilted_again() -> None:
     rig = simulated()
-    rig.handwork(Handwork.LOCK_TABLE)
-    rig.handwork(Handwork.WATCH_BLOCK, 0.3)
+    rig.perform(OperatorTask.LOCK_TABLE)
+    rig.perform(OperatorTask.WATCH_BLOCK, 0.3)
     for tilt in (0.08, -0.06):
-        rig.handwork(Handwork.TILT_BLOCK, tilt)
+        rig.perform(OperatorTask.TILT_BLOCK, tilt)
         seen = rotation(measured(started(rig), np.zeros(14_000), "laser_2"), 0.3, rig.bench.specimen.block)
         rig.stop()
         # the laser's linearity, 0.16 mm of its range, over 300 mm
@@ -180,7 +180,7 @@ def test_a_tilted_block_is_let_go_seconds_after_arming_and_tilted_again() -> Non
 
 def test_a_frame_held_when_a_test_is_stopped_is_held_in_the_next() -> None:
     rig = simulated()
-    rig.handwork(Handwork.PULL_FRAME, 0.02)
+    rig.perform(OperatorTask.PULL_FRAME, 0.02)
     for end in (rig.stop, rig.halt):
         still = measured(started(rig), np.zeros(5600), "laser_2")
         assert np.abs(still - 0.02).max() < 1e-3
@@ -189,13 +189,17 @@ def test_a_frame_held_when_a_test_is_stopped_is_held_in_the_next() -> None:
     assert swinging.min() < -0.015
 
 
-def test_nothing_is_changed_by_handwork_that_is_refused() -> None:
+def test_a_refused_task_of_the_operator_changes_nothing() -> None:
     rig = simulated(catch_angle=0.1)
-    rig.handwork(Handwork.WATCH_BLOCK, 0.3)
+    rig.perform(OperatorTask.WATCH_BLOCK, 0.3)
     before = rig.bench.arrangement
-    for work, amount in ((Handwork.MOUNT_SPRING, 100.0), (Handwork.TILT_BLOCK, 0.11), (Handwork.PULL_FRAME, None)):
+    for work, amount in (
+        (OperatorTask.MOUNT_SPRING, 100.0),
+        (OperatorTask.TILT_BLOCK, 0.11),
+        (OperatorTask.PULL_FRAME, None),
+    ):
         with pytest.raises((RigError, InvalidInput)):
-            rig.handwork(work, amount)
+            rig.perform(work, amount)
         assert rig.bench.arrangement == before
 
 

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from bench.engine.ending import SEVERITY
-from bench.engine.machine import LEGAL
+from bench.datafile import recorder as recording
+from bench.datafile.reader import DataFile, open_datafile
+from bench.engine.interface import SEVERITY
+from bench.engine.output import TRANSITIONS
 from bench.events import LimitExceeded, State, StateChanged
-from bench.record import recorder as recording
-from bench.record.reader import Record, open_record
 from sim.virtual_bench import VirtualBench
 from tests.faults.bench import FaultyBench, Story, released, run
 from tests.faults.fault import Fault
@@ -71,18 +71,18 @@ def _judged(fault: Fault, place: Place, path: Path) -> Verdict:
                 with on_disk(path) as record:
                     broken += [*sample_rules(record, story)]
         broken += [f"a thread is left: {name}" for name in left_since(before)]
-    with open_record(path) as record:
+    with open_datafile(path) as record:
         broken += [*sample_rules(record, story), *record_rules(record, story, fault)]
     fired = bench.begun and (bool(bench.rig.struck) or not fault.recorded)
     return Verdict(fault.name, place.name, fired, not bench.begun, noticed, story.status, story.reason, tuple(broken))
 
 
 @contextmanager
-def on_disk(path: Path) -> Iterator[Record]:
+def on_disk(path: Path) -> Iterator[DataFile]:
     """The bytes that are on the disk, read elsewhere: the file itself is still held."""
     with TemporaryDirectory() as elsewhere:
         shutil.copytree(path.parent, elsewhere, dirs_exist_ok=True)
-        with open_record(Path(elsewhere) / path.name) as record:
+        with open_datafile(Path(elsewhere) / path.name) as record:
             yield record
 
 
@@ -138,7 +138,7 @@ def ending_rules(story: Story, fault: Fault, place: Place, noticed: bool) -> Ite
         yield f"ended as {story.status}, not as {' or '.join(expected)}"
     changes = [event for event in story.bench.events if isinstance(event, StateChanged)]
     for event in changes:
-        if event.after not in LEGAL[event.before]:
+        if event.after not in TRANSITIONS[event.before]:
             yield f"went from {event.before} to {event.after}"
     if story.ending is not None and story.bench.engine.state is not State.CLOSED:
         yield f"ended in the state {story.bench.engine.state}"
@@ -192,7 +192,7 @@ def _within(values: NDArray[np.float64], limit: float) -> bool:
     return bool(np.abs(values).max() <= limit)
 
 
-def sample_rules(record: Record, story: Story) -> Iterator[str]:
+def sample_rules(record: DataFile, story: Story) -> Iterator[str]:
     """What is in the file is what was played."""
     blocks, drive = record.blocks, record.drive()
     edges = [*blocks["row"].tolist(), record.rows]
@@ -202,7 +202,7 @@ def sample_rules(record: Record, story: Story) -> Iterator[str]:
             yield f"the recorded drive of run {run_} from {first} on is not what was played"
 
 
-def record_rules(record: Record, story: Story, fault: Fault) -> Iterator[str]:
+def record_rules(record: DataFile, story: Story, fault: Fault) -> Iterator[str]:
     """The file says how it ended; one whose disk failed is as a killed writer leaves it."""
     untold = fault.disk in ("full", "hung") and record.status == "running"
     if untold:

@@ -6,16 +6,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bench.analysis.signals import SignalMap
-from bench.control.legs import Leg
-from bench.engine.ending import Ending
+from bench.control.oscillator import Leg
+from bench.datafile.recorder import PATIENCE, Recorder
 from bench.engine.engine import Engine
-from bench.engine.requests import Requests
-from bench.engine.steps import Arm, Calibrate, Dwell, Follow, Handle, Plan, RampOut, Step
-from bench.engine.stream import Stream
+from bench.engine.interface import Ending, EventStream, Requests
+from bench.engine.steps import Arm, Calibrate, Dwell, OperatorAction, Plan, RampOut, Step, Sweep
 from bench.events import Event, State, StateChanged
 from bench.guard.guard import Guard
-from bench.record.recorder import PATIENCE, Recorder
-from drivers.rig import Handwork
+from drivers.rig import OperatorTask
 from drivers.simulated import SimulatedRig
 from tests.faults.disk import Disk, spoil, wait_until_broken
 from tests.faults.places import Place
@@ -87,7 +85,7 @@ class FaultyBench:
             )
             spoil(recorder, self.disk)
             subscribers.append(recorder)
-        self.stream = Stream(self.rig.clock, [*subscribers, self._fail])
+        self.stream = EventStream(self.rig.clock, [*subscribers, self._fail])
         self.guard = Guard(
             self.rig, self.setting.limits, self.setting.ramps, MOVER, SignalMap(self.rig.channels, "ground")
         )
@@ -110,16 +108,16 @@ class FaultyBench:
         of = self.setting
         tests: list[list[Step]] = [
             [
-                Handle(work, specimen, work.value),
+                OperatorAction(work, specimen, work.value),
                 Arm(of.rest, patience=2.0 * of.rest),
                 Calibrate(of.calibration),
-                Follow((Leg(of.glide, of.amplitude, of.omega),)),
+                Sweep((Leg(of.glide, of.amplitude, of.omega),)),
                 *dwells,
                 RampOut(fast=fast),
             ]
             for work, specimen, dwells, fast in (
-                (Handwork.MOUNT_SPRING, COUPLED, [Dwell(1), Dwell(1)], False),
-                (Handwork.STAND_BLOCK_UP, COUPLED, [Dwell(1)], True),
+                (OperatorTask.MOUNT_SPRING, COUPLED, [Dwell(1), Dwell(1)], False),
+                (OperatorTask.STAND_BLOCK_UP, COUPLED, [Dwell(1)], True),
             )
         ]
         for step in (step for test in tests for step in test):

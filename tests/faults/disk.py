@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from threading import Event as Flag
 from time import monotonic, sleep
 
-from bench.record.recorder import Recorder
+from bench.datafile.recorder import Recorder
 
 LONG = 20.0
 """Longest wait for the recorder's thread [s]."""

@@ -96,7 +96,7 @@ def fails(
     return Fault(name, begin, "failed", str(error), must, may, recorded=True)
 
 
-def asks(*requests: str, status: str, says: str = "was asked for", must: Must = heeded) -> Fault:
+def asks(*requests: str, status: str, says: str = "requested", must: Must = heeded) -> Fault:
     """A person who asks for one or more endings at once."""
 
     def begin(bench: FaultyBench) -> None:

@@ -33,14 +33,14 @@ def sensors() -> list[Fault]:
         found += [
             of_samples(f"{name} invalid", invalid(column), status, says, stays, may=True),
             of_samples(f"{name} at its rail", at_rail(column), status, says, stays, may=True),
-            of_samples(f"{name} stuck", stuck(column), "aborted", f"{name} has shown one count", stays, may=True),
+            of_samples(f"{name} stuck", stuck(column), "aborted", f"constant count of {name}", stays, may=True),
             borne(f"spike on {name}", once(spike(column))),
         ]
     every = range(len(CHANNELS))
     return [
         *found,
         of_samples("all channels invalid", invalid(*every), "halted", "table", stays, may=True),
-        of_samples("all channels stuck", stuck(*every), "aborted", "has shown one count", stays, may=True),
+        of_samples("all channels stuck", stuck(*every), "aborted", "constant count of", stays, may=True),
         borne("two samples lost", once(lost_for(1, 2))),
         of_samples("three samples lost", once(lost_for(1, 3)), "aborted", "table acceleration", strikes),
         borne("accelerometer upside down", flipped(1)),
@@ -98,7 +98,7 @@ def calls() -> list[Fault]:
         fails("RigError in stop, not stopped", "stop", RigError("the task does not stop")),
         fails("RigError in every stop", "stop", RigError("no task stops"), times=FOR_EVER),
         fails("ConnectionLost in halt, cut all the same", "halt", gone, obeys=True, may=True, must=never),
-        fails("RigError in handwork", "handwork", RigError("the hands do not answer")),
+        fails("RigError in perform", "perform", RigError("the hands do not answer")),
         fails("RigError in interlocks", "interlocks", RigError("the safety inputs do not answer")),
         Fault("halt asked for, enable line stuck", _disobeying("halt"), "failed", "amplifier off", heeded, True),
         Fault(

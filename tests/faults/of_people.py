@@ -4,9 +4,8 @@ import errno
 from functools import partial
 from threading import Thread
 
-from bench.control.calibration import DriveCalibration
-from bench.control.legs import Leg
-from bench.engine.steps import Calibrate, Follow, Step, Trim
+from bench.control.oscillator import DriveCalibration, Leg
+from bench.engine.steps import Calibrate, SetHarmonics, Step, Sweep
 from sim.errors import RockbenchError
 from tests.faults.bench import Begin, FaultyBench
 from tests.faults.fault import Fault, answered, asks, heeded, never, reads, strikes
@@ -25,10 +24,10 @@ def _does(step: Step | Exception) -> Begin:
 def plans() -> list[Fault]:
     """Steps that ask for what is not allowed, and plans that break down."""
     bad: dict[str, Step] = {
-        "nan": Trim((complex("nan"),)),
+        "nan": SetHarmonics((complex("nan"),)),
         "over-range": Calibrate(DriveCalibration.flat(GAIN / 10.0)),
         # 1.6 V and more at 500 rad/s change by 800 V/s and more
-        "slewing": Follow((Leg(0.02, 4.0, 500.0),)),
+        "slewing": Sweep((Leg(0.02, 4.0, 500.0),)),
     }
     return [
         *(_strikes(f"{name} drive", _does(step), "aborted", "drive") for name, step in bad.items()),
@@ -124,11 +123,11 @@ def requests() -> list[Fault]:
         asks("abort", status="aborted"),
         asks("halt", status="halted", must=reads),
         asks("stop", "abort", status="aborted"),
-        asks("abort", "stop", status="aborted", says="abort was asked for"),
+        asks("abort", "stop", status="aborted", says="abort requested"),
         asks("abort", "abort", status="aborted"),
         asks("stop", "abort", "halt", status="halted", must=reads),
         asks("halt", "halt", status="halted", must=reads),
-        Fault("halt from another thread", _halt_from_another_thread, "halted", "halt was asked for", reads, True),
+        Fault("halt from another thread", _halt_from_another_thread, "halted", "halt requested", reads, True),
         *(_sequence(*pair) for pair in (("stop", "abort"), ("stop", "halt"), ("abort", "halt"), ("abort", "stop"))),
     ]
 
@@ -141,4 +140,4 @@ def _sequence(first: str, second: str) -> Fault:
         bench.later(2, lambda: getattr(bench.requests, second)())
 
     ways = {"stop": "stopped", "abort": "aborted", "halt": "halted"}
-    return Fault(f"{first}, then {second}", begin, f"{ways[first]}|{ways[second]}", "was asked for", heeded, True)
+    return Fault(f"{first}, then {second}", begin, f"{ways[first]}|{ways[second]}", "requested", heeded, True)

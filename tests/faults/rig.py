@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import Clock
-from drivers.rig import Alignment, Block, Channel, Handwork, Rig, RigError
+from drivers.rig import Alignment, Block, Channel, OperatorTask, Rig, RigError
 from drivers.simulated import SimulatedRig
 
 Array = NDArray[np.float64]
@@ -160,9 +160,9 @@ class FaultyRig:
     def close(self) -> None:
         self.inner.close()
 
-    def handwork(self, work: Handwork, amount: float | None = None) -> None:
-        self._fail("handwork")
-        self.inner.handwork(work, amount)
+    def perform(self, work: OperatorTask, amount: float | None = None) -> None:
+        self._fail("perform")
+        self.inner.perform(work, amount)
 
     def _played(self, n: int) -> None:
         """Count samples that were played, and how the table moved meanwhile."""

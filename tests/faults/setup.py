@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-from bench.control.calibration import DriveCalibration
+from bench.control.oscillator import DriveCalibration
 from bench.guard.limits import Debounce, Limits, Ramps
-from bench.guard.quantities import Mover
+from bench.guard.shaker import ShakerModel
 from sim.parameters import Parameters, quantity
 from sim.shaker import Shaker
 from sim.specimen import Frame, Specimen
@@ -34,7 +34,7 @@ LIMITS = Limits(
     debounce=Debounce(displacement=0.003, velocity=0.003, acceleration=0.003),
 )
 RAMPS = Ramps(stop=0.35, abort=0.2)
-MOVER = Mover(mass=SHAKER.moving_mass + 4.6, stiffness=SHAKER.k_s, force_constant=SHAKER.bl)
+MOVER = ShakerModel(mass=SHAKER.moving_mass + 4.6, stiffness=SHAKER.k_s, force_constant=SHAKER.bl)
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,11 @@ from time import monotonic
 
 import pytest
 
+from bench.datafile import recorder as recording
+from bench.datafile.hdf5_reading import DataFileError
+from bench.datafile.reader import open_datafile
+from bench.datafile.recorder import Recorder
 from bench.events import Warned
-from bench.record import recorder as recording
-from bench.record.errors import RecordError
-from bench.record.reader import open_record
-from bench.record.recorder import Recorder
 from drivers.rig import Channel
 from tests.faults.disk import Disk, spoil
 from tests.faults.setup import NoPoint
@@ -37,7 +37,7 @@ def hung(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Recorder, Dis
 def _fill(recorder: Recorder) -> int:
     """Events that are taken before the recorder gives up."""
     taken: list[int] = []
-    with pytest.raises(RecordError, match="events behind"):
+    with pytest.raises(DataFileError, match="events behind"):
         _tell(recorder, taken)
     return len(taken)
 
@@ -78,7 +78,7 @@ def test_nobody_waits_for_ever(end: Callable[[Recorder], None], hung: tuple[Reco
     recorder, disk = hung
     recorder(Warned("one event", time=0.0))
     begin = monotonic()
-    with pytest.raises(RecordError, match="has not answered"):
+    with pytest.raises(DataFileError, match="has not answered"):
         end(recorder)
     assert monotonic() - begin < SOON
     _finish_after_closing(recorder, disk)
@@ -92,10 +92,10 @@ def test_what_is_on_the_disk_is_readable_while_it_hangs_and_the_rest_comes_when_
     recorder.close("failed", "the disk hung")
     copy = tmp_path / "copy.h5"
     shutil.copy(recorder.path, copy)
-    with open_record(copy) as record:
+    with open_datafile(copy) as record:
         assert (record.status, record.events) == ("running", [])
     _finish(recorder, disk)
-    with open_record(recorder.path) as record:
+    with open_datafile(recorder.path) as record:
         assert (record.status, record.summary) == ("failed", "the disk hung")
         assert [event.text for event in record.events] == [f"event {k}" for k in range(taken)]
 
@@ -108,5 +108,5 @@ def test_in_virtual_time_a_slow_disk_is_waited_for(tmp_path: Path, monkeypatch: 
     for k in range(50 * SMALL):
         recorder(Warned(f"event {k}", time=float(k)))
     recorder.close("completed", "")
-    with open_record(path) as record:
+    with open_datafile(path) as record:
         assert len(record.events) == 50 * SMALL

@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pytest
 
-from bench.cli.main import main
-from bench.control.legs import Leg
-from bench.engine.requests import Requests
-from bench.engine.steps import Arm, Calibrate, Dwell, Follow, Handle, Plan, RampOut
-from bench.session import SessionResult
-from drivers.rig import Handwork
+from bench.app.session import SessionResult
+from bench.control.oscillator import Leg
+from bench.engine.interface import Requests
+from bench.engine.steps import Arm, Calibrate, Dwell, OperatorAction, Plan, RampOut, Sweep
+from drivers.rig import OperatorTask
+from tests.command_line import main_with
 from tests.faults.bench import FaultyBench, run
 from tests.faults.catalogue import catalogue
 from tests.faults.places import PLACES
@@ -24,8 +24,8 @@ DWELLING = next(place for place in PLACES if place.name == "dwelling")
     [
         ("spike on laser_1", 0, ""),
         ("stop asked for", 0, ""),
-        ("abort asked for", 130, "the run was aborted: abort was asked for"),
-        ("halt asked for", 130, "the run was halted: halt was asked for"),
+        ("abort asked for", 130, "the run was aborted: abort requested"),
+        ("halt asked for", 130, "the run was halted: halt requested"),
         ("laser_1 invalid", 1, "the run was aborted: time without a valid sample of laser_1"),
         ("table_displacement invalid", 1, "the run was halted: table displacement inf m exceeds"),
         ("emergency stop opens", 1, "the run was halted: emergency stop opened"),
@@ -48,7 +48,7 @@ def test_exit_status(
             raise story.raised
         return SessionResult(story.status, story.reason, {}, "", requests.strongest is not None)
 
-    assert main(["run", "harmonic"], start=start) == code
+    assert main_with(start, ["run", "harmonic"]) == code
     assert told in capsys.readouterr().err
 
 
@@ -56,10 +56,10 @@ def test_clocks_that_drift_apart_end_a_long_run() -> None:
     """Within the 20 s that it takes to tell two clocks apart, the matrix sees nothing of it."""
 
     def plan() -> Plan:
-        yield Handle(Handwork.MOUNT_SPRING, COUPLED, "mount the spring")
+        yield OperatorAction(OperatorTask.MOUNT_SPRING, COUPLED, "mount the spring")
         yield Arm(0.2)
         yield Calibrate(CALIBRATION)
-        yield Follow((Leg(0.25, AMPLITUDE, OMEGA),))
+        yield Sweep((Leg(0.25, AMPLITUDE, OMEGA),))
         yield Dwell(120)
         yield RampOut()
 

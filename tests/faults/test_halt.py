@@ -7,9 +7,10 @@ from threading import Thread
 
 import pytest
 
-from bench.engine.requests import Requests
+from bench.engine.interface import Requests
 from drivers.clock import VirtualClock
 from drivers.rig import RigError
+from drivers.simulated import SimulatedRig
 from tests.faults.bench import FaultyBench, Story, run
 
 LONG = 20.0
@@ -32,7 +33,8 @@ class Gate(VirtualClock):
 def _at_the_gate() -> tuple[FaultyBench, Gate, Thread, list[Story]]:
     """A campaign in its own thread whose third turn waits for its block."""
     bench, gate, stories = FaultyBench(None), Gate(), list[Story]()
-    bench.rig.inner._clock = gate  # pyright: ignore[reportPrivateUsage]
+    assert isinstance(bench.rig.inner, SimulatedRig)
+    bench.rig.inner.clock = gate
     bench.later(3, lambda: setattr(gate, "closed", True))
     thread = Thread(target=lambda: stories.append(run(bench)))
     thread.start()
@@ -49,7 +51,7 @@ def test_the_enable_line_is_cut_before_the_loop_knows() -> None:
     assert not stories
     gate.opened.set()
     thread.join(LONG)
-    assert [(story.status, story.reason) for story in stories] == [("halted", "halt was asked for")]
+    assert [(story.status, story.reason) for story in stories] == [("halted", "halt requested")]
 
 
 def test_an_abort_waits_for_its_block() -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.record.reader import open_record
+from bench.datafile.reader import open_datafile
 from tests.faults.places import PLACES
 from tests.faults.setup import BLOCK
 
@@ -24,9 +24,9 @@ def test_killed_in_every_state(tmp_path: Path) -> None:
     assert len(told) == 2 * len(PLACES)
     assert set(told.values()) == {str(-signal.SIGKILL)}, done.stderr
     for number, place in enumerate(PLACES):
-        with open_record(tmp_path / f"raw-{number}.h5") as record:
+        with open_datafile(tmp_path / f"raw-{number}.h5") as record:
             assert record.status == "running"
-        with open_record(tmp_path / f"flushed-{number}.h5") as record:
+        with open_datafile(tmp_path / f"flushed-{number}.h5") as record:
             assert record.status == "running"
             states = [event.text for event in record.events if event.kind == "StateChanged"]
             if place.turn:

@@ -8,10 +8,10 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from bench.control.legs import Leg
-from bench.engine.steps import Arm, Calibrate, Dwell, Follow, Handle, Outcome, Plan, RampOut, Step, Trim
+from bench.control.oscillator import Leg
+from bench.engine.steps import Arm, Calibrate, Dwell, OperatorAction, Outcome, Plan, RampOut, SetHarmonics, Step, Sweep
 from bench.events import State
-from drivers.rig import Handwork
+from drivers.rig import OperatorTask
 from sim.specimen import Specimen
 from tests.faults.audit import output_rules
 from tests.faults.bench import FaultyBench, Story, run
@@ -53,9 +53,9 @@ class Orders(RuleBasedStateMachine):
         return self.bench.engine.state if self.story is None else None
 
     @precondition(lambda self: self.state is State.IDLE)
-    @rule(work=st.sampled_from([(Handwork.MOUNT_SPRING, COUPLED), (Handwork.REMOVE_BLOCK, BARE)]))
-    def handle(self, work: tuple[Handwork, Specimen]) -> None:
-        self._do(Handle(*work, "as it is"))
+    @rule(work=st.sampled_from([(OperatorTask.MOUNT_SPRING, COUPLED), (OperatorTask.REMOVE_BLOCK, BARE)]))
+    def handle(self, work: tuple[OperatorTask, Specimen]) -> None:
+        self._do(OperatorAction(*work, "as it is"))
 
     @precondition(lambda self: self.state is State.IDLE)
     @rule()
@@ -67,7 +67,7 @@ class Orders(RuleBasedStateMachine):
     @precondition(lambda self: self.state is State.RUNNING)
     @rule(amplitude=st.sampled_from([0.0, 0.4, 1.0]), omega=st.sampled_from([20.0, 25.0, 40.0]))
     def follow(self, amplitude: float, omega: float) -> None:
-        self._do(Follow((Leg(0.3, amplitude, omega),)))
+        self._do(Sweep((Leg(0.3, amplitude, omega),)))
 
     @precondition(lambda self: self.state is State.RUNNING)
     @rule(cycles=st.integers(1, 3))
@@ -77,7 +77,7 @@ class Orders(RuleBasedStateMachine):
     @precondition(lambda self: self.state is State.RUNNING)
     @rule(factor=st.sampled_from([0.5, 0.9, 1.1]))
     def trim(self, factor: float) -> None:
-        self._do(Trim((factor,)))
+        self._do(SetHarmonics((factor,)))
 
     @precondition(lambda self: self.state is State.RUNNING)
     @rule(fast=st.booleans())

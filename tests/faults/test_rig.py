@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bench.testing.conformance import RigConformance, RigFactory
 from drivers.rig import Rig
 from drivers.simulated import SimulatedRig
 from sim.specimen import Specimen
 from sim.virtual_bench import VirtualBenchParameters
-from tests.drivers.conformance import RigConformance, RigFactory
 from tests.faults.audit import judge
 from tests.faults.bench import FaultyBench, run
 from tests.faults.catalogue import catalogue
@@ -60,9 +60,9 @@ def test_the_audit_finds_what_is_not_as_it_should_be(lie: str, tmp_path: Path) -
     spike, abort = known["spike on laser_1"], known["abort asked for"]
     false = {
         "not noticed": Fault("lie", spike.begin, "aborted", "laser_1", abort.must),
-        "noticed where": Fault("lie", abort.begin, "aborted", "abort was", never),
-        "ended as": Fault("lie", abort.begin, "stopped", "abort was", abort.must),
-        "raised": Fault("lie", abort.begin, "failed", "abort was", abort.must, raises=OSError),
+        "noticed where": Fault("lie", abort.begin, "aborted", "abort requested", never),
+        "ended as": Fault("lie", abort.begin, "stopped", "abort requested", abort.must),
+        "raised": Fault("lie", abort.begin, "failed", "abort requested", abort.must, raises=OSError),
     }[lie]
     place = next(place for place in PLACES if place.name == "dwelling")
     verdict = judge(false, place, tmp_path)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from bench.engine.machine import LEGAL
+from bench.engine.output import TRANSITIONS
 from bench.events import State
 from bench.guard.limits import Debounce, Limits, Ramps, Warnings
 from tests.faults.catalogue import catalogue
@@ -18,7 +18,7 @@ ROWS = [[cell.strip() for cell in line.strip("|").split("|")] for line in PAGE.s
 @pytest.mark.parametrize("state", State)
 def test_every_state_goes_where_the_page_says(state: State) -> None:
     (row,) = [row for row in ROWS if row[0] == state.value]
-    assert {name for name in row[2].split(", ") if name} == {after.value for after in LEGAL[state]}
+    assert {name for name in row[2].split(", ") if name} == {after.value for after in TRANSITIONS[state]}
 
 
 @pytest.mark.parametrize(

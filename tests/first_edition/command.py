@@ -40,7 +40,7 @@ def command(*arguments: object) -> Done:
         sys.argv, sys.unraisablehook = before, hook
         signal.set_wakeup_fd(-1)
         # an interrupt is answered once in the life of a process, which goes on here
-        sys.modules["bench.cli.interrupt"].__dict__["_watch"] = None
+        sys.modules["bench.app.cli.interrupt"].__dict__["_watch"] = None
         for number, handler in handlers.items():
             if handler is not signal.getsignal(number):
                 signal.signal(number, handler)

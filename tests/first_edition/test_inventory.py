@@ -13,7 +13,10 @@ from tests.first_edition.command import DATA, Rockbench
 
 BEFORE: dict[str, Any] = json.loads((DATA / "inventory.json").read_text(encoding="utf-8"))
 
-RENAMED: dict[str, str] = {}
+RENAMED: dict[str, str] = {
+    # headings and captions of reports were reworded; every section, table and figure remains
+    **json.loads((DATA / "captions.json").read_text(encoding="utf-8")),
+}
 """What was renamed since, as "part: name" (such as "commands: run harmonic" or "options: run harmonic --omega") to its
 name of today, each with the reason beside it.
 """
@@ -21,6 +24,12 @@ name of today, each with the reason beside it.
 CHANGED: dict[str, Any] = {
     # formats are found by entry points, and named in alphabetical order
     "options: export --to: choices": "csv, mat, parquet, uff",
+    # the two sets are there, and further devices by name
+    "options: emulate --device: choices": (
+        "usb, crio, cDAQ-9174, cDAQ-9185, cRIO-9045, cRIO-9049, PCIe-6351, USB-6351"
+    ),
+    # so are rig backends: those of other packages have names of their own
+    "configuration: backend: allowed": "a text",
 }
 """What another value is meant for today, as "part: name: what" (such as "options: run harmonic --starts: default") to
 that value, each with the reason beside it.

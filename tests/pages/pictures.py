@@ -57,7 +57,7 @@ def _window(name: str) -> Callable[[Path], Path]:
     """A picture of the operator's window while the virtual bench runs."""
 
     def make(folder: Path) -> Path:
-        done = process([sys.executable, "-m", "tests.gui.screenshots", str(folder)], ROOT)
+        done = process([sys.executable, "-m", "tests.bench.app.gui.screenshots", str(folder)], ROOT)
         if done.returncode != 0:
             raise RuntimeError(done.stderr.strip().splitlines()[-1])
         return folder / name

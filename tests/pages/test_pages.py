@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.pages import reference
 from tests.pages.blocks import LANGUAGES, ROOT, Block, anchors, blocks, links, pages
 from tests.pages.claims import CLAIMS, Claim
 from tests.pages.execute import agrees, collection, failures, furnish, specimen_text
@@ -42,6 +43,10 @@ def test_quoted_results_are_those_of_today(claim: Claim) -> None:
     if claim.records and collection() is None:
         pytest.skip("no recorded motions: set ROCKBENCH_RECORDS to their folder")
     assert claim.missing() == []
+
+
+def test_the_generated_reference_agrees_with_the_program() -> None:
+    assert reference.stale() == [], f"renew these pages of docs/reference: {reference.COMMAND}"
 
 
 def test_a_stale_output_is_found() -> None:

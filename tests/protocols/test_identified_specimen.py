@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bench.cli.main import main
-from bench.config.specimen_file import write_specimen
+from bench.app.cli.main import main
+from bench.config.result_files import write_specimen
 from sim.identified import Finding, Identified
 from sim.specimen import Frame
 

@@ -10,13 +10,13 @@ import h5py
 import numpy as np
 import pytest
 
-from bench.record.reader import open_record
+from bench.datafile.reader import open_datafile
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="sends SIGINT to one process")
 def test_ctrl_c(tmp_path: Path) -> None:
     folder = tmp_path / "run"
-    command = [sys.executable, "-c", "from bench.cli.process import run; run()", "run", "harmonic"]
+    command = [sys.executable, "-c", "from bench.app.cli.process import run; run()", "run", "harmonic"]
     command += ["--omega", "16", "--beta", "0.4", "0.64", "--out", str(folder)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
@@ -33,9 +33,9 @@ def test_ctrl_c(tmp_path: Path) -> None:
         drive = file["entry/instrument/drive/voltage"][:]
     assert np.abs(drive).max() > 0.0
     assert drive[-1] == 0.0
-    with open_record(folder / "campaign.h5") as record:
+    with open_datafile(folder / "campaign.h5") as record:
         reasons = [event.text for event in record.events if event.kind == "StateChanged"]
-    assert any("abort was asked for" in reason for reason in reasons)
+    assert any("abort requested" in reason for reason in reasons)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="sends SIGINT to one process")
@@ -69,7 +69,7 @@ def _wait_until_running(path: Path, process: "subprocess.Popen[str]") -> None:
         assert process.poll() is None, process.communicate()
         if path.exists():
             try:
-                with open_record(path) as record:
+                with open_datafile(path) as record:
                     if record.rows > 20_000:
                         return
             except Exception:  # the file is being laid out

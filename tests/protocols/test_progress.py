@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pytest
 
-from bench.catalogue import load_protocol
-from bench.config.model import BenchConfiguration, Simulation
-from bench.engine.operator import Unattended
-from bench.engine.requests import Requests
+from bench.app.catalogue import load_protocol
+from bench.app.session import run_session
+from bench.config.model import BenchConfiguration
+from bench.config.sections import Simulation
+from bench.engine.interface import Requests, Unattended
 from bench.events import Event, Progress
-from bench.session import run_session
 from protocols.check.protocol import CheckParameters
 from protocols.common.identification.parameters import IdentifyParameters
 from protocols.coupling_stiffness.protocol import CouplingStiffnessParameters

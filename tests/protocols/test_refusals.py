@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from bench.cli.main import main
+from bench.app.cli.main import main
 
 
 def _refused(capsys: pytest.CaptureFixture[str], folder: Path, *flags: str) -> str:
@@ -53,7 +53,7 @@ def test_bad_flags(
         ("[specimen\n", ("line 1",)),
         ("[specimen.frame]\nk1 = 1e300\n", ("k1", "1e+300", "rad/s")),
         ("[specimen.frame]\nh1 = 0.6\n", ("h1", "0.6", "below the second")),
-        ("[specimen.block]\nrestitution_factor = 1.5\n", ("restitution_factor", "1.5", "r is 0 to 1")),
+        ("[specimen.block]\nrestitution_factor = 1.5\n", ("restitution_factor", "1.5", "outside 0 to 1")),
         ("[specimen]\nbeta = 3.0\n", ("specimen.beta", "protocol")),
         ("[simulation.specimen]\nbeta = 3.0\n", ("simulation.specimen.beta", "spring_factor")),
         ('[simulation.bench.laser_1]\nreference = "table"\n', ("laser_2.reference", "both lasers")),

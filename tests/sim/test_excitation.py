@@ -21,8 +21,8 @@ def acceleration(row: NDArray[np.float64], t: float) -> float:
 
 def taylor(row: NDArray[np.float64], t: float, ahead: float) -> float:
     """a_g at t + ahead by the series of the kernel about t."""
-    a, work = np.zeros(31), np.zeros((9, 31))
-    forcing_coefficients(row, t, a, work, 30)
+    a = np.zeros(31)
+    forcing_coefficients(row, t, a, 30)
     return float(np.polynomial.polynomial.polyval(ahead, a))
 
 

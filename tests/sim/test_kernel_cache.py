@@ -295,7 +295,7 @@ def test_a_cache_of_another_user_is_not_loaded(installation: Installation, choos
     assert out == "3.0"
     assert not (installation.home / "attacked").exists()
     if choose is not beside:  # there the user's own folder takes its place
-        assert "belongs to another user" in err
+        assert "is owned by another user" in err
         assert NOTICE in err
 
 

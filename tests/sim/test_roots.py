@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from sim.excitation import SineProgram, Sweep
 from sim.kernel import roots
 from sim.kernel.roots import evaluate, first_root, greatest_magnitude
-from sim.kernel.taylor import WORK_ROWS, forcing_coefficients, resting_coefficients
+from sim.kernel.taylor import forcing_coefficients, resting_coefficients
 from sim.specimen import Specimen
 
 COEFFICIENTS = st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=12)
@@ -92,8 +92,8 @@ def first_step(scale: float, duration: float, omega: tuple[float, float]) -> tup
     n, specimen = 16, Specimen(beta=0.4)
     amplitude = specimen.uplift_acceleration * scale
     row = SineProgram([Sweep(duration, (amplitude, amplitude), omega)]).packed()[0]
-    a, c, work = np.zeros(n + 1), np.zeros((6, n + 1)), np.zeros((WORK_ROWS, n + 1))
-    forcing_coefficients(row, 0.0, a, work, n)
+    a, c = np.zeros(n + 1), np.zeros((6, n + 1))
+    forcing_coefficients(row, 0.0, a, n)
     resting_coefficients(specimen.packed(), a, c, n)
     sizes = {k: abs(c[2, k]) + abs(c[3, k]) for k in (n - 1, n)}
     return c[0].copy(), min(duration, *((1e-14 / size) ** (1.0 / k) for k, size in sizes.items()))

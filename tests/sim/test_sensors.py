@@ -5,7 +5,8 @@ from hypothesis import strategies as st
 from numpy.random import SeedSequence
 from numpy.typing import NDArray
 
-from sim.sensors import Accelerometer, Converter, DisplacementSensor, FilterUnit, Laser
+from sim.filter_unit import FilterUnit
+from sim.sensors import Accelerometer, Converter, DisplacementSensor, Laser
 
 Array = NDArray[np.float64]
 

@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy import signal
 
-from sim.sensors import FilterUnit
+from sim.filter_unit import FilterUnit
 from sim.shaker import Shaker
 from sim.specimen import Frame, Specimen
 from sim.virtual_bench import Truth, VirtualBench, VirtualBenchParameters

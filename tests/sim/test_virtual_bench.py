@@ -7,7 +7,8 @@ from pydantic import ValidationError
 from scipy.optimize import minimize
 
 from sim.arrangement import Arrangement
-from sim.sensors import Accelerometer, FilterUnit, Laser, PlacedSensor
+from sim.filter_unit import FilterUnit
+from sim.sensors import Accelerometer, Laser, PlacedSensor
 from sim.shaker import Shaker
 from sim.specimen import Specimen
 from sim.virtual_bench import VirtualBench, VirtualBenchParameters

@@ -1,1 +1,1 @@
-"""Stiffness and damping of the frame from a free decay: the exact linear response fitted to what the lasers saw."""
+"""Stiffness and damping of the frame from a free decay: the exact linear response fitted to the laser signals."""

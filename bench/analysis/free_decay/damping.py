@@ -1,11 +1,11 @@
-"""Whether the damping of a mode depends on its amplitude.
+"""Dependence of a mode's damping on its amplitude.
 
 With a damping ratio xi + s A, A the amplitude of the drift in the mode, the mode's coordinate q changes by
 
     - s omega q integral of A dt
 
 to first order. These changes are further columns of the linearised fit: one for the slope s of each mode, or one for
-each of several windows of time, in which the damping ratio may be off the whole decay's.
+each of several time windows with a damping ratio different from that of the whole decay.
 """
 
 from dataclasses import dataclass, replace
@@ -14,28 +14,27 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.analysis.free_decay.doubt import Errors, covariances
-from bench.analysis.free_decay.fit import Fit
-from bench.analysis.free_decay.shown import COUNT, DELAYS, GAINS, OFFSETS, STATE
+from bench.analysis.free_decay.covariance import Errors, covariances
+from bench.analysis.free_decay.fit import COUNT, DELAYS, GAINS, OFFSETS, STATE, Fit
 
 Array = NDArray[np.float64]
 
 WINDOWS = 5
-"""Windows in which the damping of a mode is looked at; in each its amplitude falls by the same factor."""
+"""Number of windows in which a mode's damping is evaluated; in each its amplitude falls by the same factor."""
 
 FLOOR = 0.03
-"""Share of its largest amplitude down to which a mode is looked at."""
+"""Fraction of its largest amplitude down to which a mode is evaluated."""
 
 _DAMPING = slice(2, 4)
 
 
 @dataclass(frozen=True, eq=False)
 class DampingCourse:
-    """How the damping of one mode goes with its amplitude.
+    """Damping of one mode as a function of its amplitude.
 
-    `slope` [1/m] is that of the damping ratio over the amplitude of the drift, `own` and `common` [1/m2] its variances:
-    new in every decay, and common to all. `amplitude` [m], shape (WINDOWS,), is the mean of each window, `damping` the
-    ratio there and `uncertainty` its standard uncertainty, without what is common.
+    `slope` [1/m] is the change of the damping ratio with the amplitude of the drift, `own` and `common` [1/m2] its
+    variances: independent between decays, and common to all. `amplitude` [m], shape (WINDOWS,), is the mean of each
+    window, `damping` the ratio there and `uncertainty` its standard uncertainty, without the common part.
     """
 
     slope: float
@@ -61,7 +60,7 @@ def damping_courses(
     pieces = _extended(fit, columns, keep_damping=False)
     moved, pieces = _stepped(pieces)
     off = moved[-len(columns) :].reshape(2, WINDOWS)
-    doubt = np.sqrt(np.diag(covariances(pieces, errors)[0])[-len(columns) :]).reshape(2, WINDOWS)
+    uncertainties = np.sqrt(np.diag(covariances(pieces, errors)[0])[-len(columns) :]).reshape(2, WINDOWS)
     first, second = (
         DampingCourse(
             slope=float(found[which - 2]),
@@ -69,7 +68,7 @@ def damping_courses(
             common=float(common[which]),
             amplitude=np.array([float(mode.amplitude[inside].mean()) for inside in mode.windows]),
             damping=ratios[which] + off[which],
-            uncertainty=doubt[which],
+            uncertainty=uncertainties[which],
         )
         for which, mode in enumerate(modes)
     )
@@ -78,7 +77,8 @@ def damping_courses(
 
 @dataclass(frozen=True, eq=False)
 class _Mode:
-    """One mode: its circular frequency, the amplitude of its drift, shape (n,), and what the lasers show of it, (2, n).
+    """One mode: its circular frequency, the amplitude of its drift, shape (n,), and its part of the laser signals, (2,
+    n).
 
     `windows` are the samples of each window.
     """
@@ -90,7 +90,7 @@ class _Mode:
     windows: list[NDArray[np.bool_]]
 
     def column(self, more: Array | NDArray[np.bool_]) -> Array:
-        """What the lasers show more, shape (2, n), when the damping ratio is larger by `more`, shape (n,)."""
+        """Change of the laser signals, shape (2, n), due to an increase of the damping ratio by `more`, shape (n,)."""
         return -self.omega * np.cumsum(more.astype(np.float64)) * self.step * self.shown
 
 
@@ -103,7 +103,7 @@ def _mode(fit: Fit, which: int, begin: float, omega: float) -> _Mode:
     amplitude = 2.0 * np.abs(drift) * np.abs(q[which])
     after = stretch.time >= begin
     largest = float(amplitude[after].max())
-    # each window as the model decays: what noise keeps alive later says nothing of damping
+    # windows follow the model's decay: later amplitudes are noise
     rate = -float(found.poles[which].real)
     last = min(np.log(1.0 / FLOOR) / rate, float(stretch.time[-1]) - begin)
     edges = [begin + last * share for share in np.linspace(0.0, 1.0, WINDOWS + 1).tolist()]
@@ -118,14 +118,14 @@ def _mode(fit: Fit, which: int, begin: float, omega: float) -> _Mode:
 
 
 def _stepped(extended: Fit) -> tuple[Array, Fit]:
-    """How far all values move to fit best, and the fit with what is then left: its noise."""
+    """Shifts of all values to the best fit, and the fit with the remaining residual."""
     moved = extended.moved(extended.residual)
     left = extended.residual - np.tensordot(moved, extended.jacobian, 1)
     return moved, replace(extended, residual=np.where(extended.residual == 0.0, 0.0, left))
 
 
 def _extended(fit: Fit, columns: list[Array], *, keep_damping: bool) -> Fit:
-    """The linearised fit with further values, behind those it has; the dashpots stay as they are unless kept free."""
+    """The linearised fit with further values, appended to its own; the dashpots are fixed unless `keep_damping`."""
     there = fit.jacobian[OFFSETS].any(axis=0)
     jacobian = np.concatenate((fit.jacobian, np.array(columns) * there))
     flat = jacobian.reshape(len(jacobian), -1)

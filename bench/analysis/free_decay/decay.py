@@ -1,34 +1,36 @@
-"""From the signals of one decay to what it tells of the frame, and how surely."""
+"""Identification of the frame from the signals of one or several decays."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.analysis.free_decay.covariance import Errors, Uncertainty, fit_uncertainty
 from bench.analysis.free_decay.damping import DampingCourse, damping_courses
-from bench.analysis.free_decay.doubt import Doubt, Errors, doubt
 from bench.analysis.free_decay.fit import Fit, fit_from_scratch
-from bench.analysis.free_decay.modal import OMEGA1, XI1, quantities
+from bench.analysis.free_decay.response import OMEGA1, XI1, quantities
 from bench.analysis.free_decay.stretch import Stretch, Unusable, stretch_of
 from bench.analysis.gain import SensorAccuracy
 from bench.analysis.signals import DISPLACEMENT, LASER_1, LASER_2
+from bench.analysis.uncertainty import enlarged, mean_of_repeats
 
 Array = NDArray[np.float64]
 
 LET_GO = 0.2
-"""Time after the first sign of a release that is left out: the hand leaves the storey [s]."""
+"""Time excluded after the start of a release, until the hand has left the storey [s]."""
 
 _HELD = 0.5
-"""Time at the start of a recording in which the storey is surely held [s]."""
+"""Time at the start of a recording in which the storey is still held [s]."""
 
 _SLIPPED = 0.1
-"""Share of its later motion by which a storey leaves the hand when it is let go."""
+"""Fraction of its later motion at which a storey counts as released."""
 
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """What is known beforehand: `sample_rate` [1/s], the lasers' `ranges` [m] and whether they ride `on_table`, their
-    `accuracy`, the `masses` (m1, m2) [kg] and their covariance `weighed` [kg2], shape (2, 2).
+    """Known conditions of a recording: `sample_rate` [1/s], the lasers' `ranges` [m] and whether they are fixed to the
+    table (`on_table`), their `accuracy`, the `masses` (m1, m2) [kg] and their covariance `weighed` [kg2], shape (2, 2).
     """
 
     sample_rate: float
@@ -41,14 +43,14 @@ class Setting:
 
 @dataclass(frozen=True, eq=False)
 class Decay:
-    """One decay: the `quantities` of `modal.NAMES`, shape (8,), their doubt, the fit behind them, how the damping of
-    either mode goes with its amplitude, and when the excitation was over (`begin` [s]).
+    """One decay: the `quantities` of `modal.NAMES`, shape (8,), their uncertainty, the underlying fit, the damping of
+    either mode over its amplitude, and the end of the excitation (`begin` [s]).
 
     `peak` [m] is the largest drift.
     """
 
     quantities: Array
-    doubt: Doubt
+    uncertainty: Uncertainty
     fit: Fit
     courses: tuple[DampingCourse, DampingCourse]
     begin: float
@@ -56,9 +58,9 @@ class Decay:
 
 
 def pulsed_decay(signals: Array, setting: Setting, quiet: float, begin: float) -> Decay:
-    """The decay after a pulse of the table, from `signals` as `bench.analysis.signals` numbers them.
+    """Decay after a pulse of the table, from `signals` in the order of `bench.analysis.signals`.
 
-    All is at rest until `quiet` [s], and the pulse is over at `begin`. Raises Unusable when it tells nothing.
+    Everything is at rest until `quiet` [s], and the pulse is over at `begin`. Raises Unusable when the fit fails.
     """
     seen = signals[:, [LASER_1, LASER_2]].T
     stretch = stretch_of(signals[:, DISPLACEMENT], seen, setting.sample_rate, on_table=setting.on_table)
@@ -66,12 +68,12 @@ def pulsed_decay(signals: Array, setting: Setting, quiet: float, begin: float) -
 
 
 def released_decay(signals: Array, setting: Setting) -> Decay:
-    """The decay of a frame that was let go on a locked table some time after the start of the recording.
+    """The decay of a frame that was released on a locked table some time after the start of the recording.
 
-    Raises Unusable when it tells nothing.
+    Raises Unusable when the fit fails.
     """
     seen = signals[:, [LASER_1, LASER_2]].T
-    # a locked table does not move: what its sensor shows is noise
+    # a locked table does not move: its sensor measures only noise
     stretch = stretch_of(np.zeros(len(signals)), seen, setting.sample_rate, on_table=setting.on_table)
     begin = _released(stretch) + LET_GO
     return _decay(stretch.from_time(begin), setting, 0.0, begin)
@@ -84,7 +86,7 @@ def _decay(stretch: Stretch, setting: Setting, quiet: float, begin: float) -> De
     ratios, omegas = found[XI1 : XI1 + 2], found[OMEGA1 : OMEGA1 + 2]
     return Decay(
         quantities=found,
-        doubt=doubt(fit, errors),
+        uncertainty=fit_uncertainty(fit, errors),
         fit=fit,
         courses=damping_courses(fit, errors, begin, ratios, omegas),
         begin=begin,
@@ -93,9 +95,42 @@ def _decay(stretch: Stretch, setting: Setting, quiet: float, begin: float) -> De
 
 
 def _released(stretch: Stretch) -> float:
-    """When storey 2 left its place [s]: by a share of its later motion. Raises Unusable when it did not."""
+    """Time of the release of storey 2 [s], from a fraction of its later motion. Raises Unusable without one."""
     seen = stretch.seen[1] - np.nanmedian(stretch.seen[1][stretch.time < _HELD])
     moved = np.nan_to_num(np.abs(seen))
     if moved.max() < 10.0 * np.nanstd(stretch.seen[1][stretch.time < _HELD]):
-        raise Unusable("the frame was not let go while it was recorded: let go sooner, or listen for longer")
+        raise Unusable("the frame was not released during the recording: release it sooner, or record for longer")
     return float(stretch.time[np.argmax(moved > _SLIPPED * moved.max())])
+
+
+@dataclass(frozen=True, eq=False)
+class Combined:
+    """`values`, shape (n,), and their covariance, shape (n, n): the part independent between decays (`own`), and the
+    `common` one.
+
+    `birge` are the Birge ratios, shape (n,), NaN for a single decay; `weights`, shape (R, n), sum to 1; `scatter`,
+    shape (n,), is the excess scatter of the decays as a standard uncertainty, included in `own`.
+    """
+
+    values: Array
+    own: Array
+    common: Array
+    birge: Array
+    weights: Array
+    scatter: Array
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance of the values, shape (n, n)."""
+        return self.own + self.common
+
+
+def combine(values: Sequence[Array], own: Sequence[Array], common: Sequence[Array]) -> Combined:
+    """Combine R decays: `values`, shape (n,) each, and covariances, shape (n, n) each.
+
+    Each quantity is the mean of the decays, weighted by their independent parts. Excess scatter enlarges the covariance
+    (`bench.analysis.uncertainty`) and never reduces it. The common part is added once."""
+    found = mean_of_repeats(values, [np.diag(one) for one in own])
+    inner = np.einsum("rn,rm,rnm->nm", found.weights, found.weights, np.array(own))
+    shared = np.mean(common, axis=0)
+    return Combined(found.values, enlarged(inner, found.scatter), shared, found.birge, found.weights, found.scatter)

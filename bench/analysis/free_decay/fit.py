@@ -1,7 +1,11 @@
-"""Least squares of what the lasers would show of a frame (`shown`) to what they showed.
+"""Model of the laser signals of a frame on a moving table, and its least-squares fit to a recording.
 
-Gains and delays that the motion does not tell (a released frame on a locked table says nothing of the common gain) stay
-where they are expected, with the uncertainty that is expected.
+    laser_i = G_i z_i(t - tau_i) + o_i + sum_k a_ik (z_i / R_i)^k,    i = 1, 2
+
+z is the response to the table's displacement from a free initial state (`response`). Gain, delay, offset and smooth
+curvature of each laser are nuisance parameters: they are fitted too, so that they do not bias the stiffness. Those that
+the motion does not determine (such as the common gain of a released frame on a locked table) keep their expected value
+and its uncertainty.
 """
 
 from dataclasses import dataclass, replace
@@ -10,31 +14,104 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.analysis.free_decay.prony import constants_of, modes_of
 from bench.analysis.free_decay.response import Constants, Response, response
-from bench.analysis.free_decay.shown import BENDS, CONSTANTS, COUNT, DELAYS, GAINS, OFFSETS, STATE, Shown
-from bench.analysis.free_decay.start import constants_of, modes_of
 from bench.analysis.free_decay.stretch import Stretch, Unusable
 
 Array = NDArray[np.float64]
 
-GAIN_DOUBT, DELAY_DOUBT = 0.01, 2e-3
-"""Standard uncertainties of what is expected of the lasers: gain 1, and delay 0 [s] after the table's sensor."""
+BEND = (2, 3, 4, 5)
+"""Exponents of the curvature terms of a laser's characteristic, from 2 on."""
 
-BEND_DOUBT = 1e-3
-"""Standard uncertainty of the bend's terms at the largest motion [m]: several times what a data sheet allows."""
+CONSTANTS, STATE = slice(0, 4), slice(4, 8)
+GAINS, DELAYS, OFFSETS = slice(8, 10), slice(10, 12), slice(12, 14)
+BENDS = slice(14, 14 + 2 * len(BEND))
+COUNT = BENDS.stop
+"""Indices of the values: k1, k2, c1, c2 of the frame, its initial state, then the lasers' parameters."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """The laser signals as a function of COUNT values. `reach` [m], shape (2,), are the R_i."""
+
+    stretch: Stretch
+    masses: tuple[float, float]
+    reach: Array
+
+    def parts(self, values: Array) -> tuple[Response, Array, Array]:
+        """The response, and (z1, z2) [m] and their velocities, shape (2, n), including the delays."""
+        found = response(Constants(*self.masses, *values[:4].tolist()), self.stretch.step)
+        # a common delay equals one of the table's motion: the initial state is free
+        late, rate = self.stretch.driving(float(values[DELAYS][0]))
+        q = found.forced(late) + (found.adjoint @ values[STATE])[:, None] * found.free(late.size)
+        return found, self._seen(found.storeys(q), late), self._seen(found.velocities(q, late), rate)
+
+    def _seen(self, absolute: Array, table: Array) -> Array:
+        return absolute - table if self.stretch.on_table else absolute
+
+    def shown(self, values: Array) -> Array:
+        """The laser signals [m], shape (2, n)."""
+        _, z, speed = self.parts(values)
+        further = values[DELAYS][1] - values[DELAYS][0]
+        z = z - np.array([[0.0], [further]]) * speed
+        share = z / self.reach[:, None]
+        bent = np.zeros_like(z)
+        for term in values[BENDS].reshape(2, len(BEND)).T[::-1]:
+            bent = (bent + term[:, None]) * share
+        return values[GAINS][:, None] * z + values[OFFSETS][:, None] + bent * share
+
+    def jacobian(self, values: Array) -> Array:
+        """Derivatives of `shown`, shape (COUNT, 2, n)."""
+        found, z, speed = self.parts(values)
+        n = z.shape[1]
+        further = values[DELAYS][1] - values[DELAYS][0]
+        z = z - np.array([[0.0], [further]]) * speed
+        share = z / self.reach[:, None]
+        powers = np.cumprod(np.broadcast_to(share, (BEND[-1], 2, n)), axis=0)
+        slope = np.tile(values[GAINS][:, None], (1, n))
+        for power, term in zip(BEND, values[BENDS].reshape(2, len(BEND)).T, strict=True):
+            slope += (power * term / self.reach)[:, None] * powers[power - 2]
+        out = np.zeros((COUNT, 2, n))
+        for place in (0, 1, 2, 3, DELAYS.start):
+            out[place] = self._difference(values, place)
+        free = found.free(n)
+        for place in range(4):
+            q = found.adjoint[:, place, None] * free
+            change = found.storeys(q)
+            change[1] -= further * found.velocities(q, np.zeros_like(self.stretch.time))[1]
+            out[STATE.start + place] = slope * change
+        for laser in range(2):
+            out[GAINS.start + laser, laser] = z[laser]
+            out[OFFSETS.start + laser, laser] = 1.0
+            first = BENDS.start + laser * len(BEND)
+            out[first : first + len(BEND), laser] = powers[1:, laser]
+        out[DELAYS.start + 1, 1] = -slope[1] * speed[1]
+        return out
+
+    def _difference(self, values: Array, place: int) -> Array:
+        step = np.zeros(COUNT)
+        step[place] = 1e-5 * max(abs(values[place]), 1e-3 if place == DELAYS.start else 1e-2)
+        return (self.shown(values + step) - self.shown(values - step)) / (2.0 * step[place])
+
+
+GAIN_UNCERTAINTY, DELAY_UNCERTAINTY = 0.01, 2e-3
+"""Standard uncertainties of the lasers' expected gain, 1, and expected delay after the table's sensor, 0 [s]."""
+
+BEND_UNCERTAINTY = 1e-3
+"""Standard uncertainty of the curvature terms at the largest motion [m]: several times the data sheet's limit."""
 
 NOISE = 2e-5
-"""What weighs the expectations against the samples [m]: the noise of a laser."""
+"""Noise of a laser, which weights the samples against the expected values [m]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """What was found: `values`, shape (COUNT,), in SI units, k1 to c2 first.
+    """Result of a fit: `values`, shape (COUNT,), in SI units, k1 to c2 first.
 
-    `jacobian`, shape (COUNT, 2, n), are the derivatives of what the lasers show, zero where a sample is missing;
-    `mass_jacobian`, shape (2, 2, n), those to the masses; `residual` [m], shape (2, n), measured less fitted, zero
-    where missing; `expected`, shape (COUNT, COUNT), is what the expectations add to the normal matrix, and `inverse`
-    that of their sum.
+    `jacobian`, shape (COUNT, 2, n), are the derivatives of the laser signals, zero where a sample is missing;
+    `mass_jacobian`, shape (2, 2, n), those to the masses; `residual` [m], shape (2, n), measured minus fitted, zero
+    where missing; `expected`, shape (COUNT, COUNT), is the contribution of the expected values to the normal matrix,
+    and `inverse` the inverse of the total.
     """
 
     stretch: Stretch
@@ -49,47 +126,47 @@ class Fit:
 
     @property
     def constants(self) -> Constants:
-        """The frame that was found."""
+        """The identified frame."""
         return Constants(*self.masses, *self.values[:4].tolist())
 
     @property
     def response(self) -> Response:
-        """Its response at the samples of the stretch."""
+        """The model's response at the samples of the stretch."""
         return response(self.constants, self.stretch.step)
 
     def moved(self, error: Array) -> Array:
-        """How far `error`s of what the lasers show [m], shape (..., 2, n), move the values: shape (..., count)."""
+        """Shifts of the values, shape (..., count), by errors of the laser signals [m], shape (..., 2, n)."""
         return np.tensordot(error, self.jacobian, ([-2, -1], [-2, -1])) @ self.inverse
 
 
 def fit(stretch: Stretch, masses: tuple[float, float], start: Constants) -> Fit:
-    """Fit the stretch from the frame `start` on. Raises Unusable when it comes to nothing."""
+    """Fit the stretch, starting from the frame `start`. Raises Unusable when the fit fails."""
     from scipy.optimize import least_squares
 
     there = np.isfinite(stretch.seen)
     seen = np.where(there, stretch.seen, 0.0)
     reach = np.maximum(np.abs(seen).max(axis=1), 1e-6)
     model = Shown(stretch, masses, reach)
-    expected, doubt = _expectations()
+    expected, uncertainty = _expectations()
     begin = expected.copy()
     begin[CONSTANTS] = start[2:]
-    # with a given frame its initial state and the offsets are linear
+    # for a given frame the initial state and the offsets are linear
     linear = [*range(COUNT)[STATE], *range(COUNT)[OFFSETS]]
     left = (model.jacobian(begin)[linear] * there).reshape(len(linear), -1).T
     begin[linear] += np.linalg.lstsq(left, ((seen - model.shown(begin)) * there).ravel(), rcond=None)[0]
-    rows = np.flatnonzero(np.isfinite(doubt))
+    rows = np.flatnonzero(np.isfinite(uncertainty))
 
     def residual(values: Array) -> Array:
         try:
             shown = model.shown(values)
         except ArithmeticError:
-            # no frame: the solver takes a shorter step
+            # not a valid frame: the solver takes a shorter step
             return np.full(seen.size + rows.size, np.inf)
-        return np.concatenate((((shown - seen) * there).ravel() / NOISE, ((values - expected) / doubt)[rows]))
+        return np.concatenate((((shown - seen) * there).ravel() / NOISE, ((values - expected) / uncertainty)[rows]))
 
     def slopes(values: Array) -> Array:
         data = (model.jacobian(values) * there).reshape(COUNT, -1).T / NOISE
-        return np.concatenate((data, np.diag(1.0 / doubt)[rows]))
+        return np.concatenate((data, np.diag(1.0 / uncertainty)[rows]))
 
     try:
         found: Any = least_squares(
@@ -98,11 +175,11 @@ def fit(stretch: Stretch, masses: tuple[float, float], start: Constants) -> Fit:
     except (ArithmeticError, np.linalg.LinAlgError, ValueError) as error:
         raise Unusable(f"the model of the frame could not be fitted to the decay ({error})") from None
     if found.status <= 0:
-        raise Unusable("the model of the frame could not be fitted to the decay: it comes to no end")
+        raise Unusable("the model of the frame could not be fitted to the decay: the fit does not converge")
     values: Array = found.x
     jacobian = model.jacobian(values) * there
     flat = jacobian.reshape(COUNT, -1)
-    known = NOISE**2 * np.diag(np.where(np.isfinite(doubt), 1.0 / doubt**2, 0.0))
+    known = NOISE**2 * np.diag(np.where(np.isfinite(uncertainty), 1.0 / uncertainty**2, 0.0))
     normal = flat @ flat.T + known
     size = np.sqrt(np.diag(normal))
     inverse = np.linalg.inv(normal / np.outer(size, size)) / np.outer(size, size)
@@ -121,7 +198,7 @@ def fit(stretch: Stretch, masses: tuple[float, float], start: Constants) -> Fit:
 
 
 def fit_from_scratch(stretch: Stretch, masses: tuple[float, float]) -> Fit:
-    """Fit the stretch, from a first estimate that it gives itself. Raises Unusable when it comes to nothing."""
+    """Fit the stretch, starting from Prony's estimate. Raises Unusable when the fit fails."""
     return fit(stretch, masses, constants_of(*modes_of(stretch), *masses))
 
 
@@ -136,8 +213,8 @@ def _mass_slope(model: Shown, values: Array, which: int) -> Array:
 
 
 def _expectations() -> tuple[Array, Array]:
-    """What is expected of the values, and its standard uncertainty, infinite where nothing is."""
-    expected, doubt = np.zeros(COUNT), np.full(COUNT, np.inf)
+    """Expected values and their standard uncertainties, infinite for values without one."""
+    expected, uncertainty = np.zeros(COUNT), np.full(COUNT, np.inf)
     expected[GAINS] = 1.0
-    doubt[GAINS], doubt[DELAYS], doubt[BENDS] = GAIN_DOUBT, DELAY_DOUBT, BEND_DOUBT
-    return expected, doubt
+    uncertainty[GAINS], uncertainty[DELAYS], uncertainty[BENDS] = GAIN_UNCERTAINTY, DELAY_UNCERTAINTY, BEND_UNCERTAINTY
+    return expected, uncertainty

@@ -1,4 +1,4 @@
-"""The exact linear response of the frame on a table that moves: closed form in modal coordinates.
+"""Exact linear response of the frame on a moving table, in closed form in modal coordinates.
 
 Absolute displacements z of the storeys, table displacement x. The forces of the lower springs and dashpots act on the
 motion relative to the table:
@@ -6,8 +6,8 @@ motion relative to the table:
     M z'' + C z' + K z = (k_1 x + c_1 x', 0)
 
 With w = z' - (c_1 / m_1, 0) x the derivative of x is not needed. The state (z, w) has two pairs of complex modes; each
-follows q' = lambda q + beta x, which is integrated exactly where straight lines join the samples of x (first-order
-hold): Franklin, Powell, Workman, Digital Control of Dynamic Systems, 3rd ed., 6.3.2.
+follows q' = lambda q + beta x, which is integrated exactly for linear interpolation of x (first-order hold): Franklin,
+Powell, Workman, Digital Control of Dynamic Systems, 3rd ed., 6.3.2.
 """
 
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ Complex = NDArray[np.complex128]
 class Constants(NamedTuple):
     """Masses [kg], stiffnesses [N/m] and dashpots [N s/m] of the frame.
 
-    A spring from storey 1 to the table is part of k1: what is measured with the block held is k1 + k_C.
+    A spring from storey 1 to the table is part of k1: with the block held, k1 + k_C is measured.
     """
 
     m1: float
@@ -38,8 +38,8 @@ class Constants(NamedTuple):
 class Response:
     """The frame's two modes; `poles`, shape (2,) [1/s], lie in the upper half plane, the slower first.
 
-    `shapes`, shape (4, 2), are of (z1, z2, w1, w2); `adjoint`, shape (2, 4), takes a state to the modes; `push`, shape
-    (2,), is what x does to them. `step` is the time between samples [s], `feed` [1/s] what x adds to z1'.
+    `shapes`, shape (4, 2), are of (z1, z2, w1, w2); `adjoint`, shape (2, 4), maps a state to the modes; `push`, shape
+    (2,), is the input vector of x. `step` is the time between samples [s], `feed` [1/s] the direct feed of x to z1'.
     """
 
     poles: Complex
@@ -66,7 +66,7 @@ class Response:
         q = np.zeros((2, x.size), np.complex128)
         for mode in range(2):
             taps = self.push[mode] * h * np.array([second[mode], first[mode] - second[mode]])
-            # the first sample only begins the first line
+            # the first sample is only the start of the first line
             q[mode] = lfilter(taps, [1.0, -turn[mode]], x, zi=-taps[:1] * x[0])[0]
         return q
 
@@ -107,3 +107,39 @@ def response(constants: Constants, step: float) -> Response:
         step=step,
         feed=float(feed[0]),
     )
+
+
+NAMES = ("k1", "k2", "xi1", "xi2", "c1", "c2", "omega1", "omega2")
+"""Quantities identified from a decay, in SI units: stiffnesses, modal damping ratios, dashpots, frequencies."""
+
+UNITS = ("N/m", "N/m", "1", "1", "N s/m", "N s/m", "rad/s", "rad/s")
+K1, K2, XI1, XI2, C1, C2, OMEGA1, OMEGA2 = range(len(NAMES))
+
+
+def quantities(constants: Constants) -> Array:
+    """Quantities of `NAMES`, shape (8,): xi_i = phi_i' C phi_i / (2 omega_i) with mass-normalised undamped modes."""
+    omega, shapes = _modes(constants)
+    c1, c2 = constants.c1, constants.c2
+    damping = np.array([[c1 + c2, -c2], [-c2, c2]])
+    xi = np.einsum("ji,jk,ki->i", shapes, damping, shapes) / (2.0 * omega)
+    return np.array([constants.k1, constants.k2, *xi, c1, c2, *omega])
+
+
+def slopes(constants: Constants) -> tuple[Array, Array]:
+    """Derivatives of `quantities` with respect to (k1, k2, c1, c2), shape (8, 4), and (m1, m2), shape (8, 2)."""
+    columns: list[Array] = []
+    for place, value in enumerate(constants):
+        step = 1e-6 * max(abs(value), 1e-3)
+        up, down = [*constants], [*constants]
+        up[place] += step
+        down[place] -= step
+        columns.append((quantities(Constants(*up)) - quantities(Constants(*down))) / (2.0 * step))
+    whole = np.array(columns).T
+    return whole[:, 2:], whole[:, :2]
+
+
+def _modes(constants: Constants) -> tuple[Array, Array]:
+    root = np.sqrt(np.array([constants.m1, constants.m2]))
+    stiffness = np.array([[constants.k1 + constants.k2, -constants.k2], [-constants.k2, constants.k2]])
+    values, vectors = np.linalg.eigh(stiffness / np.outer(root, root))
+    return np.sqrt(np.maximum(values, 0.0)), vectors / root[:, None]

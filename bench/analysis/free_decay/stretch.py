@@ -1,6 +1,6 @@
-"""The stretch of a recording that is fitted: means over a few samples each, of every channel alike.
+"""The fitted stretch of a recording, reduced to means over a few samples.
 
-The mean is one linear filter on all channels: what leaves it obeys the same equations as what went in.
+The mean is the same linear filter on all channels, so its output obeys the same equations as its input.
 """
 
 from dataclasses import dataclass, replace
@@ -10,29 +10,30 @@ from math import floor
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.channel import STOREYS, TABLE_DISPLACEMENT
 from sim.errors import RockbenchError
 
 Array = NDArray[np.float64]
 
 RATE = 200.0
-"""Rate to which signals are reduced, if they are faster [1/s]: far above the modes and their harmonics."""
+"""Highest sample rate after the reduction [1/s]: far above the modes and their harmonics."""
 
 MOST_LOST = 0.02
-"""Share of the samples of a sensor that may be missing."""
+"""Largest fraction of missing samples of a sensor."""
 
 
 class Unusable(RockbenchError):
-    """The recording does not show what the fit needs."""
+    """The recording is not sufficient for the fit."""
 
     error_code = "not_measurable"
 
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """`time`, shape (n,) [s], evenly spaced, from the first sample; `table` [m], shape (n,), what the table's sensor
-    shows, and `seen` [m], shape (2, n), what the lasers show of storeys 1 and 2, NaN where nothing.
+    """`time`, shape (n,) [s], evenly spaced, from the first sample; `table` [m], shape (n,), the reading of
+    the table's sensor, and `seen` [m], shape (2, n), the readings of the lasers on storeys 1 and 2, NaN where invalid.
 
-    `on_table` says that the lasers ride on the table and see the storeys relative to it.
+    `on_table`: the lasers are fixed to the table and measure relative to it.
     """
 
     time: Array
@@ -47,9 +48,9 @@ class Stretch:
 
     @cached_property
     def _course(self) -> tuple[Array, Array, Array]:
-        """The table's motion such that straight lines between its samples are the motion, and its two derivatives.
+        """The table's motion, corrected for linear interpolation, and its two derivatives.
 
-        Straight lines take the share (omega step)^2 / 12 off a sine; the second difference puts it back.
+        Linear interpolation reduces a sine by the fraction (omega step)^2 / 12; the second difference restores it.
         """
         course = self.table.copy()
         course[1:-1] -= np.diff(self.table, 2) / 12.0
@@ -57,12 +58,12 @@ class Stretch:
         return course, rate, np.gradient(rate, self.step)
 
     def driving(self, delay: float) -> tuple[Array, Array]:
-        """Displacement [m] and velocity [m/s] of the table as they were `delay` [s] before, to its second order."""
+        """Displacement [m] and velocity [m/s] of the table `delay` [s] earlier, to second order."""
         course, rate, bent = self._course
         return course - delay * rate + 0.5 * delay**2 * bent, rate
 
     def from_time(self, begin: float) -> "Stretch":
-        """What comes at `begin` [s] and later."""
+        """The samples from `begin` [s] on."""
         kept = self.time >= begin
         return replace(self, time=self.time[kept], table=self.table[kept], seen=self.seen[:, kept])
 
@@ -70,15 +71,15 @@ class Stretch:
 def stretch_of(table: Array, seen: Array, sample_rate: float, *, on_table: bool) -> Stretch:
     """The stretch of raw signals: table displacement [m], shape (n,), and lasers [m], shape (2, n).
 
-    Raises Unusable when more than `MOST_LOST` of the samples of a sensor are missing; of the table's sensor, which the
-    whole response follows, the few that may be are replaced by straight lines.
+    Raises Unusable when more than `MOST_LOST` of the samples of a sensor are missing; missing samples of
+    the table's sensor below that share are interpolated linearly.
     """
-    for name, values in (("table_displacement", table), ("laser_1", seen[0]), ("laser_2", seen[1])):
+    for name, values in zip((TABLE_DISPLACEMENT, *STOREYS), (table, *seen), strict=True):
         lost = float(np.mean(~np.isfinite(values)))
         if lost > MOST_LOST:
             raise Unusable(
-                f"{name} gave no value for {100.0 * lost:.1f} % of the samples: see to its range and its wiring, or ask"
-                " for less motion"
+                f"{name} has no value for {100.0 * lost:.1f} % of the samples: check its range and its wiring, or"
+                " request less motion"
             )
     there = np.isfinite(table)
     index = np.arange(table.size)

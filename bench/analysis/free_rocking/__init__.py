@@ -1,1 +1,1 @@
-"""Free rocking of a block as a laser sees it: restitution from its amplitudes, and from its whole motion."""
+"""Free rocking of a block measured by a laser: restitution from the amplitudes and from the whole motion."""

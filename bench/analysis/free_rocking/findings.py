@@ -1,26 +1,147 @@
-"""What several tilts come to: restitution and trend, slenderness and size, each with the parts of its uncertainty."""
+"""Results of several tilts with their uncertainty: restitution and trend, slenderness and size; errors of the laser.
+
+Linearity: a smooth error, size sin(2 pi n x / range + phase), with the amplitude of the data sheet and uniformly
+distributed phase and number n of periods within the measuring range; it is common to all tilts. The fitted curvature
+absorbs its smooth part. Over the phase its mean square is that of two components, with sin and cos - 1 of the
+displacement from the rest, each of size / sqrt(2).
+
+Timing: a laser with a free clock delays its values by up to one measuring period. The delay grows with the difference
+of the clocks and falls back at any moment of a recording.
+
+Noise and resolution are in the residual of a fit.
+"""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import hypot
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bench.analysis.birge import mean_of_repeats
-from bench.analysis.free_rocking.fit import ALPHA, P, R, RockingFit
-from bench.analysis.free_rocking.laser_errors import LaserErrors
-from bench.analysis.free_rocking.tilt import Tilt
+from bench.analysis.free_rocking.fit import ALPHA, BEND_3, START, ZERO, P, R, RockingFit, fit_rocking
+from bench.analysis.free_rocking.points import Points, Relation, amplitude_relation, find_points
+from bench.analysis.free_rocking.swings import NotRocking, Recording, Swings, find_swings, without_gaps
+from bench.analysis.gain import SensorAccuracy
+from bench.analysis.uncertainty import mean_of_repeats
+from sim import block_face
+from sim.free_rocking import critical_angle, frequency_parameter
+from sim.specimen import Specimen
 
 Array = NDArray[np.float64]
+
+POOR = 0.2
+"""Ratio of residual to mean amplitude above which the model does not describe the motion.
+
+Impacts that differ by 1 % cause about 0.1.
+"""
+
+PUSH = 0.03
+"""Relative difference of fitted and held tilt up to which a release counts as from rest."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tilt:
+    """Result of one tilt. The `relation` uses the critical angle of the geometry, the `fit` identifies it."""
+
+    seen: Recording
+    swings: Swings
+    points: Points
+    relation: Relation
+    fit: RockingFit
+
+    @property
+    def push(self) -> float:
+        """Relative difference of the equivalent tilt from rest to the held tilt."""
+        return abs(self.fit.motion.tilt / self.swings.held) - 1.0
+
+
+def analyse_tilt(seen: Recording, specimen: Specimen, least: float) -> Tilt:
+    """Analyse a recording down to the swing whose largest angle is below `least` [rad].
+
+    Raises NotRocking, with the remedy, for a recording that does not show free rocking.
+    """
+    alpha = critical_angle(specimen.block)
+    seen = without_gaps(seen)
+    swings = find_swings(seen, least)
+    # the reading at rest is limited by the laser's resolution: the motion to both sides yields a better zero
+    fit = fit_rocking(
+        seen, swings, find_points(seen, swings, swings.zero), alpha, frequency_parameter(specimen.block, specimen.g)
+    )
+    mean = float(abs(seen.height * swings.peaks).mean())
+    if fit.rms > POOR * mean:
+        raise NotRocking(
+            f"the exact motion leaves {1e3 * fit.rms:.2g} mm of {1e3 * mean:.3g} mm: check that the block rocks on its"
+            " two edges without yawing or sliding, then repeat"
+        )
+    straight = replace(seen, displacement=fit.straightened(seen.displacement))
+    points = find_points(straight, swings, 0.0)
+    return Tilt(seen, swings, points, amplitude_relation(points, alpha), fit)
+
+
+WAVES = (0.5, 3.0)
+"""Least and most periods of the linearity error in the measuring range: fewer act as a scale error, more are not
+smooth.
+"""
+
+CLOCK = 50e-6
+"""Largest relative difference between the laser's clock and that of the samples: two quartz clocks."""
+
+_NUMBERS, _RATES, _PHASES = 24, 12, 12
+"""Number of equally likely values each of periods, clock differences and initial delays."""
+
+
+@dataclass(frozen=True, eq=False)
+class LaserErrors:
+    """A laser's errors from its data sheet; `measuring_range` in m."""
+
+    accuracy: SensorAccuracy
+    measuring_range: float
+
+    def linearity(self, fit: RockingFit) -> Array:
+        """Shifts of the values and the trend by the components of the linearity error, shape (9, components)."""
+        return _carried(fit, self._components(fit.fitted - fit.values[ZERO]))
+
+    def timing(self, fit: RockingFit) -> Array:
+        """Standard uncertainty of the values and the trend by the laser's free clock, shape (9,)."""
+        longest = self.accuracy.laser_timing
+        if longest == 0.0:
+            return np.zeros(fit.values.size + 1)
+        rate, phase = np.meshgrid(CLOCK / longest * _middles(-1.0, 1.0, _RATES), _middles(0.0, 1.0, _PHASES))
+        delay = longest * ((rate.ravel() * fit.times[:, None] + phase.ravel()) % 1.0)
+        # a delay of the signal equals a later release
+        changes = _carried(fit, fit.jacobian[:, [START]] * delay)
+        return np.sqrt(np.mean(changes**2, axis=1))
+
+    def of_relation(self, relation: Relation, fit: RockingFit) -> Array:
+        """Shifts of the amplitude relation's r by the components of the linearity error, shape (components,)."""
+        seen = block_face.displacement(relation.angles, fit.height, fit.block)
+        rate = block_face.displacement_rate(relation.angles, fit.height, fit.block)
+        # the fit has removed zero and bend of this error from the relation's angles
+        found = np.column_stack((np.ones(seen.size), seen**2, seen**3)) @ self.linearity(fit)[ZERO : BEND_3 + 1]
+        return np.asarray(relation.weights @ ((self._components(seen) - found) / rate[:, None]))
+
+    def _components(self, displacement: Array) -> Array:
+        """The error's components [m] at displacements from the rest, shape (n,); shape (n, components)."""
+        size = self.accuracy.laser_linearity * self.measuring_range / np.sqrt(2.0 * _NUMBERS)
+        turned = 2.0 * np.pi / self.measuring_range * displacement[:, None] * _middles(*WAVES, _NUMBERS)
+        return size * np.concatenate((np.sin(turned), np.cos(turned) - 1.0), axis=1)
+
+
+def _middles(low: float, high: float, count: int) -> Array:
+    """The midpoints of `count` equal parts of a range."""
+    return low + (high - low) * (np.arange(count) + 0.5) / count
+
+
+def _carried(fit: RockingFit, error: Array) -> Array:
+    return np.vstack((fit.gain @ error, fit.trend_gain @ error))
 
 
 @dataclass(frozen=True)
 class Combined:
     """A value and its standard uncertainty with its parts: `noise` and `timing` differ between tilts, `linearity` and
-    `scale` are the laser's own, `scatter` is what the tilts differ by beyond the first two, Student's t counted.
+    `scale` are the laser's, `scatter` is the excess scatter of the tilts, with Student's t.
 
-    `birge` is the ratio of the tilts' scatter to what is expected; NaN for a single tilt.
+    `birge` is the ratio of the tilts' scatter to the expected one; NaN for a single tilt.
     """
 
     value: float
@@ -37,17 +158,17 @@ class Combined:
         return hypot(self.noise, self.timing, self.linearity, self.scale, self.scatter)
 
     def parts(self) -> dict[str, float]:
-        """The parts of the standard uncertainty."""
+        """Contributions to the standard uncertainty, by name."""
         names = ("noise", "timing", "linearity", "scale", "scatter")
         return {name: float(getattr(self, name)) for name in names}
 
 
 def combined(values: ArrayLike, noise: ArrayLike, timing: ArrayLike, linearity: Array, scale: float) -> Combined:
-    """Mean of n `values`, weighted by what is independent between them: standard uncertainties `noise` and `timing`.
+    """Mean of n `values`, weighted by their independent standard uncertainties `noise` and `timing`.
 
-    `linearity`, shape (n, components), are changes by errors that all values have in common, component by component,
-    and `scale` is a standard uncertainty that they have in common. What the values scatter beyond their independent
-    uncertainties widens the result and makes the weights more equal (`bench.analysis.birge`).
+    `linearity`, shape (n, components), are shifts by errors that are common to all values, component by component, and
+    `scale` is a common standard uncertainty. Scatter beyond the independent uncertainties widens the result and makes
+    the weights more equal (`bench.analysis.uncertainty`).
     """
     found, own, wander = (np.asarray(each, dtype=np.float64) for each in (values, noise, timing))
     repeats = mean_of_repeats(found[:, None], (own**2 + wander**2)[:, None])
@@ -68,15 +189,16 @@ _TREND = -1
 
 
 SCATTERED = 2.0
-"""Birge ratio of the fits above which the amplitudes tell the restitution. A fit takes every impact after one that
-differs from the others for too early or too late, so it errs by more than the impacts differ; amplitudes forget."""
+"""Birge ratio of the fits above which the amplitudes give the restitution. A deviating impact shifts the times of all
+later ones, so the error of a fit exceeds the scatter of the impacts; amplitudes do not accumulate that error.
+"""
 
 
 @dataclass(frozen=True)
 class Findings:
     """`motion` is the restitution of the fits and `trend` its change, `relation` that of the amplitudes alone.
 
-    `alpha` [rad] and `p` [rad/s] are the critical angle and the frequency parameter that the motion shows.
+    `alpha` [rad] and `p` [rad/s] are the identified critical angle and frequency parameter.
     """
 
     motion: Combined
@@ -88,7 +210,7 @@ class Findings:
 
     @property
     def by_amplitudes(self) -> bool:
-        """Whether impacts differ so much that the amplitudes tell the restitution better."""
+        """Whether impacts differ so much that the amplitudes are the better estimator."""
         return self.motion.birge > SCATTERED
 
     @property
@@ -98,11 +220,10 @@ class Findings:
 
 
 def findings(tilts: Sequence[Tilt], laser: LaserErrors, height: float, height_uncertainty: float) -> Findings:
-    """The tilts together; one alone, with what it leaves as its only scatter.
+    """Combine the tilts; the scatter of a single one is its residual alone.
 
-    `height` of the beam [m] and its standard uncertainty make an angle of the displacement, as the laser's scale does:
-    alpha has all of it; r and p, which time tells, have none. The amplitude relation has little of it. p has that of
-    the clock which times the samples.
+    Errors of the beam's `height` [m] and of the laser's scale affect the conversion to an angle: alpha fully, the
+    amplitude relation little, r and p, which depend on time, not at all. p has the error of the sample clock.
     """
     fits = [tilt.fit for tilt in tilts]
     linearity = np.array([laser.linearity(fit) for fit in fits])
@@ -133,7 +254,7 @@ def findings(tilts: Sequence[Tilt], laser: LaserErrors, height: float, height_un
 
 
 def uncertainties(fit: RockingFit, laser: LaserErrors, height: float, height_uncertainty: float) -> Array:
-    """Standard uncertainties of all values of one fit, noise and all that the laser may have got wrong, shape (8,)."""
+    """Standard uncertainties of all values of one fit, noise and the laser's errors, shape (8,)."""
     common = np.zeros(fit.values.size)
     common[ALPHA] = fit.values[ALPHA] * hypot(laser.accuracy.laser_slope, height_uncertainty / height)
     common[P] = fit.values[P] * laser.accuracy.timebase

@@ -1,11 +1,11 @@
-"""The exact nonlinear motion fitted to what the laser saw, from soon after the release down to the last usable impact.
+"""Fit of the exact nonlinear motion to the laser signal, from shortly after the release to the last usable impact.
 
 Six values are of the motion: alpha, p and r of `sim.free_rocking`, the tilt (as a share of alpha) and the instant of a
-release from rest that would have led to it, and what the laser shows for the standing block. A release by hand is
-neither instant nor without a push: its energy and phase are in those two, and the samples until the block is surely
-free are left out. Two more are of the laser: with the displacement D it shows D + c_2 D^2 + c_3 D^3, the smooth part of
-its linearity. Its scale is none of them: with s times the angle, alpha and tilt come out s times as large, and r and p,
-which the times of the impacts tell, stay as they are.
+release from rest that leads to it, and the laser's reading for the block at rest. A release by hand is neither
+instantaneous nor free of a push: tilt and instant account for its energy and phase, and the samples until the block is
+free are excluded. Two more are of the laser: at the displacement D its reading is D + c_2 D^2 + c_3 D^3, the smooth
+part of its linearity error. Its scale is not fitted: a scale factor s multiplies alpha and tilt by s and does not
+affect r and p, which depend on the times of the impacts.
 """
 
 from collections.abc import Callable
@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.analysis.free_rocking.points import AFTER, BEFORE, Points
-from bench.analysis.free_rocking.swings import NotRocking, Seen, Swings
+from bench.analysis.free_rocking.swings import NotRocking, Recording, Swings
 from sim import block_face
 from sim.free_rocking import FreeRocking, energy
 from sim.specimen import Block
@@ -28,27 +28,28 @@ NAMES = ("alpha", "p", "restitution", "share", "start", "zero", "bend_2", "bend_
 ALPHA, P, R, SHARE, START, ZERO, BEND_2, BEND_3 = range(len(NAMES))
 
 FREE = 0.9
-"""Share of the tilt in the hand below which the block has surely left it."""
+"""Fraction of the held tilt below which the block counts as released."""
 
 FEWEST = 12
-"""Impacts below which what is fitted is not told apart."""
+"""Fewest impacts that determine the parameters."""
 
 _RATE = 250.0
-"""Samples per second that are fitted: the laser's are averaged down to this, the motion is smooth in between [1/s]."""
+"""Sample rate of the fit [1/s], to which the laser's samples are averaged; the motion is smooth at this rate.
+"""
 
 _IMPACT, _ANGLE = 1e-4, 1e-4
-"""Standard uncertainties of single impacts [s] and turning points [rad] in the fit that the other one starts from."""
+"""Standard uncertainties of single impacts [s] and turning points [rad] in the preliminary fit."""
 
 _STEP = 1e-5
-"""Trend by which the motion's derivative to it is taken."""
+"""Step of the finite difference with respect to the trend."""
 
 
 @dataclass(frozen=True, eq=False)
 class RockingFit:
-    """What was found: `values`, shape (8,), in the order of `NAMES`, SI, for the view of `block` at `height` [m].
+    """Result of a fit: `values`, shape (8,), in the order of `NAMES`, SI, for the view of `block` at `height` [m].
 
-    `times` [s], `displacement` [m] and `swing` (the number of impacts before), all of shape (n,), are what was fitted,
-    `fitted` [m] what came out; `jacobian`, shape (n, 9), holds the derivatives to the values and, last, to the trend of
+    `times` [s], `displacement` [m] and `swing` (the number of impacts before), all of shape (n,), are the data,
+    `fitted` [m] the model; `jacobian`, shape (n, 9), holds the derivatives to the values and, last, to the trend of
     r with the impacts' speed around its mean.
     """
 
@@ -63,58 +64,58 @@ class RockingFit:
 
     @property
     def motion(self) -> FreeRocking:
-        """The motion that was found, on the side of the tilt that the data show."""
+        """The fitted motion, on the side of the recorded tilt."""
         return _motion(self.values, float(np.sign((self.displacement - self.values[ZERO])[0])))
 
     @property
     def residual(self) -> Array:
-        """What is left [m], shape (n,)."""
+        """Residual displacement [m], shape (n,)."""
         return self.displacement - self.fitted
 
     @property
     def rms(self) -> float:
-        """Root mean square of what is left [m]."""
+        """Root mean square residual [m]."""
         return float(np.sqrt(np.mean(self.residual**2)))
 
     @property
     def impacts(self) -> int:
-        """How many impacts lie within what was fitted, the last one at its end."""
+        """Number of impacts within the fitted data, the last one at its end."""
         return int(self.swing[-1]) + 1
 
     @cached_property
     def gain(self) -> Array:
-        """How the values follow small changes of the displacement, shape (8, n) [unit/m]."""
+        """Sensitivities of the values to the displacement, shape (8, n) [unit/m]."""
         return np.asarray(np.linalg.pinv(self.jacobian[:, :-1]), dtype=np.float64)
 
     @cached_property
     def trend_gain(self) -> Array:
-        """The same of the trend, when it is fitted with the others, shape (n,) [1/m]."""
+        """Sensitivity of the trend, fitted jointly with the others, shape (n,) [1/m]."""
         return np.asarray(np.linalg.pinv(self.jacobian)[-1], dtype=np.float64)
 
     @property
     def trend(self) -> float:
-        """Change of r from impacts of no speed to that of a fall from alpha: to first order, one step from no trend."""
+        """Change of r from zero impact speed to that of a fall from alpha, by one linearised step from zero trend."""
         return float(self.trend_gain @ self.residual)
 
     @property
     def covariance(self) -> Array:
-        """Of the values by what is left, shape (8, 8)."""
+        """Covariance of the values from the residual, shape (8, 8)."""
         return self._scattered(self.gain)
 
     @property
     def trend_uncertainty(self) -> float:
-        """Standard uncertainty of the trend by what is left."""
+        """Standard uncertainty of the trend from the residual."""
         return float(np.sqrt(self._scattered(self.trend_gain[None, :])[0, 0]))
 
     def straightened(self, displacement: Array) -> Array:
-        """What the laser shows [m], any shape, counted from the standing block and without the bend that was found."""
+        """A laser signal [m], any shape, relative to the block at rest and without the fitted curvature."""
         seen = displacement - self.values[ZERO]
         return seen - self.values[BEND_2] * seen**2 - self.values[BEND_3] * seen**3
 
     def _scattered(self, gain: Array) -> Array:
-        """Covariance of `gain` @ residual: what one half swing adds is correlated within itself, and with no other.
+        """Covariance of `gain` @ residual: contributions are correlated only within a half swing.
 
-        The sum over clusters of Liang and Zeger (1986), with the usual factor for few of them.
+        Cluster sum of Liang and Zeger (1986) with the usual factor for few clusters.
         """
         parts = gain * self.residual
         starts = np.flatnonzero(np.diff(self.swing, prepend=-1))
@@ -123,14 +124,14 @@ class RockingFit:
         return sums @ sums.T * (count / (count - parameters))
 
 
-def fit_rocking(seen: Seen, swings: Swings, points: Points, alpha: float, p: float) -> RockingFit:
-    """The motion that fits, begun from the geometry's `alpha` [rad] and `p` [rad/s].
+def fit_rocking(seen: Recording, swings: Swings, points: Points, alpha: float, p: float) -> RockingFit:
+    """Fit the motion, starting from the geometry's `alpha` [rad] and `p` [rad/s].
 
-    Raises NotRocking for too few impacts, or when no motion of a rocking block comes near.
+    Raises NotRocking for too few impacts, or when no motion of a rocking block fits.
     """
     size = max(round(seen.sample_rate / _RATE), 1)
     times, displacement = _thinned(seen.times, size), _thinned(seen.displacement, size)
-    # the mean over a bin is the middle plus this times the second derivative
+    # the mean over a bin is the value at its middle plus this factor times the second derivative
     spread = (size**2 - 1) / (24.0 * seen.sample_rate**2)
     swing = np.searchsorted(swings.crossings, times)
     since = times - np.append(-np.inf, swings.crossings)[swing]
@@ -165,8 +166,8 @@ def _motion(values: Array, side: float, trend: float = 0.0, trend_at: float = 0.
     return FreeRocking(alpha, p, r, side * share * alpha, start, trend, trend_at)
 
 
-def _freed(seen: Seen, swings: Swings) -> float:
-    """When the block has surely left the hand [s]: a hand may tremble before."""
+def _freed(seen: Recording, swings: Swings) -> float:
+    """Time after which the block is free [s]; before, the hand may tremble."""
     before = seen.angle(swings.zero)[: int(swings.crossings[0] * seen.sample_rate)]
     return float(np.flatnonzero(np.abs(before) >= FREE * abs(swings.held))[-1]) / seen.sample_rate
 
@@ -177,18 +178,18 @@ def _thinned(samples: Array, size: int) -> Array:
 
 
 def _bounds(alpha: float, p: float) -> tuple[Array, Array]:
-    """Within a factor of two of the geometry; the share and r where a motion exists; the others far off."""
+    """Bounds: within a factor of two of the geometry; tilt ratio and r where a motion exists; wide for the others."""
     lowest = np.array([0.5 * alpha, 0.5 * p, 0.05, 1e-3, -1e4, -1.0, -10.0, -1e3])
     return lowest, np.array([2.0 * alpha, 2.0 * p, 0.9999, 0.999, 1e4, 1.0, 10.0, 1e3])
 
 
 def _from_points(swings: Swings, points: Points, alpha: float, p: float) -> Array:
-    """Start values: the motion whose impacts and turning points are nearest to those that were found."""
+    """Initial values: the motion closest to the estimated impacts and turning points."""
     known = np.isfinite(points.impacts) & np.isfinite(points.amplitudes)
     count = known.size if known.all() else int(np.argmin(known))
     if count < FEWEST:
-        few = f"{count} impacts are large enough to be used, {FEWEST} are needed"
-        raise NotRocking(f"{few}: tilt the block farther, or let the laser look higher")
+        few = f"{count} impacts are large enough, {FEWEST} are required"
+        raise NotRocking(f"{few}: tilt the block farther, or raise the laser")
     instants, sizes = points.impacts[:count], np.abs(points.amplitudes[:count])
     side = float(np.sign(swings.held))
     left = np.log(energy(np.minimum(sizes, 0.99 * alpha), alpha))
@@ -214,5 +215,5 @@ def _least_squares(function: Callable[[Array], Array], start: Array, lowest: Arr
 
     found: Any = least_squares(function, start, bounds=(lowest, highest), x_scale="jac", max_nfev=60)
     if not found.success:
-        raise NotRocking("no motion of a rocking block fits: see to the block's base, to its sides and to the laser")
+        raise NotRocking("no motion of a rocking block fits: check the block's base and sides and the laser")
     return found

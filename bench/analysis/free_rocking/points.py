@@ -1,9 +1,16 @@
-"""Single points of the motion from the samples around them: when the block hit the ground, how far it swung.
+"""Single points of the motion from the samples around them: impact times, turning points, and the restitution from
+these. They assume only a smooth motion between impacts, and so check a model fitted to the whole. A Butterworth
+low-pass delays a smooth motion without distortion: its gain has no term in omega^2, so its impulse response has no
+second cumulant, and a parabola passes unchanged. Its response to the kink at an impact has decayed after `AFTER`, and
+those samples are excluded.
 
-Nothing is assumed of the motion but that it is smooth between impacts, so these points check a model that is fitted to
-the whole. A Butterworth low-pass keeps a smooth motion as it is, only later: its gain has no term in omega^2, so its
-impulse response has no second cumulant, and a parabola comes out as it went in. What it does to the kink at an impact
-is gone after `AFTER`, and those samples are left out.
+Between impacts the energy is constant, so the largest angles before and after an impact give the restitution of the
+angular velocity, exactly and independent of time:
+
+    r_n^2 = (cos(alpha - |theta_n+1|) - cos(alpha)) / (cos(alpha - |theta_n|) - cos(alpha)).
+
+For a constant r the logarithm of that energy falls along a line, by 2 ln(r) an impact; the line through all of them
+gives the mean r. alpha and the laser's scale have little influence: both sides of the quotient contain them.
 """
 
 from dataclasses import dataclass
@@ -11,29 +18,32 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.analysis.free_rocking.swings import Seen, Swings
+from bench.analysis.free_rocking.swings import Recording, Swings
+from sim.free_rocking import energy
 
 Array = NDArray[np.float64]
 
 BEFORE, AFTER = 0.005, 0.025
-"""Time before and after an impact that is left out [s]. A low-pass of fourth order at 100 Hz, whose delay is 2.6 ms,
-keeps exp(-6) of a kink of some 15 um for 25 ms."""
+"""Time excluded before and after an impact [s].
+
+After 25 ms, a fourth-order low-pass at 100 Hz, with a delay of 2.6 ms, has reduced a kink of about 15 um to exp(-6).
+"""
 
 _WINDOW, _PART = 0.08, 0.45
-"""Largest half width of the fit around an impact [s], and its part of the shorter half swing beside it."""
+"""Largest half width of the fit around an impact [s], and as a fraction of the shorter adjacent half swing."""
 
 _TURN = 0.6
-"""Half width of the fit around a turning point, in halves of the half swing."""
+"""Half width of the fit around a turning point, relative to half of the half swing."""
 
 _DEGREE = 4
 _FEWEST = 12
-"""Samples below which a point is not known."""
+"""Fewest samples of a point."""
 
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """`impacts` [s], shape (n,), good to 50 us, and `amplitudes` [rad], shape (n,), signed, of the turning points that
-    follow them, with standard uncertainties of noise; NaN where too few samples are left.
+    """`impacts` [s], shape (n,), accurate to 50 us, and `amplitudes` [rad], shape (n,), signed, of the turning points
+    that follow them, with standard uncertainties of noise; NaN where too few samples are left.
     """
 
     impacts: Array
@@ -42,14 +52,14 @@ class Points:
     amplitude_uncertainty: Array
 
 
-def find_points(seen: Seen, swings: Swings, zero: float) -> Points:
-    """The points of all `swings`, when the laser shows `zero` [m] for the standing block."""
+def find_points(seen: Recording, swings: Swings, zero: float) -> Points:
+    """The points of all `swings`, when the laser reads `zero` [m] for the block at rest."""
     times, angle = seen.times, seen.angle(zero)
     marks = np.append(swings.crossings, np.nan)
     impacts: list[tuple[float, float]] = []
     turns: list[tuple[float, float]] = []
     for number, crossing in enumerate(swings.crossings):
-        # the last half swing has no impact behind it: it is not longer than the one before
+        # the last half swing is not followed by an impact: it is at most as long as the previous one
         length = marks[number + 1] - crossing if number + 1 < swings.crossings.size else crossing - marks[number - 1]
         window = min(_WINDOW, _PART * float(length))
         impacts.append(_impact(times, angle, float(crossing), window))
@@ -59,11 +69,11 @@ def find_points(seen: Seen, swings: Swings, zero: float) -> Points:
 
 
 def _impact(times: Array, angle: Array, guess: float, window: float) -> tuple[float, float]:
-    """Instant at which a cubic whose slope and curvature change there passes zero, and its uncertainty [s]."""
-    instant, doubt = guess, np.nan
+    """Zero crossing of a cubic whose slope and curvature change there, and its uncertainty [s]."""
+    instant, uncertainty = guess, np.nan
     for _ in range(3):
-        instant, doubt = _closer(times, angle, instant, window)
-    return instant, doubt
+        instant, uncertainty = _closer(times, angle, instant, window)
+    return instant, uncertainty
 
 
 def _closer(times: Array, angle: Array, instant: float, window: float) -> tuple[float, float]:
@@ -104,10 +114,9 @@ def _turn(times: Array, angle: Array, crossing: float, length: float) -> tuple[f
 
 
 def functional_uncertainty(weights: Array, residual: Array, parameters: int) -> float:
-    """Standard uncertainty of `weights` @ signal, both of shape (n,), by the `residual` of a fit of so many parameters.
+    """Standard uncertainty of `weights` @ signal, both of shape (n,), from the `residual` of a fit.
 
-    The residual's neighbours are correlated, by the filters and the steps of the laser: its autocovariance counts up to
-    where it first falls to zero.
+    Filters and laser resolution correlate neighbouring residuals: their autocovariance is used up to its first zero.
     """
     n = residual.size
     covariance = np.correlate(residual, residual, "full")[n - 1 :] / max(n - parameters, 1)
@@ -116,3 +125,57 @@ def functional_uncertainty(weights: Array, residual: Array, parameters: int) -> 
     products = np.correlate(weights, weights, "full")[n - 1 :]
     variance = covariance[0] * products[0] + 2.0 * float(covariance[1:lags] @ products[1:lags])
     return float(np.sqrt(max(variance, covariance[0] * products[0])))
+
+
+@dataclass(frozen=True, eq=False)
+class Relation:
+    """r of single impacts, and of all from the fitted line.
+
+    `speed`, shape (n,), of each impact relative to that of a fall from alpha; `each` and `each_uncertainty`, shape
+    (n,), standard, of noise; neighbours share a turning point and are correlated. `restitution` has the standard
+    `uncertainty` of the scatter about the line; `weights`, shape (m,), are its sensitivities to the turning `angles`
+    [rad], shape (m,).
+    """
+
+    speed: Array
+    each: Array
+    each_uncertainty: Array
+    restitution: float
+    uncertainty: float
+    angles: Array
+    weights: Array
+
+
+def amplitude_relation(points: Points, alpha: float) -> Relation:
+    """The relation for a block of critical angle `alpha` [rad], from the turning points up to the first unknown one."""
+    known = np.isfinite(points.amplitudes)
+    count = int(np.argmin(known)) if not known.all() else known.size
+    angles, uncertainty = points.amplitudes[:count], points.amplitude_uncertainty[:count]
+    left = energy(angles, alpha)
+    steepness = _steepness(angles, alpha)
+    spread = np.abs(steepness) * uncertainty
+    each = np.sqrt(left[1:] / left[:-1])
+    number = np.arange(count) - np.average(np.arange(count), weights=spread**-2)
+    weights = number / spread**2 / np.sum(number**2 / spread**2)
+    slope = float(weights @ np.log(left))
+    level = float(np.average(np.log(left), weights=spread**-2))
+    off = (np.log(left) - level - slope * number) / spread
+    # the observed scatter replaces the noise assumed for single points
+    birge = float(np.sqrt(off @ off / (count - 2)))
+    r = float(np.exp(0.5 * slope))
+    return Relation(
+        speed=np.sqrt(left[:-1]),
+        each=each,
+        each_uncertainty=0.5 * each * np.hypot(spread[1:], spread[:-1]),
+        restitution=r,
+        uncertainty=0.5 * r * birge * float(np.sqrt(np.sum((weights * spread) ** 2))),
+        angles=angles,
+        weights=0.5 * r * weights * steepness,
+    )
+
+
+def _steepness(angle: Array, alpha: float) -> Array:
+    """Derivative of the logarithm of the energy with respect to theta [1/rad]."""
+    size = np.abs(angle)
+    slope = np.sin(alpha - size) / (2.0 * np.sin(alpha - 0.5 * size) * np.sin(0.5 * size))
+    return np.sign(angle) * slope

@@ -1,4 +1,4 @@
-"""Where in a recording the block swings: its rest, the tilt at which it was held, and every half swing."""
+"""Segmentation of a recording of free rocking: rest, initial tilt and every half swing."""
 
 from dataclasses import dataclass, replace
 
@@ -12,31 +12,31 @@ from sim.specimen import Block
 Array = NDArray[np.float64]
 
 REST = 1.0
-"""Time at the end of a recording in which the block must stand still [s]."""
+"""Time at the end of a recording for which the block must be at rest [s]."""
 
 GAP = 0.005
-"""Longest time without a valid sample that is bridged [s]: a line is then off by less than 5 um."""
+"""Longest gap without valid samples that is interpolated [s]: the error is below 5 um."""
 
 STILL = 2e-4
-"""Largest standard deviation of the displacement at rest [m]: steps and noise of a laser."""
+"""Largest standard deviation of the displacement at rest [m]: resolution and noise of a laser."""
 
 _HELD = 0.5
-"""Time at the beginning over which the tilt in somebody's hand is taken [s]."""
+"""Time at the beginning over which the held tilt is averaged [s]."""
 
 _SHARE = 0.25
-"""Share of the least displacement that counts by which the block must come out on the other side."""
+"""Fraction of the least usable angle that the block must reach on the other side."""
 
 
 class NotRocking(RockbenchError):
-    """A recording does not show what a block does that was tilted and let go."""
+    """The recording does not show the free rocking of a tilted block."""
 
     error_code = "not_measurable"
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
-    """What the laser saw: `displacement` [m], shape (n,), NaN where it saw nothing, at `sample_rate` [1/s], of the face
-    of `block` at `height` [m]. The zero of the displacement does not matter.
+class Recording:
+    """Signal of the laser: `displacement` [m], shape (n,), NaN where invalid, at `sample_rate` [1/s], of the face
+    of `block` at `height` [m]. The zero of the displacement is arbitrary.
     """
 
     displacement: Array
@@ -50,7 +50,7 @@ class Seen:
         return np.arange(self.displacement.size) / self.sample_rate
 
     def angle(self, zero: float) -> Array:
-        """theta [rad], shape (n,), when the laser shows `zero` [m] for the standing block."""
+        """theta [rad], shape (n,), when the laser reads `zero` [m] for the block at rest."""
         return block_face.rotation(self.displacement - zero, self.height, self.block)
 
 
@@ -58,8 +58,8 @@ class Seen:
 class Swings:
     """The half swings of a recording that are large enough to be used.
 
-    `zero` [m] is what the laser shows at rest, `held` [rad] the tilt at first. `crossings` [s], shape (n,), are about
-    where the ground was hit; `peaks` [rad], shape (n,), the largest angles after each, signed.
+    `zero` [m] is the laser's reading at rest, `held` [rad] the initial tilt. `crossings` [s], shape (n,), are the
+    approximate times of the impacts; `peaks` [rad], shape (n,), the largest angles after each, signed.
     """
 
     zero: float
@@ -68,43 +68,45 @@ class Swings:
     peaks: Array
 
 
-def mended(seen: Seen) -> Seen:
-    """The same with a straight line over gaps of up to `GAP`. Raises NotRocking for a longer one."""
+def without_gaps(seen: Recording) -> Recording:
+    """The recording with gaps of up to `GAP` interpolated linearly. Raises NotRocking for a longer gap."""
     known = np.flatnonzero(np.isfinite(seen.displacement))
     gaps = np.diff(known, prepend=-1, append=seen.displacement.size) - 1
     longest = int(np.argmax(gaps))
     if gaps[longest] > GAP * seen.sample_rate:
         at = (known[longest - 1] + 1) / seen.sample_rate if longest > 0 else 0.0
-        raise NotRocking(f"the laser saw nothing at {at:.2f} s: see that the block stays within its range, then repeat")
+        raise NotRocking(
+            f"the laser has no valid reading at {at:.2f} s: check that the block stays within its range, then repeat"
+        )
     if known.size == seen.displacement.size:
         return seen
     return replace(seen, displacement=np.interp(np.arange(seen.displacement.size), known, seen.displacement[known]))
 
 
-def find_swings(seen: Seen, least: float) -> Swings:
+def find_swings(seen: Recording, least: float) -> Swings:
     """The half swings down to the first one whose largest angle is below `least` [rad].
 
-    Raises NotRocking, saying what to do, when the block was not let go or did not come to rest.
+    Raises NotRocking, with the remedy, when the block was not released or did not come to rest.
     """
     n = round(REST * seen.sample_rate)
     end = seen.displacement[-n:]
     if float(end.std()) > STILL:
-        raise NotRocking("the block did not come to rest within the recording: let go earlier, or ask for less tilt")
+        raise NotRocking("the block did not come to rest within the recording: release it earlier, or use less tilt")
     zero = float(end.mean())
     angle = seen.angle(zero)
     if not np.isfinite(angle).all():
-        raise NotRocking("the laser shows what no rotation of the block gives: see to its height and where it looks")
+        raise NotRocking("no rotation of the block explains the laser's reading: check its height and its target")
     held = float(np.median(angle[: round(_HELD * seen.sample_rate)]))
     if abs(held) < least:
         raise NotRocking(
-            f"the block stood upright at first, {held:+.4f} rad: tilt it before the recording, then repeat"
+            f"the block was upright at the beginning, {held:+.4f} rad: tilt it before the recording, then repeat"
         )
     side = np.where(np.abs(angle) > _SHARE * least, np.sign(angle), 0.0)
     known = np.flatnonzero(side)
     turned = np.flatnonzero(np.diff(side[known]) != 0.0)
     before, after = known[turned], known[turned + 1]
     if turned.size == 0:
-        raise NotRocking("the block was not let go, or was put down by hand: let it go when the recording runs")
+        raise NotRocking("the block was not released, or was lowered by hand: release it during the recording")
     crossings = np.array([_crossing(angle, *pair) for pair in zip(before, after, strict=True)])
     ends = np.append(after[1:], angle.size)
     peaks = np.array([_largest(angle[low:high]) for low, high in zip(after, ends, strict=True)])
@@ -114,7 +116,7 @@ def find_swings(seen: Seen, least: float) -> Swings:
 
 
 def _crossing(angle: Array, before: int, after: int) -> float:
-    """Where a straight line between two samples of opposite sign passes zero [samples]."""
+    """Zero crossing of a straight line between two samples of opposite sign [samples]."""
     return before + (after - before) * float(angle[before] / (angle[before] - angle[after]))
 
 

@@ -1,6 +1,6 @@
-"""The classical Runge-Kutta method with a fixed step, and the procedure that the paper builds on it.
+"""The classical Runge-Kutta method with a fixed step, and the paper's procedure based on it.
 
-It takes the equations from `sim.kernel.equations` and reports as `sim.kernel.rocking.run` does.
+It uses the equations of `sim.kernel.equations` and the report of `sim.kernel.rocking.run`.
 """
 
 from math import ceil, cos, sin, sqrt
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from sim.kernel.compiled import compiled
 from sim.kernel.equations import COUPLED, GRAVITY, H1, H_B, K_C, MASS, RESTITUTION, B, rates
-from sim.kernel.rocking import (
+from sim.kernel.steps import (
     COMPLETED,
     END,
     FAILED,
@@ -26,7 +26,7 @@ from sim.kernel.rocking import (
 from sim.kernel.watching import UPLIFT_MARGIN
 
 STAGES = 5
-"""Rows of scratch space that a step needs: four stages and the state of a stage."""
+"""Rows of scratch space of a step: four stages and the state of a stage."""
 
 
 @compiled("Tuple((float64, float64))(float64[::1], float64)")
@@ -136,12 +136,12 @@ def run_paper(
     peaks_from: float,
     report: NDArray[np.float64],
 ) -> None:
-    """Section 3.3 of the paper, literally: steps `dt` on one grid, impacts seen by theta_{i-1} theta_i < 0.
+    """Section 3.3 of the paper, literally: steps `dt` on one grid, impacts detected by theta_{i-1} theta_i < 0.
 
-    parts : 1 for the harmonic procedure, which takes the step's end as the instant of the impact; more for the seismic
-    one, which repeats the step in so many parts and takes the end of the part in which the sign changes.
+    parts : 1 for the harmonic procedure, with the impact at the step's end; more for the seismic one, which repeats the
+    step in this many parts, with the impact at the end of the part in which the sign changes.
     Other arguments as for `sim.kernel.rocking.run`. The block lifts when a step begins with |m| > b g M (Eq. 9, A.3)
-    and never comes back to rest; peaks are the greatest values on the grid; samples are read off between its points.
+    and never returns to rest; peaks are the greatest values on the grid; samples are interpolated between its points.
     """
     following, k, part_slope = np.zeros(6), np.zeros((STAGES, 6)), np.zeros(6)
     peaks = report[PEAKS:]
@@ -159,7 +159,7 @@ def run_paper(
         while piece < pieces:
             h = length / pieces
             t = origin + piece * h
-            # a step may reach over the end of a segment; only its first stage moves on for good
+            # a step may extend over the end of a segment; only its first stage advances the segment permanently
             for stage in range(3):
                 place = t + 0.5 * stage * h
                 at, at_begin = segment, begin

@@ -1,7 +1,7 @@
 """The classical Runge-Kutta method with a fixed step and events located to its own order.
 
-An event is found by steps of other lengths from the same state, never by interpolation, so that order 4 survives it.
-It takes the equations from `sim.kernel.equations` and reports as `sim.kernel.rocking.run` does.
+An event is located by steps of other lengths from the same state, not by interpolation, which preserves order 4. It
+uses the equations of `sim.kernel.equations` and the report of `sim.kernel.rocking.run`.
 """
 
 from math import ceil
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from bench.comparators.kernel.fixed_step import STAGES, base, between, cubic_peak, rk4
 from sim.kernel.compiled import compiled
 from sim.kernel.equations import COUPLED, GRAVITY, H1, H_B, INERTIA, K_C, MASS, RESTITUTION, B, rates
-from sim.kernel.rocking import (
+from sim.kernel.steps import (
     COMPLETED,
     END,
     FAILED,
@@ -38,7 +38,7 @@ def distance(
     t: float,
     x: NDArray[np.float64],
 ) -> tuple[float, float]:
-    """How far the state `x` at time `t` of a segment is from `event`, positive before it, and the rate of that."""
+    """Distance of the state `x` at time `t` of a segment from `event`, positive before it, and its rate."""
     if event == IMPACT:
         return sg * x[4], sg * x[5]
     if event == OVERTURNING:
@@ -71,7 +71,7 @@ def located(
     """Length in (0, h] of the step that ends at `event`, or with `turning` where the distance to it is least.
 
     Every trial is a whole Runge-Kutta step from `x` to `out`. The `known` roots theta = 0 at the start are divided out:
-    what is sought is a zero of distance / h^known, which is `first` at h = 0. False position, with the halving of
+    the target is a zero of distance / h^known, which is `first` at h = 0. False position, with the halving of
     Dowell and Jarratt (1971).
     """
     a0, side = base(row, tau)[0], 0
@@ -116,10 +116,10 @@ def run_located(
     most_impacts: int,
     report: NDArray[np.float64],
 ) -> None:
-    """Steps of at most `dt` that end at the ends of segments and at events: order 4 through both.
+    """Integrate with steps of at most `dt` that end at segment ends and events: order 4 across both.
 
-    Arguments and the rule for coming to rest as for `sim.kernel.rocking.run`; after `most_impacts` the run has failed.
-    A dip to the ground within a step is found when the step's ends slope towards it.
+    Arguments and the rest criterion as for `sim.kernel.rocking.run`; the run fails after `most_impacts`. A dip to the
+    ground within a step is detected if the step's ends slope towards it.
     """
     following, k, slope = np.zeros(6), np.zeros((STAGES, 6)), np.zeros(6)
     peaks = report[PEAKS:]

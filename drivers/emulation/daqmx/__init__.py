@@ -1,1 +1,1 @@
-"""A stand-in for NI's gRPC device server with DAQ devices in it: the real nidaqmx client speaks with it."""
+"""An emulation of NI's gRPC device server with DAQ devices: the real nidaqmx client connects to it."""

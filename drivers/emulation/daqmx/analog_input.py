@@ -1,27 +1,75 @@
-"""Analogue input tasks: samples go by; the reader has a place among them."""
+"""Analogue input tasks: channels, buffers and reads."""
 
 import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from math import ceil
 
 import numpy as np
+from nidaqmx.constants import DigitalWidthUnits, TerminalConfiguration
 from nidaqmx.error_codes import DAQmxErrors
 from numpy.typing import NDArray
 
-from drivers.emulation.daqmx.errors import DaqmxFailure
-from drivers.emulation.daqmx.input_channel import InputChannel
+from drivers.emulation.daqmx.conversion import DeltaSigma, conversion_period
+from drivers.emulation.daqmx.device import CLOCK, START, AnalogInputs, DeviceModel, InputConverter, Seen, Wirings
+from drivers.emulation.daqmx.engines import EngineSlot
+from drivers.emulation.daqmx.errors import DaqmxFailure, NotEmulated
 from drivers.emulation.daqmx.timing import SampleClock, deadline_after, wait_until
 from drivers.emulation.plant import Plant
 from sim.channel import Counts
 from sim.errors import InvalidInput
 
+_WIRING_OF = {
+    TerminalConfiguration.RSE.value: Wirings.RSE,
+    TerminalConfiguration.NRSE.value: Wirings.NRSE,
+    TerminalConfiguration.DIFF.value: Wirings.DIFFERENTIAL,
+    TerminalConfiguration.PSEUDO_DIFF.value: Wirings.PSEUDODIFFERENTIAL,
+}
+
+
+@dataclass
+class FilterDelay:
+    """Settings of a converter with properties for its delay: whether its whole samples are removed, and its unit."""
+
+    removed: bool = True
+    units: int = DigitalWidthUnits.SAMPLE_CLOCK_PERIODS.value
+
+
+@dataclass(frozen=True)
+class InputChannel:
+    """One channel of an input task."""
+
+    name: str
+    device: DeviceModel
+    inputs: AnalogInputs
+    terminal: int
+    minimum: float
+    maximum: float
+    converter: InputConverter
+    filter: FilterDelay = field(default_factory=FilterDelay)
+
+
+def require_wiring(inputs: AnalogInputs, wiring: int) -> None:
+    """Raise DaqmxFailure for an unsupported wiring of an input."""
+    if wiring != TerminalConfiguration.DEFAULT.value and not inputs.wirings & _WIRING_OF.get(wiring, Wirings(0)):
+        raise DaqmxFailure(
+            DAQmxErrors.INVALID_ATTRIBUTE_VALUE,
+            "Requested value is not a supported value for this property.\n\n"
+            f"Property: AI.TermCfg\nRequested Value: {wiring}",
+        )
+
+
 _AUTOMATIC_BUFFER = ((100.0, 1_000), (10_000.0, 10_000), (1.0e6, 100_000), (float("inf"), 1_000_000))
-"""Sample rate up to which the driver's own buffer holds so many samples per channel (NI-DAQmx help, "How Is Buffer
+"""Sample rates, and the samples per channel of the driver's default buffer up to each (NI-DAQmx help, "How Is Buffer
 Size Determined?")."""
 
 
 class AnalogInput:
-    """A `Job`. `changed` guards it, and wakes whoever waits for samples.
+    """`Job` of analogue inputs.
 
-    The counter of samples that were taken shows whole packets of `packet` samples: what has reached the computer.
+    `changed` guards it, and wakes threads that wait for samples.
+
+    The counter of acquired samples shows whole packets of `packet` samples, those transferred to the computer.
     """
 
     def __init__(self, plant: Plant, changed: threading.Condition, packet: int = 1) -> None:
@@ -33,11 +81,12 @@ class AnalogInput:
         self.clock: SampleClock | None = None
         self.awaited: str | None = None
         self.source: str | None = None
+        self.engine = EngineSlot()
         self._buffer: int | None = None
         self._first: int | None = None
         self._position = 0
         self.run = 0
-        """How many runs have ended before this one."""
+        """Number of earlier runs."""
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -49,19 +98,25 @@ class AnalogInput:
 
     @property
     def resources(self) -> frozenset[str]:
-        return frozenset(f"{channel.device.clockwork} analogue input" for channel in self.inputs)
+        engine = self.engine.resource(self.inputs[0].device, self.engines)
+        return frozenset({engine, *(f"{name} analogue input" for name in self.devices)})
+
+    @property
+    def engines(self) -> tuple[str, ...]:
+        """The timing engines of its chassis or device."""
+        return self.inputs[0].device.input_engines
 
     @property
     def start_terminal(self) -> str | None:
-        return self.inputs[0].device.input_start
+        return self.engine.terminal(self.inputs[0].device, self.engines, START)
 
     @property
     def clock_terminal(self) -> str | None:
-        return self.inputs[0].device.input_clock
+        return self.engine.terminal(self.inputs[0].device, self.engines, CLOCK)
 
     @property
     def buffer(self) -> int:
-        """How many samples per channel the driver keeps for a reader who is late."""
+        """Size of the driver's buffer in samples per channel."""
         if self._buffer is not None or self.clock is None:
             return self._buffer or 0
         automatic = next(size for rate, size in _AUTOMATIC_BUFFER if self.clock.rate <= rate)
@@ -73,7 +128,7 @@ class AnalogInput:
 
     @property
     def highest_rate(self) -> float:
-        """Samples per second and channel that the slowest of its devices can do."""
+        """Highest sample rate per channel of the slowest of its devices."""
         rates: list[float] = []
         for name in self.devices:
             mine = [channel.inputs for channel in self.inputs if channel.device.name == name]
@@ -82,24 +137,65 @@ class AnalogInput:
         return min(rates)
 
     @property
+    def converters(self) -> list[DeltaSigma]:
+        """Its delta-sigma converters, which restrict the rates; none for other types."""
+        return [one.inputs.delta_sigma for one in self.inputs if one.inputs.delta_sigma is not None]
+
+    def conversion(self, device: str) -> float | None:
+        """Time between the conversions of a multiplexed device's inputs [s]; None for other devices."""
+        mine = [channel for channel in self.inputs if channel.device.name == device]
+        if self.clock is None or not mine or (fastest := mine[0].inputs.conversion) is None:
+            return None
+        return conversion_period(fastest, len(mine), self.clock.rate)
+
+    @property
+    def delays(self) -> NDArray[np.float64]:
+        """Delay of the signal in the samples of each input [s], shape (channels,); all 0 without a clock.
+
+        It is that of the filter, and negative for later inputs of a multiplexer.
+        """
+        if self.clock is None:
+            return np.zeros(len(self.inputs))
+        found: list[float] = []
+        places: dict[str, int] = {}
+        for channel in self.inputs:
+            filtering = channel.inputs.delta_sigma
+            place = places[channel.device.name] = places.get(channel.device.name, -1) + 1
+            step = self.conversion(channel.device.name) or 0.0
+            if filtering is None:
+                found.append(-place * step)
+                continue
+            delay = filtering.delay(self.clock.rate)
+            if filtering.readable and channel.filter.removed:
+                delay -= round(filtering.samples) / self.clock.rate
+            found.append(delay)
+        return np.array(found)
+
+    @property
     def acquired(self) -> int:
-        """How many samples per channel have been taken: counted by the clock, whoever reads, in whole packets."""
+        """Samples per channel acquired by the clock, independent of reads, in whole packets."""
         self._require_not_overrun()
         return self._passed(self._plant.tick()) // self._packet * self._packet
 
     @property
     def available(self) -> int:
-        """How many samples per channel can be read at once."""
+        """Samples per channel available to a read."""
         self._require_not_overrun()
         return self._ready() - self._position
 
     @property
     def position(self) -> int:
-        """The number of the next sample that is read."""
+        """The number of the next sample to be read."""
         return self._position
 
+    def engage(self, is_free: Callable[[str], bool]) -> None:
+        self.engine.choose(self.inputs[0].device, self.engines, is_free)
+
     def check(self) -> None:
-        pass
+        if self.clock is not None and not self.clock.is_whole(self._plant.tick_rate):
+            raise NotEmulated(
+                f"a sample rate of {self.clock.rate:g}/s on a plant with {self._plant.tick_rate:g} ticks per second"
+            )
 
     def begin(self, tick: int) -> None:
         self._first, self._position = tick, 0
@@ -107,15 +203,16 @@ class AnalogInput:
     def end(self) -> None:
         self._first = None
         self.run += 1
+        self.engine.release()
 
     def verdict(self) -> None:
         pass
 
-    def read(self, n: int, timeout: float, run: int) -> Counts:
-        """The plant's counts at the next `n` samples of this run; fewer when the time is over.
+    def read(self, n: int, timeout: float, run: int) -> Seen:
+        """The plant's counts at the next `n` samples of this run; fewer after a time-out.
 
-        Shape (n, channels). Waits; called without `changed`. Raises DaqmxFailure when samples were lost, or the run
-        has ended.
+        Shape (n, channels). Waits; called without holding `changed`. Raises DaqmxFailure when samples were lost, or the
+        run has ended.
         """
         with self._reading:
             with self._changed:
@@ -123,15 +220,16 @@ class AnalogInput:
             return self._fetch(first, ticks, divider)
 
     def _take(self, n: int, deadline: float, run: int) -> tuple[int, int, int]:
-        """Wait for samples and move on: tick of the first, their number, ticks from one to the next."""
+        """Wait for samples and advance; returns tick of the first, their number, and ticks between samples."""
         if self.clock is None:
-            # on demand: the present, as often as asked for
+            # on demand: the present value for each read
             self._first, self._position = self._plant.tick() + 1, 0
         self._require_run(run)
         self._require_not_overrun()
         end = self._position + n
         while self._ready() < end:
-            instant = float("inf") if self._first is None else self._plant.time_of(self._tick_of(end - 1) + 1)
+            due = None if self._first is None else self._tick_of(end - 1) + 1 + self._ahead
+            instant = float("inf") if due is None else self._plant.time_of(due)
             if not wait_until(self._changed, instant, deadline):
                 break
             self._require_run(run)
@@ -140,13 +238,27 @@ class AnalogInput:
         self._position += got
         return first, got, self.clock.divider if self.clock else 1
 
-    def _fetch(self, first: int, n: int, divider: int) -> Counts:
-        """The plant's counts; outside `changed`, because the plant may have to compute them first."""
-        columns = [channel.terminal for channel in self.inputs]
+    def _fetch(self, first: int, n: int, divider: int) -> Seen:
+        """The plant's counts, without holding `changed`, because the plant may have to compute them first."""
         if n == 0:
-            return np.zeros((0, len(columns)), np.int16)
+            return np.zeros((0, len(self.inputs)), np.int16)
+        shifts = self.delays * self._plant.tick_rate
+        if not shifts.any():
+            return self._at(first, (n - 1) * divider + 1)[::divider]
+        # before the plant was switched on, its signals were constant at their first values
+        begin = max(first - ceil(float(shifts.max())), 0)
+        rows = self._at(begin, first + (n - 1) * divider + self._ahead - begin + 1).astype(np.float64)
+        ticks = first + divider * np.arange(n)
+        seen = np.empty((n, len(self.inputs)))
+        for k, shift in enumerate(shifts):
+            seen[:, k] = np.interp(ticks - shift, begin + np.arange(len(rows)), rows[:, k])
+        return seen
+
+    def _at(self, first: int, n: int) -> Counts:
+        """Counts at the inputs at `n` consecutive ticks."""
+        columns = [channel.terminal for channel in self.inputs]
         try:
-            rows = self._plant.inputs(first, (n - 1) * divider + 1)[::divider]
+            rows = self._plant.inputs(first, n)
         except InvalidInput as error:
             raise _lost() from error
         if max(columns) < self._plant.terminals:
@@ -154,7 +266,12 @@ class AnalogInput:
         padded = np.column_stack((rows, np.zeros(n, rows.dtype)))
         return padded[:, [min(column, self._plant.terminals) for column in columns]]
 
-    def raw(self, counts: Counts) -> NDArray[np.int16 | np.int32]:
+    @property
+    def _ahead(self) -> int:
+        """Time from the tick of a sample to its last input [ticks], rounded up."""
+        return ceil(max(-float(self.delays.min()) * self._plant.tick_rate, 0.0))
+
+    def raw(self, counts: Seen) -> NDArray[np.int16 | np.int32]:
         """Raw counts of the device for counts of the plant, shape (n, channels)."""
         first = self.inputs[0].converter
         if all(channel.converter.is_like(first) for channel in self.inputs):
@@ -162,7 +279,7 @@ class AnalogInput:
         columns = [channel.converter.raw(counts[:, k]) for k, channel in enumerate(self.inputs)]
         return np.column_stack(columns)
 
-    def volts(self, counts: Counts) -> NDArray[np.float64]:
+    def volts(self, counts: Seen) -> NDArray[np.float64]:
         """Volts for counts of the plant, shape (n, channels)."""
         raw = self.raw(counts)
         return np.column_stack([channel.converter.volts(raw[:, k]) for k, channel in enumerate(self.inputs)])
@@ -172,14 +289,14 @@ class AnalogInput:
         return self._first + sample * (self.clock.divider if self.clock else 1)
 
     def _passed(self, tick: int) -> int:
-        """How many samples have been taken when `tick` has come."""
+        """Number of samples acquired at `tick`."""
         if self._first is None:
             return 0
         return self.clock.passed(self._first, tick) if self.clock else max(tick - self._first + 1, 0)
 
     def _ready(self) -> int:
-        """How many samples could have been read: the plant gives a tick when the next one comes."""
-        return self._passed(self._plant.tick() - 1)
+        """Number of readable samples: the plant completes a tick with the next one."""
+        return self._passed(self._plant.tick() - 1 - self._ahead)
 
     def _require_run(self, run: int) -> None:
         if run != self.run:

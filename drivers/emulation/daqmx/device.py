@@ -1,13 +1,24 @@
-"""What a DAQ device is: the numbers that a client can ask for."""
+"""Properties of a DAQ device that a client can query."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntFlag
 from types import MappingProxyType
 
+import numpy as np
 from nidaqmx.constants import ProductCategory
+from numpy.typing import NDArray
+
+from drivers.emulation.daqmx.conversion import DeltaSigma
+from sim.sensors import Converter
 
 _STRAIGHT: Mapping[int, tuple[float, ...]] = MappingProxyType({})
+
+
+Seen = NDArray[np.int16 | np.int32 | np.float64]
+"""Counts of the plant; not integer between two of its ticks."""
+START, CLOCK = "StartTrigger", "SampleClock"
+"""Signals of a timing engine."""
 
 
 class Wirings(IntFlag):
@@ -21,11 +32,13 @@ class Wirings(IntFlag):
 
 @dataclass(frozen=True)
 class AnalogInputs:
-    """The inputs of a device. Input k is terminal `first_terminal + k` of the plant; beyond its last it reads 0 V.
+    """The inputs of a device. Input k is terminal `first_terminal + k` of the plant; beyond the last terminal it reads
+    0 V.
 
     `ranges` are the largest magnitudes [V], widest first; rates are per second. The converter has `resolution` bits
     in raw samples of `raw_bits`. `polynomials` are, for single inputs, volts per power of the counts in the widest
-    range; the others are straight, with their rails at the ends of the range.
+    range; the others are linear, with their rails at the ends of the range. `delta_sigma` describes converters of that
+    type; `conversion` is the fastest conversion of a multiplexed converter [s], None for inputs taken at one instant.
     """
 
     count: int
@@ -36,26 +49,34 @@ class AnalogInputs:
     wirings: Wirings
     resolution: int = 16
     raw_bits: int = 16
+    delta_sigma: DeltaSigma | None = None
+    conversion: float | None = None
     first_terminal: int = 0
     polynomials: Mapping[int, tuple[float, ...]] = field(default_factory=lambda: _STRAIGHT)
 
 
 @dataclass(frozen=True)
 class AnalogOutputs:
-    """The outputs of a device: largest magnitudes [V], samples per second, samples that its own memory holds."""
+    """The outputs of a device: largest magnitudes [V], samples per second, samples in its onboard memory.
+
+    `transfer_condition`: the condition of transfers to that memory can be set.
+    """
 
     count: int
     ranges: tuple[float, ...]
     rate: float
     memory: int
+    transfer_condition: bool = True
 
 
 @dataclass(frozen=True)
 class DeviceModel:
-    """One device, chassis, or module in a `chassis`.
+    """Device, chassis, or module in a `chassis`.
 
-    `lines` is the number of lines at port 0 that can be outputs, `input_lines` of those that can be inputs; `watchdog`
-    the longest time-out [s] of the watchdog on them, None where there is none.
+    `lines` is the number of lines at port 0 that can be outputs, `input_lines` of those that can be inputs;
+    `direction_group` lines in a row have one direction. `watchdog` is the longest time-out [s] of its watchdog, None
+    where there is none; that of a chassis acts on the outputs of its modules. `input_engines` and `output_engines` are
+    the timing engines of analogue inputs and outputs, in the order of their numbers; a module has those of its chassis.
     """
 
     name: str
@@ -69,7 +90,10 @@ class DeviceModel:
     outputs: AnalogOutputs | None = None
     lines: int = 0
     input_lines: int = 0
+    direction_group: int = 1
     watchdog: float | None = None
+    input_engines: tuple[str, ...] = ("ai",)
+    output_engines: tuple[str, ...] = ("ao",)
 
     @property
     def input_names(self) -> tuple[str, ...]:
@@ -91,32 +115,78 @@ class DeviceModel:
         """Digital input lines."""
         return tuple(f"{self.name}/port0/line{k}" for k in range(self.input_lines))
 
+    def direction_of(self, k: int) -> str:
+        """The lines that share the direction of line `k`, as text."""
+        first = k // self.direction_group * self.direction_group
+        return f"{self.name}/port0/line{first}:{first + self.direction_group - 1}"
+
     @property
     def clockwork(self) -> str:
-        """Who makes clocks and triggers: the chassis where there is one."""
+        """Device that generates clocks and triggers: the chassis, if any."""
         return self.chassis or self.name
 
     @property
-    def input_start(self) -> str:
-        """Terminal of the start trigger of the inputs."""
-        return f"/{self.chassis}/te0/StartTrigger" if self.chassis else f"/{self.name}/ai/StartTrigger"
-
-    @property
-    def input_clock(self) -> str:
-        """Terminal of the sample clock of the inputs."""
-        return f"/{self.chassis}/te0/SampleClock" if self.chassis else f"/{self.name}/ai/SampleClock"
-
-    @property
-    def output_clock(self) -> str:
-        """Terminal of the sample clock of the outputs."""
-        return f"/{self.chassis}/te1/SampleClock" if self.chassis else f"/{self.name}/ao/SampleClock"
-
-    @property
     def terminals(self) -> tuple[str, ...]:
-        """Every terminal that others may be started or clocked from."""
-        return self.input_start, self.output_start, self.input_clock, self.output_clock
+        """Every terminal that may serve as trigger or clock source."""
+        return tuple(
+            f"/{self.clockwork}/{engine}/{signal}"
+            for engine in (*self.input_engines, *self.output_engines)
+            for signal in (START, CLOCK)
+        )
 
-    @property
-    def output_start(self) -> str:
-        """Terminal of the start trigger of the outputs."""
-        return f"/{self.chassis}/te1/StartTrigger" if self.chassis else f"/{self.name}/ao/StartTrigger"
+
+_NEWTON_STEPS = 3
+"""Newton steps to invert a calibration polynomial, which is almost linear: accurate to a fraction of a count."""
+
+
+class InputConverter:
+    """Input `k` of a device, set to `range` [V].
+
+    `source` is the converter of the plant's counts.
+
+    volts = coefficients[0] + coefficients[1] raw + coefficients[2] raw^2 + ...
+    """
+
+    def __init__(self, inputs: AnalogInputs, k: int, range: float, source: Converter) -> None:
+        widest = inputs.ranges[0]
+        straight = (0.0, 2.0 * widest / 2**inputs.resolution)
+        self.range = range
+        self.coefficients = tuple(c * range / widest for c in inputs.polynomials.get(k, straight))
+        self._rails = -(2 ** (inputs.resolution - 1)), 2 ** (inputs.resolution - 1) - 1
+        self._dtype = np.int16 if inputs.raw_bits == 16 else np.int32
+        self._source = source
+        self._same = self.coefficients == (0.0, source.lsb) and self._rails == source.codes
+
+    def is_like(self, other: "InputConverter") -> bool:
+        """Whether both give the same raw counts."""
+        return self.coefficients == other.coefficients and self._rails == other._rails
+
+    def raw(self, counts: Seen) -> NDArray[np.int16 | np.int32]:
+        """Raw counts for the plant's counts, same shape; saturated where the plant's converter is."""
+        if self._same:
+            return np.rint(counts).astype(self._dtype)
+        volts = counts.astype(np.float64) * self._source.lsb
+        raw = (volts - self.coefficients[0]) / self.coefficients[1]
+        if len(self.coefficients) > 2:
+            for _ in range(_NEWTON_STEPS):
+                raw -= (_polynomial(self.coefficients, raw) - volts) / self._slope(raw)
+        lowest, highest = self._rails
+        raw = np.clip(np.rint(raw), lowest, highest)
+        raw[counts <= self._source.codes[0]] = lowest
+        raw[counts >= self._source.codes[1]] = highest
+        return raw.astype(self._dtype)
+
+    def volts(self, raw: NDArray[np.int16 | np.int32]) -> NDArray[np.float64]:
+        """Scaled values [V] of raw counts, same shape."""
+        return _polynomial(self.coefficients, raw.astype(np.float64))
+
+    def _slope(self, raw: NDArray[np.float64]) -> NDArray[np.float64]:
+        return _polynomial([power * c for power, c in enumerate(self.coefficients)][1:], raw)
+
+
+def _polynomial(coefficients: Sequence[float], x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """coefficients[0] + coefficients[1] x + coefficients[2] x^2 + ..., by Horner's rule."""
+    value = np.zeros_like(x)
+    for c in reversed(coefficients):
+        value = value * x + c
+    return value

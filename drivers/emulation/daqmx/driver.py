@@ -1,27 +1,27 @@
-"""The driver behind the server: tasks by name, what they have reserved, and how they start each other."""
+"""The driver behind the server: tasks by name, their reservations, and their triggers."""
 
 import threading
 from collections.abc import Sequence
 
 from nidaqmx.error_codes import DAQmxErrors
 
-from drivers.emulation.daqmx.catalogue import Catalogue
 from drivers.emulation.daqmx.device import DeviceModel
 from drivers.emulation.daqmx.errors import DaqmxFailure, SessionExists, SessionMissing
-from drivers.emulation.daqmx.job import Job
-from drivers.emulation.daqmx.lines import Lines, Wires
-from drivers.emulation.daqmx.task import State, Task
-from drivers.emulation.daqmx.terminals import Instant, OutputTerminal
+from drivers.emulation.daqmx.generation import Instant, OutputTerminal
+from drivers.emulation.daqmx.lines import Lines, LineTask, Wires
+from drivers.emulation.daqmx.models import Catalogue
+from drivers.emulation.daqmx.task import Job, State, Task
 from drivers.emulation.daqmx.watchdog import Watchdog
 from drivers.emulation.plant import Plant
 from sim.sensors import Converter
 
 
 class Driver:
-    """Devices, tasks and reservations; `changed` guards all of it. It outlives every client.
+    """Devices, tasks and reservations; `changed` guards all of it.
 
-    `drive` is the output that is wired to the plant; None leaves it unconnected. `wires` are at the digital lines.
-    `converter` made the plant's counts. `output_clock_error` and `packet` as of `DaqServer`.
+    It outlives every client. `drive` is the output wired to the plant; None leaves it unconnected. `wires` are
+    connected to the digital lines. `converter` is that of the plant's counts. `output_clock_error` and `packet` as in
+    `DaqServer`.
     """
 
     def __init__(
@@ -48,11 +48,13 @@ class Driver:
         self._tasks: dict[str, Task] = {}
         self._reserved: dict[str, Task] = {}
         self._unnamed = 0
+        self._expired: set[str] = set()
+        """Chassis whose watchdog has expired."""
         if drive is not None:
             plant.wire(self.terminals[drive])
 
     def create(self, name: str, *, may_attach: bool, may_create: bool) -> tuple[Task, bool]:
-        """A task of that name, and whether it is new; "" makes a name up.
+        """Task of that name, and whether it is new; "" generates a name.
 
         Raises SessionExists and SessionMissing.
         """
@@ -70,7 +72,7 @@ class Driver:
             return task, True
 
     def task(self, name: str) -> Task:
-        """The task of that name. Raises DaqmxFailure when it was cleared, or never was."""
+        """Task of that name. Raises DaqmxFailure if it was cleared or never created."""
         if name not in self._tasks:
             raise DaqmxFailure(
                 DAQmxErrors.INVALID_TASK, f"Task specified is invalid or does not exist.\n\nTask Name: {name}"
@@ -78,12 +80,14 @@ class Driver:
         return self._tasks[name]
 
     def reserve(self, task: Task) -> None:
-        """Keep what the task needs from everybody else. Raises DaqmxFailure when somebody has it."""
+        """Reserve the task's resources. Raises DaqmxFailure when one is in use."""
         with self.changed:
-            # it may have been cleared while this call was on its way
+            # the task may have been cleared during this call
             job = self.task(task.name).required_job
+            self.require_alive(job)
             if isinstance(job, Watchdog):
                 self._require_nothing_reserved(task, job)
+            job.engage(lambda resource: self._reserved.get(resource, task) is task)
             for resource in job.resources:
                 if self._reserved.get(resource, task) is not task:
                     raise DaqmxFailure(
@@ -91,12 +95,14 @@ class Driver:
                         f"The specified resource is reserved. The operation could not be completed as specified.\n\n"
                         f"Resource: {resource}\nTask Name: {task.name}",
                     )
+            if isinstance(job, LineTask):
+                self._require_direction(task, job)
             self._reserved.update(dict.fromkeys(job.resources, task))
             if task.state is State.IDLE:
                 task.state = State.RESERVED
 
     def start(self, task: Task) -> None:
-        """Start a task, or arm it when it waits for a trigger. What waits for its start starts with it."""
+        """Start a task, or arm it if it has a trigger. Tasks triggered by its start signal start with it."""
         with self.changed:
             task.require_stopped()
             job = task.required_job
@@ -104,38 +110,41 @@ class Driver:
             self._require_terminals(job)
             self.reserve(task)
             task.state = State.ARMED
-            # what follows a clock of another task goes when that does
+            # a task on the clock of another task starts with that clock
             if job.awaited is None and job.source is None:
                 self._fire(task, job)
             self.changed.notify_all()
 
     def stop(self, task: Task) -> None:
-        """End a task and give back what it had. Raises DaqmxFailure when its run had failed."""
+        """End a task and release its resources. Raises DaqmxFailure if its run had failed."""
         with self.changed:
             self._end(task)
             if task.job is not None:
                 task.job.verdict()
 
     def clear(self, task: Task) -> None:
-        """End a task and forget it."""
+        """End a task and remove it."""
         with self.changed:
             self._end(task)
             self._tasks.pop(task.name, None)
 
     def reset_device(self, device: DeviceModel) -> None:
-        """Abort its tasks, outputs to 0 V, lines low. The tasks themselves stay, stopped."""
+        """Abort its tasks, set outputs to 0 V and lines low. The stopped tasks remain."""
         with self.changed:
             for name in {device.name, *device.modules}:
                 part = self.catalogue.device(name)
                 for task in self._tasks.values():
                     if task.job is not None and part.name in task.job.devices:
                         self._end(task)
+                        if isinstance(task.job, Watchdog):
+                            task.job.disarm()
                 for output in part.output_names:
                     self.terminals[output].hold(0.0)
                 self.lines.reset(part.name, part.line_names)
+            self._expired.discard(device.name)
 
     def reset(self) -> None:
-        """No task is left, every device is as at power-up."""
+        """Clear all tasks, and set every device to its state at power-up."""
         with self.changed:
             for task in tuple(self._tasks.values()):
                 self.clear(task)
@@ -158,9 +167,54 @@ class Driver:
         task.state = State.IDLE
         self.changed.notify_all()
 
+    def expire(self, parts: Sequence[DeviceModel], lines: dict[str, bool], volts: dict[str, float]) -> None:
+        """Set the outputs of devices whose watchdog has expired, and reject writes to them.
+
+        A chassis refuses every operation until it is reset (cDAQ-9185 User Manual, "Watchdog Timer").
+        """
+        whole = len(parts) > 1
+        error = DAQmxErrors.WRITE_FAILED_BECAUSE_WATCHDOG_EXPIRED
+        if whole:
+            self._expired.add(parts[0].name)
+            error = DAQmxErrors.CHASSIS_WATCHDOG_TIMER_EXPIRED
+        for part in parts:
+            self.lines.expire(part.name, {line: lines[line] for line in part.line_names if line in lines}, error)
+        for output, value in volts.items():
+            self.terminals[output].hold(value)
+
+    def lose_network(self) -> None:
+        """Simulate a lost network connection to every chassis, to which its watchdog responds."""
+        with self.changed:
+            for task in self._tasks.values():
+                if isinstance(task.job, Watchdog):
+                    task.job.lose_network()
+
+    def require_alive(self, job: Job) -> None:
+        """Raise DaqmxFailure for a job on a chassis whose watchdog has expired."""
+        for name in job.devices:
+            if (owner := self.catalogue.device(name).clockwork) in self._expired:
+                raise DaqmxFailure(
+                    DAQmxErrors.CHASSIS_WATCHDOG_TIMER_EXPIRED,
+                    "Watchdog timer has expired on the chassis. Reset the chassis to continue operation.\n\n"
+                    f"Device: {owner}",
+                )
+
+    def _require_direction(self, task: Task, job: LineTask) -> None:
+        """Raise DaqmxFailure when another task uses lines of one direction group in the other direction."""
+        for other in self._reserved.values():
+            theirs = other.job
+            if other is task or not isinstance(theirs, LineTask) or theirs.outwards == job.outwards:
+                continue
+            if shared := theirs.groups & job.groups:
+                raise DaqmxFailure(
+                    DAQmxErrors.DIG_LINES_RESERVED_OR_UNAVAILABLE,
+                    "Some or all of the lines requested are reserved or unavailable.\n\n"
+                    f"Lines: {sorted(shared)[0]}\nTask Name: {task.name}",
+                )
+
     def _require_nothing_reserved(self, task: Task, watchdog: Watchdog) -> None:
         for other in self._reserved.values():
-            if other is not task and other.job is not None and other.job.devices & watchdog.devices:
+            if other is not task and other.job is not None and other.job.devices & watchdog.guarded:
                 raise DaqmxFailure(
                     DAQmxErrors.CANT_RESERVE_WATCHDOG_TASK_WHILE_OTHER_TASKS_RESERVED,
                     "Watchdog timer task cannot be reserved while other tasks of the device are.\n\n"
@@ -168,7 +222,7 @@ class Driver:
                 )
 
     def _require_terminals(self, job: Job) -> None:
-        """Raise DaqmxFailure when it would wait for a trigger or follow a clock that no device has."""
+        """Raise DaqmxFailure for a trigger or clock source that no device has."""
         own = {self.catalogue.device(name).clockwork for name in job.devices}
         devices = [device for device in self.catalogue.devices if device.clockwork in own]
         known = {terminal.lower() for device in devices for terminal in device.terminals}
@@ -186,7 +240,7 @@ def _begin(task: Task, job: Job, tick: int) -> None:
 
 
 def _goes_with(waiting: Job, fired: Job) -> bool:
-    """Whether a job that waits for trigger or clock, or both, has all of it from the one that starts."""
+    """Whether a job that waits for trigger, clock or both receives them all from the starting job."""
     triggered = waiting.awaited is None or _same(waiting.awaited, fired.start_terminal)
     return triggered and (waiting.source is None or _same(waiting.source, fired.clock_terminal))
 

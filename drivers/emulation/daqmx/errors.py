@@ -1,10 +1,10 @@
-"""What a DAQmx driver and its gRPC server refuse, before it is put on the wire."""
+"""Errors of a DAQmx driver and its gRPC server, before their transmission."""
 
 from nidaqmx.error_codes import DAQmxErrors
 
 
 class DaqmxFailure(Exception):
-    """An error of the driver. A write tells how many samples per channel it has written before."""
+    """An error of the driver. For a write, with the samples per channel written before it."""
 
     def __init__(self, code: DAQmxErrors, text: str, *, samples_written: int = 0) -> None:
         super().__init__(text)
@@ -13,12 +13,12 @@ class DaqmxFailure(Exception):
 
 
 class SessionExists(Exception):
-    """A new session was asked for under a name that is taken."""
+    """A new session was requested under an existing name."""
 
 
 class SessionMissing(Exception):
-    """An existing session was asked for under a name that nobody has."""
+    """An existing session was requested under an unknown name."""
 
 
 class NotEmulated(Exception):
-    """The real driver could do it; this one says so instead of doing something else."""
+    """A function of the real driver that the emulation does not have."""

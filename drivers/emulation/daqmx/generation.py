@@ -1,21 +1,29 @@
-"""One run of a buffered output: samples wait, are played once each, and the last one is held."""
+"""One run of a buffered output: each sample is played once, and the last one is held."""
 
+import threading
+from collections import deque
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.emulation.daqmx.terminals import Signal
 from drivers.emulation.daqmx.timing import SampleClock
-from drivers.emulation.history import History
+from drivers.emulation.plant import History
+
+Signal = Callable[[int, int], NDArray[np.float64]]
+"""Volts at `n` ticks from tick `first` on: `signal(first, n)`, shape (n,)."""
 
 _PATIENCE = 10.0
-"""How late the plant may ask for what was played [s]."""
+"""Length of the retained output [s]."""
 
 
 class Generation:
-    """Samples of all channels of an output task, by number. `buffer` samples fit before the start; when it runs, the
-    `memory` on the device comes on top."""
+    """Samples of all channels of an output task, by number.
+
+    `buffer` samples fit before the start; a running generation has the device's `memory` in addition.
+    """
 
     def __init__(self, channels: int, clock: SampleClock, buffer: int, memory: int) -> None:
         self._clock = clock
@@ -26,39 +34,39 @@ class Generation:
 
     @property
     def written(self) -> int:
-        """How many samples were written so far."""
+        """Number of samples written so far."""
         return self._samples.end
 
     def begin(self, tick: int) -> None:
-        """Sample 0 leaves at `tick`."""
+        """Play sample 0 at `tick`."""
         self._first = tick
 
     def played(self, tick: int) -> int:
-        """How many samples have left when `tick` has come; it stops at the last one that was there."""
+        """Number of samples generated at `tick`, up to the last one written."""
         return min(self._due(tick), self.written)
 
     def dry(self, tick: int) -> bool:
-        """Whether more samples were due at `tick` than were there."""
+        """Whether more samples were due at `tick` than were written."""
         return self._due(tick) > self.written
 
     def space(self, tick: int) -> int:
-        """How many samples can be written at `tick`."""
+        """Free space at `tick` in samples."""
         capacity = self._buffer if self._first is None else self._buffer + self._memory
         return capacity - (self.written - self.played(tick))
 
     def tick_of_space(self, samples: int) -> int | None:
-        """The tick at which there will be room for `samples`, or as many as ever fit; None when it does not run."""
+        """Tick at which `samples`, or as many as can ever fit, will fit; None while not running."""
         if self._first is None:
             return None
         capacity = self._buffer + self._memory
         return self._clock.ticks(self._first, self.written + min(samples, capacity) - capacity - 1)
 
     def append(self, samples: NDArray[np.float64]) -> None:
-        """Add samples, shape (n, channels), that have room."""
+        """Append samples, shape (n, channels), for which there is room."""
         self._samples.append(samples)
 
     def signal(self, channel: int) -> Signal:
-        """What the terminal of a channel follows while this runs."""
+        """Signal of a channel's terminal during the generation."""
 
         def volts(first: int, n: int) -> NDArray[np.float64]:
             assert self._first is not None
@@ -69,3 +77,73 @@ class Generation:
 
     def _due(self, tick: int) -> int:
         return 0 if self._first is None else self._clock.passed(self._first, tick)
+
+
+class Instant:
+    """Synchronisation: a common tick for everything that starts or changes together.
+
+    `tick` is the plant's clock; it is read under the lock and must not block. The plant takes the same lock when it
+    reads past ticks: decisions made under it precede every read.
+    """
+
+    def __init__(self, tick: Callable[[], int]) -> None:
+        self._tick = tick
+        self.lock = threading.RLock()
+
+    @property
+    def now(self) -> int:
+        """The latest tick."""
+        return self._tick()
+
+    @contextmanager
+    def next(self) -> Generator[int]:
+        """The next tick; it is not read while this context lasts."""
+        with self.lock:
+            yield self._tick() + 1
+
+
+class OutputTerminal:
+    """Analogue output that holds a value or plays a signal; both change at a tick."""
+
+    def __init__(self, instant: Instant) -> None:
+        self._instant = instant
+        self._changes: deque[tuple[int, Signal]] = deque([(0, _constant(0.0))])
+
+    def __call__(self, first: int, n: int) -> NDArray[np.float64]:
+        """Volts at `n` past ticks from `first` on, shape (n,); read in order, earlier ones are discarded."""
+        with self._instant.lock:
+            while len(self._changes) > 1 and self._changes[1][0] <= first:
+                self._changes.popleft()
+            volts = np.empty(n)
+            for start, signal in self._changes:
+                start = max(start, first)
+                if start < first + n:
+                    volts[start - first :] = signal(start, first + n - start)
+            return volts
+
+    def hold(self, volts: float) -> None:
+        """Output `volts` from the next tick on."""
+        with self._instant.next() as tick:
+            self.follow(tick, _constant(volts))
+
+    def follow(self, tick: int, signal: Signal) -> None:
+        """Play `signal` from `tick`, the next one, on."""
+        self._changes.append((tick, signal))
+
+    def freeze(self) -> None:
+        """Hold the present value."""
+        with self._instant.next() as tick:
+            self.hold(self.volts_at(tick - 1))
+
+    def volts_at(self, tick: int) -> float:
+        """Volts at one tick, new or the last one read."""
+        with self._instant.lock:
+            signal = next(signal for start, signal in reversed(self._changes) if start <= tick)
+            return float(signal(tick, 1)[0])
+
+
+def _constant(volts: float) -> Signal:
+    def signal(_: int, n: int) -> NDArray[np.float64]:
+        return np.full(n, volts)
+
+    return signal

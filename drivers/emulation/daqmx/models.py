@@ -1,21 +1,26 @@
-"""Two sets of devices, with the numbers of their data sheets."""
+"""Two sets of devices with specifications from their data sheets."""
 
+import re
+from collections.abc import Sequence
 from dataclasses import replace
 
 from nidaqmx.constants import ProductCategory
+from nidaqmx.error_codes import DAQmxErrors
 
 from drivers.emulation.daqmx.device import AnalogInputs, AnalogOutputs, DeviceModel, Wirings
+from drivers.emulation.daqmx.errors import DaqmxFailure
+from drivers.emulation.daqmx.zoo import build
 
 _CALIBRATED = 2
-"""The input whose calibration is not straight, where one is: that of the first laser's analogue output."""
+"""The input with a non-linear calibration, if any: that of the first laser's analogue output."""
 _BEND = 1.0e-4
-"""What the square and the cube of its calibration each make at the end of the range, relative to the range."""
+"""Contribution of each of the square and cubic terms of the calibration at full scale, relative to the range."""
 
 
 def x_series(name: str = "Dev1", *, simulated: bool = False, calibrated: bool = False) -> DeviceModel:
     """A multifunction device at the USB port, after the data sheet of the USB-6363.
 
-    `calibrated`, one input has a calibration polynomial with offset, slope error, square and cube.
+    With `calibrated`, one input has a calibration polynomial with offset, slope error, square and cube.
     """
     return DeviceModel(
         name,
@@ -42,55 +47,83 @@ def x_series(name: str = "Dev1", *, simulated: bool = False, calibrated: bool = 
 def compact_rio(name: str = "cRIO1", *, simulated: bool = False, calibrated: bool = False) -> tuple[DeviceModel, ...]:
     """A cRIO-9045 with two NI 9239 (inputs), NI 9263 (outputs), NI 9485 (relays) and NI 9421 (digital inputs).
 
-    Modules are devices of their own: `cRIO1Mod1/ai0`; triggers are the controller's: `/cRIO1/te0/StartTrigger`. A
-    CompactRIO has no watchdog that DAQmx could set. `calibrated` as of `x_series`, for the first module.
+    Modules are devices: `cRIO1Mod1/ai0`. The controller has a timing engine for each slot: `/cRIO1/it0/StartTrigger`. A
+    CompactRIO has no watchdog that DAQmx could set. `calibrated` as in `x_series`, for the first module.
     """
-    first = replace(_ni_9239(0), polynomials=_polynomials(24)) if calibrated else _ni_9239(0)
-    slots = (
-        DeviceModel("", "NI 9239", inputs=first),
-        DeviceModel("", "NI 9239", inputs=_ni_9239(4)),
-        DeviceModel("", "NI 9263", outputs=AnalogOutputs(count=4, ranges=(10.0,), rate=1.0e5, memory=127)),
-        DeviceModel("", "NI 9485", lines=8),
-        DeviceModel("", "NI 9421", input_lines=8),
-    )
-    modules = tuple(
-        replace(
-            module,
-            name=f"{name}Mod{slot}",
-            category=ProductCategory.C_SERIES_MODULE,
-            serial=0x01D00000 + slot,
-            simulated=simulated,
-            chassis=name,
-        )
-        for slot, module in enumerate(slots, 1)
-    )
-    controller = DeviceModel(
-        name,
-        "cRIO-9045",
-        category=ProductCategory.COMPACT_RIO_CHASSIS,
-        serial=0x01D00000,
-        simulated=simulated,
-        modules=tuple(module.name for module in modules),
-    )
-    return controller, *modules
-
-
-def _ni_9239(first_terminal: int) -> AnalogInputs:
-    """Four simultaneous inputs of 24 bits in raw samples of 32 (NI 9239 data sheet)."""
-    return AnalogInputs(
-        count=4,
-        ranges=(10.0,),
-        rate=5.0e4,
-        total_rate=5.0e4,
-        simultaneous=True,
-        wirings=Wirings.DIFFERENTIAL,
-        resolution=24,
-        raw_bits=32,
-        first_terminal=first_terminal,
-    )
+    controller, *modules = build("cRIO-9045", ("9239", "9239", "9263", "9485", "9421"))
+    assert modules[0].inputs is not None
+    assert modules[1].inputs is not None
+    first = replace(modules[0].inputs, polynomials=_polynomials(24) if calibrated else {})
+    second = replace(modules[1].inputs, first_terminal=first.count)
+    modules[:2] = replace(modules[0], inputs=first), replace(modules[1], inputs=second)
+    renamed = [replace(module, name=module.name.replace(controller.name, name), chassis=name) for module in modules]
+    whole = (replace(controller, name=name, modules=tuple(module.name for module in renamed)), *renamed)
+    return tuple(replace(device, simulated=simulated) for device in whole)
 
 
 def _polynomials(bits: int, span: float = 10.0) -> dict[int, tuple[float, ...]]:
-    """Volts per power of the counts for the one input that is not straight, of `bits` over +-`span` volts."""
+    """Volts per power of the counts for the one non-linear input, of `bits` over +-`span` volts."""
     full = 2.0 ** (bits - 1)
     return {_CALIBRATED: (5e-5 * span, (1.0 + 2e-4) * span / full, _BEND * span / full**2, -_BEND * span / full**3)}
+
+
+_RANGE = re.compile(r"^(?P<stem>.*?)(?P<first>\d+):(?:.*?)(?P<last>\d+)$")
+
+
+def flattened(names: Sequence[str]) -> str:
+    """The names in one string, separated as in DAQmx."""
+    return ", ".join(names)
+
+
+def unflattened(names: str) -> tuple[str, ...]:
+    """The individual names in a list such as "Dev1/ai0:3, Dev1/ai6"; ranges may run downwards."""
+    found: list[str] = []
+    for part in filter(None, (part.strip() for part in names.split(","))):
+        if (given := _RANGE.match(part)) is None:
+            found.append(part)
+            continue
+        first, last = int(given["first"]), int(given["last"])
+        step = 1 if last >= first else -1
+        found.extend(f"{given['stem']}{k}" for k in range(first, last + step, step))
+    return tuple(found)
+
+
+class Catalogue:
+    """The devices of a server. Names are case-insensitive, as in DAQmx."""
+
+    def __init__(self, devices: Sequence[DeviceModel]) -> None:
+        self.devices = tuple(devices)
+
+    def device(self, name: str) -> DeviceModel:
+        """The device of that name."""
+        for device in self.devices:
+            if device.name.lower() == name.lower():
+                return device
+        raise DaqmxFailure(DAQmxErrors.INVALID_DEVICE_ID, f"Device identifier is invalid.\n\nDevice Specified: {name}")
+
+    def input(self, channel: str) -> tuple[DeviceModel, int]:
+        """The device of an analogue input and the number of the input."""
+        return self._find(channel, "input_names")
+
+    def output(self, channel: str) -> tuple[DeviceModel, int]:
+        """Device of an analogue output, and its output number."""
+        return self._find(channel, "output_names")
+
+    def line(self, line: str) -> tuple[DeviceModel, int]:
+        """The device of a digital output line and the number of the line."""
+        return self._find(line, "line_names")
+
+    def input_line(self, line: str) -> tuple[DeviceModel, int]:
+        """The device of a digital input line and the number of the line."""
+        return self._find(line, "input_line_names")
+
+    def _find(self, channel: str, kind: str) -> tuple[DeviceModel, int]:
+        device = self.device(channel.strip("/").split("/")[0])
+        names: tuple[str, ...] = getattr(device, kind)
+        for index, name in enumerate(names):
+            if name.lower() == channel.strip("/").lower():
+                return device, index
+        raise DaqmxFailure(
+            DAQmxErrors.PHYSICAL_CHAN_DOES_NOT_EXIST,
+            f"Physical channel specified does not exist on this device.\n\nPhysical Channel Name: {channel}",
+        )

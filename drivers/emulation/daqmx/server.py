@@ -1,7 +1,10 @@
-"""The server: devices on a plant, behind an address."""
+"""Server: devices on a plant, at a network address, with planned faults."""
 
 # ruff: noqa: ARG002 - gRPC gives every call a context, needed or not
 
+import threading
+import time
+from collections import deque
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Self, cast
@@ -9,23 +12,108 @@ from typing import Any, Self, cast
 import grpc
 import session_pb2 as sessions
 from nidaqmx._stubs.nidaqmx_pb2_grpc import NiDAQmxServicer, add_NiDAQmxServicer_to_server
+from nidaqmx.error_codes import DAQmxErrors
 from session_pb2_grpc import SessionUtilitiesServicer, add_SessionUtilitiesServicer_to_server
 
 from drivers.emulation.daqmx.device import DeviceModel
 from drivers.emulation.daqmx.driver import Driver
-from drivers.emulation.daqmx.faults import Boundary, Faults
+from drivers.emulation.daqmx.errors import DaqmxFailure, NotEmulated, SessionExists, SessionMissing
 from drivers.emulation.daqmx.lines import Wires
-from drivers.emulation.daqmx.service.channel_attributes import ChannelAttributeService
-from drivers.emulation.daqmx.service.channels import ChannelService
-from drivers.emulation.daqmx.service.lines import LineService
-from drivers.emulation.daqmx.service.reading import ReadingService
+from drivers.emulation.daqmx.service.channels import ChannelAttributeService, ChannelService
+from drivers.emulation.daqmx.service.lines import LineService, WatchdogService
+from drivers.emulation.daqmx.service.samples import ReadingService, WritingService
 from drivers.emulation.daqmx.service.system import SystemService
 from drivers.emulation.daqmx.service.timing import TimingService
-from drivers.emulation.daqmx.service.watchdogs import WatchdogService
-from drivers.emulation.daqmx.service.writing import WritingService
 from drivers.emulation.plant import Plant
 from sim.errors import InvalidInput
 from sim.sensors import Converter
+
+_GRPC = cast(Any, grpc)
+
+
+class Faults:
+    """Planned faults."""
+
+    def __init__(self) -> None:
+        self._codes: dict[str, deque[int]] = {}
+        self._changed = threading.Condition()
+        self._silent_until = 0.0
+
+    def fail_next(self, call: str, code: int) -> None:
+        """Make the next call of this name fail with a DAQmx code and without effect, once per request."""
+        with self._changed:
+            self._codes.setdefault(call, deque()).append(code)
+
+    def stall(self, seconds: float) -> None:
+        """Stall all calls for `seconds`; they take effect and are answered afterwards."""
+        with self._changed:
+            self._silent_until = time.monotonic() + seconds
+
+    def end(self) -> None:
+        """End the stall: answer requests again."""
+        with self._changed:
+            self._silent_until = 0.0
+            self._changed.notify_all()
+
+    def strike(self, call: str) -> None:
+        """Apply a planned fault to a call: delay it, raise DaqmxFailure, or do nothing."""
+        with self._changed:
+            while (remaining := self._silent_until - time.monotonic()) > 0.0:
+                self._changed.wait(remaining)
+            if waiting := self._codes.get(call):
+                code = waiting.popleft()
+                raise DaqmxFailure(DAQmxErrors(code), f"A failure was requested: {DAQmxErrors(code).name}")
+
+
+class Boundary(_GRPC.ServerInterceptor):
+    """Interceptor of every call: injects faults and transmits errors as NI's server does.
+
+    A DAQmx error is gRPC status UNKNOWN with its code in the trailing metadata (NI gRPC device server,
+    source/server/converters.h).
+    """
+
+    def __init__(self, faults: Faults) -> None:
+        self._faults = faults
+
+    def intercept_service(self, continuation: Any, handler_call_details: Any) -> Any:
+        handler = continuation(handler_call_details)
+        if handler is None or handler.unary_unary is None:
+            return handler
+        name = str(handler_call_details.method).rpartition("/")[2]
+
+        def call(request: object, context: Any) -> object:
+            try:
+                self._faults.strike(name)
+                return handler.unary_unary(request, context)
+            except DaqmxFailure as failure:
+                context.set_trailing_metadata(_metadata(name, failure))
+                context.abort(_GRPC.StatusCode.UNKNOWN, str(failure))
+            except SessionExists as error:
+                context.abort(
+                    _GRPC.StatusCode.ALREADY_EXISTS, f"Cannot initialize '{error}' when a session already exists."
+                )
+            except SessionMissing as error:
+                context.abort(
+                    _GRPC.StatusCode.FAILED_PRECONDITION,
+                    f"Cannot attach to '{error}' because it has not been initialized.",
+                )
+            except NotEmulated as error:
+                context.abort(_GRPC.StatusCode.UNIMPLEMENTED, f"{error} is not emulated")
+            except NotImplementedError:
+                context.abort(_GRPC.StatusCode.UNIMPLEMENTED, f"{name} is not emulated")
+
+        return _GRPC.unary_unary_rpc_method_handler(call, handler.request_deserializer, handler.response_serializer)
+
+
+def _metadata(call: str, failure: DaqmxFailure) -> tuple[tuple[str, str], ...]:
+    """The code, and for reads and writes the number of samples per channel before the error."""
+    entries = [("ni-error", str(failure.code.value))]
+    if call.startswith("Read"):
+        # the samples of a failed read are lost: only a time-out returns those acquired
+        entries.append(("ni-samps-per-chan-read", "0"))
+    if call.startswith("Write"):
+        entries.append(("ni-samps-per-chan-written", str(failure.samples_written)))
+    return tuple(entries)
 
 
 class NiDaqmx(
@@ -39,7 +127,7 @@ class NiDaqmx(
     LineService,
     NiDAQmxServicer,
 ):
-    """Whatever is not here is UNIMPLEMENTED, as the base class says."""
+    """NI-DAQmx service; calls that are not defined here are UNIMPLEMENTED, as in the base class."""
 
 
 class SessionUtilities(SessionUtilitiesServicer):
@@ -69,18 +157,17 @@ class SessionUtilities(SessionUtilitiesServicer):
 
 
 _WORKERS = 32
-"""Calls at the same time; a read that waits holds one."""
+"""Concurrent calls; a waiting read occupies one."""
 
 
 class DaqServer:
-    """Speaks like NI's gRPC device server, with `devices` whose terminals are those of `plant`.
+    """Emulates NI's gRPC device server with `devices` whose terminals are those of `plant`.
 
-    `drive` is the analogue output that drives the plant and `enable_line` the digital line of its enable relay; the
-    first that the devices have unless told. `wires` are the digital lines' instead, when the relay is not all there is
-    on them. `converter` made the plant's counts. `output_clock_error` is by how much an
-    output that does not follow the inputs' sample clock is faster than it, relative; the counter of samples that the
-    inputs have taken goes in steps of `packet`, as where they travel in packets. Raises InvalidInput when the address
-    cannot be had.
+    `drive` is the analogue output that drives the plant and `enable_line` the digital line of its enable relay; by
+    default the first of the devices. `wires` replaces the wiring of the digital lines when more than the relay is
+    connected. `converter` is that of the plant's counts. `output_clock_error` is the relative excess rate of an output
+    that does not follow the inputs' sample clock; the inputs' sample counter advances in steps of `packet`, as with
+    packet transfer. Raises InvalidInput when the address is not available.
     """
 
     def __init__(
@@ -116,7 +203,7 @@ class DaqServer:
             interceptors=(Boundary(self._faults),),
             options=[("grpc.so_reuseport", 0), ("grpc.max_receive_message_length", -1)],
         )
-        # the generated types call every call abstract, while at run time those that are left out are UNIMPLEMENTED
+        # the generated types declare every call abstract; at run time undefined ones are UNIMPLEMENTED
         daqmx = NiDaqmx(self._driver)  # pyright: ignore[reportAbstractUsage]
         utilities = SessionUtilities(self._driver)  # pyright: ignore[reportAbstractUsage]
         add_NiDAQmxServicer_to_server(daqmx, self._server)
@@ -126,9 +213,7 @@ class DaqServer:
             port = int(self._server.add_insecure_port(address))
         except RuntimeError as error:
             self._pool.shutdown()
-            raise InvalidInput(
-                "address", address, "somebody listens there already, or there is no such address"
-            ) from error
+            raise InvalidInput("address", address, "it is in use already, or there is no such address") from error
         self.address = f"{host}:{port}"
 
     @property
@@ -143,28 +228,32 @@ class DaqServer:
             return self._driver.terminals[output].volts_at(tick)
 
     def start(self) -> None:
-        """Answer from now on."""
+        """Start to answer requests."""
         self._server.start()
 
     def close(self) -> None:
-        """Switch devices and server off; no thread and no port is left. Allowed any number of times."""
+        """Switch devices and server off; no thread or port remains. Allowed any number of times."""
         self._faults.end()
         gone = self._server.stop(None)
-        # ends the reads and writes that wait, too
+        # also ends waiting reads and writes
         self._driver.reset()
         gone.wait()
         self._pool.shutdown()
 
     def fail_next(self, call: str, code: int) -> None:
-        """The next call of this name, such as "StartTask", fails with a code of DAQmx and is not done."""
+        """Make the next call of this name, such as "StartTask", fail with a DAQmx code and without effect."""
         self._faults.fail_next(call, code)
 
     def stall(self, seconds: float) -> None:
-        """Answer nobody for so long, like a frozen machine; the devices go on."""
+        """Delay all replies, like a frozen machine; the devices continue."""
         self._faults.stall(seconds)
 
+    def lose_network(self) -> None:
+        """Simulate a lost network between this server and its chassis: watchdogs configured to do so expire."""
+        self._driver.lose_network()
+
     def vanish(self) -> None:
-        """Be gone at once, like a server whose cable is pulled; the devices go on until `close`."""
+        """Disconnect at once, like a server whose cable is pulled; the devices continue until `close`."""
         self._server.stop(None).wait()
 
     def __enter__(self) -> Self:
@@ -176,9 +265,9 @@ class DaqServer:
 
 
 def _chosen(item: str, given: str | None, known: Sequence[str]) -> str | None:
-    """The one that was told, else the first."""
+    """The given one, else the first."""
     if given is None:
         return known[0] if known else None
     if given not in known:
-        raise InvalidInput(item, given, f"the devices have: {', '.join(known) or 'none'}")
+        raise InvalidInput(item, given, f"available: {', '.join(known) or 'none'}")
     return given

@@ -1,22 +1,82 @@
-"""A task as the driver keeps it: a name, a state, and the job it does."""
+"""Tasks of the driver: states, and the interface of the job of each kind of task."""
 
+from collections.abc import Callable
 from enum import Enum
-from typing import TypeVar
+from typing import Protocol, TypeVar
 
 from nidaqmx.error_codes import DAQmxErrors
 
 from drivers.emulation.daqmx.errors import DaqmxFailure
-from drivers.emulation.daqmx.job import Job
+
+
+class Job(Protocol):
+    """Work of a task: its channels, timing and run."""
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the channels."""
+        ...
+
+    @property
+    def devices(self) -> frozenset[str]:
+        """Names of the devices that it uses."""
+        ...
+
+    @property
+    def resources(self) -> frozenset[str]:
+        """Resources reserved exclusively."""
+        ...
+
+    @property
+    def awaited(self) -> str | None:
+        """The terminal of the start trigger that it waits for."""
+        ...
+
+    @property
+    def start_terminal(self) -> str | None:
+        """The terminal of its own start signal."""
+        ...
+
+    @property
+    def source(self) -> str | None:
+        """The terminal of the external sample clock that it follows; None for its own clock, or none."""
+        ...
+
+    @property
+    def clock_terminal(self) -> str | None:
+        """The terminal of its own sample clock."""
+        ...
+
+    def engage(self, is_free: Callable[[str], bool]) -> None:
+        """Choose what the driver chooses when it reserves the task, among the resources that are free."""
+        ...
+
+    def check(self) -> None:
+        """Raise DaqmxFailure when it cannot start."""
+        ...
+
+    def begin(self, tick: int) -> None:
+        """Start; clocked channels have their first sample at `tick`, the next one."""
+        ...
+
+    def end(self) -> None:
+        """Stop, from any state."""
+        ...
+
+    def verdict(self) -> None:
+        """Raise DaqmxFailure if the ended run had failed."""
+        ...
+
 
 J = TypeVar("J", bound=Job)
 
 
 class State(Enum):
-    """Where a task is in the life that DAQmx gives it."""
+    """State of a task in the DAQmx task state model."""
 
     IDLE = "nothing is reserved"
-    RESERVED = "resources are reserved, samples may wait"
-    ARMED = "started, waits for its start trigger"
+    RESERVED = "resources are reserved, samples may be buffered"
+    ARMED = "started, waiting for its start trigger"
     RUNNING = "runs"
 
     @property
@@ -25,7 +85,7 @@ class State(Enum):
 
 
 class Task:
-    """Empty at first; its first channel decides what kind of job it does."""
+    """A task, empty at first; its first channel determines the kind of job."""
 
     def __init__(self, name: str) -> None:
         self.name = name
@@ -48,12 +108,12 @@ class Task:
         if not isinstance(job, kind):
             raise DaqmxFailure(
                 DAQmxErrors.NO_CHANS_OF_GIVEN_TYPE_IN_TASK,
-                f"Task contains no channels of the type that was asked for.\n\nTask Name: {self.name}",
+                f"Task contains no channels of the requested type.\n\nTask Name: {self.name}",
             )
         return job
 
     def require_stopped(self) -> None:
-        """Raise DaqmxFailure when it runs."""
+        """Raise DaqmxFailure while it runs."""
         if self.state.started:
             raise DaqmxFailure(
                 DAQmxErrors.CAN_NOT_PERFORM_OP_WHILE_TASK_RUNNING,

@@ -1,4 +1,4 @@
-"""Sample clocks: whole fractions of the plant's tick rate."""
+"""Sample clocks: integer fractions of the plant's tick rate."""
 
 import threading
 import time
@@ -12,16 +12,16 @@ from numpy.typing import NDArray
 from drivers.emulation.daqmx.errors import DaqmxFailure
 
 _SOON = 5.0e-5
-"""The clock's reading may lie a rounding error before the tick it promised [s]."""
+"""Tolerance for clock readings that are before the expected tick due to rounding [s]."""
 
 
 def deadline_after(timeout: float) -> float:
-    """When a call with this DAQmx time-out gives up (monotonic seconds); -1 waits for ever."""
+    """Deadline of a call with this DAQmx time-out (monotonic seconds); -1 waits for ever."""
     return float("inf") if timeout < 0.0 else time.monotonic() + timeout
 
 
 def wait_until(changed: threading.Condition, instant: float, deadline: float) -> bool:
-    """Let time pass until `instant`, `deadline` or a change; False when the deadline has passed before."""
+    """Wait until `instant`, `deadline` or a change; False if the deadline has passed before."""
     now = time.monotonic()
     if now >= deadline:
         return False
@@ -31,14 +31,14 @@ def wait_until(changed: threading.Condition, instant: float, deadline: float) ->
 
 
 _SAME = 1.0e-9
-"""Relative difference below which two rates are one."""
+"""Relative difference below which two rates are equal."""
 
 
 @dataclass(frozen=True)
 class SampleClock:
     """One sample every `divider` ticks: `rate` samples per second. `samples` sizes the buffer, per channel.
 
-    `error` is by how much the clock is faster than the plant's ticks, relative.
+    `error` is the relative excess rate of the clock over the plant's ticks.
     """
 
     divider: int
@@ -46,25 +46,30 @@ class SampleClock:
     samples: int
     error: float = 0.0
 
+    def is_whole(self, tick_rate: float) -> bool:
+        """Whether every sample coincides with a tick of the plant at `tick_rate` [1/s]."""
+        return abs(self.divider * self.rate - tick_rate) <= _SAME * tick_rate
+
     def ticks(self, first: int, samples: int) -> int:
-        """The tick of sample number `samples` when sample 0 is taken at tick `first`."""
+        """The tick of each of the sample numbers `samples` if sample 0 is at tick `first`."""
         return first + ceil(samples * self.divider / (1.0 + self.error))
 
     def passed(self, first: int, tick: int) -> int:
-        """How many samples have their tick at `tick` or before when sample 0 has it at `first`."""
+        """Number of samples up to `tick` if sample 0 is at `first`."""
         return max(int(self.numbers(first, np.array([tick]))[0]) + 1, 0)
 
     def numbers(self, first: int, ticks: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Number of the sample that is the last at each of `ticks`, same shape, when sample 0 has its at `first`."""
+        """Number of the latest sample at each of `ticks`, same shape, if sample 0 is at `first`."""
         if self.error == 0.0:
             return (ticks - first) // self.divider
         return np.floor((ticks - first) * (1.0 + self.error) / self.divider).astype(np.int64)
 
 
 def sample_clock(asked: float, highest: float, tick_rate: float, samples: int, error: float = 0.0) -> SampleClock:
-    """The clock that a device makes when `asked` samples per second are wanted: the next higher rate that it has.
+    """The clock of a device for `asked` samples per second: the next higher rate that it supports.
 
-    All rates are a tick rate over an integer, at most `highest`, as with delta-sigma converters (NI 9239 data sheet).
+    All rates are the tick rate divided by an integer, at most `highest`, as with delta-sigma converters (NI 9239 data
+    sheet).
     """
     if not 0.0 < asked <= highest * (1.0 + _SAME):
         raise DaqmxFailure(

@@ -2,6 +2,7 @@
 
 import threading
 import time
+from collections.abc import Callable, Sequence
 
 from nidaqmx.error_codes import DAQmxErrors
 
@@ -9,16 +10,24 @@ from drivers.emulation.daqmx.device import DeviceModel
 from drivers.emulation.daqmx.errors import DaqmxFailure
 from drivers.emulation.daqmx.lines import Lines
 
+Expire = Callable[[Sequence[DeviceModel], dict[str, bool], dict[str, float]], None]
+"""Sets the outputs of devices: levels by line, volts by analogue output."""
+
 
 class Watchdog:
-    """A `Job`. A simulated device's watchdog never expires; a time-out of -1 means the same."""
+    """A `Job`. The watchdog of a simulated device, or with a time-out of -1, never expires.
+
+    `parts` are the device and its modules; `expire` sets their outputs to the given levels and volts, `release` permits
+    writes to the lines again.
+    """
 
     awaited: str | None = None
     start_terminal: str | None = None
     source: str | None = None
     clock_terminal: str | None = None
 
-    def __init__(self, device: DeviceModel, lines: Lines, timeout: float) -> None:
+    def __init__(self, parts: Sequence[DeviceModel], expire: Expire, lines: Lines, timeout: float) -> None:
+        device = parts[0]
         if device.watchdog is None:
             raise DaqmxFailure(
                 DAQmxErrors.WATCHDOG_TIMER_NOT_SUPPORTED,
@@ -31,8 +40,14 @@ class Watchdog:
             )
         self.timeout = timeout
         self.device = device
+        self.guarded = frozenset(part.name for part in parts)
+        """Its devices: none of their tasks may be reserved when it starts."""
+        self._parts = tuple(parts)
+        self._expire = expire
         self._lines = lines
         self._states: dict[str, bool] = {}
+        self._volts: dict[str, float] = {}
+        self._trips = False
         self._changed = threading.Condition()
         self._deadline: float | None = None
         self._expired = False
@@ -40,7 +55,7 @@ class Watchdog:
 
     @property
     def channels(self) -> tuple[str, ...]:
-        return tuple(self._states)
+        return (*self._states, *self._volts)
 
     @property
     def devices(self) -> frozenset[str]:
@@ -56,8 +71,51 @@ class Watchdog:
         return self._expired
 
     def expire_to(self, states: dict[str, bool]) -> None:
-        """The levels that lines go to on expiry."""
+        """Set the levels of lines on expiry."""
         self._states.update(states)
+
+    def engage(self, is_free: Callable[[str], bool]) -> None:
+        pass
+
+    def hold_at(self, volts: dict[str, float]) -> None:
+        """Set the voltages of analogue outputs on expiry. Raises DaqmxFailure on a device that sets lines only."""
+        if len(self._parts) == 1:
+            raise DaqmxFailure(
+                DAQmxErrors.ATTRIBUTE_NOT_SUPPORTED_IN_TASK_CONTEXT,
+                f"The watchdog of {self.device.product} has no states for analogue outputs.\n\nDevice:"
+                f" {self.device.name}",
+            )
+        self._volts.update(volts)
+
+    @property
+    def trips_on_loss(self) -> bool:
+        """Whether it expires when the network connection to the chassis is lost. Raises DaqmxFailure on a device."""
+        self._require_network()
+        return self._trips
+
+    @trips_on_loss.setter
+    def trips_on_loss(self, trips: bool) -> None:
+        self._require_network()
+        self._trips = trips
+
+    def disarm(self) -> None:
+        """Clear the expiry, as a reset of the device does."""
+        self._expired = False
+
+    def lose_network(self) -> None:
+        """Simulate a lost connection: the watchdog expires at once if it is configured to."""
+        with self._changed:
+            if self._trips and self._deadline is not None:
+                self._deadline = time.monotonic()
+                self._changed.notify()
+
+    def _require_network(self) -> None:
+        if len(self._parts) == 1:
+            raise DaqmxFailure(
+                DAQmxErrors.ATTRIBUTE_NOT_SUPPORTED_IN_TASK_CONTEXT,
+                "Specified property is not supported by the device or is not applicable to the task.\n\n"
+                f"Property: ExpirTrig.OnNetworkConnLoss\nDevice: {self.device.name}",
+            )
 
     def check(self) -> None:
         pass
@@ -82,7 +140,7 @@ class Watchdog:
         pass
 
     def reset(self) -> None:
-        """All is well: count from now on."""
+        """Restart the count."""
         with self._changed:
             if self._expired:
                 raise DaqmxFailure(
@@ -93,8 +151,16 @@ class Watchdog:
                 self._deadline = time.monotonic() + self.timeout
 
     def clear_expiration(self) -> None:
-        """Let the lines be written again, and count from now on when it had expired."""
+        """Permit writes to the lines again, and restart the timer if it had expired.
+
+        Raises DaqmxFailure on a chassis, which must be reset instead.
+        """
         with self._changed:
+            if self._expired and len(self._parts) > 1:
+                raise DaqmxFailure(
+                    DAQmxErrors.CHASSIS_WATCHDOG_TIMER_EXPIRED,
+                    "Watchdog timer has expired on the chassis. Reset the chassis to continue operation.",
+                )
             self._lines.release(self.device.name)
             if self._expired and self._deadline is not None:
                 self._deadline = time.monotonic() + self.timeout
@@ -111,4 +177,4 @@ class Watchdog:
                     self._changed.wait(remaining)
                 else:
                     self._expired = True
-                    self._lines.expire(self.device.name, self._states)
+                    self._expire(self._parts, self._states, self._volts)

@@ -1,1 +1,1 @@
-"""The laser optoNCDT 1420 on a pseudo-terminal: its measuring clock, its stream of values, its commands, its faults."""
+"""Emulated laser optoNCDT 1420 on a pseudo-terminal: measuring clock, stream of values, commands and faults."""

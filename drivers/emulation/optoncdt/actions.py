@@ -1,19 +1,18 @@
-"""Commands that are no settings: they tell, reset, store, master (manual of the optoNCDT 1420, pp. 97 to 108)."""
+"""Commands that are not settings: queries, reset, storage, mastering (manual of the optoNCDT 1420, pp. 97 to 108)."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from drivers.emulation.optoncdt.sensor import Sensor
-from drivers.emulation.optoncdt.settings import BASIC
-from drivers.emulation.optoncdt.table import WRONG_COUNT, WRONG_TYPE, Refusal, number, single
+from drivers.emulation.optoncdt.settings import BASIC, WRONG_COUNT, WRONG_TYPE, Refusal, number, single
 
 _MASTERING_TIME = 2.0
-"""How long mastering waits for a distance [s] (manual, p. 108)."""
+"""Time-out of mastering without a valid distance [s] (manual, p. 108)."""
 
 
 @dataclass(frozen=True)
 class Request:
-    """A command as it was understood at the host time `now` [s]."""
+    """A parsed command, received at the host time `now` [s]."""
 
     text: str
     parameters: list[str]
@@ -22,7 +21,7 @@ class Request:
 
 @dataclass(frozen=True)
 class Identity:
-    """What the sensor says of itself; `measuring_range` in metres."""
+    """Identification of the sensor; `measuring_range` in metres."""
 
     name: str
     serial: str
@@ -45,14 +44,14 @@ class Identity:
 
 
 class Mastering:
-    """Waits for a distance that can be called by another value, for at most two seconds."""
+    """Pending mastering: waits for a valid distance for at most two seconds."""
 
     def __init__(self, sensor: Sensor, value: float, done: list[str], now: float) -> None:
         self._sensor, self._value, self._done = sensor, value, done
         self._deadline = now + _MASTERING_TIME
 
     def outcome(self, now: float) -> list[str] | None:
-        """The answer, when there is one. Raises Refusal when the time is over."""
+        """The answer, once available. Raises Refusal after the time-out."""
         if self._sensor.master(self._value, now):
             return self._done
         if now >= self._deadline:
@@ -61,9 +60,9 @@ class Mastering:
 
 
 class Actions:
-    """The actions of `sensor` by name; each gives the lines of its answer, or what the answer waits for.
+    """The actions of `sensor` by name; each returns the lines of its answer, or a pending answer.
 
-    Every action raises Refusal for what it cannot do. `boot_time` is how long a reset takes [s].
+    Every action raises Refusal for an invalid request. `boot_time` is the duration of a reset [s].
     """
 
     def __init__(self, sensor: Sensor, identity: Identity, password: str, boot_time: float) -> None:
@@ -85,17 +84,17 @@ class Actions:
         }
 
     def done(self, request: Request) -> list[str]:
-        """The answer to a command that was carried out and has nothing to tell (manual, p. 98)."""
+        """The answer to a successful command that returns no value (manual, p. 98)."""
         return [f"{request.text} ok"] if self._sensor.settings.echo else []
 
     def require_professional(self) -> None:
-        """Raises Refusal when the user may only look."""
+        """Raise Refusal for the user level with read access only."""
         if not self._sensor.settings.professional:
             raise Refusal(202, "Access denied")
 
     @property
     def mastering(self) -> str:
-        """The mastering as the sensor tells it."""
+        """The mastering setting in the sensor's format."""
         mastering = self._sensor.settings.mastering
         return "MASTERMV NONE" if mastering is None else f"MASTERMV MASTER {1e3 * mastering.value:.6f}"
 
@@ -168,7 +167,7 @@ class Actions:
         return self.done(request)
 
     def _measuring_settings(self, request: Request) -> list[str]:
-        """There is one place to store measurement settings, whatever name is given."""
+        """Handler for measurement settings: there is one storage slot, regardless of its name."""
         self.require_professional()
         sensor = self._sensor
         match request.parameters:

@@ -1,20 +1,101 @@
-"""The conversation with the sensor: commands in ASCII, each answered with a prompt (manual, pp. 94 to 116)."""
+"""Serial line of the sensor, a pseudo-terminal that programs open like a serial port, and its command dialogue."""
 
+import os
+import select
 import shlex
+import struct
+import sys
 
 from drivers.emulation.optoncdt.actions import Actions, Mastering, Request
 from drivers.emulation.optoncdt.sensor import Sensor
-from drivers.emulation.optoncdt.table import WRONG_TYPE, Refusal, commands
+from drivers.emulation.optoncdt.settings import WRONG_TYPE, Refusal, commands
+from drivers.errors import DeviceNotFound
+
+if sys.platform != "win32":
+    import fcntl
+    import termios
+    import tty
+
+_TCGETS2 = 0x802C542A
+"""Linux ioctl request for terminal settings with numeric speeds."""
+_SPEED_AT = 40
+"""Offset of the output speed in the answer: after four flags, a byte, nineteen control characters, one speed."""
+_MOST = 4096
+"""Bytes per read."""
+
+
+class PseudoTerminal:
+    """The instrument's end of a serial line. No call blocks.
+
+    Raises DeviceNotFound on a system without pseudo-terminals.
+    """
+
+    def __init__(self) -> None:
+        if sys.platform == "win32":
+            raise DeviceNotFound(
+                "an emulated laser on a serial line is refused: Windows has no pseudo-terminals;"
+                " use the analogue connection, or run the emulated laboratory on Linux"
+            )
+        self._end, other = os.openpty()
+        self.port = os.ttyname(other)
+        """Path of the client's end."""
+        os.close(other)
+        # no echo, no line mode: a client that has not configured the port receives plain bytes, as on a serial port
+        tty.setraw(self._end)
+        os.set_blocking(self._end, False)
+        self._watch = select.poll()
+        self._watch.register(self._end, select.POLLIN)
+        self._open = True
+        self.dropped = 0
+        """Number of bytes lost because the client did not read them in time."""
+
+    @property
+    def connected(self) -> bool:
+        """Whether a client holds the port open."""
+        return self._open and not any(event & select.POLLHUP for _, event in self._watch.poll(0))
+
+    @property
+    def baud(self) -> int:
+        """Baud rate that the client has set."""
+        if sys.platform == "linux":
+            answer = fcntl.ioctl(self._end, _TCGETS2, bytes(64))
+            return int(struct.unpack_from("I", answer, _SPEED_AT)[0])
+        return int(termios.tcgetattr(self._end)[5])
+
+    def read(self) -> bytes:
+        """Bytes sent by the client."""
+        try:
+            return os.read(self._end, _MOST)
+        except OSError:
+            # no data yet, or the client has disconnected
+            return b""
+
+    def write(self, sent: bytes) -> None:
+        """Send bytes; those beyond the capacity of the client's buffer are lost, as on a real line."""
+        try:
+            taken = os.write(self._end, sent)
+        except BlockingIOError:
+            taken = 0
+        except OSError:
+            return
+        self.dropped += len(sent) - taken
+
+    def close(self) -> None:
+        """Close the line: the client's next access fails. Allowed any number of times."""
+        if self._open:
+            self._open = False
+            os.close(self._end)
+
 
 PROMPT = b"->"
 _LONGEST = 255
-"""Characters of the longest command that is understood."""
+"""Length of the longest accepted command [characters]."""
 _OPEN_TO_ALL = ("ECHO", "LANGUAGE")
-"""Settings that a user of either level may change."""
+"""Settings that both user levels may change."""
 
 
 class Dialogue:
-    """Understands commands for `sensor` and answers them; `rates` are the measuring rates that it has [1/s]."""
+    """Executes commands for `sensor` and answers them; `rates` are its measuring rates [1/s]."""
 
     def __init__(self, sensor: Sensor, actions: Actions, rates: tuple[float, ...]) -> None:
         self._sensor, self._actions = sensor, actions
@@ -23,9 +104,9 @@ class Dialogue:
         self._waiting: Mastering | None = None
 
     def hear(self, received: bytes, now: float) -> bytes:
-        """Everything that is to be said at the host time `now` [s], after `received` came in.
+        """Output due at the host time `now` [s], after `received` has arrived.
 
-        A command ends with a line feed, with or without carriage return; while the sensor starts up it is deaf.
+        A command ends with a line feed, with or without carriage return; input during start-up is ignored.
         """
         if now < self._sensor.ready:
             self._heard, self._waiting = b"", None
@@ -36,12 +117,12 @@ class Dialogue:
             line, self._heard = self._heard.split(b"\n", 1)
             said += self._answer(line.rstrip(b"\r"), now)
         if b"\n" not in self._heard:
-            # of a command without end, so much is kept that it is too long
+            # keep enough of an unterminated command to exceed the longest valid one
             self._heard = self._heard[: _LONGEST + 1]
         return said
 
     def _answer(self, line: bytes, now: float) -> bytes:
-        """The answer to one command with its prompt; nothing when it will come later."""
+        """The answer to one command with its prompt; empty if it is pending."""
         text = line.decode("ascii", "replace").strip()
         try:
             if len(text) > _LONGEST:
@@ -55,7 +136,7 @@ class Dialogue:
         return _reply(answer)
 
     def _finish(self, now: float) -> bytes:
-        """The answer that had to wait, when there is one."""
+        """The pending answer, once available."""
         if self._waiting is None:
             return b""
         try:
@@ -68,7 +149,7 @@ class Dialogue:
         return _reply(answer)
 
     def _obey(self, text: str, now: float) -> list[str] | Mastering:
-        """Do what the command says. Raises Refusal."""
+        """Execute the command. Raises Refusal."""
         try:
             words = shlex.split(text.upper())
         except ValueError:
@@ -98,5 +179,5 @@ class Dialogue:
 
 
 def _reply(lines: list[str]) -> bytes:
-    """An answer as it goes over the line: its lines and the prompt, which is not followed by a line break."""
+    """The bytes of an answer: its lines and the prompt, which is not followed by a line break."""
     return "".join(f"{line}\r\n" for line in lines).encode("ascii", "replace") + PROMPT

@@ -1,17 +1,66 @@
-"""From what the sensor sees to codes: errors of the optics, moving mean, mastering, hold."""
+"""Conversion of distances to codes (errors of the optics, moving mean, mastering, hold) and of codes to bytes."""
+
+from enum import IntEnum
 
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
 from drivers.emulation.optoncdt.settings import Settings
-from drivers.emulation.optoncdt.words import Fault, distance_codes, mastered_codes
 from sim.sensors import Laser
+
+WORD = 3
+"""Bytes per value."""
+WORD_BITS = 30
+"""Bits per value on the line: each byte has a start bit and a stop bit."""
+LAST_DISTANCE = 65520
+"""Code at the end of the reserve beyond the measuring range (manual of the optoNCDT 1420, p. 65)."""
+LAST_MASTERED = 262071
+"""Largest code of a mastered distance: error codes begin above."""
+
+
+class Fault(IntEnum):
+    """Codes in place of a distance (manual of the optoNCDT 1420, p. 66)."""
+
+    DATA_VOLUME = 262075
+    NO_PEAK = 262076
+    TOO_CLOSE = 262077
+    TOO_FAR = 262078
+    LASER_OFF = 262082
+
+
+def distance_codes(shares: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Codes of distances given as shares of the measuring range, shape (n,), reserve included.
+
+    x = (100 d / MR + 1) 65520 / 102 (manual of the optoNCDT 1420, p. 65). NaN is not allowed.
+    """
+    codes = np.rint((100.0 * shares + 1.0) * (LAST_DISTANCE / 102.0))
+    return np.clip(codes, 0, LAST_DISTANCE).astype(np.int64)
+
+
+def mastered_codes(shares: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Codes of mastered distances, shape (n,): x = (100 d / MR + 51) 65520 / 102, over 18 bits (manual, p. 65)."""
+    codes = np.rint((100.0 * shares + 51.0) * (LAST_DISTANCE / 102.0))
+    return np.clip(codes, 0, LAST_MASTERED).astype(np.int64)
+
+
+def words(blocks: NDArray[np.int64]) -> NDArray[np.uint8]:
+    """Bytes of `n` blocks of `m` values of 18 bits, shape (n, m): low, middle and high six bits (manual, p. 84).
+
+    The two upper bits distinguish the three bytes, and the first value of a block from the others.
+    """
+    sent = np.empty((*blocks.shape, WORD), dtype=np.uint8)
+    sent[:, :, 0] = blocks & 0x3F
+    sent[:, :, 1] = blocks >> 6 & 0x3F | 0x40
+    sent[:, :, 2] = blocks >> 12 & 0x3F | 0xC0
+    sent[:, 0, 2] &= 0xBF
+    return sent.reshape(-1)
+
 
 Array = NDArray[np.float64]
 
 _RESERVE = 0.01
-"""How far beyond either end of the measuring range a distance is still measured [share of the range]."""
+"""Reserve beyond either end of the measuring range that is still measured [share of the range]."""
 
 
 class Optics:
@@ -31,14 +80,14 @@ class Optics:
 
 
 class Evaluation:
-    """Turns measurements, in order, into codes; keeps what the moving mean and the hold need of the past."""
+    """Converts measurements, in order, to codes; keeps the history for the moving mean and the hold."""
 
     def __init__(self, measuring_range: float) -> None:
         self._range = measuring_range
         self.restart()
 
     def restart(self) -> None:
-        """Forget the past."""
+        """Discard the history."""
         self._tail = np.empty(0)
         self._held = 0
         self._age = np.inf
@@ -56,7 +105,7 @@ class Evaluation:
         return self._hold(np.where(valid, codes, faults), valid, settings.hold)
 
     def _mean(self, shares: Array, n: int) -> Array:
-        """Mean of the valid ones among the last `n` measurements, where the newest is valid."""
+        """Mean of the valid measurements among the last `n`, where the newest is valid."""
         known = np.concatenate((self._tail, shares))
         self._tail = known[known.size - min(n - 1, known.size) :]
         if n == 1:

@@ -1,4 +1,4 @@
-"""An optoNCDT 1420 that any program can open as a serial port."""
+"""Emulated optoNCDT 1420 on a serial port."""
 
 import threading
 import time
@@ -9,11 +9,10 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from drivers.emulation.optoncdt.actions import Actions, Identity
-from drivers.emulation.optoncdt.dialogue import Dialogue
-from drivers.emulation.optoncdt.line import PseudoTerminal
+from drivers.emulation.optoncdt.dialogue import Dialogue, PseudoTerminal
+from drivers.emulation.optoncdt.evaluation import WORD, Fault
 from drivers.emulation.optoncdt.sensor import Sensor
 from drivers.emulation.optoncdt.settings import Settings
-from drivers.emulation.optoncdt.words import WORD, Fault
 from drivers.emulation.plant import Sight
 from sim.sensors import Laser
 
@@ -23,23 +22,23 @@ _HYPHEN = 0x2D
 
 
 class Line:
-    """What becomes of the bytes between sensor and client: faultless until told otherwise."""
+    """Transmission faults between sensor and client; none by default."""
 
     def __init__(self, random: Generator) -> None:
         self._random = random
         self.lose = 0
-        """How many of the next bytes get lost."""
+        """Number of next bytes to lose."""
         self.probability = 0.0
-        """The probability that a byte gets lost."""
+        """Probability of the loss of a byte."""
         self.garbage = 0
-        """How many bytes of noise come next."""
+        """Number of pending noise bytes."""
         self.silent_until = -np.inf
-        """Until when nothing gets through [s]."""
+        """End of the period without output [s]."""
         self.splits_words = False
-        """Whether an answer may stand within a value."""
+        """Whether an answer may split a value."""
 
     def carried(self, stream: Bytes, answer: bytes, now: float) -> Bytes:
-        """What arrives of the values of `stream` and of an answer, which stands between any two of the values."""
+        """Bytes that reach the client: values of `stream` with an answer between any two of them."""
         sent = self._woven(stream, answer)
         if now < self.silent_until:
             return sent[:0]
@@ -54,9 +53,8 @@ class Line:
         return sent
 
     def misread(self, sent: Bytes, baud: int, read_at: int) -> Bytes:
-        """What a client makes of bytes sent at `baud` when it reads at another rate.
-
-        Noise; without a hyphen, so that no test depends on whether it spells a prompt by chance.
+        """Noise that a client receives at a rate other than `baud`; without a hyphen, so that it never resembles a
+        prompt by chance.
         """
         noise = self._random.integers(0, 256, round(sent.size * min(1.0, read_at / baud)), dtype=np.uint8)
         return np.where(noise == _HYPHEN, np.uint8(0), noise)
@@ -71,19 +69,19 @@ class Line:
 
 
 _TURN = 0.002
-"""How often the sensor looks after its line [s]."""
+"""Period of the sensor's line handling [s]."""
 _RATES = (250.0, 500.0, 1000.0, 2000.0, 4000.0, 8000.0)
-"""Measuring rates of a recent sensor [1/s]; an old one lacks the last (manual of the optoNCDT 1420, p. 84)."""
+"""Measuring rates of a recent sensor [1/s]; older sensors lack the last rate (manual of the optoNCDT 1420, p. 84)."""
 _TARGETS = {"too close": Fault.TOO_CLOSE, "too far": Fault.TOO_FAR, "none": Fault.NO_PEAK, None: None}
 
 
 class EmulatedLaser:
-    """A sensor that looks at `sight` and has the errors of the simulated `laser`, on the serial port `port`.
+    """A sensor that measures `sight` with the errors of the simulated `laser`, on the serial port `port`.
 
-    It is switched on when it is made and serves its line from `start()` on. `as_found` are the settings at power-up:
-    unless they say otherwise it does not stream. `clock_error` is the relative error of its clock, that of `laser`
-    unless given. `rates` [1/s], `password` and `boot_time` [s] differ between versions of the sensor or are not
-    documented. Every method may be called from any thread.
+    It is switched on by the constructor and serves its line from `start()` on. `as_found` are the settings at power-up;
+    by default it does not stream. `clock_error` is the relative error of its clock, by default that of `laser`. `rates`
+    [1/s], `password` and `boot_time` [s] differ between versions of the sensor or are not documented. Every method may
+    be called from any thread.
 
     Raises DeviceNotFound on Windows, which has no pseudo-terminals.
     """
@@ -117,7 +115,7 @@ class EmulatedLaser:
         self._thread.start()
 
     def close(self) -> None:
-        """Switch off: no thread and no port is left. Allowed any number of times."""
+        """Switch off; no thread or port remains. Allowed any number of times."""
         self.unplug()
         if self._thread.is_alive():
             self._thread.join()
@@ -134,12 +132,12 @@ class EmulatedLaser:
 
     @property
     def settings(self) -> Settings:
-        """What the sensor is set to."""
+        """Settings of the sensor."""
         return self._sensor.settings
 
     @property
     def dropped(self) -> int:
-        """Bytes that found no room at the client."""
+        """Bytes lost because the client's buffer was full."""
         return self._terminal.dropped
 
     @property
@@ -155,13 +153,13 @@ class EmulatedLaser:
             return self._sensor.grid.rate
 
     def host_time_of(self, index: int) -> float:
-        """Host time of an exposure [s]: `index` is its counter, counted on beyond 18 bits, at the present rate."""
+        """Host time of an exposure [s]: `index` is its counter, continued beyond 18 bits, at the present rate."""
         with self._lock:
             grid = self._sensor.grid
             return float(grid.times(np.array([index + grid.count.now]))[0])
 
     def lose_bytes(self, count: int = 0, *, probability: float = 0.0) -> None:
-        """Lose the next `count` bytes, and from then on every byte with a probability."""
+        """Lose the next `count` bytes, and every later byte with the given probability."""
         with self._lock:
             self._line.lose, self._line.probability = count, probability
 
@@ -171,17 +169,17 @@ class EmulatedLaser:
             self._line.garbage = count
 
     def silence(self, seconds: float) -> None:
-        """Let nothing get through to the client for a while; the sensor goes on measuring."""
+        """Suppress all output to the client for a while; the sensor continues measuring."""
         with self._lock:
             self._line.silent_until = time.monotonic() + seconds
 
     def split_words(self, allowed: bool = True) -> None:
-        """Let answers stand within values: whether a real sensor does that is not documented."""
+        """Allow answers to split values: whether a real sensor does so is not documented."""
         with self._lock:
             self._line.splits_words = allowed
 
     def laser_off(self) -> None:
-        """Open the input that switches the laser on."""
+        """Open or close the input that switches the laser on."""
         with self._lock:
             self._sensor.beam = False
 
@@ -191,18 +189,18 @@ class EmulatedLaser:
             self._sensor.beam = True
 
     def target(self, place: Literal["too close", "too far", "none"] | None) -> None:
-        """Put something else before the sensor, or nothing; None: what its sight gives."""
+        """Replace the target by another, or none; None restores its sight."""
         with self._lock:
             self._sensor.target = _TARGETS[place]
 
     def unplug(self) -> None:
-        """Take the sensor off its line for good: a client that reads or writes gets an error."""
+        """Disconnect the sensor permanently: a client's reads and writes fail."""
         with self._lock:
             self._over = True
             self._terminal.close()
 
     def _serve(self) -> None:
-        """The thread: send what there is, answer what was asked."""
+        """Thread that sends pending output and answers."""
         while True:
             with self._lock:
                 if self._over:
@@ -212,10 +210,10 @@ class EmulatedLaser:
 
     def _turn(self, now: float) -> None:
         received = self._terminal.read()
-        # looked at after reading: who has sent something has opened and set up the port before
+        # checked after the read: a client opens and configures the port before it sends data
         connected, read_at, baud = self._terminal.connected, self._terminal.baud, self._sensor.settings.baud
         if read_at != baud:
-            # at the wrong rate nothing is understood, and what was heard spoils the next command
+            # at the wrong rate no command is recognised, and the received bytes corrupt the next one
             received = b"\xff" * len(received)
         stream = self._sensor.stream(now)
         answer = self._dialogue.hear(received, now)

@@ -1,22 +1,77 @@
-"""The sensor without its line: it measures, and what it has to send comes out as bytes."""
+"""The sensor without its serial line: clock, measurements and output bytes."""
 
 from dataclasses import replace
+from math import floor
 
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from drivers.emulation.optoncdt.evaluation import Evaluation, Optics, faults_of
-from drivers.emulation.optoncdt.grid import Grid
+from drivers.emulation.optoncdt.evaluation import WORD_BITS, Evaluation, Fault, Optics, faults_of, words
 from drivers.emulation.optoncdt.settings import Mastering, Settings
-from drivers.emulation.optoncdt.words import WORD_BITS, Fault, words
 from drivers.emulation.plant import Sight
 from sim.sensors import Laser
 
+TICKS = 100_000
+"""Ticks of the time stamp in a second of the sensor's clock (manual of the optoNCDT 1420, p. 66)."""
+
+
+class Zero:
+    """Resettable counter: earlier values keep their zero."""
+
+    def __init__(self, now: float) -> None:
+        self._before = self.now = now
+
+    def reset(self, now: float) -> None:
+        self._before, self.now = self.now, now
+
+    def since(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Ascending `values`, shape (n,) with n > 0, counted from their zero."""
+        if values[0] >= self.now:
+            return values - self.now
+        return values - np.where(values < self.now, self._before, self.now)
+
+
+class Grid:
+    """Exposures at equal intervals of the sensor's clock, which has the relative error `clock_error`.
+
+    Host times in seconds. Exposures are numbered from power-up, across changes of the rate.
+    """
+
+    def __init__(self, rate: float, clock_error: float, origin: float) -> None:
+        self._pace = 1.0 + clock_error
+        self.rate = rate * self._pace
+        self._origin, self.first = origin, 0
+        self.epoch = Zero(origin)
+        self.count = Zero(0)
+
+    def change(self, rate: float, now: float) -> None:
+        """Measure `rate` times per second of the sensor's clock from `now` on."""
+        self.first = self.end(now)
+        self.rate = rate * self._pace
+        self._origin = now + 1.0 / self.rate
+
+    def end(self, now: float) -> int:
+        """Number of the first exposure after `now`."""
+        return self.first + max(floor((now - self._origin) * self.rate) + 1, 0)
+
+    def times(self, numbers: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Times of the exposures of these numbers [s]."""
+        return self._origin + (numbers - self.first) / self.rate
+
+    def counters(self, numbers: NDArray[np.int64]) -> NDArray[np.int64]:
+        """The 18-bit counter of these exposures."""
+        return self.count.since(numbers.astype(np.float64)).astype(np.int64) & 0x3FFFF
+
+    def stamps(self, times: NDArray[np.float64]) -> NDArray[np.int64]:
+        """The 32-bit time stamps of exposures at these times, in ticks."""
+        return np.floor(self.epoch.since(times) * (self._pace * TICKS)).astype(np.int64) & 0xFFFFFFFF
+
+
 PIPELINE = 3
-"""Measuring cycles between exposure and output (manual of the optoNCDT 1420, p. 52, and of its sibling 1320, p. 42)."""
+"""Measuring cycles between exposure and output (manual of the optoNCDT 1420, p. 52, and of the 1320, p. 42)."""
 _PAST = 10.0
-"""After a longer standstill of the machine, older measurements are lost [s]."""
+"""Longest stall of the computer without loss of measurements [s]."""
 _EXPOSURE = 1000
 """Exposure time that the sensor reports, in tenths of a microsecond."""
 _INTENSITY = 32736
@@ -27,13 +82,13 @@ _STATES = {
     Fault.TOO_CLOSE: 2 << 16 | 1 << 5,
     Fault.TOO_FAR: 2 << 16 | 1 << 6,
 }
-"""Status words: the light is green (1) or red (2), bits 2, 5 and 6 say why (manual of the optoNCDT 1420, p. 66)."""
+"""Status words: the light is green (1) or red (2), bits 2, 5 and 6 the reason (manual of the optoNCDT 1420, p. 66)."""
 
 Codes = NDArray[np.int64]
 
 
 class Sensor:
-    """Looks at `sight` from `now` on; `as_found` are its settings at power-up. Times are host times [s]."""
+    """Measures `sight` from `now` on; `as_found` are its settings at power-up. Times are host times [s]."""
 
     def __init__(
         self, sight: Sight, laser: Laser, clock_error: float, random: Generator, as_found: Settings, now: float
@@ -48,11 +103,11 @@ class Sensor:
         self.beam = True
         """Whether the input that switches the laser on is tied to ground."""
         self.target: Fault | None = None
-        """What there is to be seen instead of what the sight gives."""
+        """Target that replaces the sight."""
         self.boot(now)
 
     def boot(self, ready: float) -> None:
-        """Be as after power-up from the instant `ready` on."""
+        """Enter the power-up state at the instant `ready`."""
         self.ready = ready
         self.settings = self.stored
         self.grid = Grid(self.settings.rate, self._clock_error, ready + self._phase / self.settings.rate)
@@ -60,7 +115,7 @@ class Sensor:
         self._evaluation.restart()
 
     def apply(self, settings: Settings, now: float) -> None:
-        """Work with other settings from `now` on."""
+        """Use other settings from `now` on."""
         if settings.rate != self.settings.rate:
             self.grid.change(settings.rate, now)
             self._following = self.grid.first
@@ -68,7 +123,7 @@ class Sensor:
         self.settings = settings
 
     def stream(self, now: float) -> NDArray[np.uint8]:
-        """The bytes that came out of the sensor since the last call, in whole blocks."""
+        """The bytes produced since the last call, in whole blocks."""
         settings = self.settings
         if settings.output != "RS422" or settings.trigger != "NONE":
             self._following = self.grid.end(now)
@@ -84,16 +139,16 @@ class Sensor:
 
     @property
     def values(self) -> int:
-        """Values in a block: a time stamp takes two."""
+        """Number of values in a block: a time stamp takes two."""
         return 1 + len(self.settings.additional) + ("TIMESTAMP" in self.settings.additional)
 
     def look(self, now: float) -> float | None:
-        """The distance seen now as a share of the measuring range; None when there is no valid one."""
+        """The present distance as a share of the measuring range; None when it is invalid."""
         shares, faults = self._measure(np.array([now]))
         return None if faults[0] else float(shares[0])
 
     def master(self, value: float, now: float) -> bool:
-        """Call the present distance `value` [m]; False when there is none."""
+        """Master the present distance to `value` [m]; False when it is invalid."""
         place = self.look(now)
         if place is None:
             return False
@@ -101,7 +156,7 @@ class Sensor:
         return True
 
     def _measure(self, times: NDArray[np.float64]) -> tuple[NDArray[np.float64], Codes]:
-        """Shares of the measuring range and faults at `times`, shape (n,) each; a share is void where a fault is."""
+        """Shares of the measuring range and faults at `times`, shape (n,) each; shares at faults are meaningless."""
         if not self.beam or self.settings.laser_power == "OFF":
             return np.full(times.size, np.nan), np.full(times.size, Fault.LASER_OFF)
         if self.target is not None:
@@ -110,14 +165,14 @@ class Sensor:
         return shares, faults_of(shares)
 
     def _blocks(self, numbers: Codes) -> Codes:
-        """What is sent of the exposures of these numbers, shape (n, values)."""
+        """Transmitted values of the exposures of these numbers, shape (n, values)."""
         times = self.grid.times(numbers)
         shares, faults = self._measure(times)
         codes = self._evaluation.codes(shares, faults, self.settings)
         every = self.settings.reduction if "RS422" in self.settings.reduced else 1
         too_much = self.values * WORD_BITS * self.grid.rate / every / self.settings.baud
         if too_much > 1.0:
-            # an error in place of every distance, in as many blocks as the line can carry
+            # an error in place of every distance, in as many blocks as fit on the line
             codes = np.full(numbers.size, Fault.DATA_VOLUME)
             every = int(np.ceil(every * too_much))
         blocks = np.array([codes, *self._additional(numbers, times, shares, faults)]).T
@@ -126,7 +181,7 @@ class Sensor:
     def _additional(
         self, numbers: Codes, times: NDArray[np.float64], shares: NDArray[np.float64], faults: Codes
     ) -> list[Codes]:
-        """The values that are sent along with the distances, shape (n,) each, in the order of the line."""
+        """The additional values sent with the distances, shape (n,) each, in the order of transmission."""
         columns: list[Codes] = []
         for name in self.settings.additional:
             match name:

@@ -1,17 +1,21 @@
-"""What can be set at the sensor, and what it is set to."""
+"""Settings of the emulated sensor, and the commands that change them."""
 
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from math import inf, isinf
+from typing import Any, Literal
 
 BAUDS = (9600, 19200, 56000, 115200, 128000, 230400, 256000, 460800, 691200, 921600, 1_000_000)
 ADDITIONAL = ("SHUTTER", "COUNTER", "TIMESTAMP", "INTENSITY", "STATE", "DIST_RAW")
-"""Values that can be sent along with the distance. Their order on the line is not documented; this sensor sends them
-in this order, whatever the order in which they were asked for."""
+"""Values that can be sent with the distance.
+
+Their order of transmission is not documented; this sensor sends them in this order, regardless of that of the request.
+"""
 
 
 @dataclass(frozen=True)
 class Mastering:
-    """The distance that was there [share of the measuring range] is called `value` [m]."""
+    """The distance at mastering [share of the measuring range], reported as `value` [m]."""
 
     place: float
     value: float
@@ -19,10 +23,9 @@ class Mastering:
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of the sensor; as it comes from the factory when nothing is said.
+    """Settings of the sensor; factory settings by default.
 
-    The analogue output and 2 kHz are how the factory is remembered to set it: a client that does not configure the
-    sensor gets no stream.
+    Analogue output and 2 kHz are the presumed factory settings: without configuration the sensor does not stream.
     """
 
     output: Literal["NONE", "RS422", "ANALOG"] = "ANALOG"
@@ -32,13 +35,13 @@ class Settings:
     average: int = 1
     """Measurements in the moving mean."""
     hold: float = 0.0
-    """For how many measurements the last valid value stands in for an error; infinity: until there is another."""
+    """Number of measurements for which the last valid value replaces an error; infinity: until the next valid one."""
     reduction: int = 1
-    """Every how many measurements one is sent."""
+    """Output reduction: one of this number of measurements is sent."""
     reduced: tuple[str, ...] = ("RS422",)
-    """The outputs that are reduced."""
+    """The outputs to which the reduction applies."""
     trigger: Literal["NONE", "EDGE", "PULSE", "SOFTWARE"] = "NONE"
-    """Anything but NONE and the sensor sends nothing: nobody triggers it."""
+    """With any value but NONE the sensor sends no output, since there is no trigger source."""
     laser_power: Literal["FULL", "OFF"] = "FULL"
     mastering: Mastering | None = None
     baud: int = 921_600
@@ -49,4 +52,140 @@ class Settings:
 
 
 BASIC = ("baud", "language")
-"""Settings of the device; the others are settings of the measurement."""
+"""Device settings; the others are measurement settings."""
+
+
+class Refusal(Exception):
+    """A refusal by the sensor. Only E104 and E202 are documented; the other numbers are presumed."""
+
+    def __init__(self, number: int, text: str) -> None:
+        super().__init__(f"E{number} {text}")
+
+
+WRONG_COUNT = "Wrong parameter count"
+WRONG_TYPE = "Wrong or unknown parameter type"
+OUT_OF_RANGE = "Parameter value is out of range or the format is invalid"
+
+
+@dataclass(frozen=True)
+class Command:
+    """Query and change of a setting; `change` raises Refusal."""
+
+    show: Callable[[Settings], str]
+    change: Callable[[Settings, list[str]], Settings]
+
+
+def number(text: str, kind: type[int] | type[float] = int) -> float:
+    """The number in `text`. Raises Refusal."""
+    try:
+        return kind(text)
+    except ValueError:
+        raise Refusal(236, OUT_OF_RANGE) from None
+
+
+def single(parameters: list[str]) -> str:
+    """The only parameter. Raises Refusal."""
+    if len(parameters) != 1:
+        raise Refusal(232, WRONG_COUNT)
+    return parameters[0]
+
+
+def _choice(field: str, meanings: dict[str, Any]) -> Command:
+    """A setting with a keyword for each value."""
+    words = {value: word for word, value in meanings.items()}
+
+    def change(settings: Settings, parameters: list[str]) -> Settings:
+        if (word := single(parameters)) not in meanings:
+            raise Refusal(234, WRONG_TYPE)
+        return replace(settings, **{field: meanings[word]})
+
+    return Command(lambda settings: words[getattr(settings, field)], change)
+
+
+def _named(*words: str) -> dict[str, Any]:
+    return {word: word for word in words}
+
+
+def _several(field: str, allowed: tuple[str, ...]) -> Command:
+    """A setting that is a set of keywords, or NONE; shown in the sensor's order."""
+
+    def show(settings: Settings) -> str:
+        return " ".join(getattr(settings, field)) or "NONE"
+
+    def change(settings: Settings, parameters: list[str]) -> Settings:
+        if parameters == ["NONE"]:
+            return replace(settings, **{field: ()})
+        if not set(parameters) <= set(allowed):
+            raise Refusal(234, WRONG_TYPE)
+        return replace(settings, **{field: tuple(word for word in allowed if word in parameters)})
+
+    return Command(show, change)
+
+
+def _integer(field: str, allowed: Callable[[float], bool]) -> Command:
+    """A setting that is a number."""
+
+    def change(settings: Settings, parameters: list[str]) -> Settings:
+        if not allowed(value := number(single(parameters))):
+            raise Refusal(236, OUT_OF_RANGE)
+        return replace(settings, **{field: value})
+
+    return Command(lambda settings: str(getattr(settings, field)), change)
+
+
+def _measuring_rate(rates: tuple[float, ...]) -> Command:
+    """Measuring rate in kHz, one of `rates` [1/s]."""
+
+    def change(settings: Settings, parameters: list[str]) -> Settings:
+        if (rate := 1e3 * number(single(parameters), float)) not in rates:
+            raise Refusal(236, OUT_OF_RANGE)
+        return replace(settings, rate=rate)
+
+    return Command(lambda settings: f"{settings.rate / 1e3:g}", change)
+
+
+def _show_hold(settings: Settings) -> str:
+    return "NONE" if not settings.hold else "INFINITE" if isinf(settings.hold) else f"{settings.hold:g}"
+
+
+def _change_hold(settings: Settings, parameters: list[str]) -> Settings:
+    words = {"NONE": 0.0, "INFINITE": inf}
+    word = single(parameters)
+    cycles = words[word] if word in words else number(word)
+    if word not in words and not 1 <= cycles <= 1024:
+        raise Refusal(236, OUT_OF_RANGE)
+    return replace(settings, hold=cycles)
+
+
+def _show_average(settings: Settings) -> str:
+    return "NONE" if settings.average == 1 else f"MOVING {settings.average}"
+
+
+def _change_average(settings: Settings, parameters: list[str]) -> Settings:
+    match parameters:
+        case ["NONE"]:
+            return replace(settings, average=1)
+        case ["MOVING", text]:
+            if (n := int(number(text))) not in (2, 4, 8, 16, 32, 64, 128):
+                raise Refusal(236, OUT_OF_RANGE)
+            return replace(settings, average=n)
+        case _:
+            raise Refusal(234, WRONG_TYPE)
+
+
+def commands(rates: tuple[float, ...]) -> dict[str, Command]:
+    """The settings by name; the sensor measures at `rates` [1/s]."""
+    return {
+        "LANGUAGE": _choice("language", _named("DE", "EN", "CN")),
+        "ECHO": _choice("echo", {"ON": True, "OFF": False}),
+        "TRIGGER": _choice("trigger", _named("NONE", "EDGE", "PULSE", "SOFTWARE")),
+        "BAUDRATE": _integer("baud", BAUDS.__contains__),
+        "MEASRATE": _measuring_rate(rates),
+        "LASERPOW": _choice("laser_power", _named("FULL", "OFF")),
+        "AVERAGE": Command(_show_average, _change_average),
+        "OUTPUT": _choice("output", _named("NONE", "RS422", "ANALOG")),
+        "OUTREDUCEDEVICE": _several("reduced", ("RS422", "ANALOG")),
+        "OUTREDUCECOUNT": _integer("reduction", lambda n: 1 <= n <= 3_000_000),
+        "OUTHOLD": Command(_show_hold, _change_hold),
+        "OUTADD_RS422": _several("additional", ADDITIONAL),
+    }

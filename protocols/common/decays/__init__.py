@@ -1,1 +1,1 @@
-"""Free decays of the frame: pulses, fits and what follows from them, as stages of any protocol."""
+"""Free decays of the frame: pulses, fits and results, shared by several protocols."""

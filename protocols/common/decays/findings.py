@@ -1,6 +1,6 @@
-"""Findings of the frame: the fit of a decay as an event, findings for other runs, and the masses they depend on.
+"""Results of the decays: the fit as an event, findings for other runs, and the masses on which they depend.
 
-The masses of the storeys are those of a specimen file, else as configured.
+The masses of the storeys are taken from a specimen file if it has them, else from the configuration.
 """
 
 from collections.abc import Generator
@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.analysis.free_decay.decay import Decay
-from bench.analysis.free_decay.modal import K1, K2, NAMES, UNITS, XI1, XI2
-from bench.analysis.rounding import in_brackets
+from bench.analysis.free_decay.response import K1, K2, NAMES, UNITS, XI1, XI2
+from bench.analysis.uncertainty import in_brackets
 from bench.config.model import BenchConfiguration
-from bench.engine.steps import Outcome, Say, Step
+from bench.engine.steps import Outcome, Publish, Step
 from bench.events import FitFinished, FittedParameter, Series, Warned
 from protocols.common.decays.frame import FrameResult
 from protocols.common.decays.parameters import DecayParameters
+from sim.channel import STOREYS, TABLE_DISPLACEMENT
 from sim.errors import InvalidInput
 from sim.identified import Correlation, Finding, Identified, possible
 
@@ -25,22 +26,22 @@ Array = NDArray[np.float64]
 SOURCE = "free vibration of the bare frame"
 
 FOUND = {"k1": K1, "k2": K2, "xi1": XI1, "xi2": XI2}
-"""Quantities that go into the file of the specimen."""
+"""Quantities written to the specimen file."""
 
 MASSES = ("m1", "m2")
 
 
 def fit_finished(decay: Decay, name: str) -> FitFinished:
-    """The event of a fitted decay, as measured by the lasers."""
+    """Event of a fitted decay, as measured by the lasers."""
     fit, stretch = decay.fit, decay.fit.stretch
     columns = {"time": Series(stretch.time, "s", "time since the start of the recording")}
-    for row, laser in enumerate(("laser_1", "laser_2")):
+    for row, laser in enumerate(STOREYS):
         measured, fitted = stretch.seen[row], fit.fitted[row]
-        columns[laser] = Series(measured, "m", f"what {laser} saw, means over the step of the time")
-        columns[f"{laser}_fitted"] = Series(fitted, "m", f"what {laser} would see of the fitted frame")
-        columns[f"{laser}_residual"] = Series(measured - fitted, "m", "measured less fitted")
-    columns["table_displacement"] = Series(stretch.table, "m", "motion of the table that the fit follows")
-    uncertainties = np.sqrt(np.diag(decay.doubt.own + decay.doubt.common))
+        columns[laser] = Series(measured, "m", f"signal of {laser}, averaged over the time step")
+        columns[f"{laser}_fitted"] = Series(fitted, "m", f"signal of {laser} for the fitted frame")
+        columns[f"{laser}_residual"] = Series(measured - fitted, "m", "measured minus fitted")
+    columns[TABLE_DISPLACEMENT] = Series(stretch.table, "m", "measured motion of the table, input of the fit")
+    uncertainties = np.sqrt(np.diag(decay.uncertainty.own + decay.uncertainty.common))
     parameters = {
         key: FittedParameter(float(value), float(uncertainty), unit)
         for key, value, uncertainty, unit in zip(NAMES, decay.quantities, uncertainties, UNITS, strict=True)
@@ -49,10 +50,10 @@ def fit_finished(decay: Decay, name: str) -> FitFinished:
 
 
 def frame_findings(result: FrameResult, known: Identified) -> tuple[list[Finding], list[Correlation]]:
-    """Stiffnesses, damping ratios and the masses they were found with, with the correlations of all of them.
+    """Stiffnesses, damping ratios and the masses used to identify them, with all correlations.
 
-    Masses that are known stay as they are; through them the frame is correlated with all other known quantities. A
-    value that is impossible, such as a damping fitted below zero, is left out.
+    Known masses are kept; they correlate the frame with all other known quantities. A physically impossible
+    value, such as a negative damping ratio, is omitted.
     """
     indices = list(FOUND.values())
     inner = result.frame.covariance[np.ix_(indices, indices)]
@@ -61,7 +62,10 @@ def frame_findings(result: FrameResult, known: Identified) -> tuple[list[Finding
     uncertainties = np.sqrt(np.diag(whole))
     names, values = [*FOUND, "m1", "m2"], [*result.frame.values[indices].tolist(), *result.masses]
     date = datetime.now(UTC).replace(microsecond=0)
-    sources = [*[SOURCE] * len(FOUND), *(f"as configured, with {mass:.2g} kg left open" for mass in uncertainties[-2:])]
+    sources = [
+        *[SOURCE] * len(FOUND),
+        *(f"as configured, standard uncertainty {mass:.2g} kg" for mass in uncertainties[-2:]),
+    ]
     findings = [
         Finding(name=name, value=value, standard_uncertainty=float(uncertainty), source=origin, date=date)
         for name, value, uncertainty, origin in zip(names, values, uncertainties, sources, strict=True)
@@ -91,19 +95,19 @@ def frame_findings(result: FrameResult, known: Identified) -> tuple[list[Finding
 
 
 def impossible_values(result: FrameResult) -> str | None:
-    """A warning that names physically impossible values, which go into no file; None where all are possible."""
+    """Warning naming physically impossible values, which are not written to a file; None if all are possible."""
     values = {name: float(result.frame.values[place]) for name, place in FOUND.items()}
     texts = [f"{name} = {value:.3g}" for name, value in values.items() if not possible(name, value)]
-    return f"{', '.join(texts)} cannot be, and is not kept for other runs" if texts else None
+    return f"{', '.join(texts)} is physically impossible, and is not stored for other runs" if texts else None
 
 
 def through_masses(shift: Array, known: Identified, name: str) -> float:
-    """Covariance of a quantity that depends on the known masses by `shift`, shape (2,), with a known quantity."""
+    """Covariance with a known quantity of one with the sensitivity `shift`, shape (2,), to the known masses."""
     return float(shift @ [known_covariance(known, mass, name) for mass in MASSES])
 
 
 def known_covariance(known: Identified, first: str, second: str) -> float:
-    """Covariance of two findings, or the variance of one."""
+    """Covariance of two findings; variance if both are the same."""
     places = (first,) if first == second else (first, second)
     return float(known.covariance(places)[0, -1])
 
@@ -111,7 +115,9 @@ def known_covariance(known: Identified, first: str, second: str) -> float:
 def correlations_with(
     name: str, own: float, covariances: dict[str, float], others: dict[str, float]
 ) -> list[Correlation]:
-    """Correlations of `name`, of standard uncertainty `own`, with others by covariances and standard uncertainties."""
+    """Correlations of `name`, with the standard uncertainty `own`, with other quantities, from their covariances and
+    standard uncertainties.
+    """
     return [
         Correlation(first=name, second=other, coefficient=float(np.clip(covariance / (others[other] * own), -1.0, 1.0)))
         for other, covariance in covariances.items()
@@ -125,7 +131,7 @@ def standard_uncertainties(known: Identified) -> dict[str, float]:
 
 
 def known_masses(known: Identified | None) -> Identified | None:
-    """The identified quantities where both masses are among them; else None."""
+    """Identified quantities if they include both masses, else None."""
     return known if known is not None and set(MASSES) <= set(known.names) else None
 
 
@@ -138,32 +144,32 @@ def mass_covariance(parameters: DecayParameters, known: Identified | None) -> ND
 
 
 def check_masses(parameters: DecayParameters, configuration: BenchConfiguration) -> None:
-    """Raise InvalidInput for mass uncertainties in the parameters where the specimen file has its own."""
+    """Raise InvalidInput for mass uncertainties in the parameters if the specimen file includes the masses."""
     if (known := known_masses(configuration.identified)) is None:
         return
     for item in ("mass_uncertainty", "mass_correlation"):
         value = getattr(parameters, item)
         if value != DecayParameters.model_fields[item].default:
             allowed = (
-                f"{_masses_text(known)} are those of the specimen file: leave it out, or take both out of that file"
+                f"{_masses_text(known)} are those of the specimen file: omit it, or remove both masses from that file"
             )
             raise InvalidInput(item, value, allowed)
 
 
 def mass_warning(configuration: BenchConfiguration) -> Generator[Step, Outcome, None]:
-    """Warn where the configuration has other masses than the specimen file, whose masses count."""
+    """Warn when the configuration and the specimen file have different masses; those of the specimen file are used."""
     if (known := known_masses(configuration.identified)) is None:
         return
     frame = configuration.specimen.frame
     found = {name: finding for name in MASSES if (finding := known.finding(name)) is not None}
     if any(finding.value != getattr(frame, name) for name, finding in found.items()):
         asked = f"specimen.frame has m1 = {frame.m1:.6g} kg, m2 = {frame.m2:.6g} kg"
-        text = f"the masses are those of the specimen file, {_masses_text(known)}; {asked}, which does not count"
-        yield Say(Warned(text))
+        text = f"the masses are those of the specimen file, {_masses_text(known)}; {asked}, which is not used"
+        yield Publish(Warned(text))
 
 
 def _summary(values: np.ndarray, uncertainties: np.ndarray) -> str:
-    """The four quantities with their standard uncertainties, in one line."""
+    """One-line summary of the four quantities with their standard uncertainties."""
     return ", ".join(
         f"{name} {in_brackets(float(values[index]), float(uncertainties[index]))}"
         + (f" {UNITS[index]}" if UNITS[index] != "1" else "")

@@ -1,4 +1,4 @@
-"""Decays together: the quantities of `modal.NAMES` and the two slopes of the damping, with all covariances."""
+"""Combination of decays: quantities `modal.NAMES` and slopes of the damping, with all covariances."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -7,27 +7,27 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.analysis.free_decay.combine import Combined, combine
+from bench.analysis.free_decay.covariance import COMMON
 from bench.analysis.free_decay.damping import DampingCourse
-from bench.analysis.free_decay.decay import Decay
-from bench.analysis.free_decay.doubt import COMMON
-from bench.analysis.free_decay.modal import K1, K2, NAMES, XI1, XI2
+from bench.analysis.free_decay.decay import Combined, Decay, combine
+from bench.analysis.free_decay.response import K1, K2, NAMES, XI1, XI2
 from bench.analysis.gain import COVERAGE
 from protocols.common.decays.parameters import DecayPoint
 
 Array = NDArray[np.float64]
 
 SIGNIFICANT = 2.576
-"""Standard uncertainties that a difference must reach to be significant: the normal quantile for 99 %."""
+"""Threshold of a significant difference in standard uncertainties: the normal quantile for 99 %."""
 
 
 @dataclass(frozen=True, eq=False)
 class FrameResult:
-    """One decay or several. `frame` combines the quantities, `slopes` those of the damping over the amplitude [1/m].
+    """Result of one or several decays.
 
-    `masses` [kg] and `weighed` [kg2], shape (2, 2), are as weighed; `mass_shift`, shape (8, 2), is how the quantities
-    follow them, `time_shift`, shape (8,), how they follow the timebase by its standard uncertainty. `parts` are the
-    standard uncertainties, shape (8,), by part.
+    `frame` combines the quantities, `slopes` the changes of the damping with amplitude [1/m]. `masses` [kg] are as
+    weighed, with the covariance `weighed` [kg2], shape (2, 2). `mass_shift`, shape (8, 2), is the sensitivity of the
+    quantities to the masses, `time_shift`, shape (8,), that to the timebase times its standard uncertainty. `parts` has
+    the standard uncertainties, shape (8,), by contribution.
     """
 
     decays: tuple[Decay, ...]
@@ -41,12 +41,12 @@ class FrameResult:
 
     @property
     def shared_shift(self) -> Array:
-        """Shift of the quantities with both masses and the timebase, which all frames of a run share, shape (8, 3)."""
+        """Sensitivity of the quantities to both masses and timebase, shared by all frames of a run, shape (8, 3)."""
         return np.column_stack((self.mass_shift, self.time_shift))
 
     @property
     def shared(self) -> Array:
-        """Covariance of both masses [kg2] and of the timebase in its standard uncertainties, shape (3, 3)."""
+        """Covariance of both masses [kg2] and of the timebase, in units of its standard uncertainty, shape (3, 3)."""
         whole = np.eye(3)
         whole[:2, :2] = self.weighed
         return whole
@@ -68,24 +68,26 @@ class FrameResult:
 
 
 def frame_result(decays: Sequence[Decay], masses: tuple[float, float], weighed: Array) -> FrameResult:
-    """The combined result of the decays of one frame."""
+    """Combined result of the decays of one frame."""
     frame = combine(
-        [one.quantities for one in decays], [one.doubt.own for one in decays], [one.doubt.common for one in decays]
+        [one.quantities for one in decays],
+        [one.uncertainty.own for one in decays],
+        [one.uncertainty.common for one in decays],
     )
     slopes = combine(
         [np.array([course.slope for course in one.courses]) for one in decays],
         [np.diag([course.own for course in one.courses]) for one in decays],
         [np.diag([course.common for course in one.courses]) for one in decays],
     )
-    names = decays[0].doubt.parts
+    names = decays[0].uncertainty.parts
     parts = {name: _part(name, decays, frame) for name in names} | {"scatter": frame.scatter}
-    shift = np.mean([one.doubt.mass_shift for one in decays], axis=0)
-    late = np.mean([one.doubt.time_shift for one in decays], axis=0)
+    shift = np.mean([one.uncertainty.mass_shift for one in decays], axis=0)
+    late = np.mean([one.uncertainty.time_shift for one in decays], axis=0)
     return FrameResult(tuple(decays), frame, slopes, masses, weighed, shift, late, parts)
 
 
 def decay_point(result: FrameResult, number: int) -> DecayPoint:
-    """The result as a point; `number` 0 for all decays together."""
+    """Result as a point; `number` is 0 for all decays together."""
     names = dict(zip(NAMES, _FIELDS, strict=True))
     values = {
         name: value
@@ -120,7 +122,7 @@ def decay_point(result: FrameResult, number: int) -> DecayPoint:
 
 
 def parts_as_json(parts: Mapping[str, float]) -> str:
-    """Standard uncertainties by part, the largest first."""
+    """Standard uncertainties by contribution, largest first, as JSON."""
     return json.dumps({name: _short(part) for name, part in sorted(parts.items(), key=lambda each: -each[1])})
 
 
@@ -134,7 +136,7 @@ def _course_json(course: DampingCourse) -> str:
 
 
 def _short(value: float) -> float:
-    """Rounded to five digits, for the texts of a data file."""
+    """Round to five digits for the texts of a data file."""
     return float(f"{value:.5g}")
 
 
@@ -151,16 +153,16 @@ _FIELDS = (
 
 
 def _part(name: str, decays: Sequence[Decay], frame: Combined) -> Array:
-    """Standard uncertainty by one part: those of single decays average out, those of all do not."""
-    variances = np.array([np.diag(one.doubt.parts[name]) for one in decays])
+    """Standard uncertainty from one contribution, which averages out over the decays if independent."""
+    variances = np.array([np.diag(one.uncertainty.parts[name]) for one in decays])
     return np.sqrt(np.mean(variances, axis=0) if name in COMMON else np.sum(frame.weights**2 * variances, axis=0))
 
 
 def nonlinear_text(result: FrameResult) -> str:
-    """A warning that the damping depends on the amplitude, with the slopes."""
+    """Warning that the damping depends on the amplitude, with the slopes."""
     slopes = [
         f"xi{mode + 1} changes by {slope:.2g} +- {uncertainty:.1g} per metre of drift"
         for mode, (slope, uncertainty) in enumerate(zip(result.slopes.values, result.slope_uncertainty, strict=True))
         if result.nonlinear[mode]
     ]
-    return f"the damping depends on the amplitude: {', '.join(slopes)}; what is stated is its mean over the decays"
+    return f"the damping depends on the amplitude: {', '.join(slopes)}; the stated value is its mean over the decays"

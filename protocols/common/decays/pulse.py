@@ -1,10 +1,10 @@
-"""The pulse that sets the frame ringing: its shape, its level, its demands on the bench.
+"""Pulse that excites the frame: shape, level, and demands on the bench.
 
     w(t) = sin(phi) - sin(2 phi) / 2,    phi = 2 pi t / T,    0 <= t <= T
 
-It begins and ends with two derivatives at zero and has no mean. A table that follows its drive with its velocity goes
-there and back; one that follows with its acceleration comes to rest where it is. With T = 2 pi / sqrt(omega_1 omega_2)
-both modes ring.
+Its first two derivatives are zero at both ends, and so is its mean. A table whose velocity follows the drive returns to
+its initial position; one whose acceleration follows the drive ends at rest. T = 2 pi / sqrt(omega_1 omega_2) excites
+both modes.
 """
 
 from collections.abc import Mapping
@@ -15,12 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.config.model import BenchConfiguration
-from bench.preflight.asked import UNKNOWN_SHAKER
-from bench.preflight.bounds import bounds
-from bench.preflight.forecast import Demand, Forecast
-from bench.preflight.response import SimulatedTable, response_of
+from bench.preflight.demands import UNPROBED, SimulatedTable, response_of
+from bench.preflight.margins import Demand, Forecast, bounds
+from bench.preflight.motion import RESTING, resting_demands
 from protocols.common.decays.parameters import DecayParameters
-from protocols.common.identification.motion import RESTING, largest
 from sim.errors import InvalidInput
 from sim.linear import frame_matrices
 from sim.specimen import Specimen
@@ -31,30 +29,24 @@ SHARE = 0.75
 """Share of each limit that is used."""
 
 QUIET = 2.0
-"""Rest in the recording before the pulse [s]: the noise of the table's sensor is taken there."""
+"""Time at rest in the recording before the pulse [s], to determine the noise of the table's sensor."""
 
 LEFT, LONGEST = 1.0 / 12.0, 60.0
 """Remaining share of the first mode at the end of the window, and the longest automatic window [s]."""
 
 LEAST = 0.003
-"""Drift [m] below which a decay is drowned by the steps of the lasers."""
+"""Minimum drift of a decay [m]; below it the resolution of the lasers dominates."""
 
 _FEWEST = 20
-"""Samples of a pulse below which it has no shape."""
+"""Minimum number of samples of a pulse."""
 
 _PADDING = 20.0
-"""Rest after a pulse in a Fourier transform [s]."""
-
-_UNKNOWN = {
-    "drive_voltage": "nothing is known of this table: the probes find out, within limits.drive_voltage",
-    "drive_slew": "nothing is known of this table: the probes find out, within limits.drive_slew",
-    **UNKNOWN_SHAKER,
-}
+"""Time at rest after a pulse in a Fourier transform [s]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Pulse:
-    """A pulse of `duration` [s], recorded for `window` [s] afterwards, at `sample_rate` [1/s]."""
+    """Pulse of `duration` [s], recorded for `window` [s] afterwards, at `sample_rate` [1/s]."""
 
     duration: float
     window: float
@@ -62,19 +54,19 @@ class Pulse:
 
     @property
     def shape(self) -> Array:
-        """The pulse itself with a peak of 1, shape (n,)."""
+        """Pulse with a peak of 1, shape (n,)."""
         phi = 2.0 * pi * np.arange(round(self.duration * self.sample_rate)) / (self.duration * self.sample_rate)
         made = np.sin(phi) - 0.5 * np.sin(2.0 * phi)
         return made / np.abs(made).max()
 
     def record(self, volts: float, window: float | None = None) -> Array:
-        """The drive for a peak of `volts`: rest, pulse, and zeros for the window, or for another one [s]."""
+        """Drive [V], shape (n,), for a peak of `volts`: rest, pulse, and zeros for `window` [s] (default: its own)."""
         before, after = (round(time * self.sample_rate) for time in (QUIET, self.window if window is None else window))
         return np.concatenate((np.zeros(before), volts * self.shape, np.zeros(after)))
 
     @property
     def begin(self) -> float:
-        """Begin of the free motion, from the start of the recording [s]."""
+        """Start of the free motion, from the start of the recording [s]."""
         return QUIET + self.duration
 
     @property
@@ -84,7 +76,7 @@ class Pulse:
 
 
 def frequencies(specimen: Specimen) -> Array:
-    """Undamped circular frequencies of the frame [rad/s], shape (2,), ascending; a spring is grounded on its block."""
+    """Undamped circular frequencies of the frame [rad/s], shape (2,), ascending; a spring is grounded at its block."""
     mass, _, stiffness = frame_matrices(specimen.frame)
     stiffness[0, 0] += specimen.k_c
     root = np.sqrt(np.diag(mass))
@@ -92,7 +84,7 @@ def frequencies(specimen: Specimen) -> Array:
 
 
 def decay_pulse(parameters: DecayParameters, configuration: BenchConfiguration, specimen: Specimen) -> Pulse:
-    """The pulse for a specimen, bare or with its block held."""
+    """Pulse for a specimen, bare or with the block clamped."""
     omegas = frequencies(specimen)
     duration = parameters.pulse or 2.0 * pi / sqrt(float(omegas.prod()))
     return Pulse(duration, decay_window(parameters, specimen), configuration.sample_rate)
@@ -108,9 +100,9 @@ def decay_window(parameters: DecayParameters, specimen: Specimen) -> float:
 
 @dataclass(frozen=True, eq=False)
 class PlannedPulse:
-    """A pulse with the drift [m] that it is expected to reach, and its demands by the keys of `bench.preflight.bounds`.
+    """Pulse with its expected peak drift [m] and demands, by the keys of `bench.preflight.margins`.
 
-    Quantities that are not known are absent. `binds` names what sets the drift.
+    Unknown demands are absent. `binds` names the limit that determines the drift.
     """
 
     pulse: Pulse
@@ -120,38 +112,38 @@ class PlannedPulse:
 
 
 def plan_pulse(parameters: DecayParameters, configuration: BenchConfiguration, specimen: Specimen) -> PlannedPulse:
-    """The pulse at the level that the bench allows.
+    """Plan the pulse at the level allowed by the bench.
 
-    A simulated bench's table is that of its shaker; any other is taken as one whose velocity follows the drive.
-    Raises InvalidInput for a pulse that has no shape, or that the limits leave too little of.
+    The table of a simulated bench is modelled by its shaker; any other as one whose velocity follows the drive. Raises
+    InvalidInput for a pulse that is too short, or too weak within the limits.
     """
     pulse = decay_pulse(parameters, configuration, specimen)
     if pulse.shape.size < _FEWEST:
         least = _FEWEST / configuration.sample_rate
-        raise InvalidInput("pulse", pulse.duration, f"at this sample rate it needs {least:g} s at least")
+        raise InvalidInput("pulse", pulse.duration, f"at this sample rate it must be at least {least:g} s")
     if parameters.drift < LEAST:
-        raise InvalidInput("drift", parameters.drift, f"the steps of the lasers drown a decay below {LEAST:g} m")
+        raise InvalidInput("drift", parameters.drift, f"the lasers do not resolve a decay below {LEAST:g} m")
     unit = _unit_demands(pulse, configuration, specimen)
     limits = {name: SHARE * bound.limit for name, bound in bounds(configuration).items()}
     allowed = {name: limits[name] / value for name, value in unit.items() if value > 0.0}
     binds = min(allowed, key=lambda name: allowed[name])
     wanted = parameters.drift / unit["drift"]
     scale = min(wanted, allowed[binds])
-    binding = "drift asked for" if wanted <= allowed[binds] else binds
+    binding = "requested drift" if wanted <= allowed[binds] else binds
     drift = scale * unit["drift"]
     if drift < LEAST:
-        needs = f"limits of {binding} leave {drift:.2g} m of drift, a decay needs {LEAST:g} m"
+        needs = f"limits of {binding} allow a drift of only {drift:.2g} m, a decay needs {LEAST:g} m"
         raise InvalidInput("pulse", pulse.duration, f"{needs}: raise that limit, or give another length")
     return PlannedPulse(pulse, drift, {name: scale * value for name, value in unit.items()}, binding)
 
 
 def pulse_forecast(configuration: BenchConfiguration, pulses: Mapping[str, PlannedPulse], duration: float) -> Forecast:
-    """The most that any of the pulses asks for; `pulses` by the name of the specimen."""
+    """Largest demands of the `pulses`, by name of the specimen."""
     demands: list[Demand] = []
     for quantity in bounds(configuration):
         known = {name: pulse.demands[quantity] for name, pulse in pulses.items() if quantity in pulse.demands}
         if not known:
-            demands.append(Demand(quantity, None, None, _UNKNOWN[quantity]))
+            demands.append(Demand(quantity, None, None, UNPROBED[quantity]))
             continue
         name = max(known, key=lambda each: known[each])
         where = f"the pulse of {pulses[name].pulse.duration:.2g} s, {name}"
@@ -160,23 +152,21 @@ def pulse_forecast(configuration: BenchConfiguration, pulses: Mapping[str, Plann
 
 
 def _unit_demands(pulse: Pulse, configuration: BenchConfiguration, specimen: Specimen) -> dict[str, float]:
-    """The largest magnitudes under a drive of 1 V, or, where the table is not known, a velocity of 1 m/s."""
+    """Largest magnitudes under a drive of 1 V or, for an unknown table, a velocity of 1 m/s."""
     drive = pulse.record(1.0, 5.0)
     response = response_of(configuration)
     if not isinstance(response, SimulatedTable):
         moved = np.gradient(drive, 1.0 / pulse.sample_rate)
         return _motion(moved, pulse, specimen, configuration)
-    frame, block = specimen.frame, specimen.block
-    payload = frame.m1 + frame.m2 + (block.mass if specimen.beta is not None else 0.0)
     size = drive.size + round(_PADDING * pulse.sample_rate)
     omega = 2.0 * pi * np.fft.rfftfreq(size, 1.0 / pulse.sample_rate)
-    transfer = response.transfer(np.maximum(omega, 1e-9), payload)
+    transfer = response.transfer(np.maximum(omega, 1e-9), specimen.mass)
     moved = np.fft.irfft(np.fft.rfft(drive, size) * transfer, size)[: drive.size]
     slew = float(np.abs(np.diff(drive)).max()) * pulse.sample_rate
     return _motion(moved, pulse, specimen, configuration) | {"drive_voltage": 1.0, "drive_slew": slew}
 
 
 def _motion(moved: Array, pulse: Pulse, specimen: Specimen, configuration: BenchConfiguration) -> dict[str, float]:
-    found = largest(moved, pulse.sample_rate, specimen, configuration)
-    # a block that is held does not lift
+    found = resting_demands(moved, pulse.sample_rate, specimen, configuration)
+    # a clamped block does not lift
     return {name: value for name, value in found.items() if name != RESTING}

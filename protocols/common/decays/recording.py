@@ -1,4 +1,7 @@
-"""Recording of decays: progress of the run, the drive played from rest, and the search for its level."""
+"""Recording of the decays of one frame: search for the level, then recording, fit and point of each decay.
+
+An unusable decay is repeated once, then omitted.
+"""
 
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
@@ -6,32 +9,40 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.analysis.free_decay.decay import Decay, Setting, pulsed_decay
+from bench.analysis.free_decay.stretch import Unusable
 from bench.analysis.signals import ACCELERATION, DISPLACEMENT, DRIFT, LASER_1, LASER_2
 from bench.config.model import BenchConfiguration
-from bench.engine.steps import Arm, Fallen, Outcome, Play, Played, RampOut, Say, Step
-from bench.events import Event, Progress, StepStarted, Warned
+from bench.engine.steps import Arm, Fallen, Outcome, Play, Played, Publish, RampOut, Step
+from bench.events import Event, PointFinished, Progress, StepStarted, Warned
+from bench.preflight.margins import bounds
+from bench.preflight.motion import laser_demands, table_demands
 from protocols.common.calibrate import PROBE, Unmeasurable
-from protocols.common.decays.pulse import LEAST, QUIET, SHARE, Pulse
+from protocols.common.decays.findings import fit_finished, mass_covariance
+from protocols.common.decays.frame import FrameResult, decay_point, frame_result
+from protocols.common.decays.parameters import DecayParameters
+from protocols.common.decays.pulse import LEAST, QUIET, SHARE, PlannedPulse, Pulse
+from sim.parameters import Parameters
 
 Array = NDArray[np.float64]
 
 REST = 2.0
-"""Time at rest before each pulse, over which the zero of the signals is taken [s]."""
+"""Time at rest before each pulse, for the zero of the signals [s]."""
 
 STILL = 5e-5
-"""Scatter of the storeys at rest below which they are still [m]; a laser's steps stay below."""
+"""Scatter below which the storeys count as at rest [m]; larger than the resolution of a laser."""
 
 WAITING = 45.0
-"""Expected time of a recording besides its drive: until the storeys are still, rest, ramp [s]."""
+"""Expected time of a recording in addition to its drive: settling of the storeys, rest, ramp [s]."""
 
 DETECTABLE = 20.0
-"""Least ratio of the drift in a probe to its noise."""
+"""Minimum ratio of the drift in a probe to its noise."""
 
 GROWTH, NEAR = 10.0, 2.0
-"""Most by which the drive grows from one probe to the next; a probe is the last when less than the other is left."""
+"""Largest growth factor of the drive between probes, and remaining growth factor below which a probe is the last."""
 
 _PROBED = 3.0
-"""Time after a probe's pulse in which the largest motion comes [s]."""
+"""Time after the pulse of a probe within which the largest motion occurs [s]."""
 
 _MOST = 6
 """Largest number of probes."""
@@ -39,24 +50,24 @@ _MOST = 6
 
 @dataclass
 class Pace:
-    """Progress of a run: `expected` duration [s] of the whole, `elapsed` [s] of it."""
+    """Progress of a run: its `expected` duration [s], and the `elapsed` time [s]."""
 
     expected: float
     elapsed: float = 0.0
 
     def progress(self, activity: str) -> Progress:
-        """The progress now."""
+        """Present progress."""
         return Progress(self.elapsed / self.expected, self.expected - self.elapsed, activity)
 
     def finish(self, begun: float, planned: float) -> None:
-        """End a part for which `planned` [s] were expected, and which began when `begun` [s] had elapsed.
+        """End a part that was expected to take `planned` [s] and began when `begun` [s] had elapsed.
 
-        The time that it really took, with more probes or fewer, or a repetition, is expected in its place.
+        Its actual duration, which depends on the number of probes and repetitions, replaces the expected one.
         """
         self.expected += self.elapsed - begun - planned
 
     def watch(self, sample_rate: float, activity: str) -> Callable[[Array], Event]:
-        """Makes the progress from each block of signals."""
+        """Callback that computes the progress from each block of signals."""
         since = 0
 
         def progress(signals: Array) -> Event:
@@ -69,37 +80,35 @@ class Pace:
 
 
 def record(volts: Array, sample_rate: float, pace: Pace, activity: str) -> Generator[Step, Outcome, Array]:
-    """Arm, play and ramp out; the signals, shape (n, 6). Raises Unmeasurable when something fell."""
+    """Arm, play and ramp out. Returns the signals, shape (n, 6). Raises Unmeasurable if a fall is detected."""
     yield Arm(REST, STILL)
     outcome = yield Play(volts, pace.watch(sample_rate, activity))
     end = yield RampOut(fast=isinstance(outcome, Fallen))
     pace.elapsed += volts.size / sample_rate + WAITING
     pace.expected = max(pace.expected, pace.elapsed)
     if not isinstance(outcome, Played) or isinstance(end, Fallen):
-        raise Unmeasurable(
-            "storey 1 has moved aside for good: see to the frame, to what holds the block, and to laser 1"
-        )
+        raise Unmeasurable("storey 1 has a permanent offset: check the frame, the clamps of the block, and laser 1")
     return outcome.signals
 
 
 def find_level(
     pulse: Pulse, drift: float, configuration: BenchConfiguration, pace: Pace
 ) -> Generator[Step, Outcome, float]:
-    """The drive [V] with which the pulse makes a peak of `drift` [m], or as much as the limits allow.
+    """Find the drive [V] for which the pulse causes a peak of `drift` [m], or as much as the limits allow.
 
-    Raises Unmeasurable when the frame does not respond, or its drift does not reach `LEAST`.
+    Raises Unmeasurable if the frame does not respond, or its drift does not reach `LEAST`.
     """
     volts, seen, limit = PROBE, 0.0, _largest_drive(pulse, configuration)
     for probe in range(1, _MOST + 1):
-        yield Say(StepStarted(f"probe {probe}: a pulse of {volts:.3g} V"))
-        signals = yield from record(pulse.record(volts, _PROBED), pulse.sample_rate, pace, "the pulse is probed")
+        yield Publish(StepStarted(f"probe {probe}: a pulse of {volts:.3g} V"))
+        signals = yield from record(pulse.record(volts, _PROBED), pulse.sample_rate, pace, "probing the pulse")
         rest = round(QUIET * pulse.sample_rate)
         seen, noise = _peak(signals[:, DRIFT]), float(np.nanstd(signals[:rest, DRIFT]))
         if not seen > DETECTABLE * noise:
             if volts >= GROWTH * PROBE:
                 raise Unmeasurable(
-                    f"the frame does not answer a pulse of {volts:.2g} V: {1e3 * seen:.2g} mm of drift, noise"
-                    f" {1e3 * noise:.2g} mm; see to the amplifier, the enable line, the emergency stop and the lasers"
+                    f"the frame does not respond to a pulse of {volts:.2g} V: {1e3 * seen:.2g} mm of drift, noise"
+                    f" {1e3 * noise:.2g} mm; check the amplifier, the enable line, the emergency stop and the lasers"
                 )
             volts *= GROWTH
             continue
@@ -111,48 +120,40 @@ def find_level(
             return (yield from _accept(left * volts, left * seen, drift, binds))
         volts *= min(GROWTH, left)
     raise Unmeasurable(
-        f"after {_MOST} probes the drift comes to {1e3 * seen:.2g} mm where {1e3 * drift:.2g} mm are asked for: see to"
-        " the amplifier's gain and to what holds the table"
+        f"after {_MOST} probes the drift is {1e3 * seen:.2g} mm, {1e3 * drift:.2g} mm are required: check "
+        f"the amplifier's gain and the guides of the table"
     )
 
 
 def _accept(volts: float, seen: float, drift: float, binds: str) -> Generator[Step, Outcome, float]:
     if seen < LEAST:
         raise Unmeasurable(
-            f"{binds} leaves {1e3 * seen:.2g} mm of drift, a decay needs {1e3 * LEAST:g} mm: raise the limit, or give"
-            " another --pulse"
+            f"{binds} allows a drift of only {1e3 * seen:.2g} mm, a decay needs {1e3 * LEAST:g} mm: raise the limit, "
+            "or give another --pulse"
         )
     if seen < 0.9 * drift:
-        yield Say(Warned(f"{binds} leaves {1e3 * seen:.2g} mm of drift, {1e3 * drift:.2g} mm are asked for"))
+        yield Publish(Warned(f"{binds} allows a drift of only {1e3 * seen:.2g} mm, {1e3 * drift:.2g} mm are requested"))
     return volts
 
 
 def _headroom(signals: Array, sample_rate: float, configuration: BenchConfiguration) -> tuple[float, str]:
-    """By how much a motion may grow until it takes `SHARE` of a limit, and which that is."""
-    limits, halves = configuration.limits, [0.5 * whole for whole in configuration.laser_ranges]
-    acceleration, displacement = _peak(signals[:, ACCELERATION]), _peak(signals[:, DISPLACEMENT])
-    # the mean over some milliseconds: the difference of single samples is noise
+    """Factor by which a motion may grow until it reaches `SHARE` of a limit, and the name of that limit."""
+    # average over a few milliseconds: differences of single samples are dominated by noise
     many = max(round(0.02 * sample_rate), 1)
     rows = len(signals) // many
     smooth = signals[: rows * many, DISPLACEMENT].reshape(rows, many).mean(axis=1)
-    asked = {
-        "drift": _peak(signals[:, DRIFT]) / limits.drift,
-        "laser_range": max(_peak(signals[:, LASER_1]) / halves[0], _peak(signals[:, LASER_2]) / halves[1])
-        / min(limits.laser_range, 1.0),
-        "displacement": displacement / min(limits.displacement, configuration.half_stroke),
-        "velocity": _peak(np.diff(smooth)) * sample_rate / many / limits.velocity,
-        "acceleration": acceleration / limits.acceleration,
-    }
-    if (mover := configuration.mover) is not None:
-        asked["force"] = mover.mass * acceleration / limits.force
-        current = (mover.mass * acceleration + mover.stiffness * displacement) / mover.force_constant
-        asked["current"] = current / limits.current
-    binds = max(asked, key=lambda name: asked[name])
-    return SHARE / asked[binds], f"limits.{binds}"
+    velocity = _peak(np.diff(smooth)) * sample_rate / many
+    storeys = (_peak(signals[:, LASER_1]), _peak(signals[:, LASER_2]), _peak(signals[:, DRIFT]))
+    asked = laser_demands(*storeys, configuration.laser_half_ranges) | table_demands(
+        _peak(signals[:, DISPLACEMENT]), velocity, _peak(signals[:, ACCELERATION]), configuration.shaker_model
+    )
+    limits = bounds(configuration)
+    binds = max(asked, key=lambda name: asked[name] / limits[name].limit)
+    return SHARE / (asked[binds] / limits[binds].limit), limits[binds].owner
 
 
 def _largest_drive(pulse: Pulse, configuration: BenchConfiguration) -> float:
-    """Peak [V] of the pulse that takes `SHARE` of the limits of the drive."""
+    """Peak [V] of the pulse at `SHARE` of the limits of the drive."""
     limits = configuration.limits
     slew = float(np.abs(np.diff(pulse.shape)).max()) * pulse.sample_rate
     return SHARE * min(limits.drive_voltage, limits.drive_slew / slew)
@@ -160,3 +161,105 @@ def _largest_drive(pulse: Pulse, configuration: BenchConfiguration) -> float:
 
 def _peak(values: Array) -> float:
     return float(np.nanmax(np.abs(values)))
+
+
+PointMaker = Callable[[FrameResult, int], Parameters]
+"""Creates the point of a result; the number is 0 for all decays together."""
+
+PROBES = 3
+"""Number of probes that most tables need, for the expected duration."""
+
+_TRIES = 2
+"""Maximum number of attempts at a decay."""
+
+
+def pulsed_decays(
+    parameters: DecayParameters,
+    configuration: BenchConfiguration,
+    planned: PlannedPulse,
+    setting: Setting,
+    pace: Pace,
+    name: str,
+    point: PointMaker = decay_point,
+) -> Generator[Step, Outcome, list[Decay]]:
+    """Find the level, then record the decays; `point` creates the point of each.
+
+    Raises Unmeasurable if no decay is usable.
+    """
+    yield Publish(StepStarted(f"{name}: {1e3 * planned.drift:.3g} mm of drift, {_reason(planned)}"))
+    pulse = planned.pulse
+    begun = pace.elapsed
+    volts = yield from find_level(pulse, planned.drift, configuration, pace)
+    pace.finish(begun, _probing_duration(pulse))
+
+    def once(activity: str) -> Generator[Step, Outcome, Decay]:
+        signals = yield from record(pulse.record(volts), pulse.sample_rate, pace, activity)
+        return pulsed_decay(signals, setting, QUIET, pulse.begin)
+
+    how = f"a pulse of {volts:.3g} V, {pulse.length:.0f} s"
+    length = pulse.length + WAITING
+    return (yield from repeat_decays(parameters, setting, pace, length, once, name, how, point))
+
+
+def repeat_decays(
+    parameters: DecayParameters,
+    setting: Setting,
+    pace: Pace,
+    planned: float,
+    once: Callable[[str], Generator[Step, Outcome, Decay]],
+    name: str,
+    how: str,
+    point: PointMaker = decay_point,
+) -> Generator[Step, Outcome, list[Decay]]:
+    """Record decays by `once`, each in at most two attempts, and publish the fit and the point of each.
+
+    `planned` is the expected time of one decay [s], `name` and `how` describe the excitation. Raises Unmeasurable if no
+    decay is usable.
+    """
+    decays: list[Decay] = []
+    for number in range(1, parameters.repeats + 1):
+        begun = pace.elapsed
+        for attempt in range(_TRIES):
+            yield Publish(StepStarted(f"{name} {number} of {parameters.repeats}: {how}"))
+            try:
+                decay = yield from once(f"{name} {number} of {parameters.repeats}")
+            except Unusable as refusal:
+                again = "it is repeated" if attempt + 1 < _TRIES else "it is omitted"
+                yield Publish(Warned(f"{name} {number}: {refusal}; {again}"))
+                continue
+            decays.append(decay)
+            yield Publish(fit_finished(decay, f"{name} {number}"))
+            yield Publish(PointFinished(point(frame_result([decay], setting.masses, setting.weighed), number)))
+            break
+        pace.finish(begun, planned)
+        yield Publish(pace.progress(f"finished {name} {number} of {parameters.repeats}"))
+    if not decays:
+        raise Unmeasurable("no decay was usable: see the warnings of this run")
+    return decays
+
+
+def fit_setting(parameters: DecayParameters, configuration: BenchConfiguration) -> Setting:
+    """Known values for the fit of a decay, with the covariance of the masses."""
+    frame = configuration.known_specimen.frame
+    return Setting(
+        sample_rate=configuration.sample_rate,
+        ranges=configuration.laser_ranges,
+        on_table=configuration.laser_reference == "table",
+        accuracy=configuration.analysis,
+        masses=(frame.m1, frame.m2),
+        weighed=mass_covariance(parameters, configuration.identified),
+    )
+
+
+def pulsed_duration(parameters: DecayParameters, pulse: Pulse) -> float:
+    """Expected length of the decays after pulses [s]."""
+    return _probing_duration(pulse) + parameters.repeats * (pulse.length + WAITING)
+
+
+def _probing_duration(pulse: Pulse) -> float:
+    """Expected time of the probes before the decays [s]."""
+    return PROBES * (pulse.begin + WAITING)
+
+
+def _reason(planned: PlannedPulse) -> str:
+    return "as requested" if planned.binds == "requested drift" else f"{planned.binds} is the limit"

@@ -1,1 +1,1 @@
-"""The identification of the table by multisines, as a stage of any protocol."""
+"""Identification of the table by multisines, a stage shared by several protocols."""

@@ -1,4 +1,4 @@
-"""What the identification asks for: declared once, used by command line, file and documentation."""
+"""Parameters of the table identification."""
 
 from pydantic import model_validator
 
@@ -20,39 +20,45 @@ class IdentifyParameters(Parameters):
     band_low: float | None = quantity(
         None,
         "Hz",
-        "lower end of the band; absent: half that of the table's band, as a replication needs it",
+        "lower end of the band; absent: half that of the table's band, as required for replication",
         gt=0,
         usual=(0.2, 1.8),
     )
     band_high: float | None = quantity(
         None,
         "Hz",
-        "upper end of the band; absent: twice that of the table's band, as a replication needs it",
+        "upper end of the band; absent: twice that of the table's band, as required for replication",
         gt=0,
         usual=(8.0, 80.0),
     )
     corner: float = quantity(
-        1.0, "Hz", "the motion is flat in displacement below this frequency, in acceleration above", gt=0, le=50
+        1.0,
+        "Hz",
+        "below this frequency the motion has constant displacement, above it constant acceleration",
+        gt=0,
+        le=50,
     )
     level: float = quantity(
         0.6,
         "m/s2",
-        "peak of the table's acceleration at most; less where the bench or a standing block asks for it",
+        "peak of the table's acceleration, reduced if required by the bench or to keep the block at rest",
         gt=0,
     )
-    period: float = quantity(8.0, "s", "period of the multisines: one over the distance of their lines", ge=0.5, le=120)
+    period: float = quantity(8.0, "s", "period of the multisines, the inverse of their line spacing", ge=0.5, le=120)
     realisations: int = quantity(
-        3, "1", "multisines with phases of their own: distortion shows between them", ge=2, le=50
+        3, "1", "number of multisines with different phases; their differences show the distortion", ge=2, le=50
     )
-    periods: int = quantity(3, "1", "periods of each that are used: noise shows between them", ge=2, le=50)
+    periods: int = quantity(3, "1", "used periods of each multisine; their differences show the noise", ge=2, le=50)
     discarded: int | None = quantity(
         None,
         "1",
-        "periods at the start of each that are left out; absent: until 2 % are left of what the start has excited",
+        "discarded periods at the start of each multisine; absent: until the transient of the start has decayed to 2 %",
         ge=1,
         le=100,
     )
-    odd_lines: bool = quantity(False, "", "leave every other line out: those left carry no distortion of even order")
+    odd_lines: bool = quantity(
+        False, "", "omit every other line, so that the remaining lines have no distortion of even order"
+    )
     phase_seed: int = quantity(1, "", "seed of the phases", ge=0, lt=2**32)
 
     @model_validator(mode="after")

@@ -1,11 +1,12 @@
-"""The steps of an identification.
+"""Steps of an identification.
 
-1. The specimen is mounted. The table is probed from a drive too small to do harm up to the level.
-2. Multisines with random phases are played, each from rest; their first periods are left out.
-3. Response, noise and distortion follow from the periods.
+1. The specimen is mounted. The table is probed from a drive too small to cause damage up to the level.
+2. Multisines with random phases are played, each from rest; their first periods are discarded.
+3. Response, noise and distortion are computed from the periods.
 """
 
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime
 
 import numpy as np
@@ -13,27 +14,167 @@ from numpy.typing import NDArray
 
 from bench.analysis.signals import ACCELERATION, DISPLACEMENT
 from bench.config.model import BenchConfiguration
-from bench.control.identification import identify_table, line_amplitudes, line_response, sensor_agreement
+from bench.control.identification import identify_table, line_amplitudes, line_response, sensor_agreement, waveform
 from bench.control.table_model import TableModel
-from bench.engine.steps import Fallen, Handle, Outcome, Played, Say, Step
-from bench.events import StepStarted, TableIdentified, Warned
-from drivers.rig import Handwork
-from protocols.common.calibrate import Unmeasurable
-from protocols.common.identification.level import Planned, mounted_name, specimen_of
-from protocols.common.identification.motion import RESTING, largest
+from bench.engine.steps import Arm, Fallen, OperatorAction, Outcome, Play, Played, Publish, RampOut, Step
+from bench.events import Event, Progress, StepStarted, TableIdentified, Warned
+from bench.guard.limits import Limits
+from bench.preflight.motion import RESTING, resting_demands
+from drivers.rig import OperatorTask
+from protocols.common.calibrate import PROBE, Unmeasurable
 from protocols.common.identification.parameters import IdentifyParameters
-from protocols.common.identification.playing import OVERHEAD, Rules, played
-from protocols.common.identification.probe import probed_response
-from protocols.common.identification.signal import drive_for
+from protocols.common.identification.signal import (
+    Complex,
+    Grid,
+    Planned,
+    drive_for,
+    mounted_name,
+    seen_peak,
+    specimen_of,
+)
 from sim.specimen import Specimen
 
 Array = NDArray[np.float64]
 
+REST = 2.0
+"""Time at rest before each drive, for the zero of the signals [s]."""
+
+OVERHEAD = 12.0
+"""Time in addition to the drive: rest, settling of the storeys, ramp [s]."""
+
+
+@dataclass
+class Rules:
+    """Limits and progress of all drives of one identification; `knee` [Hz] is the upper end of the table's band.
+
+    `expected` [s] is the total length, of which `gone` [s] have been played.
+    """
+
+    limits: Limits
+    sample_rate: float
+    knee: float
+    expected: float
+    gone: float = 0.0
+
+    def require_drive(self, volts: Array) -> None:
+        """Raise Unmeasurable for a drive beyond its limits: the table responds less than expected."""
+        peak, slew = float(np.abs(volts).max()), float(np.abs(np.diff(volts)).max()) * self.sample_rate
+        limits = self.limits
+        if peak > limits.drive_voltage or slew > limits.drive_slew:
+            raise Unmeasurable(
+                f"the motion would need {peak:.3g} V and {slew:.3g} V/s of drive, limits.drive_voltage ="
+                f" {limits.drive_voltage:g} V, limits.drive_slew = {limits.drive_slew:g} V/s: reduce --level, or use a "
+                "narrower band"
+            )
+
+    def progress(self, activity: str) -> Progress:
+        return Progress(self.gone / self.expected, self.expected - self.gone, activity)
+
+    def remains(self, seconds: float) -> None:
+        """Set the expected remaining time [s], since the number of probes depends on the table."""
+        self.expected = self.gone + seconds
+
+    def watch(self) -> Callable[[Array], Event]:
+        """Callback that computes the progress from each block of signals."""
+        since = 0
+
+        def progress(signals: Array) -> Event:
+            nonlocal since
+            since += len(signals)
+            gone = min(self.gone + since / self.sample_rate, self.expected)
+            return Progress(gone / self.expected, self.expected - gone, "playing the multisine")
+
+        return progress
+
+
+def played(volts: Array, rules: Rules) -> Generator[Step, Outcome, Played | Fallen]:
+    """Arm, play and ramp out; `Fallen` also when the block falls in the ramp."""
+    yield Arm(REST)
+    outcome = yield Play(volts, rules.watch())
+    end = yield RampOut(fast=isinstance(outcome, Fallen))
+    rules.gone += volts.size / rules.sample_rate + OVERHEAD
+    if isinstance(outcome, Played) and not isinstance(end, Fallen):
+        return outcome
+    return Fallen()
+
+
+GROWTH = 10.0
+"""Largest growth factor of the table's motion between probes."""
+
+REACHED = 0.95
+"""Share of the final motion above which a probe is the last."""
+
+AUDIBLE = 2.0
+"""Minimum ratio of the response to its noise."""
+
+_AUDIBLE_BY = 2
+"""Number of the probe by which the table must respond."""
+
+_MOST = 6
+"""Largest number of probes."""
+
+
+def probed_response(motion: Complex, grid: Grid, rules: Rules) -> Generator[Step, Outcome, Complex | Fallen]:
+    """Response of the table [m/s2/V] at the lines, measured with `motion` [m/s2].
+
+    Raises Unmeasurable if the table does not respond, or does not reach the motion.
+    """
+    short = grid.shortened()
+    level, reached = seen_peak(motion, short, rules.knee), 0.0
+    # until the response is measured, use the spectrum of the acceleration for the drive
+    drive = motion * (PROBE / _peak(motion, short))
+    for probe in range(1, _MOST + 1):
+        rules.require_drive(short.record(drive))
+        yield Publish(StepStarted(f"probe {probe}: {_peak(drive, short):.3g} V"))
+        outcome = yield from played(short.record(drive), rules)
+        if isinstance(outcome, Fallen):
+            return outcome
+        volts, moved = (line_amplitudes(short.used(of), short.lines) for of in (outcome.drive, _acceleration(outcome)))
+        answer, noise = _answer(moved)
+        if not answer > AUDIBLE * noise:
+            if probe >= _AUDIBLE_BY:
+                raise Unmeasurable(
+                    f"the table does not respond to a drive of {_peak(drive, short):.2g} V: {answer:.2g} m/s2, noise"
+                    f" {noise:.2g}; check the amplifier, the enable line, the emergency stop and the accelerometer"
+                )
+            drive = GROWTH * drive
+            continue
+        response = moved.mean(axis=0) / volts.mean(axis=0)
+        reached = seen_peak(moved.mean(axis=0), short, rules.knee)
+        if reached >= REACHED * level:
+            return response
+        drive = drive_for(motion, response, short, rules.knee) * min(1.0, GROWTH * reached / level)
+    raise Unmeasurable(
+        f"after {_MOST} probes the acceleration of the table is {reached:.2g} m/s2, {level:.2g} are required: check "
+        "the amplifier's gain and the guides of the table"
+    )
+
+
+def _acceleration(outcome: Played) -> NDArray[np.float64]:
+    return outcome.signals[:, ACCELERATION]
+
+
+def _answer(moved: Complex) -> tuple[float, float]:
+    """Rms of the mean of the periods, and of its noise, estimated from the scatter of the periods.
+
+    Without a response both are equal except for their scatter, which decreases with the number of lines.
+    """
+    periods, mean = moved.shape[0], moved.mean(axis=0)
+    noise = np.sum(np.abs(moved - mean) ** 2) / (periods * (periods - 1))
+    return float(np.sqrt(np.sum(np.abs(mean) ** 2))), float(np.sqrt(noise))
+
+
+def _peak(spectrum: Complex, grid: Grid) -> float:
+    return float(np.abs(waveform(grid.lines, spectrum, grid.samples)).max())
+
+
+Array = NDArray[np.float64]
+
 PROBES = 3
-"""Probes that most tables take to the level: for the expected duration."""
+"""Number of probes that most tables need, for the expected duration."""
 
 SENSORS_AGREE = 0.05
-"""Relative difference of the table's two sensors, or turn [rad] at the corner of the band, that is worth a warning."""
+"""Relative difference of the table's two sensors, or phase difference [rad] at the band edge, that causes a warning."""
 
 
 def expected_duration(parameters: IdentifyParameters, found: Planned) -> float:
@@ -45,7 +186,7 @@ def expected_duration(parameters: IdentifyParameters, found: Planned) -> float:
 def identified(
     parameters: IdentifyParameters, configuration: BenchConfiguration, found: Planned
 ) -> Generator[Step, Outcome, TableModel]:
-    """The identification with the motions that were `found`, from the specimen on the table to the model."""
+    """The whole identification with the planned motions `found`, from mounting the specimen to the table model."""
     specimen = specimen_of(parameters, configuration)
     rules = Rules(
         configuration.limits,
@@ -54,7 +195,7 @@ def identified(
         expected_duration(parameters, found),
     )
     yield _mounting(specimen)
-    yield Say(StepStarted(_level(found)))
+    yield Publish(StepStarted(_level(found)))
     response = yield from probed_response(found.motions[0], found.grid, rules)
     if isinstance(response, Fallen):
         raise (yield from _fell(specimen))
@@ -62,7 +203,7 @@ def identified(
     rules.remains(parameters.realisations * each)
     records: list[Played] = []
     for number, motion in enumerate(found.motions, 1):
-        yield Say(StepStarted(f"multisine {number} of {parameters.realisations}, {found.grid.duration:.0f} s"))
+        yield Publish(StepStarted(f"multisine {number} of {parameters.realisations}, {found.grid.duration:.0f} s"))
         volts = found.grid.record(drive_for(motion, response, found.grid, rules.knee))
         rules.require_drive(volts)
         outcome = yield from played(volts, rules)
@@ -71,44 +212,44 @@ def identified(
         yield from _warned(outcome, specimen, configuration)
         records.append(outcome)
         rules.remains((parameters.realisations - number) * each)
-        yield Say(rules.progress(f"finished multisine {number} of {parameters.realisations}"))
+        yield Publish(rules.progress(f"finished multisine {number} of {parameters.realisations}"))
     model, agreement = _identified(records, found, specimen)
     yield from _told(model, agreement)
     return model
 
 
-def _mounting(specimen: Specimen) -> Handle:
+def _mounting(specimen: Specimen) -> OperatorAction:
     if specimen.beta is None:
-        return Handle(Handwork.REMOVE_BLOCK, specimen, "Take the spring and the block off the table.")
-    request = f"Stand the block on its base and mount the spring of beta = {specimen.label:g}."
-    return Handle(Handwork.MOUNT_SPRING, specimen, request)
+        return OperatorAction(OperatorTask.REMOVE_BLOCK, specimen, "Remove the spring and the block from the table.")
+    request = f"Set the block upright on its base and mount the spring of beta = {specimen.label:g}."
+    return OperatorAction(OperatorTask.MOUNT_SPRING, specimen, request)
 
 
 def _level(found: Planned) -> str:
-    reason = "as asked for" if found.binds == "level" else f"{found.binds} allows no more"
+    reason = "as requested" if found.binds == "level" else f"{found.binds} is the limit"
     return f"probe the table; the level is {found.level:.3g} m/s2, {reason}"
 
 
 def _fell(specimen: Specimen) -> Generator[Step, Outcome, Unmeasurable]:
-    """Have the block stood up; the error that ends the run."""
+    """Request that the block be set upright. Returns the error that ends the run."""
     if specimen.beta is None:
-        return Unmeasurable("storey 1 has moved aside for good, and no block stands: see to frame and lasers")
-    yield Handle(Handwork.STAND_BLOCK_UP, specimen, "The block has fallen. Stand it up again on its base.")
-    return Unmeasurable("the block fell at a level that should leave it at rest: see to its base, ask for less --level")
+        return Unmeasurable("storey 1 has a permanent offset without a standing block: check frame and lasers")
+    yield OperatorAction(OperatorTask.STAND_BLOCK_UP, specimen, "The block has fallen. Set it upright on its base.")
+    return Unmeasurable("the block fell at a level that should leave it at rest: check its base, or reduce --level")
 
 
 def _warned(outcome: Played, specimen: Specimen, configuration: BenchConfiguration) -> Generator[Step, Outcome, None]:
-    """Say when the measured motion came near to lifting the block: what rocks is another system."""
+    """Warn if the measured motion was close to uplift, since a rocking block changes the system."""
     moved = outcome.signals[:, ACCELERATION]
-    share = largest(moved, configuration.sample_rate, specimen, configuration).get(RESTING, 0.0)
+    share = resting_demands(moved, configuration.sample_rate, specimen, configuration).get(RESTING, 0.0)
     if share > 1.0:
-        yield Say(Warned(f"the block may have lifted: the moment came to {share:.2f} of that of its weight"))
+        yield Publish(Warned(f"the block may have lifted: the moment reached {share:.2f} of that of its weight"))
 
 
 def _identified(
     records: Sequence[Played], found: Planned, specimen: Specimen
 ) -> tuple[TableModel, tuple[float, float]]:
-    """The model, and gain and lead [s] of the displacement sensor against the accelerometer."""
+    """Table model, and gain and lead [s] of the displacement sensor relative to the accelerometer."""
     grid = found.grid
     drive = np.array([grid.used(record.drive) for record in records])
     moved = [np.array([grid.used(record.signals[:, at]) for record in records]) for at in (ACCELERATION, DISPLACEMENT)]
@@ -124,12 +265,12 @@ def _told(model: TableModel, agreement: tuple[float, float]) -> Generator[Step, 
     low, high = model.band
     text = f"{model.specimen}, {low:g} to {high:g} Hz, {len(model.frequency)} lines, {model.level:.3g} m/s2 rms"
     columns = ("frequency", "real", "imaginary", "uncertainty", "distortion", "coherence", "noise")
-    yield Say(TableIdentified(text, *(np.array(getattr(model, name)) for name in columns)))
+    yield Publish(TableIdentified(text, *(np.array(getattr(model, name)) for name in columns)))
     gain, lead = agreement
     if abs(gain - 1.0) > SENSORS_AGREE or abs(2.0 * np.pi * low * lead) > SENSORS_AGREE:
-        yield Say(
+        yield Publish(
             Warned(
-                f"table_displacement says {gain:.3f} times what table_acceleration says, {1e3 * lead:+.2f} ms apart:"
-                " see to both with `rockbench check`",
+                f"table_displacement measures {gain:.3f} times the motion of table_acceleration "
+                f"with a lead of {1e3 * lead:+.2f} ms: check both with `rockbench check`",
             )
         )

@@ -1,4 +1,6 @@
-"""The multisines of an identification: the motions that are wanted, and the volts that are played for them."""
+"""Multisines of an identification: requested motions, their level within the limits of bench and resting block, and the
+drive for them.
+"""
 
 from dataclasses import dataclass
 from math import ceil, log
@@ -7,10 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.config.model import BenchConfiguration
-from bench.control.identification import steady_periods
-from bench.control.multisine import Lines, band_lines, drive_amplitudes, multisine, waveform
-from bench.control.octaves import octave_mean
+from bench.control.identification import Lines, band_lines, drive_amplitudes, multisine, steady_periods, waveform
+from bench.control.table_model import octave_mean
 from bench.control.target import REACH
+from bench.preflight.demands import response_of
+from bench.preflight.margins import bounds
+from bench.preflight.motion import RESTING, resting_demands
 from protocols.common.identification.parameters import IdentifyParameters
 from sim.errors import InvalidInput
 from sim.specimen import Specimen
@@ -20,15 +24,15 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 FADE = 0.25
-"""Time in which a multisine is faded in and out, in its periods."""
+"""Duration of the fade-in and the fade-out of a multisine, in periods."""
 
 _LEFT = 0.02
-"""What is left of the specimen's own motion when the first period is used."""
+"""Remaining share of the specimen's transient at the first used period."""
 
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """The lines of an identification and how often their period is played: `discarded` periods, then `periods`."""
+    """Frequency lines of an identification, and the number of `discarded` and used `periods`."""
 
     lines: Lines
     samples: int
@@ -38,49 +42,49 @@ class Grid:
 
     @property
     def frequency(self) -> Array:
-        """Of the lines [Hz], shape (n_lines,)."""
+        """Frequencies of the lines [Hz], shape (n_lines,)."""
         return self.lines.astype(np.float64) * (self.sample_rate / self.samples)
 
     @property
     def fade(self) -> int:
-        """Samples in which a record is faded in, and out."""
+        """Number of samples of the fade-in and of the fade-out."""
         return round(FADE * self.samples)
 
     @property
     def duration(self) -> float:
-        """Length of what is played for one realisation [s]."""
+        """Length of the drive of one realisation [s]."""
         return (2 * self.fade + (self.discarded + self.periods) * self.samples) / self.sample_rate
 
     def shortened(self) -> "Grid":
-        """The same lines for a probe: two periods after one that is left out."""
+        """Grid of a probe: the same lines with one discarded and two used periods."""
         return Grid(self.lines, self.samples, self.sample_rate, 1, 2)
 
     def record(self, spectrum: Complex) -> Array:
-        """What is played or moved for a spectrum at the lines, shape (n,): faded in and out, zero at both ends."""
+        """Signal of a spectrum at the lines, shape (n,), faded in and out from and to zero."""
         whole = np.tile(waveform(self.lines, spectrum, self.samples), self.discarded + self.periods)
         one, n = whole[: self.samples], self.fade
         rise = 0.5 * (1.0 - np.cos(np.pi * np.arange(n) / n))
         return np.concatenate((rise * one[self.samples - n :], whole, rise[::-1] * one[:n]))
 
     def used(self, record: Array) -> Array:
-        """The periods in steady state of a signal taken while `record` was played, shape (periods, samples).
+        """Steady-state periods of a signal recorded while `record` was played, shape (periods, samples).
 
-        Raises InvalidInput when a sample of them is missing.
+        Raises InvalidInput for missing samples.
         """
         return steady_periods(record[self.fade : record.size - self.fade], self.samples, self.discarded)
 
 
 def grid(parameters: IdentifyParameters, configuration: BenchConfiguration, specimen: Specimen) -> Grid:
-    """The lines that `parameters` ask for on this bench. Raises InvalidInput for a band that holds none."""
+    """Frequency lines for `parameters` on this bench. Raises InvalidInput for a band without lines."""
     rate = configuration.sample_rate
     samples = round(parameters.period * rate)
     low, high = band(parameters, configuration)
     spacing = rate / samples
     if low < spacing:
         raise InvalidInput(
-            "period", parameters.period, f"a line at {low:g} Hz needs a period of {1.0 / low:g} s at least"
+            "period", parameters.period, f"a line at {low:g} Hz needs a period of at least {1.0 / low:g} s"
         )
-    # a line at or beyond either end: nothing is extrapolated
+    # lines at or beyond both ends, so that nothing is extrapolated
     wide = (2 if parameters.odd_lines else 1) * spacing
     lines = band_lines(samples, rate, (max(low - wide, spacing), high + wide), odd=parameters.odd_lines)
     first = int(np.searchsorted(lines * spacing, low * (1.0 + 1e-9), side="right")) - 1
@@ -91,7 +95,7 @@ def grid(parameters: IdentifyParameters, configuration: BenchConfiguration, spec
 
 
 def band(parameters: IdentifyParameters, configuration: BenchConfiguration) -> tuple[float, float]:
-    """The band that is identified [Hz]: as asked for, else all that a motion within the table's band takes."""
+    """Identified band [Hz]: as given in the parameters, else as required for replication."""
     low, high = configuration.table_band
     return parameters.band_low or low / REACH, parameters.band_high or high * REACH
 
@@ -109,10 +113,10 @@ def wanted_motions(parameters: IdentifyParameters, lines: Grid) -> list[Complex]
 
 
 def drive_for(motion: Complex, response: Complex, grid: Grid, knee: float) -> Complex:
-    """Complex amplitudes of the drive [V] for those of an acceleration, by the table's `response` as far as known.
+    """Complex amplitudes of the drive [V] for those of an acceleration, using the table's `response` where known.
 
-    Above the `knee` [Hz], where filters take their part of what is measured, the drive is what it is in the octave
-    below: asking for the whole motion there would make much more of it.
+    Above the `knee` [Hz], where filters attenuate the measured response, the drive is that of the octave below;
+    dividing by the attenuated response would make the motion much too large.
     """
     frequency = grid.frequency
     size = np.sqrt(octave_mean(np.abs(response) ** 2, frequency))
@@ -124,12 +128,82 @@ def drive_for(motion: Complex, response: Complex, grid: Grid, knee: float) -> Co
 
 
 def seen_peak(motion: Complex, grid: Grid, knee: float) -> float:
-    """Peak [m/s2] of an acceleration by its lines up to half the `knee` [Hz], which no filter has touched."""
+    """Peak [m/s2] of an acceleration from its lines up to half the `knee` [Hz], where no filter attenuates."""
     seen = grid.frequency <= 0.5 * knee
     seen = seen if seen.any() else np.ones(seen.shape, np.bool_)
     return float(np.abs(waveform(grid.lines[seen], motion[seen], grid.samples)).max())
 
 
 def _settling(specimen: Specimen) -> float:
-    """Time until the share `_LEFT` is left of the specimen's slowest motion [s]; with a block, while it rests."""
+    """Time for the slowest motion of the specimen, with a resting block, to decay to the share `_LEFT` [s]."""
     return log(_LEFT) / float(resting_rates(specimen).real.max())
+
+
+SHARE = 0.75
+"""Share of each limit that is used."""
+
+BLOCK_SHARE = 0.6
+"""Share of the uplift moment that is used; the margin covers the uncertainty of spring, frame and base."""
+
+
+@dataclass(frozen=True, eq=False)
+class Planned:
+    """Planned multisines: acceleration spectra `motions` at the lines of `grid`, whose largest peak is `level`.
+
+    `asked` are the largest magnitudes of their demands. `binds` names the limit that determines the level.
+    """
+
+    grid: Grid
+    motions: tuple[Complex, ...]
+    level: float
+    asked: dict[str, float]
+    binds: str
+
+
+def specimen_of(parameters: IdentifyParameters, configuration: BenchConfiguration) -> Specimen:
+    """Specimen on the table during the identification."""
+    specimen = configuration.known_specimen
+    return specimen.bare() if parameters.beta is None else specimen.coupled(parameters.beta)
+
+
+def mounted_name(specimen: Specimen) -> str:
+    """Name of the mounted specimen in a table model."""
+    return "bare frame" if specimen.beta is None else f"block with the spring of beta = {specimen.label:g}"
+
+
+def planned(parameters: IdentifyParameters, configuration: BenchConfiguration) -> Planned:
+    """Plan the motions at the allowed level.
+
+    The drive is a limit only if the table is known: simulated, or identified before. Raises InvalidInput for a band
+    that the bench cannot produce.
+    """
+    specimen = specimen_of(parameters, configuration)
+    lines = grid(parameters, configuration, specimen)
+    unit = wanted_motions(parameters, lines)
+    each = [_asked(lines, motion, specimen, configuration) for motion in unit]
+    asked = {name: max(one[name] for one in each) for name in each[0]}
+    limits = {name: SHARE * bound.limit for name, bound in bounds(configuration).items()} | {RESTING: BLOCK_SHARE}
+    allowed = {name: limits[name] / value for name, value in asked.items() if value > 0.0}
+    binds = min(allowed, key=lambda name: allowed[name])
+    if parameters.level <= allowed[binds]:
+        binds = "level"
+    level = min(parameters.level, *allowed.values())
+    scaled = {name: level * value for name, value in asked.items()}
+    return Planned(lines, tuple(level * motion for motion in unit), level, scaled, binds)
+
+
+def _asked(lines: Grid, motion: Complex, specimen: Specimen, configuration: BenchConfiguration) -> dict[str, float]:
+    found = resting_demands(lines.record(motion), lines.sample_rate, specimen, configuration)
+    return found | _drive(lines, motion, specimen, configuration)
+
+
+def _drive(lines: Grid, motion: Complex, specimen: Specimen, configuration: BenchConfiguration) -> dict[str, float]:
+    """Peaks of the drive and of its slew rate, if the response of the table is known over the whole band."""
+    response = response_of(configuration)
+    if response is None:
+        return {}
+    omega: Array = 2.0 * np.pi * lines.frequency
+    gain = response.gain(omega, specimen.mass).astype(np.complex128)
+    volts = lines.record(drive_for(motion, gain, lines, configuration.table_band[1]))
+    slew = np.diff(volts) * lines.sample_rate
+    return {"drive_voltage": float(np.abs(volts).max()), "drive_slew": float(np.abs(slew).max())}

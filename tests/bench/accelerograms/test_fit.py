@@ -11,8 +11,8 @@ from scipy.interpolate import make_interp_spline
 from bench.accelerograms.read import read_accelerogram
 from bench.accelerograms.synthetic import synthetic_record
 from bench.analysis.response_spectrum import pseudo_acceleration
-from bench.cli.main import main
-from bench.control.stroke.fit import PERIODS
+from bench.app.cli.main import main
+from bench.control.stroke_fit import PERIODS
 from sim.specimen import Frame
 
 REACH = 0.9 * 0.060, 0.9 * 0.60

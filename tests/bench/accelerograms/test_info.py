@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.cli.main import main
-from bench.report.record_figure import MOST_POINTS, RecordPicture, record_figure
+from bench.app.cli.main import main
+from bench.figures.record_figure import MOST_POINTS, RecordPicture, record_figure
 from tests.bench.accelerograms import writers
 from tests.bench.accelerograms.writers import Block
 
@@ -62,7 +62,7 @@ def test_text_and_figure(file: Path, tmp_path: Path, capsys: pytest.CaptureFixtu
 @pytest.mark.parametrize(
     ("arguments", "word"),
     [
-        ([], "give one record or more"),
+        ([], "give at least one record"),
         (["missing.AT2"], "no such file"),
         (["{file}", "--unit", "cm/s2"], "states g"),
         (["{file}", "--plot", "a.bmp"], ".png, .pdf, .svg"),
@@ -85,7 +85,7 @@ def test_refusals_are_one_line_and_leave_nothing(
 def test_a_drift_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "half.txt").write_text("\n".join(f"{value:.6f}" for value in np.sin(np.linspace(0.0, np.pi, 50))))
     assert main(["records", "info", str(tmp_path / "half.txt"), "--dt", "0.01", "--unit", "m/s2"]) == 0
-    assert "it drifts" in capsys.readouterr().out
+    assert "baseline drift" in capsys.readouterr().out
 
 
 def test_a_long_history_keeps_its_peaks_in_the_figure() -> None:

@@ -92,7 +92,7 @@ def test_the_first_and_the_last_sample(
         (ERZINCAN, "@column=1,dt=0.01,unit=cm/s2", "line 2 ="),
         (CAMPAIGN / "RSN1119_KOBE_TAZ000.csv", "", "@unit="),
         (CAMPAIGN / "RSN1119_KOBE_TAZ000.csv", "@unit=g,dt=0.02", "0.01 s"),
-        (CAMPAIGN / "AQV_20090406_ITACA16837.metadata", "", "like no format"),
+        (CAMPAIGN / "AQV_20090406_ITACA16837.metadata", "", "unrecognised file format"),
     ],
 )
 def test_what_must_be_given_or_is_refused(path: Path, options: str, word: str) -> None:

@@ -40,8 +40,8 @@ def test_a_file_with_options(text: str, path: str | None, options: dict[str, obj
         ("@dt=0.01", "it must be FILE"),
         ("synthetic:nowhere", NAMES[0]),
         ("synthetic:", NAMES[0]),
-        (f"synthetic:{NAMES[0]}:x", "whole number"),
-        (f"synthetic:{NAMES[0]}:", "whole number"),
+        (f"synthetic:{NAMES[0]}:x", "integer"),
+        (f"synthetic:{NAMES[0]}:", "integer"),
         (f"synthetic:{NAMES[0]}@dt=0.1", "no option but name"),
     ],
 )

@@ -17,7 +17,7 @@ class Another:
         self._held = ExitStack()
 
     def holds(self, kind: str) -> None:
-        """Reserve the "inputs", "output" or "line" of Dev1."""
+        """Reserve the "inputs", "output" or "line" of Dev1, or an "engine" of the inputs of cRIO1."""
         task: Any = self._held.enter_context(
             nidaqmx.Task("somebody_else", grpc_options=GrpcSessionOptions(self._channel, "somebody_else"))
         )
@@ -25,6 +25,9 @@ class Another:
             task.do_channels.add_do_chan("Dev1/port0/line0")
         elif kind == "output":
             task.ao_channels.add_ao_voltage_chan("Dev1/ao0")
+        elif kind == "engine":
+            task.ai_channels.add_ai_voltage_chan("cRIO1Mod2/ai0")
+            task.timing.cfg_samp_clk_timing(1000.0, sample_mode=AcquisitionType.CONTINUOUS)
         else:
             task.ai_channels.add_ai_voltage_chan("Dev1/ai7")
             task.timing.cfg_samp_clk_timing(1000.0, sample_mode=AcquisitionType.CONTINUOUS)

@@ -72,7 +72,7 @@ def test_a_client_that_is_driving_is_left_alone(open_session: OpenSession, plant
         first.read(BLOCK)
     other.join()
     assert isinstance(refused[0], DeviceNotFound)
-    assert "another client is driving the shaker" in str(refused[0])
+    assert "another client drives the shaker" in str(refused[0])
     assert plant.enabled
     assert len(first.read(BLOCK)) == BLOCK
 

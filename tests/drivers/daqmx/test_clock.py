@@ -47,6 +47,6 @@ def test_with_a_clock_of_its_own_it_does_not_and_the_session_says_which_it_has(o
 
 
 def test_a_clock_of_another_device_is_refused_and_nothing_falls_back(open_session: OpenSession) -> None:
-    session = open_session(clock="/cRIO1/te0/SampleClock")
+    session = open_session(clock="/cRIO1/it0/SampleClock")
     with pytest.raises(RigError, match=r"hardware\.daq\.clock"):
         started(session, np.zeros(200))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers.daqmx.enable import EnableLine
+from drivers.daqmx.safety import EnableLine
 from drivers.daqmx.session import DaqSession
 from drivers.emulation.daqmx.server import DaqServer
 from drivers.errors import ConnectionLost, DeviceTimeout, DriveUnderflow, InputOverflow, RigError
@@ -137,7 +137,7 @@ def test_a_relay_whose_task_does_not_stop_is_reported_though_it_is_open(
 ) -> None:
     driving(session)
     server.fail_next("StopTask", -200077)
-    with pytest.raises(RigError, match="letting go of the enable relay, which is open"):
+    with pytest.raises(RigError, match="releasing the enable relay, which is open"):
         session.stop()
     assert not plant.enabled
     session.stop()

@@ -88,7 +88,7 @@ def test_a_line_that_cannot_be_turned_over_ends_the_run(
 ) -> None:
     driving(session)
     server.fail_next("WriteDigitalLines", -200077)
-    with pytest.raises(RigError, match="turning the heartbeat line over"):
+    with pytest.raises(RigError, match="toggling the heartbeat line"):
         session.read(BLOCK)
     assert not plant.enabled
 

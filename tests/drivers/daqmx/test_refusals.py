@@ -19,13 +19,13 @@ from tests.drivers.daqmx.others import Another
 @pytest.mark.parametrize(
     ("change", "item", "told"),
     [
-        ({"output": "Dev7/ao0"}, "hardware.daq.output", "there is no device Dev7; there is: Dev1"),
+        ({"output": "Dev7/ao0"}, "hardware.daq.output", "no device Dev7 exists; available: Dev1"),
         ({"output": "Dev1/ao4"}, "hardware.daq.output", "Dev1/ao0 to Dev1/ao3"),
         ({"output": "Dev1/ai0"}, "hardware.daq.output", "no such analogue output"),
         ({"enable_line": "Dev1/port9/line0"}, "hardware.daq.enable_line", "no such digital output line"),
         ({"inputs": (AnalogInput(terminal="Dev1/ai32"),)}, "terminal of an input", "Dev1/ai0 to Dev1/ai31"),
         ({"inputs": (AnalogInput(terminal="Dev1/ai0:3"),)}, "terminal of an input", "no such analogue input"),
-        ({"inputs": (AnalogInput(terminal="Dev2/ai0"),)}, "terminal of an input", "there is no device Dev2"),
+        ({"inputs": (AnalogInput(terminal="Dev2/ai0"),)}, "terminal of an input", "no device Dev2 exists"),
         ({"inputs": (AnalogInput(range=30.0),)}, "range of input Dev1/ai0", "at most +-10 V"),
         (
             {"inputs": (AnalogInput(wiring="pseudodifferential"),)},
@@ -35,7 +35,7 @@ from tests.drivers.daqmx.others import Another
         ({"inputs": ()}, "inputs", "at least one"),
         # the data sheet: 2 MS/s for one channel, 1 MS/s for all together
         ({"rate": 251e3}, "sample_rate", "4 inputs of Dev1 (USB-6363) are read at most 250000/s each"),
-        ({"rate": 2.9e6}, "sample_rate", "makes at most 2.86e+06/s"),
+        ({"rate": 2.9e6}, "sample_rate", "has a maximum rate of 2.86e+06/s"),
         ({"rate": 0.0}, "sample_rate", "greater than 0"),
         ({"lead": -1}, "lead", "0 or more"),
         ({"watchdog": 1.0, "enable_line": None}, "hardware.daq.watchdog", "hardware.daq.enable_line"),
@@ -69,7 +69,7 @@ def test_a_rate_that_the_device_does_not_have_is_refused(open_session: OpenSessi
 def test_a_watchdog_that_the_device_does_not_have_is_refused() -> None:
     with DaqServer(Loopback(RATE), compact_rio()) as server:
         daq = Daq(server=server.address, output="cRIO1Mod3/ao0", enable_line="cRIO1Mod4/port0/line0", watchdog=1.0)
-        with pytest.raises(InvalidInput, match="cRIO1Mod4 has no watchdog") as caught:
+        with pytest.raises(InvalidInput, match="cRIO1 has no watchdog") as caught:
             DaqSession(daq, [AnalogInput(terminal="cRIO1Mod1/ai0")], RATE, LEAD)
         assert caught.value.item == "hardware.daq.watchdog"
 

@@ -157,7 +157,7 @@ class TestAnAmplifierThatIsReadyOnlyWhenEnabled:
         contacts.levels[LINES["amplifier_ready"]] = False
         cut = threading.Timer(0.1, session.cut)
         cut.start()
-        with pytest.raises(RigError, match="cut meanwhile"):
+        with pytest.raises(RigError, match="enable line was cut"):
             session.prepare()
         cut.join()
         assert is_safe(plant)
@@ -175,10 +175,10 @@ def test_a_session_says_what_is_wired_and_what_is_not(open_session: OpenSession)
 @pytest.mark.parametrize(
     ("daq", "item", "remedy"),
     [
-        ({"emergency_stop": {"line": "Dev1/port0/LINE0"}}, "emergency_stop.line", "enable_line has this line"),
+        ({"emergency_stop": {"line": "Dev1/port0/LINE0"}}, "emergency_stop.line", "enable_line uses this line"),
         ({"over_travel": {"line": "/Dev1/port0/line3"}, "over_travel_2": {}}, "over_travel_2.line", "over_travel.line"),
         ({"amplifier_ready": {"line": "Dev1/port0/line5"}, "heartbeat": {}}, "heartbeat.line", "amplifier_ready.line"),
-        ({"heartbeat": {}, "enable_line": None}, "heartbeat.line", "needs enable_line"),
+        ({"heartbeat": {}, "enable_line": None}, "heartbeat.line", "requires enable_line"),
     ],
 )
 def test_a_line_has_one_use(daq: dict[str, Any], item: str, remedy: str) -> None:
@@ -194,7 +194,7 @@ def test_a_line_has_one_use(daq: dict[str, Any], item: str, remedy: str) -> None
     ("line", "says"),
     [
         ("Dev1/port0/line99", r"has no such digital input line; it has Dev1/port0/line0 to Dev1/port0/line31"),
-        ("Dev2/port0/line1", "there is no device Dev2"),
+        ("Dev2/port0/line1", "no device Dev2 exists"),
     ],
 )
 def test_a_line_that_is_not_there_is_refused_by_name(open_session: OpenSession, line: str, says: str) -> None:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from drivers.daqmx.scaling import valid_counts
+from drivers.daqmx.inputs import valid_counts
 
 
 @pytest.mark.parametrize(

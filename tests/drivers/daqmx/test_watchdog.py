@@ -58,7 +58,7 @@ def test_a_watchdog_that_has_barked_keeps_the_relay_open_as_long_as_the_output_i
     eventually(lambda: not plant.enabled)
     plant.ever_enabled = False
     server.fail_next("WriteAnalogF64", -200077)
-    with pytest.raises(RigError, match="putting the output to 0 V"):
+    with pytest.raises(RigError, match="setting the output to 0 V"):
         session.stop()
     assert not plant.ever_enabled
     # what was left to do is done before the next run

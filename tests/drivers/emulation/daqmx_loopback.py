@@ -117,6 +117,7 @@ class Desk:
         packet: int = 1,
         output_clock_error: float = 0.0,
         wires: LineWires | None = None,
+        drive: str | None = None,
     ) -> None:
         self.plant = Wires(speed)
         self.server = DaqServer(
@@ -126,6 +127,7 @@ class Desk:
             packet=packet,
             output_clock_error=output_clock_error,
             wires=wires,
+            drive=drive,
         )
         self.server.start()
         self.channel: Any = grpc.insecure_channel(self.server.address)

@@ -8,7 +8,7 @@ import pytest
 from drivers.emulation import bench as module
 from drivers.emulation.bench import EmulatedBench
 from drivers.errors import RigError
-from drivers.rig import Handwork
+from drivers.rig import OperatorTask
 from sim.block_face import rotation
 from sim.specimen import Specimen
 from sim.virtual_bench import VirtualBenchParameters
@@ -37,8 +37,12 @@ def bench(hour: Hour, monkeypatch: pytest.MonkeyPatch) -> EmulatedBench:
 
 
 def test_both_outputs_of_laser_2_see_the_tilted_block_and_its_release(bench: EmulatedBench, hour: Hour) -> None:
-    for work, amount in ((Handwork.LOCK_TABLE, None), (Handwork.WATCH_BLOCK, 0.3), (Handwork.TILT_BLOCK, -0.07)):
-        bench.handwork(work, amount)
+    for work, amount in (
+        (OperatorTask.LOCK_TABLE, None),
+        (OperatorTask.WATCH_BLOCK, 0.3),
+        (OperatorTask.TILT_BLOCK, -0.07),
+    ):
+        bench.perform(work, amount)
     hour.now += 10.0
     bench.enable(True)
     enabled = hour.now
@@ -58,7 +62,7 @@ def test_both_outputs_of_laser_2_see_the_tilted_block_and_its_release(bench: Emu
 
 
 def test_a_hand_holds_on_while_the_amplifier_does_not_listen(bench: EmulatedBench, hour: Hour) -> None:
-    bench.handwork(Handwork.PULL_FRAME, 0.01)
+    bench.perform(OperatorTask.PULL_FRAME, 0.01)
     for _ in range(2):
         bench.enable(True)
         hour.now += 2.9
@@ -74,8 +78,8 @@ def test_a_hand_holds_on_while_the_amplifier_does_not_listen(bench: EmulatedBenc
 
 
 def test_a_block_that_was_taken_away_is_no_target(bench: EmulatedBench, hour: Hour) -> None:
-    bench.handwork(Handwork.WATCH_BLOCK, 0.3)
-    bench.handwork(Handwork.REMOVE_BLOCK, None)
+    bench.perform(OperatorTask.WATCH_BLOCK, 0.3)
+    bench.perform(OperatorTask.REMOVE_BLOCK, None)
     hour.now += 1.0
     assert np.isnan(bench.seen(2, np.array([hour.now - 0.1]))).all()
     assert np.isfinite(bench.seen(1, np.array([hour.now - 0.1]))).all()
@@ -84,4 +88,4 @@ def test_a_block_that_was_taken_away_is_no_target(bench: EmulatedBench, hour: Ho
 def test_hands_stay_off_while_the_amplifier_listens(bench: EmulatedBench) -> None:
     bench.enable(True)
     with pytest.raises(RigError, match="tilt block is refused: the amplifier is enabled"):
-        bench.handwork(Handwork.TILT_BLOCK, 0.05)
+        bench.perform(OperatorTask.TILT_BLOCK, 0.05)

@@ -9,11 +9,9 @@ from typing import Any
 
 import pytest
 
-from drivers.emulation.control import ControlServer
+from drivers.emulation.control import ControlServer, ask, place_of
 from drivers.errors import ConnectionLost, DeviceTimeout, RigError
-from drivers.hands import Person, RemoteHands
-from drivers.laboratory_client import ask
-from drivers.rig import Handwork
+from drivers.rig import OperatorTask
 from sim.errors import InvalidInput
 
 DEADLINE = 20.0
@@ -65,15 +63,10 @@ def test_it_listens_on_this_machine_only(server: ControlServer) -> None:
     assert int(port) > 0
 
 
-def test_hands_are_told_of_the_work(server: ControlServer, done: list[dict[str, Any]]) -> None:
-    hands = RemoteHands(server.address)
-    hands.do(Handwork.MOUNT_SPRING, 1250.0)
-    hands.do(Handwork.REMOVE_BLOCK, None)
+def test_the_operators_work_arrives_with_its_amount(server: ControlServer, done: list[dict[str, Any]]) -> None:
+    ask(server.address, "handwork", work=OperatorTask.MOUNT_SPRING.value, amount=1250.0)
+    ask(server.address, "handwork", work=OperatorTask.REMOVE_BLOCK.value, amount=None)
     assert done == [{"work": "mount spring", "amount": 1250.0}, {"work": "remove block", "amount": None}]
-
-
-def test_a_person_has_done_it_already() -> None:
-    Person().do(Handwork.STAND_BLOCK_UP, None)
 
 
 def test_the_answer_to_a_question(server: ControlServer) -> None:
@@ -92,7 +85,7 @@ def test_a_failure_of_the_laboratory_is_told(server: ControlServer, command: str
 
 
 def test_an_unknown_command_is_named(server: ControlServer) -> None:
-    with pytest.raises(RigError, match=r"'dance' is refused: there are break, epoch, handwork"):
+    with pytest.raises(RigError, match=r"'dance' is refused: available: break, epoch, handwork"):
         ask(server.address, "dance")
 
 
@@ -134,7 +127,7 @@ def test_a_command_that_waits_does_not_hold_up_others() -> None:
 def test_nobody_there_is_a_lost_connection(server: ControlServer) -> None:
     server.close()
     with pytest.raises(ConnectionLost, match="handwork is refused: no connection"):
-        RemoteHands(server.address).do(Handwork.REMOVE_BLOCK, None)
+        ask(server.address, "handwork", work=OperatorTask.REMOVE_BLOCK.value, amount=None)
 
 
 def test_a_laboratory_that_hangs_up_is_a_lost_connection() -> None:
@@ -147,7 +140,7 @@ def test_a_laboratory_that_hangs_up_is_a_lost_connection() -> None:
 
         thread = threading.Thread(target=hang_up)
         thread.start()
-        with pytest.raises(ConnectionLost, match="hung up"):
+        with pytest.raises(ConnectionLost, match="closed the connection"):
             ask(f"127.0.0.1:{listening.getsockname()[1]}", "handwork")
         thread.join()
 
@@ -169,7 +162,7 @@ def test_an_answer_of_something_else_is_refused(answer: bytes) -> None:
 
         thread = threading.Thread(target=talk)
         thread.start()
-        with pytest.raises(RigError, match="not understood"):
+        with pytest.raises(RigError, match="invalid answer"):
             ask(f"127.0.0.1:{listening.getsockname()[1]}", "handwork")
         thread.join()
 
@@ -177,7 +170,7 @@ def test_an_answer_of_something_else_is_refused(answer: bytes) -> None:
 @pytest.mark.parametrize("address", ["", "here", ":80", "here:", "here:x", "here:0", "here:65536", "here:-1"])
 def test_an_address_that_is_none_is_refused(address: str) -> None:
     with pytest.raises(InvalidInput, match="host:port"):
-        RemoteHands(address)
+        place_of(address)
 
 
 @pytest.mark.skipif(not os.path.exists("/proc/self/fd"), reason="open files are counted in /proc")

@@ -5,10 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.emulation.daqmx.catalogue import unflattened
-from drivers.emulation.daqmx.converter import InputConverter
-from drivers.emulation.daqmx.device import AnalogInputs, Wirings
+from drivers.emulation.daqmx.device import AnalogInputs, InputConverter, Wirings
 from drivers.emulation.daqmx.errors import DaqmxFailure
+from drivers.emulation.daqmx.models import unflattened
 from drivers.emulation.daqmx.timing import sample_clock
 from sim.sensors import Converter
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from drivers.emulation.optoncdt.evaluation import Fault
 from drivers.emulation.optoncdt.settings import BAUDS, Settings
-from drivers.emulation.optoncdt.words import Fault
 from tests.drivers.emulation.optoncdt_client import PERFECT, Bare, still
 
 MANUAL = """\

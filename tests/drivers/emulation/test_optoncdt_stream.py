@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.emulation.optoncdt.words import Fault
+from drivers.emulation.optoncdt.evaluation import Fault
 from sim.sensors import Laser
 from tests.drivers.emulation.optoncdt_client import PERFECT, Bare, Seen, blocks, metres, still
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.emulation.optoncdt.words import distance_codes, mastered_codes, words
+from drivers.emulation.optoncdt.evaluation import distance_codes, mastered_codes, words
 from tests.drivers.emulation.optoncdt_client import decode
 
 CODES = st.integers(0, 2**18 - 1)

@@ -175,7 +175,7 @@ def test_a_broken_heartbeat_wire_opens_the_relay(chain: Chain) -> None:
 def test_what_does_not_exist_is_refused(chain: Chain) -> None:
     with pytest.raises(RigError, match="over-travel at end 3"):
         chain.safety.trip_over_travel(3)
-    with pytest.raises(RigError, match="wire 'fire' is refused: there are emergency_stop"):
+    with pytest.raises(RigError, match="wire 'fire' is refused: the wires are emergency_stop"):
         chain.safety.break_wire("fire")
 
 

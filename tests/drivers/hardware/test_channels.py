@@ -18,7 +18,7 @@ from drivers.hardware.parameters import (
     TableDisplacement,
     TableForce,
 )
-from drivers.optoncdt.faults import LASER_OFF, MEANINGS
+from drivers.optoncdt.codec import LASER_OFF, MEANINGS
 from sim.channel import Channel
 
 

@@ -6,14 +6,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bench.testing.conformance import play, started
 from drivers.emulation.laboratory import Connection, Laboratory
 from drivers.hardware.parameters import Hardware
 from drivers.hardware.rig import HardwareRig
-from drivers.rig import Handwork
+from drivers.rig import OperatorTask
 from drivers.timebase.common_motion import CommonMotion, common_motion
 from sim.specimen import Specimen
 from sim.virtual_bench import VirtualBenchParameters
-from tests.drivers.conformance import play, started
 from tests.drivers.lines import complex_amplitudes
 
 LEAD = 600
@@ -35,7 +35,7 @@ def compared(connection: Connection, **changes: dict[str, Any]) -> tuple[CommonM
         groups = {"lasers": {"listening": 2.0, **changes.pop("lasers", {})}, **changes}
         made = {name: getattr(hardware, name).model_copy(update=new) for name, new in groups.items()}
         with HardwareRig(Hardware.model_validate(dict(hardware) | made), lead=LEAD) as rig:
-            rig.handwork(Handwork.LOCK_FRAME)
+            rig.perform(OperatorTask.LOCK_FRAME)
             time = np.arange(SETTLED + MEASURED) / rig.sample_rate
             volts = 0.25 * np.minimum(time, 1.0) * np.sin(np.outer(time, OMEGA) + np.arange(OMEGA.size)).sum(axis=1)
             blocks = play(started(rig), volts, BLOCK)
@@ -48,7 +48,7 @@ def compared(connection: Connection, **changes: dict[str, Any]) -> tuple[CommonM
     return common_motion(OMEGA, table, first), common_motion(OMEGA, table, second), hardware.lasers.delay
 
 
-@pytest.mark.parametrize("connection", [pytest.param("serial", marks=SERIAL), "analogue"])
+@pytest.mark.parametrize("connection", [pytest.param("serial", marks=[SERIAL, pytest.mark.milliseconds]), "analogue"])
 def test_lasers_show_the_tables_motion_at_its_time(connection: Connection) -> None:
     for found in compared(connection)[:2]:
         assert found.polarity == 1
@@ -57,6 +57,7 @@ def test_lasers_show_the_tables_motion_at_its_time(connection: Connection) -> No
 
 
 @SERIAL
+@pytest.mark.milliseconds
 def test_serial_lasers_without_a_configured_delay_are_early_by_it() -> None:
     """The table's channel lags by its filter, the laser by its own latency: the difference is what is configured."""
     first, second, configured = compared("serial", lasers={"delay": 0.0})

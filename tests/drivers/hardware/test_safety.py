@@ -10,14 +10,15 @@ import pytest
 from bench.config.model import BenchConfiguration
 from bench.guard.guard import Guard
 from bench.guard.limits import Limits, Ramps
+from bench.testing.conformance import play, started
+from drivers.border import CheckedRig
+from drivers.emulation.control import ask
 from drivers.emulation.laboratory import Device, Laboratory
 from drivers.errors import RigError
 from drivers.hardware.rig import HardwareRig
-from drivers.laboratory_client import ask
 from sim.errors import InvalidInput
 from sim.specimen import Specimen
 from sim.virtual_bench import VirtualBenchParameters
-from tests.drivers.conformance import play, started
 from tests.drivers.daqmx.conftest import eventually
 
 LEAD = 1000
@@ -107,16 +108,39 @@ def test_a_halt_from_another_thread_is_no_input_that_opened(laboratory: Laborato
     assert all(all(one.values()) for one in seen)
 
 
-@pytest.mark.parametrize("device", ["usb", "crio"])
-def test_both_laboratories_are_wired(device: Device) -> None:
+@pytest.mark.parametrize(
+    ("device", "modules"),
+    [
+        ("usb", ()),
+        ("crio", ()),
+        ("cDAQ-9174", ("9205", "9263", "9401", "9485")),
+        ("cDAQ-9185", ("9239", "9215", "9269", "9401")),
+        ("cRIO-9045", ("9239", "9263", "9401")),
+        ("cRIO-9049", ("9239", "9205", "9269", "9485", "9421")),
+        ("PCIe-6351", ()),
+        ("USB-6351", ()),
+    ],
+)
+def test_every_laboratory_is_wired(device: Device, modules: tuple[str, ...]) -> None:
     parameters, specimen = VirtualBenchParameters(), Specimen()
-    with Laboratory(parameters, specimen, seed=1, connection="analogue", device=device) as laboratory:
+    emulated = Laboratory(parameters, specimen, seed=1, connection="analogue", device=device, modules=modules)
+    with emulated as laboratory:
         BenchConfiguration(backend="hardware", hardware=laboratory.hardware)
         with HardwareRig(laboratory.hardware, lead=LEAD) as rig:
             assert rig.interlocks() == dict.fromkeys(NAMES[:3], True)
             play(started(rig), np.zeros(200))
             assert rig.interlocks() == dict.fromkeys(NAMES, True)
             assert all(name in rig.description for name in (*NAMES, "heartbeat"))
+
+
+def test_an_amplifier_that_is_ready_only_while_enabled_can_be_armed_again(laboratory: Laboratory) -> None:
+    with CheckedRig(HardwareRig(laboratory.hardware, lead=LEAD), "hardware") as rig:
+        for end in (rig.stop, rig.halt):
+            assert rig.interlocks() == dict.fromkeys(NAMES[:3], True)
+            play(started(rig), np.zeros(200))
+            assert rig.interlocks() == dict.fromkeys(NAMES, True)
+            end()
+        assert rig.interlocks() == dict.fromkeys(NAMES[:3], True)
 
 
 def test_the_relay_of_the_heartbeat_outlasts_some_blocks(laboratory: Laboratory) -> None:

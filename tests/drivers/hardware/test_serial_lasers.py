@@ -11,9 +11,8 @@ from drivers.clock import WallClock, now
 from drivers.emulation.optoncdt.laser import EmulatedLaser
 from drivers.errors import RigError
 from drivers.hardware.parameters import Hardware, Laser1, Laser2, Lasers
-from drivers.hardware.serial_lasers import open_serial_lasers
-from drivers.hardware.tracks import Track, Tracks
-from drivers.optoncdt.faults import LOST
+from drivers.hardware.tracks import MARKS, Track, Tracks, open_serial_lasers
+from drivers.optoncdt.codec import LATE
 from drivers.optoncdt.stream import Readings
 from drivers.rig import Channel
 from drivers.timebase.sensor_track import SensorTrack
@@ -74,20 +73,20 @@ class Run:
         return counts, now() - begun
 
 
-def test_a_silent_laser_is_lost_and_soon_not_waited_for(
+def test_a_silent_laser_is_late_and_soon_not_waited_for(
     emulated: tuple[EmulatedLaser, EmulatedLaser], lasers: Tracks
 ) -> None:
     run = Run(lasers, 200)
     deadline = now() + DEADLINE
-    while (run.block()[0] == LOST).any():
+    while (run.block()[0] == LATE).any():
         assert now() < deadline
     emulated[1].silence(60.0)
-    while run.block()[0][:, 1].max() != LOST:
+    while run.block()[0][:, 1].max() != LATE:
         assert now() < deadline
     waits: list[float] = []
     for _ in range(15):
         counts, wait = run.block()
-        assert (counts[:, 1] == LOST).all()
+        assert (counts[:, 1] == LATE).all()
         waits.append(wait)
     # waiting in vain takes 50 ms of each block
     assert np.median(waits) < 0.025
@@ -149,7 +148,7 @@ def test_a_second_kind_of_sensor_is_one_more_track(emulated: tuple[EmulatedLaser
         laser_2=Laser2(port=second, baud=921_600),
     )
     sensor = Inclinometer()
-    placing = SensorTrack("tilt", 100.0, 0.0, lambda code: code.astype(np.int16), 32_000, LOST)
+    placing = SensorTrack("tilt", 100.0, 0.0, lambda code: code.astype(np.int16), 32_000, MARKS)
     channel = Channel("tilt", "angle", "rad", 1e-4, 0.0, (-32_000, 32_000), "an inclinometer")
     tracks = Tracks([*open_serial_lasers(hardware), Track(sensor, channel, placing, 1.5)])
     try:

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from drivers.emulation.optoncdt.laser import EmulatedLaser
 from drivers.emulation.optoncdt.settings import Settings
 from drivers.errors import ConnectionLost
-from drivers.optoncdt.faults import LASER_OFF, OTHER, marked
-from drivers.optoncdt.find import find_lasers
+from drivers.optoncdt.codec import LASER_OFF, OTHER, marked
+from drivers.optoncdt.search import find_lasers
 from drivers.optoncdt.sensor import SerialLaser
 from drivers.optoncdt.stream import Readings
 from sim.sensors import Laser

@@ -2,7 +2,7 @@
 
 import pytest
 
-from drivers.optoncdt.analogue import laser_scaling, require_input_range
+from drivers.hardware.channels import laser_scaling, require_input_range
 from sim.errors import InvalidInput
 from sim.sensors import Laser
 

@@ -5,26 +5,25 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.optoncdt import faults
-from drivers.optoncdt.codec import distance
-from drivers.optoncdt.faults import MEANINGS, marked
+from drivers.optoncdt import codec
+from drivers.optoncdt.codec import IMPLAUSIBLE, LATE, MEANINGS, distance, marked
 
 
 @pytest.mark.parametrize(
     ("word", "mark", "meaning"),
     [
-        (262075, faults.OTHER, "baud rate"),
-        (262076, faults.NO_PEAK, "no reflection"),
-        (262077, faults.TOO_CLOSE, "before"),
-        (262078, faults.TOO_FAR, "behind"),
-        (262079, faults.OTHER, "unknown"),
-        (262080, faults.NOT_CALCULABLE, "calculated"),
-        (262081, faults.TOO_WIDE, "too large"),
-        (262082, faults.LASER_OFF, "off"),
-        (262072, faults.OTHER, "unknown"),
-        (262143, faults.OTHER, "unknown"),
-        (65521, faults.OTHER, "unknown"),
-        (-1, faults.OTHER, "unknown"),
+        (262075, codec.OTHER, "baud rate"),
+        (262076, codec.NO_PEAK, "no reflection"),
+        (262077, codec.TOO_CLOSE, "in front"),
+        (262078, codec.TOO_FAR, "beyond"),
+        (262079, codec.OTHER, "unknown"),
+        (262080, codec.NOT_CALCULABLE, "calculated"),
+        (262081, codec.TOO_WIDE, "too large"),
+        (262082, codec.LASER_OFF, "off"),
+        (262072, codec.OTHER, "unknown"),
+        (262143, codec.OTHER, "unknown"),
+        (65521, codec.OTHER, "unknown"),
+        (-1, codec.OTHER, "unknown"),
     ],
 )
 def test_error_words_are_those_of_the_manual(word: int, mark: int, meaning: str) -> None:
@@ -47,4 +46,4 @@ def test_counts_are_from_mid_range_exactly() -> None:
 
 
 def test_every_count_that_is_no_distance_has_a_meaning() -> None:
-    assert set(MEANINGS) == set(range(-32768, -32760))
+    assert set(MEANINGS) == {*range(-32768, -32760), IMPLAUSIBLE, LATE}

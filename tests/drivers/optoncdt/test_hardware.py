@@ -11,8 +11,8 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from drivers.optoncdt.faults import LASER_OFF, marked
-from drivers.optoncdt.find import find_lasers
+from drivers.optoncdt.codec import LASER_OFF, marked
+from drivers.optoncdt.search import find_lasers
 from drivers.optoncdt.sensor import SerialLaser
 from drivers.optoncdt.stream import Readings
 

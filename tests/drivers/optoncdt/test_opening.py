@@ -73,7 +73,7 @@ def test_whatever_ends_the_reader_is_a_lost_connection(error: Exception, monkeyp
         laser.start()
         monkeypatch.setattr("drivers.optoncdt.codec.Decoder.feed", fail)
         peer.send(b"".join(measurements(range(30), 31)))
-        with pytest.raises(ConnectionLost, match=r"laser_1 on .* is gone .*open it anew"):
+        with pytest.raises(ConnectionLost, match=r"laser_1 on .* was disconnected .*reopen it"):
             take_until_deadline(laser)
         laser.close()
         peer.wait_heard(len(script))

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.optoncdt.codec import encode
-from drivers.optoncdt.info import info_in
-from drivers.optoncdt.reply import Reply, error_in, parameters_in
+from drivers.optoncdt.dialogue import Reply, error_in, parameters_in
+from drivers.optoncdt.search import info_in
 from tests.drivers.optoncdt.script import INFO
 
 

@@ -6,9 +6,9 @@ import pytest
 from serial import SerialException
 
 from drivers.errors import ConnectionLost, DeviceNotFound, DeviceTimeout, RigError
-from drivers.optoncdt import port as port_module
+from drivers.optoncdt import search
 from drivers.optoncdt.dialogue import CommandRefused, Dialogue
-from drivers.optoncdt.port import open_port
+from drivers.optoncdt.search import open_port
 from drivers.optoncdt.sensor import SerialLaser
 from sim.errors import InvalidInput
 from tests.drivers.optoncdt.peer import Peer, no_thread_left
@@ -74,7 +74,7 @@ def test_a_fast_sensor_on_the_factorys_baud_rate_sends_its_counter_only() -> Non
         (
             replaced(SILENCED, GETINFO=INFO.replace(b"200.00mm", b" 50.00mm")),
             InvalidInput,
-            r"hardware\.laser_1\.measuring_range = 0\.2 is refused: laser_1 on .* has 0\.05 m: correct",
+            r"hardware\.laser_1\.measuring_range = 0\.2 is refused: laser_1 on .* has a range of 0\.05 m: correct",
         ),
         (
             replaced(OPENED, MASTERMV=b"MASTERMV MASTER 12.500000\r\n->"),
@@ -82,9 +82,12 @@ def test_a_fast_sensor_on_the_factorys_baud_rate_sends_its_counter_only() -> Non
             r"zero shifted \(MASTERMV MASTER 12\.500000\); set MASTERMV NONE",
         ),
         (
-            replaced(OPENED, MASTERMV=b"E210 Unknown command\r\n->"),
+            [
+                *replaced(OPENED, MASTERMV=b"E210 Unknown command\r\n->"),
+                (b"MASTERMV NONE", b"E210 Unknown command\r\n->"),
+            ],
             RigError,
-            "does not say whether its zero is shifted: E210 Unknown command; set",
+            "neither reports whether its zero is shifted nor resets it: E210 Unknown command; set",
         ),
         (
             replaced(OPENED[:5], MEASRATE=b"E236 Value out of range\r\n->"),
@@ -96,21 +99,21 @@ def test_a_fast_sensor_on_the_factorys_baud_rate_sends_its_counter_only() -> Non
             InvalidInput,
             r"hardware\.lasers\.rate = 4000\.0 is refused: .* measures at 2000 1/s instead",
         ),
-        ([*OPENED[:5], (b"MEASRATE", b"MEASRATE fast\r\n->")], RigError, r"does not say its rate \('FAST'\)"),
+        ([*OPENED[:5], (b"MEASRATE", b"MEASRATE fast\r\n->")], RigError, r"does not report its rate \('FAST'\)"),
         (
             replaced(OPENED, TRIGGER=b"TRIGGER E202 Access denied\r\n->"),
             CommandRefused,
-            "refused TRIGGER NONE: E202 Access denied; switch it to the user level professional",
+            "refused TRIGGER NONE: E202 Access denied; switch it to the professional user level",
         ),
         (
             replaced(OPENED, OUTHOLD=b"E234 Wrong parameter\r\n->"),
             CommandRefused,
-            "refused OUTHOLD NONE: E234 Wrong parameter; compare",
+            "refused OUTHOLD NONE: E234 Wrong parameter; check the command",
         ),
         (
             replaced(OPENED, GETOUTINFO_RS422=b"GETOUTINFO_RS422 DIST1\r\n->"),
             RigError,
-            "sends DIST1; its firmware is not supported",
+            "sends DIST1 instead of distance, counter, timestamp; its firmware is not supported",
         ),
         (replaced(OPENED, AVERAGE=b""), DeviceTimeout, "did not answer AVERAGE NONE within 1 s; check its power"),
     ],
@@ -123,6 +126,16 @@ def test_a_sensor_that_is_not_as_it_should_be_is_refused(script: Script, error: 
         open_port("next", peer.path, 921_600).close()
 
 
+def test_another_sensor_of_the_same_range_is_refused_by_its_serial_number() -> None:
+    wanted = {"baud": 921_600, "rate": 4000.0, "measuring_range": 0.2}
+    with Peer(SILENCED) as peer:
+        with pytest.raises(InvalidInput, match=r"is the sensor 15030002: swap the ports") as caught:
+            SerialLaser("laser_1", peer.path, **wanted, serial_number="15030001")
+        assert caught.value.item == "hardware.laser_1.serial_number"
+    with Peer(OPENED) as peer, SerialLaser("laser_1", peer.path, **wanted, serial_number="15030002"):
+        pass
+
+
 @pytest.mark.parametrize("noise", [b"", b"\xff->\x80:->"])
 def test_a_line_without_a_sensor_is_refused_after_all_baud_rates(noise: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("drivers.optoncdt.search._PROBE", 0.05)
@@ -130,11 +143,11 @@ def test_a_line_without_a_sensor_is_refused_after_all_baud_rates(noise: bytes, m
     monkeypatch.setattr("drivers.optoncdt.search.has_baud", lambda _, baud: asked.append(baud) or True)
     with (
         Peer([], baud=38_400, noise=noise) as peer,
-        pytest.raises(DeviceNotFound, match=r"says nothing at any baud rate: .* pairs"),
+        pytest.raises(DeviceNotFound, match=r"does not answer at any baud rate: .* pairs"),
     ):
         opened(peer.path, baud=115_200)
     assert asked[0] == 115_200
-    assert sorted(asked) == sorted(port_module.BAUDS)
+    assert sorted(asked) == sorted(search.BAUDS)
 
 
 @pytest.mark.parametrize("noise", [b"", b"\xfe\xff\x80"])
@@ -156,10 +169,10 @@ def test_a_baud_rate_that_no_sensor_has_is_refused_before_anything_is_opened() -
         opened("/dev/nothing", baud=57_600)
 
 
-@pytest.mark.parametrize("baud", port_module.BAUDS)
+@pytest.mark.parametrize("baud", search.BAUDS)
 def test_every_baud_rate_of_the_sensor_can_be_set(baud: int) -> None:
     with Peer([]) as peer, open_port("laser_1", peer.path, 9600) as line:
-        assert port_module.has_baud(line, baud)
+        assert search.has_baud(line, baud)
 
 
 def test_a_port_in_use_is_refused() -> None:
@@ -172,8 +185,8 @@ def test_a_port_in_use_is_refused() -> None:
 
 
 def test_an_absent_port_is_refused_with_those_there_are(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(port_module, "listed_ports", lambda: ["/dev/ttyUSB7"])
-    with pytest.raises(DeviceNotFound, match=r"there is no port /dev/nothing; .*ports there are: /dev/ttyUSB7"):
+    monkeypatch.setattr(search, "listed_ports", lambda: ["/dev/ttyUSB7"])
+    with pytest.raises(DeviceNotFound, match=r"there is no port /dev/nothing; .*/dev/ttyUSB7"):
         opened("/dev/nothing")
 
 
@@ -182,7 +195,7 @@ def test_an_absent_port_is_refused_with_those_there_are(monkeypatch: pytest.Monk
     [
         (
             SerialException(13, "could not open port /dev/ttyUSB0"),
-            "COM5 may not be used by this account; add it to the group",
+            "this account may not use COM5; add it to the group",
         ),
         (SerialException(16, "could not open port /dev/ttyUSB0"), "COM5 is in use; close"),
         (
@@ -203,7 +216,7 @@ def test_what_the_system_says_of_a_port_is_told(error: Exception, text: str, mon
     def fail(*_: object, **__: object) -> None:
         raise error
 
-    monkeypatch.setattr(port_module, "Serial", fail)
+    monkeypatch.setattr(search, "Serial", fail)
     with pytest.raises(DeviceNotFound, match=f"laser_1 cannot be opened: {text}"):
         opened("COM5")
 
@@ -219,5 +232,5 @@ def test_a_port_that_goes_during_a_dialogue_is_a_lost_connection() -> None:
         dialogue = Dialogue("laser_1", line)
         peer.unplug()
         for talk in (lambda: dialogue.ask("GETINFO"), lambda: dialogue.send("GETINFO"), lambda: dialogue.drain(0.1, 1)):
-            with pytest.raises(ConnectionLost, match=r"laser_1 is gone .* open it anew"):
+            with pytest.raises(ConnectionLost, match=r"laser_1 was disconnected .* reopen it"):
                 talk()

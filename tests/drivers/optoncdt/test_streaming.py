@@ -1,5 +1,6 @@
 """A sensor that streams: what arrives is handed out whole, and nothing is when it must not be."""
 
+import threading
 import time
 from collections.abc import Callable
 
@@ -9,9 +10,10 @@ from numpy.typing import NDArray
 
 from drivers.clock import now
 from drivers.errors import ConnectionLost, DeviceTimeout, RigError
-from drivers.optoncdt.faults import LASER_OFF, marked
+from drivers.optoncdt.codec import LASER_OFF, encode, marked
 from drivers.optoncdt.sensor import SerialLaser
 from drivers.optoncdt.stream import Readings
+from sim.errors import InvalidInput
 from tests.drivers.optoncdt.peer import DEADLINE, Peer, no_thread_left
 from tests.drivers.optoncdt.script import INFO, OPENED, STARTED, STOPPED, Script, joined, measurements
 
@@ -90,7 +92,7 @@ def test_a_stream_that_is_not_as_said_is_refused(answer: bytes, monkeypatch: pyt
     monkeypatch.setattr("drivers.optoncdt.sensor._LOCK_TIME", 0.2)
     with no_thread_left(), Peer([*OPENED, STARTED[0], (b"OUTPUT RS422", answer), *STOPPED]) as peer:
         laser = opened(peer)
-        with pytest.raises(DeviceTimeout, match="sends no measurements at 4000 1/s that follow each other"):
+        with pytest.raises(DeviceTimeout, match="sends no consecutive measurements at 4000 1/s"):
             laser.start()
         laser.close()
 
@@ -117,6 +119,57 @@ def test_waiting_ends_with_a_value_or_in_time() -> None:
         assert laser.wait(DEADLINE)
 
 
+def without_queries(script: Script) -> Script:
+    """The script of a sensor that has the documented commands only."""
+    unknown = b"E210 Unknown command\r\n->"
+    answered: list[tuple[bytes, bytes]] = []
+    for command, answer in script:
+        answered.append((command, unknown if command in (b"MASTERMV", b"MEASRATE") else answer))
+        if command == b"MASTERMV":
+            answered.append((b"MASTERMV NONE", b"->"))
+    return answered
+
+
+@pytest.mark.parametrize(("sent", "refused"), [(4000, False), (2000, True)])
+def test_the_rate_is_counted_where_the_sensor_does_not_report_it(
+    monkeypatch: pytest.MonkeyPatch, sent: int, refused: bool
+) -> None:
+    monkeypatch.setattr("drivers.optoncdt.sensor._COUNTING", 0.3)
+    over = threading.Event()
+
+    def send(peer: Peer) -> None:
+        peer.wait_heard(len(OPENED) + 3)
+        begin, done = now(), 30
+        while not over.is_set():
+            due = 30 + int((now() - begin) * sent)
+            peer.send(b"".join(measurements(np.zeros(due - done, np.int32), done + 1)))
+            done = due
+            time.sleep(0.005)
+
+    with Peer([*without_queries(streaming(30)), *STOPPED]) as peer, opened(peer) as laser:
+        sender = threading.Thread(target=send, args=(peer,))
+        sender.start()
+        try:
+            if refused:
+                with pytest.raises(InvalidInput, match=r"sends (19|20)\d\d 1/s instead"):
+                    laser.start()
+            else:
+                laser.start()
+        finally:
+            over.set()
+            sender.join()
+
+
+def test_a_sensor_that_restarts_with_its_factory_settings_is_told_as_that() -> None:
+    with Peer([*streaming(30), *STOPPED]) as peer, opened(peer) as laser:
+        laser.start()
+        eventually(laser, 30 - LOCK)
+        # distances alone, as from the factory: each word begins a measurement
+        peer.send(b"".join(encode(30_000 + k, True) for k in range(300)))
+        with pytest.raises(ConnectionLost, match="restarted with its factory settings"):
+            until(lambda: bool(len(laser.take())))
+
+
 def test_an_unplugged_sensor_is_told_by_take_every_time() -> None:
     with no_thread_left(), Peer(streaming(30)[:], tidy=False) as peer:
         laser = opened(peer)
@@ -125,7 +178,7 @@ def test_an_unplugged_sensor_is_told_by_take_every_time() -> None:
         peer.unplug()
         assert laser.wait(DEADLINE)
         for _ in range(2):
-            with pytest.raises(ConnectionLost, match=r"laser_1 on .* is gone .*; plug it in"):
+            with pytest.raises(ConnectionLost, match=r"laser_1 on .* was disconnected .*; plug it in"):
                 laser.take()
         laser.stop()
         laser.close()
@@ -138,7 +191,7 @@ def test_a_sensor_that_was_switched_off_in_between_is_a_lost_connection() -> Non
         eventually(laser, 3000 - LOCK)
         peer.send(b"".join(measurements(CODES[:100], 0)))
         until(lambda: laser.wait(0.1))
-        with pytest.raises(ConnectionLost, match="began to count anew"):
+        with pytest.raises(ConnectionLost, match="restarted its counter"):
             laser.take()
 
 
@@ -174,7 +227,7 @@ def test_a_stream_can_be_stopped_and_started_again_and_counts_anew() -> None:
     again = streaming(40)[len(OPENED) :]
     with no_thread_left(), Peer([*streaming(30), *STOPPED, *again, *STOPPED]) as peer, opened(peer) as laser:
         laser.start()
-        with pytest.raises(RigError, match=r"start is refused: laser_1 on .* streams already"):
+        with pytest.raises(RigError, match=r"start is refused: laser_1 on .* is streaming"):
             laser.start()
         laser.stop()
         laser.stop()
@@ -190,7 +243,7 @@ def test_what_is_not_possible_is_refused() -> None:
             laser.take()
         laser.close()
         for refused in (laser.start, lambda: laser.laser(True)):
-            with pytest.raises(RigError, match=r"laser_1 on .* is closed; open it anew"):
+            with pytest.raises(RigError, match=r"laser_1 on .* is closed; reopen it"):
                 refused()
         laser.close()
 

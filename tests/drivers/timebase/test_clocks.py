@@ -1,8 +1,7 @@
 import numpy as np
 import pytest
 
-from drivers.timebase.sample_clock import SampleClock
-from drivers.timebase.sensor_clock import SensorClock
+from drivers.timebase.clocks import SampleClock, SensorClock
 from tests.drivers.timebase.made_clocks import FLOOR, SWITCHED_ON, Daq, stream
 
 

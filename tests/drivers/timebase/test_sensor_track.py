@@ -9,11 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from drivers.timebase.sample_clock import SampleClock
-from drivers.timebase.sensor_track import SensorTrack
+from drivers.timebase.clocks import SampleClock
+from drivers.timebase.sensor_track import Marks, SensorTrack
 from tests.drivers.timebase.made_clocks import FLOOR, SWITCHED_ON, Daq, Stream, stream
 
 LOST, NO_PEAK, OFF = -32768, -32767, -32762
+LATE, IMPLAUSIBLE = 32767, 32766
+MARKS = Marks(LOST, LATE, IMPLAUSIBLE)
 OMEGA = 2.0 * np.pi * 2.0
 AMPLITUDE = 30_000.0
 SAMPLE_RATE = 2000.0
@@ -30,8 +32,8 @@ def codes(taken: NDArray[np.float64]) -> NDArray[np.int32]:
     return (32760 + np.rint(AMPLITUDE * np.sin(OMEGA * taken))).astype(np.int32)
 
 
-def track(delay: float = 0.0) -> SensorTrack:
-    return SensorTrack("laser_1", 4000.0, delay, marked, 32760, LOST)
+def track(delay: float = 0.0, largest_step: float = np.inf) -> SensorTrack:
+    return SensorTrack("laser_1", 4000.0, delay, marked, 32760, MARKS, largest_step)
 
 
 class Bench:
@@ -79,9 +81,9 @@ def delays(daq: Daq, counts: NDArray[np.int16]) -> NDArray[np.float64]:
     return -np.arctan2((seen * np.cos(phase)).mean(axis=1), (seen * np.sin(phase)).mean(axis=1)) / OMEGA
 
 
-def known(rate: float = 1.0, delay: float = 0.0) -> tuple[SensorTrack, SampleClock]:
+def known(rate: float = 1.0, delay: float = 0.0, largest_step: float = np.inf) -> tuple[SensorTrack, SampleClock]:
     """A track of a sensor of 4000 1/s without any delay or error, and a clock that agrees: sensor second 2 is 0."""
-    laser, clock = track(delay), SampleClock(1000.0)
+    laser, clock = track(delay, largest_step), SampleClock(1000.0)
     for count in range(1, 2001):
         # the look ends when sample count - 1 is taken, and begins when sample count is due: no room between
         clock.observe(102.0 + count / 1000.0, count, 102.0 + (count - 1) / 1000.0)
@@ -179,6 +181,66 @@ def test_lost_values_mark_the_samples_between_them() -> None:
     assert laser.alignment(clock).lost == 40
 
 
+def test_flipped_bits_are_marked_and_counted_and_their_neighbours_are_not() -> None:
+    laser, clock = known(largest_step=400.0)
+    index = np.arange(8000, 9000)
+    code = ramp(index)
+    # bits 14, 10 and 15 of single values, and two in a row
+    for place, bit in ((200, 14), (400, 10), (600, 15), (601, 13)):
+        code[place] ^= 1 << bit
+    feed(laser, index, code)
+    counts = laser.counts(clock, 0, 200, 1000.0)
+    plain, again = known()
+    feed(plain, index)
+    marked = counts == IMPLAUSIBLE
+    assert set(np.flatnonzero(marked)) <= {49, 50, 51, 99, 100, 101, 149, 150, 151}
+    assert marked.sum() >= 3
+    np.testing.assert_array_equal(counts[~marked], plain.counts(again, 0, 200, 1000.0)[~marked])
+    assert laser.alignment(clock).implausible == 4
+    assert laser.alignment(clock).lost == 0
+
+
+def test_a_target_that_really_jumps_is_found_again() -> None:
+    laser, clock = known(largest_step=400.0)
+    index = np.arange(8000, 9000)
+    code = ramp(index)
+    code[200:] += 20_000
+    feed(laser, index, code)
+    counts = laser.counts(clock, 0, 200, 1000.0)
+    # three values at 4 kHz are doubted, then the guard must see the motion
+    assert laser.alignment(clock).implausible == 3
+    assert 1 <= np.count_nonzero(counts == IMPLAUSIBLE) <= 2
+    assert np.abs(counts[53:]).max() < 32760
+
+
+def test_a_beam_that_flickers_between_two_distances_is_shown_to_the_guard() -> None:
+    laser, clock = known(largest_step=400.0)
+    index = np.arange(8000, 9000)
+    code = ramp(index)
+    code[np.arange(1000) % 3 > 0] += 20_000
+    feed(laser, index, code)
+    counts = laser.counts(clock, 0, 200, 1000.0)
+    assert laser.alignment(clock).implausible <= 4
+    assert np.count_nonzero(counts == IMPLAUSIBLE) <= 3
+
+
+def test_a_first_value_with_a_flipped_bit_does_not_doubt_those_after_it() -> None:
+    laser, clock = known(largest_step=400.0)
+    index = np.arange(8000, 9000)
+    code = ramp(index)
+    code[0] += 20_000
+    feed(laser, index, code)
+    assert laser.alignment(clock).implausible <= 3
+
+
+def test_a_sensor_that_restarts_its_clock_is_plausible_again() -> None:
+    laser, clock = known(largest_step=400.0)
+    feed(laser, np.arange(8000, 8400))
+    index = np.arange(7000)
+    laser.add(index, index / 4000.0, ramp(index + 8400) + 15_000, 102.1 + index / 4000.0)
+    assert laser.alignment(clock).implausible == 0
+
+
 def test_repeated_values_change_nothing() -> None:
     once, clock = known()
     again, _ = known()
@@ -198,16 +260,17 @@ def test_no_readings_are_nothing_new() -> None:
     assert laser.alignment(clock) == before
 
 
-def test_a_silent_sensor_is_lost_from_its_last_value_on() -> None:
+def test_a_silent_sensor_is_late_from_its_last_value_on() -> None:
     laser, clock = known()
     feed(laser, np.arange(8000, 8401))
     assert laser.reach(clock) == pytest.approx(0.1, abs=1e-5)
     counts = laser.counts(clock, 0, 200, 1000.0)
-    np.testing.assert_array_equal(counts == LOST, np.arange(200) >= np.count_nonzero(counts != LOST))
-    assert np.count_nonzero(counts != LOST) in (100, 101)
+    np.testing.assert_array_equal(counts == LATE, np.arange(200) >= np.count_nonzero(counts != LATE))
+    assert np.count_nonzero(counts != LATE) in (100, 101)
+    assert laser.alignment(clock).late == np.count_nonzero(counts == LATE)
     # 99 ms are missing up to the last sample that was asked for
     assert laser.alignment(clock).lost == pytest.approx(0.099 * 4000.0, abs=1.0)
-    assert (laser.counts(clock, 200, 50, 1000.0) == LOST).all()
+    assert (laser.counts(clock, 200, 50, 1000.0) == LATE).all()
 
 
 def test_samples_before_the_first_value_are_lost() -> None:
@@ -220,11 +283,11 @@ def test_samples_before_the_first_value_are_lost() -> None:
     assert (counts[101:] != LOST).all()
 
 
-def test_a_sensor_that_was_never_heard_is_lost() -> None:
+def test_a_sensor_that_was_never_heard_is_late() -> None:
     laser, clock = track(), SampleClock(1000.0)
     clock.observe(100.0, 1, 100.001)
     assert laser.reach(clock) == -np.inf
-    assert (laser.counts(clock, 0, 1000, 1000.0) == LOST).all()
+    assert (laser.counts(clock, 0, 1000, 1000.0) == LATE).all()
     alignment = laser.alignment(clock)
     assert np.isnan([alignment.offset, alignment.rate, alignment.residual]).all()
     assert (alignment.values, alignment.lost) == (0, 4000)
@@ -233,15 +296,15 @@ def test_a_sensor_that_was_never_heard_is_lost() -> None:
 def test_nothing_is_placed_on_a_sample_clock_that_is_not_known() -> None:
     laser, _ = known()
     assert laser.reach(SampleClock(1000.0)) == -np.inf
-    assert (laser.counts(SampleClock(1000.0), 0, 10, 1000.0) == LOST).all()
+    assert (laser.counts(SampleClock(1000.0), 0, 10, 1000.0) == LATE).all()
 
 
 def test_a_clock_that_was_watched_for_less_than_a_second_places_nothing() -> None:
     laser, (_, clock) = track(), known()
     feed(laser, np.arange(8000, 11_000))
-    assert (laser.counts(clock, 0, 100, 1000.0) == LOST).all()
+    assert (laser.counts(clock, 0, 100, 1000.0) == LATE).all()
     feed(laser, np.arange(11_000, 12_400))
-    assert (laser.counts(clock, 100, 100, 1000.0) != LOST).all()
+    assert (laser.counts(clock, 100, 100, 1000.0) != LATE).all()
 
 
 def test_a_sensor_that_restarts_its_clock_is_found_again() -> None:

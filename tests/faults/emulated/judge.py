@@ -5,7 +5,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from bench.record.reader import open_record
+from bench.datafile.reader import open_datafile
 from drivers.errors import RigError
 from tests.faults.audit import (
     Verdict,
@@ -103,7 +103,7 @@ def _judged(fault: WiredFault, place: Place, folder: Path) -> tuple[Verdict, boo
     broken += [f"a thread is left: {name}" for name in left_since(before)]
     if not fired:
         broken.append("lost: it never struck")
-    with open_record(path) as record:
+    with open_datafile(path) as record:
         broken += [*sample_rules(record, story), *record_rules(record, story, fault)]
     rules = (*unsafe, *broken)
     return Verdict(fault.name, place.name, fired, not fired, noticed, story.status, story.reason, rules), bool(unsafe)

@@ -183,7 +183,7 @@ def cables() -> list[WiredFault]:
     for column, name in enumerate(("table_displacement", "table_acceleration", "laser_1", "laser_2")):
         table = name.startswith("table")
         status, says = ("halted", name.replace("_", " ")) if table else ("aborted", f"valid sample of {name}")
-        stuck = f"{name} has shown one count"
+        stuck = f"constant count of {name}"
         found += [
             WiredFault(f"{name} at its rail", _cable(column, lambda: rail), status, says, stays, True),
             WiredFault(f"{name} frozen", _cable(column, frozen), "aborted", stuck, stays, True),

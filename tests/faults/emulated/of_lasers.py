@@ -64,7 +64,7 @@ def lasers() -> list[WiredFault]:
         invalid("half the bytes lost", _does(lambda laser: laser.lose_bytes(probability=0.5))),
         borne("a few bytes lost", _does(lambda laser: laser.lose_bytes(7), 2)),
         borne("garbage on the line", _does(lambda laser: laser.garbage(40))),
-        fault("laser frozen", _does(_freeze, 2), "aborted", "laser_2 has shown one count", stays, True),
+        fault("laser frozen", _does(_freeze, 2), "aborted", "constant count of laser_2", stays, True),
         fault("laser mastered", _does(_masters(0.09)), "aborted", "drift", _driven, True),
         # no limit is exceeded by it; the next program that opens the sensor refuses it
         borne("laser mastered by half a range", _does(_masters(0.05))),

@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import Any
 
-from bench.control.calibration import DriveCalibration
+from bench.control.oscillator import DriveCalibration
 from bench.guard.limits import Ramps
 from drivers.emulation.laboratory import Laboratory
 from drivers.emulation.safety_chain import PulseRelay

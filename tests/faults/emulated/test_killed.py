@@ -7,7 +7,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from bench.record.reader import open_record
+from bench.datafile.reader import open_datafile
 from tests.faults.emulated.killed import Aftermath, kill_at
 from tests.faults.emulated.setup import KEEPER, PLACES, SETTING
 from tests.faults.emulated.truth import GRACE, rest_rules
@@ -72,7 +72,7 @@ def test_the_next_program_makes_it_safe_and_the_file_is_readable(name: str, keep
     after = killed[name, keeper].result()
     assert "rockbench_out" in after.found
     assert (after.enabled_after, after.held_after) == (False, 0.0)
-    with open_record(after.path) as record:
+    with open_datafile(after.path) as record:
         assert record.status == "running"
         states = [event.text for event in record.events if event.kind == "StateChanged"]
         assert f"-> {_place(name).state}" in states[-1]

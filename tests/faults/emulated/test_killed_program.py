@@ -11,12 +11,12 @@ from typing import Any
 
 import pytest
 
-from bench.config.dump import as_toml
 from bench.config.model import BenchConfiguration
-from bench.record.reader import open_record
+from bench.config.toml import as_toml
+from bench.datafile.reader import open_datafile
 from bench.results import FILE
+from drivers.emulation.control import ask
 from drivers.hardware.rig import HardwareRig
-from drivers.laboratory_client import ask
 from tests.emulated import emulated
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="kills processes the POSIX way")
@@ -82,7 +82,7 @@ def test_the_chain_opens_by_itself(state: str, laboratory: BenchConfiguration, t
     held = truth()["drive"]
     time.sleep(0.1)
     assert truth()["drive"] == held
-    with open_record(tmp_path / FILE) as record:
+    with open_datafile(tmp_path / FILE) as record:
         assert record.status == "running"
     with HardwareRig(hardware, lead=100) as rig:
         assert "rockbench_out" in rig.description["tasks left by another client"]

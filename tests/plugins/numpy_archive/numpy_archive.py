@@ -5,8 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.export.content import Content
-from bench.export.format import ExportFormat
+from bench.app.export.format import Content, ExportFormat
 
 
 def write(content: Content, folder: Path) -> None:

@@ -8,21 +8,18 @@ import numpy as np
 from pydantic import PositiveFloat
 
 from bench.analysis.signals import ACCELERATION, SIGNALS
-from bench.control.calibration import DriveCalibration
-from bench.control.legs import Leg, program
-from bench.engine.steps import Arm, Calibrate, Dwell, Follow, Handle, Measured, RampOut, Say
+from bench.control.oscillator import DriveCalibration, Leg, program
+from bench.datafile.tables import Column, Table
+from bench.document.campaign import Campaign
+from bench.document.document import Picture, Section
+from bench.engine.steps import Arm, Calibrate, Dwell, Measured, OperatorAction, Publish, RampOut, Sweep
 from bench.events import LiveValue, PointFinished, StepStarted
-from bench.preflight.bounds import bounds
-from bench.preflight.forecast import Demand, Forecast, Stage
-from bench.preflight.load import load
-from bench.preflight.response import response_of
+from bench.figures.style import new_figure, write_figure
+from bench.figures.text_table import TextColumn, text_table
+from bench.preflight.demands import load, response_of
+from bench.preflight.margins import Demand, Forecast, Stage, bounds
 from bench.protocol import Plan, Prepared, Protocol, Result
-from bench.publication.campaign import Campaign
-from bench.record.tables import Column, Table
-from bench.report.page.document import Picture, Section
-from bench.report.style import new_figure, write_figure
-from bench.report.text_table import TextColumn, text_table
-from drivers.rig import Handwork
+from drivers.rig import OperatorTask
 from sim.parameters import Parameters, quantity
 
 
@@ -49,19 +46,19 @@ class ToneSweep(Prepared[SweepParameters]):
     def gains(self) -> np.ndarray:
         """Predicted gains [m/s2/V]; NaN where nothing is known of the table."""
         table, omega = response_of(self.configuration), np.array(self.parameters.omega)
-        frame = self.configuration.known_specimen.frame
-        return omega * np.nan if table is None else table.gain(omega, frame.m1 + frame.m2)
+        mass = self.configuration.known_specimen.bare().mass
+        return omega * np.nan if table is None else table.gain(omega, mass)
 
     @cached_property
     def forecast(self) -> Forecast:
-        p, frame = self.parameters, self.configuration.known_specimen.frame
+        p, bare = self.parameters, self.configuration.known_specimen.bare()
         length = sum((p.cycles + 2) * tau / omega + 2.0 for omega in p.omega)
         if (table := response_of(self.configuration)) is None:
             return Forecast(duration=length)
         steps = [(float(gain) * p.volts, omega) for gain, omega in zip(self.gains, p.omega, strict=True)]
         legs = tuple(leg for level, omega in steps for leg in (Leg(1.0, level, omega), Leg(1.0, 0.0, omega)))
-        mass, mover, time = frame.m1 + frame.m2, self.configuration.mover, self.configuration.limits.heating_time
-        demands = load(program(legs), 0.0, length, payload=mass, mover=mover, response=table, heating_time=time)
+        mass, shaker, time = bare.mass, self.configuration.shaker_model, self.configuration.limits.heating_time
+        demands = load(program(legs), 0.0, length, payload=mass, shaker=shaker, response=table, heating_time=time)
         found = [Demand(key, demands[key], None, "the sweep") for key in bounds(self.configuration) if key in demands]
         return Forecast(tuple(found), (Stage("the sweep", legs),), length)
 
@@ -72,21 +69,21 @@ class ToneSweep(Prepared[SweepParameters]):
 
     def plan(self) -> Plan:
         p, bare, points = self.parameters, self.configuration.known_specimen.bare(), list[SweepPoint]()
-        yield Handle(Handwork.REMOVE_BLOCK, bare, "Take the spring and the block off the table.")
+        yield OperatorAction(OperatorTask.REMOVE_BLOCK, bare, "Take the spring and the block off the table.")
         yield Arm(2.0)
         yield Calibrate(DriveCalibration.flat(1.0))  # amplitudes are volts
         for omega, predicted in zip(p.omega, self.gains, strict=True):
-            yield Say(StepStarted(f"sweep at {omega:g} rad/s"))
-            yield Follow((Leg(1.0, p.volts, omega),))
+            yield Publish(StepStarted(f"sweep at {omega:g} rad/s"))
+            yield Sweep((Leg(1.0, p.volts, omega),))
             outcome = yield Dwell(p.cycles + 2)
             cycles = outcome.cycles[2:] if isinstance(outcome, Measured) else ()
             if len(cycles) >= 4:
                 gains = [abs(each.fundamental[ACCELERATION] / each.fundamental[len(SIGNALS)]) for each in cycles]
                 gain, doubt = float(np.mean(gains)), 2.0 * float(np.std(gains, ddof=1)) / sqrt(len(gains))
-                yield Say(LiveValue("gain of the table", gain, "m/s2/V", doubt, float(predicted)))
+                yield Publish(LiveValue("gain of the table", gain, "m/s2/V", doubt, float(predicted)))
                 points.append(SweepPoint(omega_rad_s=omega, gain_m_s2_v=gain, gain_uncertainty=doubt))
-                yield Say(PointFinished(points[-1]))
-            yield Follow((Leg(1.0, 0.0, omega),))
+                yield Publish(PointFinished(points[-1]))
+            yield Sweep((Leg(1.0, 0.0, omega),))
         yield RampOut()
         return self.result(points)
 

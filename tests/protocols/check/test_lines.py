@@ -1,19 +1,30 @@
 """The lines of the check from made-up signals whose truth is known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from bench.analysis.check_line import CheckLine, Verdict
 from bench.analysis.gain import SensorAccuracy
 from bench.config.model import BenchConfiguration
-from bench.engine.steps import Heard
+from bench.engine.steps import RestSamples
 from drivers.hardware.parameters import Hardware, Lasers
+from drivers.optoncdt.codec import IMPLAUSIBLE, LATE, LOST, MEANINGS
 from drivers.rig import Channel
-from protocols.check.comparison import allowed_delay, delay_lines, scale_lines, signed_scale
-from protocols.check.drive import dead_time, drive_lines
+from protocols.check.lines import (
+    Sines,
+    allowed_delay,
+    dead_time,
+    delay_lines,
+    drive_lines,
+    input_lines,
+    resting_lines,
+    scale_lines,
+    signed_scale,
+    table_delay_lines,
+)
 from protocols.check.protocol import CheckParameters
-from protocols.check.resting import resting_lines
-from protocols.check.sines import Sines
 from sim.specimen import Frame, Specimen
 
 OMEGA = np.array([8.0, 12.0, 18.0, 27.0, 40.0])
@@ -29,7 +40,7 @@ def late(amplitudes: np.ndarray, delay: float) -> np.ndarray:
 def sines(**changed: np.ndarray) -> Sines:
     """Four sensors that agree about 60 mm/s, with some signals changed."""
     x = (0.06 / OMEGA) * np.exp(0.7j)
-    signals = {"drive": x, "acceleration": -(OMEGA**2) * x, "displacement": x, "laser_1": x, "laser_2": x}
+    signals = {"drive": x, "acceleration": -(OMEGA**2) * x, "displacement": x, "storey_1": x, "storey_2": x}
     return Sines(omega=OMEGA, **(signals | changed))
 
 
@@ -51,8 +62,8 @@ def test_sensors_that_agree_pass() -> None:
     [
         ("acceleration", "table_acceleration", "table_displacement"),
         ("displacement", "table_displacement", "table_acceleration"),
-        ("laser_1", "laser_1", "table_displacement"),
-        ("laser_2", "laser_2", "table_displacement"),
+        ("storey_1", "laser_1", "table_displacement"),
+        ("storey_2", "laser_2", "table_displacement"),
     ],
 )
 def test_the_sensor_that_contradicts_the_others_is_named(signal: str, subject: str, reference: str) -> None:
@@ -72,13 +83,13 @@ def test_a_clamp_that_gives_way_changes_no_scale() -> None:
 
 
 def test_without_lasers_only_the_table_is_compared() -> None:
-    lines = list(scale_lines(sines(laser_1=np.zeros(5) + 0j), PARAMETERS, lasers=False))
+    lines = list(scale_lines(sines(storey_1=np.zeros(5) + 0j), PARAMETERS, lasers=False))
     assert {line.subject for line in lines} == {"table_acceleration"}
 
 
 def test_a_delay_is_measured_and_the_setting_takes_it_away() -> None:
     x = sines().displacement
-    lines = list(delay_lines(sines(laser_1=late(x, 0.003), laser_2=late(x, 0.0028)), PARAMETERS, SERIAL))
+    lines = list(delay_lines(sines(storey_1=late(x, 0.003), storey_2=late(x, 0.0028)), PARAMETERS, SERIAL))
     first, second, difference, setting = lines
     assert (first.measured, second.measured) == (pytest.approx(0.003, abs=1e-9), pytest.approx(0.0028, abs=1e-9))
     assert difference.measured == pytest.approx(-0.0002, abs=1e-9)
@@ -86,6 +97,43 @@ def test_a_delay_is_measured_and_the_setting_takes_it_away() -> None:
     assert setting.verdict is Verdict.STATED
     # 2 ms are configured; the lasers are still 2.9 ms late, so they must be placed 2.9 ms earlier
     assert setting.measured == pytest.approx(0.002 - 0.0029, abs=1e-9)
+
+
+@pytest.mark.parametrize("delay", [11e-6, 4.4e-4, -1.9e-4, 4.6e-4, -2.1e-4, 8e-3, 20e-3, -20e-3])
+def test_the_delay_between_the_sensors_of_the_table_is_measured(delay: float) -> None:
+    made = sines(acceleration=late(sines().acceleration, delay))
+    line, *rest = table_delay_lines(made, PARAMETERS, 2000.0, lasers=False)
+    assert line.measured == pytest.approx(delay, abs=1e-9)
+    assert (line.subject, line.what) == ("table_acceleration", "delay against table_displacement")
+    assert line.verdict is (Verdict.PASSED if -2e-4 < delay < 4.5e-4 else Verdict.FAILED)
+    assert rest == []
+
+
+@pytest.mark.parametrize(
+    ("changed", "odd"), [("acceleration", "table_acceleration"), ("displacement", "table_displacement")]
+)
+def test_the_sensor_that_differs_from_the_lasers_is_named(changed: str, odd: str) -> None:
+    x = sines().displacement
+    # lasers with a latency of their own
+    latency = {"storey_1": late(x, 6e-4), "storey_2": late(x, 6e-4)}
+    made = sines(**latency, **{changed: late(getattr(sines(), changed), 8e-3)})
+    line, *pairs = table_delay_lines(made, PARAMETERS, 2000.0, lasers=True)
+    assert f"{odd} differs from the lasers" in line.remedy
+    assert "different times" in line.remedy
+    assert [(pair.subject, pair.what) for pair in pairs] == [
+        (name, "delay against table_acceleration") for name in ("laser_1", "laser_2")
+    ]
+
+
+def test_known_and_unknown_delays_of_inputs_are_told() -> None:
+    given = (
+        replace(CHANNELS[0], delay=0.02, delay_uncertainty=1e-6),
+        replace(CHANNELS[1], delay_uncertainty=np.inf),
+        CHANNELS[2],
+    )
+    known, unknown = input_lines(given)
+    assert (known.subject, known.measured, known.uncertainty) == ("table_displacement", 0.02, 2e-6)
+    assert (unknown.subject, unknown.verdict) == ("laser_1", Verdict.UNTESTED)
 
 
 def test_where_no_delay_can_be_set_none_is_stated() -> None:
@@ -96,7 +144,7 @@ def test_where_no_delay_can_be_set_none_is_stated() -> None:
 def test_lasers_that_differ_in_delay_fail_on_their_difference() -> None:
     x = sines().displacement
     lines = list(
-        delay_lines(sines(laser_1=late(x, -3.5e-4), laser_2=late(x, 3.5e-4)), PARAMETERS, BenchConfiguration())
+        delay_lines(sines(storey_1=late(x, -3.5e-4), storey_2=late(x, 3.5e-4)), PARAMETERS, BenchConfiguration())
     )
     assert failures(lines) == [("lasers", "delay of laser_2 against laser_1")]
 
@@ -135,7 +183,7 @@ CHANNELS = (
 def rest(**columns: np.ndarray) -> list[CheckLine]:
     noise = np.random.default_rng(5).integers(-2, 3, 1000)
     counts = np.column_stack([columns.get(channel.name, noise) for channel in CHANNELS]).astype(np.int16)
-    return list(resting_lines(Heard(CHANNELS, counts, None), PARAMETERS, SensorAccuracy()))
+    return list(resting_lines(RestSamples(CHANNELS, counts, None), PARAMETERS, SensorAccuracy()))
 
 
 def test_quiet_living_channels_pass_and_others_are_stated() -> None:
@@ -152,6 +200,19 @@ def test_a_fault_is_said_in_the_sensors_words() -> None:
     lines = rest(laser_1=np.full(1000, 8191))
     assert failures(lines) == [("laser_1", "valid samples at rest")]
     assert "no target" in next(line.remedy for line in lines if line.verdict is Verdict.FAILED)
+
+
+@pytest.mark.parametrize(
+    ("mark", "words"),
+    [(LATE, "the computer was busy, or the sensor is silent"), (LOST, "check the cable"), (IMPLAUSIBLE, "shield")],
+)
+def test_values_that_did_not_arrive_are_not_blamed_on_the_target(mark: int, words: str) -> None:
+    laser = Channel("laser_1", "displacement", "m", 3e-6, 0.0, (-32760, 32760), "made up", faults=MEANINGS)
+    counts = np.full((1000, 1), mark, np.int16)
+    line, *_ = resting_lines(RestSamples((laser,), counts, None), PARAMETERS, SensorAccuracy())
+    assert line.verdict is Verdict.FAILED
+    assert words in line.remedy
+    assert "storey" not in line.remedy
 
 
 @pytest.mark.parametrize(("count", "end"), [(-8192, "lower"), (8191, "upper")])

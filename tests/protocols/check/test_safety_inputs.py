@@ -8,19 +8,19 @@ from pathlib import Path
 import pytest
 
 from bench.analysis.check_line import Verdict
-from bench.catalogue import load_protocol
-from bench.config.model import Acquisition, BenchConfiguration
-from bench.engine.operator import Unattended
-from bench.engine.requests import Requests
-from bench.record.reader import open_record
+from bench.app.catalogue import load_protocol
+from bench.app.session import SessionResult, run_session
+from bench.config.model import BenchConfiguration
+from bench.config.sections import Acquisition
+from bench.datafile.reader import open_datafile
+from bench.engine.interface import Requests, Unattended
 from bench.results import FILE
-from bench.session import SessionResult, run_session
 from drivers.daqmx.parameters import Daq
+from drivers.emulation.control import ask
 from drivers.emulation.laboratory import Laboratory
 from drivers.hardware.parameters import Hardware
-from drivers.laboratory_client import ask
+from protocols.check.lines import safety_lines
 from protocols.check.protocol import CheckParameters
-from protocols.check.resting import safety_lines
 from sim.specimen import Specimen
 from sim.virtual_bench import VirtualBenchParameters
 
@@ -103,7 +103,7 @@ def test_an_input_that_opens_halts_the_bench_and_the_file_says_which(
     assert truth["drive"] == 0.0
     assert not truth["enabled"]
     assert not truth["contacts"]["enable relay"]
-    with open_record(tmp_path / FILE) as record:
+    with open_datafile(tmp_path / FILE) as record:
         assert record.status == "halted"
         assert says in record.summary
         assert any(event.text == f"armed -> halted: {says}" for event in record.events)

@@ -1,4 +1,4 @@
-"""What all parts of the service share."""
+"""Common base of all parts of the service."""
 
 from typing import Protocol
 
@@ -31,7 +31,7 @@ class AboutAttribute(Protocol):
 
 
 class Service:
-    """A part of the service: its calls ask the driver."""
+    """Part of the service; its calls use the driver."""
 
     def __init__(self, driver: Driver) -> None:
         self._driver = driver
@@ -41,12 +41,12 @@ class Service:
 
 
 def attribute_of(request: AboutAttribute) -> int:
-    """The number of the attribute that a request is about."""
+    """The number of the attribute in a request."""
     return request.attribute_raw or request.attribute
 
 
 def unsupported(attribute: int) -> DaqmxFailure:
-    """Nobody here has this attribute."""
+    """The failure for an attribute that is not emulated."""
     return DaqmxFailure(
         DAQmxErrors.ATTRIBUTE_NOT_SUPPORTED_IN_TASK_CONTEXT,
         "Specified property is not supported by the device or is not applicable to the task.\n\n"

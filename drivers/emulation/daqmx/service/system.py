@@ -6,10 +6,11 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol, TypeVar
 
 from nidaqmx._stubs import nidaqmx_pb2 as pb
+from nidaqmx.constants import ProductCategory
 from nidaqmx.error_codes import DAQmxErrors
 
-from drivers.emulation.daqmx.catalogue import flattened
 from drivers.emulation.daqmx.device import AnalogInputs, AnalogOutputs, DeviceModel
+from drivers.emulation.daqmx.models import flattened
 from drivers.emulation.daqmx.service.base import AboutAttribute, Service, attribute_of, unsupported
 
 T = TypeVar("T")
@@ -25,7 +26,7 @@ _VERSION: Mapping[int, int] = {
     pb.SYSTEM_ATTRIBUTE_NIDAQ_MINOR_VERSION: 8,
     pb.SYSTEM_ATTRIBUTE_NIDAQ_UPDATE_VERSION: 0,
 }
-"""The oldest driver that is still common: clients do without what is newer."""
+"""The oldest driver still in common use: clients must not need newer functions."""
 
 
 def _inputs(device: DeviceModel, attribute: int) -> AnalogInputs:
@@ -51,7 +52,6 @@ _TEXTS: Mapping[int, Callable[[DeviceModel], str]] = {
     pb.DEVICE_ATTRIBUTE_DI_LINES: lambda device: flattened(device.input_line_names),
     pb.DEVICE_ATTRIBUTE_DO_LINES: lambda device: flattened(device.line_names),
     pb.DEVICE_ATTRIBUTE_CHASSIS_MODULE_DEV_NAMES: lambda device: flattened(device.modules),
-    pb.DEVICE_ATTRIBUTE_COMPACT_RIO_CHASSIS_DEV_NAME: lambda device: device.chassis or "",
 }
 _FLAGS: Mapping[int, Callable[[DeviceModel], bool]] = {
     pb.DEVICE_ATTRIBUTE_IS_SIMULATED: lambda device: device.simulated,
@@ -80,6 +80,12 @@ _RANGES: Mapping[int, Callable[[DeviceModel], list[float]]] = {
 }
 
 
+_CHASSIS: Mapping[int, ProductCategory] = {
+    pb.DEVICE_ATTRIBUTE_COMPACT_DAQ_CHASSIS_DEV_NAME: ProductCategory.COMPACT_DAQ_CHASSIS,
+    pb.DEVICE_ATTRIBUTE_COMPACT_RIO_CHASSIS_DEV_NAME: ProductCategory.COMPACT_RIO_CHASSIS,
+}
+
+
 class SystemService(Service):
     """GetSystemInfoAttribute..., GetDeviceAttribute..., GetPhysicalChanAttribute..., ResetDevice, GetErrorString."""
 
@@ -104,6 +110,8 @@ class SystemService(Service):
     def GetDeviceAttributeString(
         self, request: pb.GetDeviceAttributeStringRequest, context: object
     ) -> pb.GetDeviceAttributeStringResponse:
+        if (attribute := attribute_of(request)) in _CHASSIS:
+            return pb.GetDeviceAttributeStringResponse(value=self._chassis(request, attribute))
         return pb.GetDeviceAttributeStringResponse(value=self._asked(_TEXTS, request))
 
     def GetDeviceAttributeBool(
@@ -148,6 +156,13 @@ class SystemService(Service):
             return pb.GetErrorStringResponse(error_string=DAQmxErrors(request.error_code).name)
         except ValueError:
             return pb.GetErrorStringResponse(error_string="")
+
+    def _chassis(self, request: _AboutDevice, attribute: int) -> str:
+        """The name of the chassis of a module, which only a chassis of that category has as its parent."""
+        device = self._driver.catalogue.device(request.device_name)
+        if device.chassis is None or self._driver.catalogue.device(device.chassis).category != _CHASSIS[attribute]:
+            raise unsupported(attribute)
+        return device.chassis
 
     def _asked(self, table: Mapping[int, Callable[[DeviceModel], T]], request: _AboutDevice) -> T:
         device = self._driver.catalogue.device(request.device_name)

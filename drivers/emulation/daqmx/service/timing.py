@@ -7,10 +7,12 @@ from nidaqmx.constants import AcquisitionType, Edge
 
 from drivers.emulation.daqmx.analog_input import AnalogInput
 from drivers.emulation.daqmx.analog_output import AnalogOutput
+from drivers.emulation.daqmx.conversion import delta_sigma_rate
+from drivers.emulation.daqmx.engines import undefined
 from drivers.emulation.daqmx.errors import NotEmulated
 from drivers.emulation.daqmx.service.base import AboutTask, Service, attribute_of, unsupported
 from drivers.emulation.daqmx.task import Task
-from drivers.emulation.daqmx.timing import sample_clock
+from drivers.emulation.daqmx.timing import SampleClock, sample_clock
 
 Sampled = AnalogInput | AnalogOutput
 
@@ -21,20 +23,32 @@ def _sampled(task: Task) -> Sampled:
     return job if isinstance(job, AnalogOutput) else task.doing(AnalogInput)
 
 
+def _conversion_rate(job: Sampled, device: str) -> float:
+    """Conversions of a multiplexed device per second. Raises DaqmxFailure for devices without multiplexer."""
+    period = job.conversion(device) if isinstance(job, AnalogInput) else None
+    if period is None:
+        raise unsupported(pb.TIMING_ATTRIBUTE_AI_CONV_RATE)
+    return 1.0 / period
+
+
 class TimingService(Service):
     """CfgSampClkTiming, CfgDigEdgeStartTrig, DisableStartTrig, timing, trigger and buffer attributes."""
 
     def CfgSampClkTiming(self, request: pb.CfgSampClkTimingRequest, context: object) -> pb.CfgSampClkTimingResponse:
         job = self._changeable(request)
         if (request.sample_mode_raw or request.sample_mode) != AcquisitionType.CONTINUOUS.value:
-            raise NotEmulated("a clock that stops by itself")
+            raise NotEmulated("a clock for a finite number of samples")
         own = request.source in ("", "OnboardClock")
         if not own and isinstance(job, AnalogInput):
-            raise NotEmulated("inputs on a sample clock from elsewhere")
+            raise NotEmulated("inputs on an external sample clock")
         error = self._driver.output_clock_error if own and isinstance(job, AnalogOutput) else 0.0
         tick_rate = self._driver.plant.tick_rate
         job.source = None if own else request.source
-        job.clock = sample_clock(request.rate, job.highest_rate, tick_rate, request.samps_per_chan, error)
+        if isinstance(job, AnalogInput) and job.converters:
+            rate = delta_sigma_rate(request.rate, job.converters)
+            job.clock = SampleClock(max(round(tick_rate / rate), 1), rate, request.samps_per_chan)
+        else:
+            job.clock = sample_clock(request.rate, job.highest_rate, tick_rate, request.samps_per_chan, error)
         return pb.CfgSampClkTimingResponse()
 
     def GetTimingAttributeDouble(
@@ -46,8 +60,18 @@ class TimingService(Service):
                 return pb.GetTimingAttributeDoubleResponse(value=job.clock.rate)
             case pb.TIMING_ATTRIBUTE_SAMP_CLK_MAX_RATE:
                 return pb.GetTimingAttributeDoubleResponse(value=job.highest_rate)
+            case pb.TIMING_ATTRIBUTE_AI_CONV_RATE if len(job.devices) == 1:
+                return pb.GetTimingAttributeDoubleResponse(value=_conversion_rate(job, *job.devices))
             case other:
                 raise unsupported(other)
+
+    def GetTimingAttributeExDouble(
+        self, request: pb.GetTimingAttributeExDoubleRequest, context: object
+    ) -> pb.GetTimingAttributeExDoubleResponse:
+        if (attribute := attribute_of(request)) != pb.TIMING_ATTRIBUTE_AI_CONV_RATE:
+            raise unsupported(attribute)
+        device = self._driver.catalogue.device(request.device_names)
+        return pb.GetTimingAttributeExDoubleResponse(value=_conversion_rate(_sampled(self._task(request)), device.name))
 
     def GetTimingAttributeString(
         self, request: pb.GetTimingAttributeStringRequest, context: object
@@ -55,7 +79,7 @@ class TimingService(Service):
         job = _sampled(self._task(request))
         match attribute_of(request):
             case pb.TIMING_ATTRIBUTE_SAMP_CLK_TERM:
-                return pb.GetTimingAttributeStringResponse(value=job.clock_terminal or "")
+                return pb.GetTimingAttributeStringResponse(value=self._terminal(request, job, "SampClk.Term"))
             case pb.TIMING_ATTRIBUTE_SAMP_CLK_SRC:
                 return pb.GetTimingAttributeStringResponse(value=job.source or "OnboardClock")
             case other:
@@ -69,6 +93,27 @@ class TimingService(Service):
         clocked = _sampled(self._task(request)).clock is not None
         mode = AcquisitionType.CONTINUOUS if clocked else AcquisitionType.FINITE
         return pb.GetTimingAttributeInt32Response(value_raw=mode.value)
+
+    def GetTimingAttributeUInt32(
+        self, request: pb.GetTimingAttributeUInt32Request, context: object
+    ) -> pb.GetTimingAttributeUInt32Response:
+        if (attribute := attribute_of(request)) != pb.TIMING_ATTRIBUTE_SAMP_TIMING_ENGINE:
+            raise unsupported(attribute)
+        job = _sampled(self._task(request))
+        if len(job.engines) == 1:
+            raise unsupported(attribute)
+        if (number := job.engine.number(job.engines)) is None:
+            raise undefined("SampTimingEngine", request.task.name)
+        return pb.GetTimingAttributeUInt32Response(value=number)
+
+    def SetTimingAttributeUInt32(
+        self, request: pb.SetTimingAttributeUInt32Request, context: object
+    ) -> pb.SetTimingAttributeUInt32Response:
+        if (attribute := attribute_of(request)) != pb.TIMING_ATTRIBUTE_SAMP_TIMING_ENGINE:
+            raise unsupported(attribute)
+        job = self._changeable(request)
+        job.engine.request(request.value, job.engines)
+        return pb.SetTimingAttributeUInt32Response()
 
     def CfgDigEdgeStartTrig(
         self, request: pb.CfgDigEdgeStartTrigRequest, context: object
@@ -88,7 +133,7 @@ class TimingService(Service):
         job = _sampled(self._task(request))
         match attribute_of(request):
             case pb.TRIGGER_ATTRIBUTE_START_TRIG_TERM:
-                return pb.GetTrigAttributeStringResponse(value=job.start_terminal or "")
+                return pb.GetTrigAttributeStringResponse(value=self._terminal(request, job, "Start.Term"))
             case pb.TRIGGER_ATTRIBUTE_DIG_EDGE_START_TRIG_SRC:
                 return pb.GetTrigAttributeStringResponse(value=job.awaited or "")
             case other:
@@ -117,6 +162,14 @@ class TimingService(Service):
         task.require_stopped()
         task.doing(AnalogOutput).buffer = request.num_samps_per_chan
         return pb.CfgOutputBufferResponse()
+
+    def _terminal(self, request: AboutTask, job: Sampled, what: str) -> str:
+        """A terminal of the task. Raises DaqmxFailure while its timing engine is undefined."""
+        if job.clock is None:
+            return ""
+        if job.engine.number(job.engines) is None:
+            raise undefined(what, request.task.name)
+        return (job.clock_terminal if what == "SampClk.Term" else job.start_terminal) or ""
 
     def _changeable(self, request: AboutTask) -> Sampled:
         task = self._task(request)

@@ -1,0 +1,200 @@
+"""Covariance of a fit, by source of uncertainty.
+
+Every error of a measured signal shifts the values by the gain of the linearised fit (`Fit.moved`). The sources differ
+in how the error is described:
+
+- noise: from the spectrum of the residual (Welch), because neighbouring samples are correlated (laser resolution,
+filters); each quantity has the noise at the frequencies that determine it;
+- table: the noise of the table's sensor, filtered by the frame's response while a mode rings; its
+density is measured at rest before the motion;
+- clock: the lasers' clocks run freely, so that their delay wanders by up to one of their measuring periods;
+- linearity: smooth sine waves over the lasers' range, of any phase and typical numbers of periods, mostly absorbed by
+the fitted curvature;
+- masses: the uncertainty of weighing;
+- timebase: a relative error of the sample clock enters once in frequencies and dashpots, twice in stiffnesses, not in
+damping ratios.
+
+Noise, table and clock are independent between decays. Linearity, masses and timebase are common to all.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.analysis.free_decay.fit import Fit
+from bench.analysis.free_decay.response import quantities, slopes
+from bench.analysis.gain import SensorAccuracy
+
+Array = NDArray[np.float64]
+
+WAVES = np.arange(0.5, 3.01, 0.5)
+"""Periods of a linearity error within the range of a laser."""
+
+CLOCKS = np.array([5e-6, 1e-5, 2e-5, 5e-5, 1e-4])
+"""Relative errors of a laser's clock, which determine how often a measurement is gained or lost."""
+
+PHASES = 8
+"""Phases of such a wander that are evaluated."""
+
+
+def waves(fit: Fit, size: float, ranges: tuple[float, float]) -> Array:
+    """Linearity errors of each laser: every number of periods and both quadratures, shape (m, 2, n)."""
+    seen = fit.fitted
+    errors: list[Array] = []
+    # uniformly distributed phase: each quadrature has half the power
+    weight = size / np.sqrt(2.0 * WAVES.size)
+    for laser in range(2):
+        for number in WAVES:
+            turn = 2.0 * np.pi * number / ranges[laser] * seen[laser]
+            for shape in (np.sin(turn), np.cos(turn)):
+                error = np.zeros_like(seen)
+                error[laser] = weight * ranges[laser] * shape
+                errors.append(error)
+    return np.array(errors)
+
+
+def clocks(fit: Fit, wander: float) -> Array:
+    """Sawtooth delays of each laser by `wander` [s], at several rates and phases, shape (m, 2, n)."""
+    speed, time = np.gradient(fit.fitted, fit.stretch.step, axis=1), fit.stretch.time
+    errors: list[Array] = []
+    for laser in range(2):
+        for pace in CLOCKS if wander > 0.0 else ():
+            for phase in np.arange(PHASES) / PHASES:
+                late = wander * ((time * pace / wander + phase) % 1.0 - 0.5)
+                error = np.zeros_like(speed)
+                error[laser] = speed[laser] * late / np.sqrt(CLOCKS.size * PHASES)
+                errors.append(error)
+    return np.array(errors).reshape(-1, *speed.shape)
+
+
+OWN, COMMON = ("noise", "table", "clock"), ("linearity", "masses", "timebase")
+"""Sources that are independent between decays, and those common to all."""
+
+_RATES = np.array([2.0, 2.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0])
+"""Exponents of the sample rate in the quantities of `modal.NAMES`."""
+
+SEGMENT = 4.0
+"""Length of the segments for the spectrum of the residual [s]."""
+
+BAND = 30.0
+"""Upper frequency of the band in which the noise of the table's sensor at rest is evaluated [Hz]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Errors:
+    """Description of the errors: the `accuracy` of the sensors, the lasers' `ranges` [m], the time [s] until which
+    the stretch is at rest (`quiet`, 0 where it is not), and the covariance of the `masses` [kg2], shape (2, 2).
+    """
+
+    accuracy: SensorAccuracy
+    ranges: tuple[float, float]
+    quiet: float
+    masses: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Uncertainty:
+    """Covariances of the quantities of `modal.NAMES`, shape (n, n), by contribution.
+
+    `mass_shift`, shape (n, 2), is the sensitivity to the masses; `time_shift`, shape (n,), the shift by one standard
+    uncertainty of the timebase.
+    """
+
+    parts: dict[str, Array]
+    mass_shift: Array
+    time_shift: Array
+
+    @property
+    def own(self) -> Array:
+        """Covariance independent between decays, shape (n, n)."""
+        return sum((self.parts[name] for name in OWN), np.zeros_like(self.parts[OWN[0]]))
+
+    @property
+    def common(self) -> Array:
+        """Covariance common to all decays, shape (n, n)."""
+        return sum((self.parts[name] for name in COMMON), np.zeros_like(self.parts[OWN[0]]))
+
+
+def fit_uncertainty(fit: Fit, errors: Errors) -> Uncertainty:
+    """The covariances of a fit."""
+    turn, direct = slopes(fit.constants)
+    turn = np.hstack((turn, np.zeros((len(turn), fit.values.size - turn.shape[1]))))
+    shift = turn @ -fit.moved(fit.mass_jacobian).T + direct
+    parts = {name: turn @ part @ turn.T for name, part in _parts(fit, errors).items()}
+    late = errors.accuracy.timebase * _RATES * quantities(fit.constants)
+    shared = {"masses": shift @ errors.masses @ shift.T, "timebase": np.outer(late, late)}
+    return Uncertainty(parts | shared, shift, late)
+
+
+def covariances(fit: Fit, errors: Errors) -> tuple[Array, Array]:
+    """Covariances of all values of a linearised fit, independent between decays and common to all.
+
+    They include neither masses nor timebase.
+    """
+    parts = _parts(fit, errors)
+    own = sum((parts[name] for name in OWN), np.zeros_like(fit.inverse))
+    return own, parts["linearity"]
+
+
+def _parts(fit: Fit, errors: Errors) -> dict[str, Array]:
+    return {
+        "noise": _noise(fit),
+        "table": _table(fit, errors.quiet),
+        "clock": _spread(fit.moved(clocks(fit, errors.accuracy.laser_timing))),
+        "linearity": _spread(fit.moved(waves(fit, errors.accuracy.laser_linearity, errors.ranges))),
+    }
+
+
+def _spread(moved: Array) -> Array:
+    """Covariance of independent shifts, shape (m, count)."""
+    return moved.T @ moved
+
+
+def _noise(fit: Fit) -> Array:
+    """Contribution of noise from the spectrum of each laser's residual: J R J' with R its covariance."""
+    from scipy import signal
+
+    welch: Any = signal.welch
+    n = fit.stretch.time.size
+    scores = np.zeros_like(fit.inverse)
+    for jacobian, residual in zip(fit.jacobian.transpose(1, 0, 2), fit.residual, strict=True):
+        length = min(round(SEGMENT / fit.stretch.step), n)
+        found = welch(residual, nperseg=length)
+        frequency, density = np.asarray(found[0], np.float64), np.asarray(found[1], np.float64)
+        turned = np.fft.rfft(jacobian)
+        # half the one-sided density is the variance of white noise of this strength
+        left = _left_alone(frequency, fit)
+        power = np.interp(np.fft.rfftfreq(n), frequency[left], density[left] / 2.0)
+        twice = np.full(power.size, 2.0)
+        twice[0] = 1.0
+        scores += ((turned * (twice * power / n)) @ turned.conj().T).real
+    return fit.inverse @ scores @ fit.inverse
+
+
+def _left_alone(frequency: Array, fit: Fit) -> NDArray[np.bool_]:
+    """Mask of the frequencies (in cycles per sample) at which the fit absorbs no noise: not near a mode or zero."""
+    modes = np.abs(fit.response.poles) * fit.stretch.step / (2.0 * np.pi)
+    apart = 1.5 * frequency[1]
+    return (frequency > 0.0) & (np.abs(frequency[:, None] - modes) > apart).all(axis=1)
+
+
+def _table(fit: Fit, quiet: float) -> Array:
+    """Contribution of the table sensor's white noise through the response, by the adjoint method."""
+    rest = fit.stretch.table[fit.stretch.time < quiet]
+    if rest.size < 2:
+        return np.zeros_like(fit.inverse)
+    lines = np.fft.rfftfreq(rest.size, fit.stretch.step)
+    power = np.abs(np.fft.rfft(rest - rest.mean())) ** 2 / rest.size
+    # up to the modes; above, filters and averaging have reduced the noise
+    variance = float(power[(lines > 0.0) & (lines <= BAND)].mean())
+    response = fit.response
+    response_to_scores = np.array(
+        [
+            sum(response.storeys(response.forced(score[storey]))[storey] for storey in range(2))
+            for score in fit.jacobian[:, :, ::-1]
+        ]
+    )
+    through = fit.inverse @ response_to_scores
+    return variance * through @ through.T

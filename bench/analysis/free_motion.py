@@ -1,0 +1,155 @@
+"""Description of an unsteady motion: peaks of its cycles, period, and rate of approach to a periodic motion.
+
+The peak of a cycle is that of its samples. A fit of one cycle by harmonics of the drive overshoots it, by 10 % where
+the amplitude changes by half within a few cycles, because the motion then differs at both ends of the cycle.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import tau
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.analysis.cycles import Cycle
+from bench.analysis.gain import SteadyPeak, steady_peak
+from bench.analysis.signals import DRIFT, LASER_1, LASER_2, U1
+
+LONGEST_PERIOD = 24
+"""Longest period in the search [cycles]."""
+
+CYCLES = 4 * LONGEST_PERIOD
+"""Largest number of cycles, counted from the end, from which peaks and period are determined."""
+
+KEPT = 1000
+"""Largest number of cycles from which the rate is computed."""
+
+REPEATED, ALIKE = 0.01, 0.05
+"""Largest change of a peak after a period of a periodic motion, relative to the largest peak and to the range of the
+peaks, since a slow spiral also returns close to its past.
+"""
+
+LINEAR = 0.98
+"""Smallest share of the changes from cycle to cycle explained by one pair of multipliers for which a rate is stated."""
+
+
+KNOWN, TURNS = 0.02, 2.0
+"""Largest standard uncertainty of the modulus, and least number of turns of the spiral, for the orbit's own peak to be
+stated: the mean over less than a turn is that of one side.
+"""
+
+UNKNOWN = 0.1
+"""Standard uncertainty of a modulus above which no rate is stated: the multiplier is that of the noise."""
+
+SMALL = 0.15
+"""Largest relative deviation of the peaks from their mean at which the peak of the orbit is still stated."""
+
+SHORTEST, SINGULAR, STEP = 24, 1e8, 1e-6
+"""Smallest number of changes for a rate, largest condition number of its equations, step of its finite differences."""
+
+
+@dataclass(frozen=True)
+class Rate:
+    """Slowest pair of multipliers of a motion near a periodic one: modulus per cycle, and its standard
+    uncertainty; `angle` [rad] per cycle.
+    """
+
+    modulus: float
+    uncertainty: float
+    angle: float
+
+    @property
+    def decays(self) -> bool:
+        """Whether the deviation from a periodic motion decays significantly."""
+        return self.modulus + 2.0 * self.uncertainty < 1.0
+
+
+@dataclass(frozen=True)
+class FreeMotion:
+    """Peaks of the drift per cycle [m]: smallest, mean and largest. `repeats` is the number of cycles after which the
+    motion repeats, 0 where it does not; `rate` is None where the changes are not those of a linear system.
+    """
+
+    least: float
+    mean: float
+    greatest: float
+    repeats: int
+    rate: Rate | None
+    cycles: int
+
+
+def free_motion(cycles: Sequence[Cycle]) -> FreeMotion:
+    """Description of consecutive cycles at a constant drive; peaks and period are those of the last `CYCLES`."""
+    extremes = np.array([cycle.extreme[[U1, DRIFT]] for cycle in cycles[-CYCLES:]])
+    return FreeMotion(
+        least=float(extremes[:, 1].min()),
+        mean=float(extremes[:, 1].mean()),
+        greatest=float(extremes[:, 1].max()),
+        repeats=_period(extremes),
+        rate=_rate(np.array([cycle.fundamental[[LASER_1, LASER_2]] for cycle in cycles])),
+        cycles=extremes.shape[0],
+    )
+
+
+def orbit_peak(cycles: Sequence[Cycle], motion: FreeMotion, omega: float) -> SteadyPeak | None:
+    """Peak of the mean of the last `CYCLES` cycles at `omega` [rad/s]: that of the periodic motion about which a motion
+    turns, to second order in the deviation. None where the deviation is large, or the changes are not linear.
+
+    The square of the relative deviation, as a rectangular distribution, is added as a transient. On exact motions of
+    the model near their boundaries of stability, with deviations up to 10 %, the error was at most 5.1e-4.
+    """
+    deviation, rate = 0.5 * (motion.greatest - motion.least) / motion.mean, motion.rate
+    if rate is None or deviation > SMALL or rate.uncertainty > KNOWN or rate.angle * motion.cycles < TURNS * tau:
+        return None
+    return steady_peak(cycles[-CYCLES:], omega, deviation**2)
+
+
+def _period(peaks: NDArray[np.float64]) -> int:
+    """Smallest number of cycles after which all peaks, shape (n, 2), repeat, over at least two periods."""
+    allowed = np.minimum(REPEATED * peaks.max(axis=0), ALIKE * np.ptp(peaks, axis=0))
+    for period in range(1, min(LONGEST_PERIOD, peaks.shape[0] // 2) + 1):
+        if bool(np.all(np.abs(peaks[period:] - peaks[:-period]) <= allowed)):
+            return period
+    return 0
+
+
+def _rate(amplitudes: NDArray[np.complex128]) -> Rate | None:
+    """Rate from the linear map of changes from cycle to cycle, in the plane of their two largest components.
+
+    The preceding changes are the instrumental variables of the least-squares problem: noise of the amplitudes would
+    bias the multipliers low, but is independent for changes that share no cycle.
+    """
+    moved = np.diff(np.concatenate((amplitudes.real, amplitudes.imag), axis=1), axis=0)
+    size = float(np.sum(moved**2))
+    if moved.shape[0] < SHORTEST or size == 0.0:
+        return None
+    _, _, axes = np.linalg.svd(moved, full_matrices=False)
+    plane = moved @ axes[:2].T
+    instruments, before, after = plane[:-3], plane[2:-1], plane[3:]
+    common = instruments.T @ before
+    if np.linalg.cond(common) > SINGULAR:
+        return None
+    found = np.linalg.solve(common, instruments.T @ after)
+    residual = after - before @ found
+    explained = 1.0 - float(np.sum(residual**2)) / float(np.sum(after**2))
+    if explained < LINEAR or float(np.sum(plane**2)) < LINEAR * size:
+        return None
+    slowest = max(np.linalg.eigvals(found), key=abs)
+    scatter = residual.T @ residual / (residual.shape[0] - 2)
+    spread = np.linalg.solve(common, np.linalg.solve(common, instruments.T @ instruments).T)
+    rate = Rate(float(abs(slowest)), _uncertainty(found, spread, scatter), float(abs(np.angle(slowest))))
+    return rate if rate.uncertainty <= UNKNOWN else None
+
+
+def _uncertainty(found: NDArray[Any], spread: NDArray[Any], scatter: NDArray[np.float64]) -> float:
+    """Standard uncertainty of the largest modulus, to first order; the covariance of the elements of `found` is the
+    product of `spread` (rows) and `scatter` (columns).
+    """
+
+    def modulus(change: NDArray[np.float64]) -> float:
+        return float(np.abs(np.linalg.eigvals(found + change)).max())
+
+    units = np.eye(4).reshape(4, 2, 2) * STEP
+    slopes = np.array([modulus(unit) - modulus(-unit) for unit in units]).reshape(2, 2) / (2.0 * STEP)
+    return float(np.sqrt(max(np.einsum("ij,kl,ik,jl->", slopes, slopes, spread, scatter), 0.0)))

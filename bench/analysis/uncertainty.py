@@ -1,0 +1,138 @@
+"""Statement of uncertainties: mean of a few repeats, budgets, and rounding of values.
+
+The Birge ratio, the root of chi2 / (R - 1), shows whether R repeats scatter more than stated (Birge, Physical Review 40
+(1932) 207). Where it exceeds 1, the same term is added to each variance to reduce it to 1 (Mandel and Paule, Analytical
+Chemistry 42 (1970) 1194): a dominant scatter makes the weights equal. Few repeats determine the scatter only roughly,
+so its part follows Student's t with R - 1 degrees of freedom: it is enlarged until +-1.96 times the combined
+uncertainty covers 95 %, as elsewhere (GUM:2008, G.4). Where the scatter is one to four times as large as stated,
+repeats may agree by chance: the interval of two then covers 87 %, of three 91 %, of five or more 93 %.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import floor, hypot, isfinite, log10
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+_LEVEL = 0.975
+_STEPS, _CLOSE = 200, 1e-10
+
+
+@dataclass(frozen=True, eq=False)
+class Repeats:
+    """`values`, shape (n,), the means; `weights`, shape (R, n), of the repeats, which sum to 1; `scatter`, shape (n,),
+    its part of the standard uncertainties, with Student's t; `birge`, shape (n,), NaN for a single repeat.
+    """
+
+    values: Array
+    weights: Array
+    scatter: Array
+    birge: Array
+
+
+def mean_of_repeats(values: ArrayLike, variances: ArrayLike) -> Repeats:
+    """Mean of R repeats of n independent quantities: `values` and their own `variances`, shapes (R, n)."""
+    found, own = np.asarray(values, dtype=np.float64), np.asarray(variances, dtype=np.float64)
+    number = len(found)
+    added, birge = np.zeros(found.shape[1]), np.full(found.shape[1], np.nan)
+    if number > 1:
+        birge = np.sqrt(np.sum(_squares(found, own), axis=0) / (number - 1))
+        added = _addition(found, own)
+    weights = _weights(own + added)
+    spread = np.sqrt(added * np.sum(weights**2, axis=0))
+    return Repeats(np.sum(weights * found, axis=0), weights, student_factor(number) * spread, birge)
+
+
+def enlarged(covariance: Array, scatter: Array) -> Array:
+    """`covariance` of a mean, shape (n, n), enlarged by the `scatter`, shape (n,); keeps correlations."""
+    own = np.diag(covariance)
+    larger = np.sqrt(1.0 + scatter**2 / np.where(own > 0.0, own, np.inf))
+    return np.outer(larger, larger) * covariance
+
+
+def student_factor(number: int) -> float:
+    """Factor on the scatter of so many repeats: 95 % interval of Student's t over the normal one."""
+    from scipy.stats import norm, t
+
+    return float(t.ppf(_LEVEL, number - 1) / norm.ppf(_LEVEL)) if number > 1 else 0.0
+
+
+def _weights(variances: Array) -> Array:
+    return (1.0 / variances) / np.sum(1.0 / variances, axis=0)
+
+
+def _squares(values: Array, variances: Array) -> Array:
+    return (values - np.sum(_weights(variances) * values, axis=0)) ** 2 / variances
+
+
+def _addition(values: Array, variances: Array) -> Array:
+    """Common addition to the variances for Birge ratios of 1, shape (n,); zero where they are smaller.
+
+    Newton's method from zero converges from below (DerSimonian and Kacker, Contemporary Clinical Trials 28 (2007) 105),
+    and doubles the addition per step while far from the solution.
+    """
+    wanted = len(values) - 1
+    added = np.zeros(values.shape[1])
+    for _ in range(_STEPS):
+        whole = variances + added
+        squares = _squares(values, whole)
+        excess = np.sum(squares, axis=0) - wanted
+        if not np.any(excess > _CLOSE):
+            break
+        added += np.maximum(excess, 0.0) / np.maximum(np.sum(squares / whole, axis=0), np.finfo(np.float64).tiny)
+    return added
+
+
+COVERAGE = 2.0
+"""Coverage factor k of every expanded uncertainty."""
+
+
+@dataclass(frozen=True)
+class Budget:
+    """Independent contributions to one result: standard uncertainties in its unit, by name."""
+
+    parts: Mapping[str, float]
+
+    @property
+    def largest_first(self) -> dict[str, float]:
+        """The parts in descending order."""
+        return dict(sorted(self.parts.items(), key=lambda part: -part[1]))
+
+    @property
+    def expanded(self) -> float:
+        """Expanded uncertainty (k = 2)."""
+        return COVERAGE * hypot(*self.parts.values())
+
+    @property
+    def dominating(self) -> str:
+        """The largest contribution; empty if none is above zero."""
+        name, value = next(iter(self.largest_first.items()), ("", 0.0))
+        return name if value > 0.0 else ""
+
+    @property
+    def as_json(self) -> str:
+        """All contributions as JSON, largest first."""
+        return json.dumps({name: float(f"{value:.3g}") for name, value in self.largest_first.items()})
+
+
+def decimals(uncertainty: float) -> int | None:
+    """Decimal places up to the second digit of an uncertainty; None for one that is not finite and positive."""
+    if not (isfinite(uncertainty) and uncertainty > 0.0):
+        return None
+    return max(1 - floor(log10(uncertainty)), 0)
+
+
+def plus_minus(value: float, uncertainty: float, sign: str = "+-") -> str:
+    """A value with its uncertainty, as in 213.44 +- 0.32; only the value without a usable uncertainty."""
+    places = decimals(uncertainty)
+    return f"{value:.6g}" if places is None else f"{value:.{places}f} {sign} {uncertainty:.{places}f}"
+
+
+def in_brackets(value: float, uncertainty: float) -> str:
+    """A value with its uncertainty in units of the last digits, as in 213.44(16); alone without one."""
+    places = decimals(uncertainty)
+    return f"{value:.6g}" if places is None else f"{value:.{places}f}({round(uncertainty * 10.0**places):d})"

@@ -1,0 +1,226 @@
+"""`rockbench emulate`: serves an emulated laboratory, for test runs with the real drivers."""
+
+import signal
+import sys
+import threading
+from collections.abc import Generator
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from cyclopts import Parameter
+
+from bench.app.cli.inputs import configuration_from
+from bench.app.cli.interrupt import SIGNALS
+from bench.app.cli.options import Handed, Seed
+from bench.app.cli.output import print_warning
+from bench.progress import silent
+from sim.errors import InvalidInput
+from sim.extras import require
+
+if TYPE_CHECKING:
+    from bench.config.model import BenchConfiguration
+    from drivers.emulation.laboratory import Laboratory
+
+
+STEP = 0.2
+"""Longest uninterruptible wait [s]."""
+
+LARGEST_CLOCK_ERROR = 0.01
+"""Largest relative error of an emulated clock, as for the lasers of the virtual bench."""
+
+
+def emulate(
+    *,
+    config: Annotated[
+        Path | None, Parameter(metavar="FILE", help="Configuration that provides specimen, limits and simulation.")
+    ] = None,
+    lasers: Annotated[Literal["serial", "analogue"], Parameter(help="How the lasers are connected.")] = "serial",
+    device: Annotated[
+        Literal["usb", "crio", "cDAQ-9174", "cDAQ-9185", "cRIO-9045", "cRIO-9049", "PCIe-6351", "USB-6351"],
+        Parameter(help="DAQ device: USB-6363 (usb), cRIO-9045 with NI 9239 (crio), or by its name."),
+    ] = "usb",
+    modules: Annotated[
+        tuple[str, ...] | None,
+        Parameter(
+            metavar="MODULE",
+            negative=(),
+            consume_multiple=True,
+            help="Modules of a chassis from its first slot on: 9205, 9215, 9234, 9239, 9263, 9269, 9401, 9421, 9485.",
+            show_default="9205 9263 9401 9485",
+        ),
+    ] = None,
+    sample_rate: Annotated[
+        str | None,
+        Parameter(
+            metavar="HZ",
+            help="Samples per second of drive, inputs and virtual bench (at most 20000).",
+            show_default="as the simulation's",
+        ),
+    ] = None,
+    seed: Seed = None,
+    lead: Annotated[
+        str | None,
+        Parameter(
+            metavar="S",
+            help="Lead of the drive in the written configuration; a busy computer needs more.",
+            show_default="as configured",
+        ),
+    ] = None,
+    clock_error: Annotated[
+        tuple[str, str, str] | None,
+        Parameter(
+            metavar="NUMBER",
+            negative=(),
+            help="Relative errors of the clocks of DAQ, laser 1 and laser 2, such as 12e-6 30e-6 -21e-6.",
+        ),
+    ] = None,
+    write: Annotated[
+        Path | None,
+        Parameter(
+            metavar="FILE",
+            help="File for the configuration of a client; an existing file is never overwritten.",
+            show_default="standard output",
+        ),
+    ] = None,
+    progress: Handed = silent,
+) -> int:
+    """Serve an emulated laboratory: the virtual bench in real time behind the instruments' real protocols.
+
+    Prints the configuration of a client, or writes it with --write, then serves the laboratory until Ctrl-C. Serial
+    lasers need pseudo-terminals, which exist on Linux and macOS only.
+    """
+    require("ni", "rockbench emulate")
+    progress("loading the program")
+    given = configuration_from(config, seed)
+    if given.backend != "simulated":
+        raise InvalidInput(
+            "backend", given.backend, "it must be the simulated bench, which the emulated laboratory uses"
+        )
+    configuration = _with_lead(_at_rate(given, sample_rate), lead)
+    from bench.config.review import review
+
+    reviewed = review(configuration)
+    reviewed.require()
+    for notice in reviewed.notices:
+        print_warning(notice)
+    errors = None if clock_error is None else _ratios(clock_error)
+    if write is not None and write.exists():
+        raise InvalidInput("--write", str(write), "it exists and is never overwritten; choose another name")
+    from bench.app.preflight import load_bench
+    from drivers.emulation.laboratory import ClockErrors, Laboratory
+
+    load_bench(configuration, progress)
+    progress("starting the emulated laboratory")
+    simulation = configuration.simulation
+    laboratory = Laboratory(
+        simulation.bench,
+        simulation.specimen or configuration.specimen,
+        seed=simulation.seed,
+        spring_factor=simulation.spring_factor,
+        connection=lasers,
+        device=device,
+        modules=modules or (),
+        clock_errors=None if errors is None else ClockErrors(*errors),
+    )
+    try:
+        laboratory.start()
+        with _until_asked() as over:
+            _hand_out(configuration, laboratory, write)
+            # in steps: on Windows before Python 3.14, a signal does not end a wait
+            while not over.wait(STEP):
+                pass
+            # under the same handler, so that a second Ctrl-C does not interrupt it
+            laboratory.close()
+    finally:
+        laboratory.close()
+    _say("the laboratory is closed")
+    return 0
+
+
+def _ratios(typed: tuple[str, str, str]) -> list[float]:
+    """Parse the relative errors of the clocks. Raises InvalidInput."""
+    from bench.config.numbers import read_number
+
+    found: list[float] = []
+    for text in typed:
+        allowed = f"it must be a number from -{LARGEST_CLOCK_ERROR:g} to {LARGEST_CLOCK_ERROR:g}, such as 12e-6"
+        try:
+            found.append(read_number(text))
+        except ValueError as error:
+            raise InvalidInput("--clock-error", text, str(error) or allowed) from None
+        if abs(found[-1]) > LARGEST_CLOCK_ERROR:
+            raise InvalidInput("--clock-error", text, allowed)
+    return found
+
+
+def _at_rate(configuration: "BenchConfiguration", rate: str | None) -> "BenchConfiguration":
+    """The configuration with the sample rate of its virtual bench replaced. Raises InvalidInput."""
+    if rate is None:
+        return configuration
+    from bench.config.sections import Simulation
+    from bench.config.validation import dotted, read_fields, validated
+    from sim.virtual_bench import VirtualBenchParameters
+
+    simulation = configuration.simulation.model_dump(mode="json")
+    simulation["bench"] |= read_fields(VirtualBenchParameters, {"sample_rate": rate})
+    changed = validated(
+        Simulation, simulation, lambda path: "--sample-rate" if path[-1] == "sample_rate" else dotted(path)
+    )
+    return configuration.model_copy(update={"simulation": changed})
+
+
+def _with_lead(configuration: "BenchConfiguration", lead: str | None) -> "BenchConfiguration":
+    """The configuration with its lead replaced. Raises InvalidInput."""
+    if lead is None:
+        return configuration
+    from bench.config.sections import Acquisition
+    from bench.config.validation import read_fields, validated
+
+    acquisition = configuration.acquisition.model_dump(mode="json") | read_fields(Acquisition, {"lead": lead})
+    changed = validated(Acquisition, acquisition, lambda _: "--lead")
+    return configuration.model_copy(update={"acquisition": changed})
+
+
+def _hand_out(configuration: "BenchConfiguration", laboratory: "Laboratory", path: Path | None) -> None:
+    """Output the configuration of a client, and instructions on standard error. Raises InvalidInput."""
+    from bench.config.toml import as_toml
+
+    hardware = laboratory.hardware
+    changed = {"backend": "hardware", "hardware": hardware}
+    text = as_toml(configuration.model_copy(update=changed))
+    if path is None:
+        print(text, end="", flush=True)
+    else:
+        try:
+            with path.open("x", encoding="utf-8", newline="\n") as file:
+                file.write(text)
+        except OSError as error:
+            raise InvalidInput("--write", str(path), f"it cannot be written: {error.strerror}") from None
+    _say(f"DAQ at {hardware.daq.server}, {hardware.sample_rate:g} samples per second")
+    for name, laser in (("laser 1", hardware.laser_1), ("laser 2", hardware.laser_2)):
+        _say(f"{name} at {laser.port if hardware.lasers.connection == 'serial' else laser.terminal}")
+    named = path if path is not None else "FILE, with the text above in FILE"
+    _say(f"in another terminal: rockbench check --config {named}")
+    _say("Ctrl-C closes the laboratory")
+
+
+@contextmanager
+def _until_asked() -> Generator[threading.Event]:
+    """An event that Ctrl-C, SIGTERM and a closed terminal set, instead of their default actions."""
+    over = threading.Event()
+
+    def handle(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - the signature is Python's
+        over.set()
+
+    before = {number: signal.signal(number, handle) for number in SIGNALS}
+    try:
+        yield over
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _say(text: str) -> None:
+    print(f"emulated laboratory: {text}", file=sys.stderr, flush=True)

@@ -1,0 +1,209 @@
+"""`rockbench predict`: predictions of the model, without a bench."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pkgutil import resolve_name
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+
+from bench.app.cli.inputs import (
+    configuration_from,
+    known_from,
+    records_from,
+    request_from,
+    specimen_from,
+    warn_of_unusual,
+)
+from bench.app.cli.options import BenchFile, Handed, ResultOptions, SpecimenOptions, with_flags
+from bench.app.cli.output import check_files, deliver
+from bench.prediction.requests import (
+    BandStudyRequest,
+    HistoryRequest,
+    MapRequest,
+    ModesRequest,
+    RecordsRequest,
+    SeismicRequest,
+    SineRequest,
+    SpectrumRequest,
+    StabilityRequest,
+    SteadyRequest,
+)
+from bench.progress import silent
+from sim.errors import InvalidInput
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from bench.accelerograms.accelerogram import Accelerogram
+    from bench.config.model import BenchConfiguration
+    from sim.knowledge import SpecimenKnowledge
+    from sim.specimen import Specimen
+
+MOST_HISTORIES = 6
+"""Maximum number of points in a figure of histories."""
+
+_EXIT_CODES = (
+    "The exit code is 0 when the prediction succeeded, 1 when it failed, 2 when an input was refused. "
+    "Existing files are never overwritten."
+)
+
+_Records = Annotated[
+    str,
+    Parameter(
+        name="FILE",
+        metavar="FILE",
+        help="Records, before the flags: FILE, FILE@KEY=VALUE,... with the keys unit, dt, channel, column, name, "
+        "or synthetic:NAME[:SEED]. Without any: the seven synthetic ones.",
+    ),
+]
+
+
+@dataclass(frozen=True)
+class Subject:
+    """Specimen of a prediction and its uncertainty; for predictions under records also the bench and the records."""
+
+    specimen: "Specimen"
+    known: "SpecimenKnowledge"
+    configuration: "BenchConfiguration"
+    records: "tuple[Accelerogram, ...]" = ()
+
+
+def _sine(
+    request_type: type[ModesRequest | SineRequest | StabilityRequest],
+    function: str,
+    documentation: str,
+    drawable: int | None = None,
+) -> "Callable[..., int]":
+    """A command with the flags of a request; a `function` of `predict_sine` computes it. Its figure has room for
+    `drawable` points.
+    """
+
+    def command(
+        typed: Mapping[str, Any],
+        *,
+        chosen: SpecimenOptions = SpecimenOptions(),  # noqa: B008 - immutable
+        options: ResultOptions = ResultOptions(),  # noqa: B008 - immutable
+        progress: Handed = silent,
+    ) -> int:
+        progress("loading the program")
+        from bench.config.model import BenchConfiguration
+
+        request = request_from(request_type, typed)
+        known = known_from(chosen.specimen, chosen.restitution_factor)
+        specimen = specimen_from(chosen.specimen, chosen.distance, chosen.restitution_factor, known=known)
+        if specimen.label is not None and typed.get("beta") is None and not isinstance(request, MapRequest):
+            request = request.model_copy(update={"beta": (specimen.label,)})
+        check_files(options)
+        if options.plot is not None and drawable is not None and isinstance(request, SineRequest):
+            points = len(request.omega) * len(request.beta)
+            if points > drawable:
+                allowed = f"at most {drawable} points fit in this figure; give fewer"
+                raise InvalidInput("--plot", f"{points} points", allowed)
+        warn_of_unusual(request, specimen)
+        make = resolve_name(f"bench.app.cli.predict_sine:{function}")
+        subject = Subject(specimen, known, BenchConfiguration())
+        return deliver(lambda: make(request, subject, progress), options, progress)
+
+    command.__doc__ = f"{documentation}\n\n{_EXIT_CODES}"
+    return with_flags(request_type, f"Parameters of {function.removeprefix('gain_')}", command)
+
+
+def _under_records(
+    request_type: type[RecordsRequest], function: str, documentation: str, drawable: int
+) -> "Callable[..., int]":
+    """A command with the flags of a request for records; a `function` of `predict_seismic` computes it. Its figure has
+    room for `drawable` records.
+    """
+
+    def command(
+        typed: Mapping[str, Any],
+        *files: _Records,
+        config: BenchFile = None,
+        chosen: SpecimenOptions = SpecimenOptions(),  # noqa: B008 - immutable
+        options: ResultOptions = ResultOptions(),  # noqa: B008 - immutable
+        progress: Handed = silent,
+    ) -> int:
+        progress("loading the program")
+        configuration = configuration_from(config, None)
+        request = request_from(request_type, typed)
+        known = known_from(chosen.specimen, chosen.restitution_factor, configuration)
+        assumed = configuration.specimen
+        specimen = specimen_from(chosen.specimen, chosen.distance, chosen.restitution_factor, assumed, known)
+        check_files(options)
+        progress("reading the records")
+        records = records_from(files)
+        if options.plot is not None and len(records) > drawable:
+            allowed = f"at most {drawable} fit in this figure; give fewer"
+            raise InvalidInput("--plot", f"{len(records)} records", allowed)
+        warn_of_unusual(request, specimen)
+        make = resolve_name(f"bench.app.cli.predict_seismic:{function}")
+        subject = Subject(specimen, known, configuration, records)
+        return deliver(lambda: make(request, subject, progress), options, progress)
+
+    command.__doc__ = f"{documentation}\n\n{_EXIT_CODES}"
+    return with_flags(request_type, f"Parameters of {function.replace('_', '-')}", command)
+
+
+modes = _sine(
+    ModesRequest,
+    "modes",
+    "Frequencies and shapes of the bare frame and of the linearised coupled system.\n\n"
+    "A mode with negative stiffness is divergent: it has a growth rate instead of a frequency. The figure is like the "
+    "paper's Fig. 3; with more than five stiffnesses it shows curves against stiffness.",
+)
+history = _sine(
+    HistoryRequest,
+    "history",
+    "Time histories of drift, u1 and theta, with the sine switched on at rest or in the steady state.\n\n"
+    "From rest the block may overturn even where the steady motion is stable; the history then ends at that time and "
+    "is marked. With --steady: whole periods of each steady motion that exists. The figure is like the paper's Fig. "
+    "5.",
+)
+steady = _sine(
+    SteadyRequest,
+    "steady",
+    "Steady motions at single points: gain coefficients, peaks, impacts, Floquet multipliers.\n\n"
+    "The periodic motions are solved for directly, without waiting for transients to decay. Up to two exist at a "
+    "point: the block rocks, or it never lifts. Each is listed, its alpha_2 with an uncertainty band: expanded "
+    "uncertainty (k = 2) to first order, or the 95 % interval of a Monte Carlo simulation with --members. The figure "
+    "shows two periods of each.",
+    drawable=MOST_HISTORIES,
+)
+spectrum = _sine(
+    SpectrumRequest,
+    "spectrum",
+    "Gain spectra: alpha_1 and alpha_2 against frequency for each stiffness, both branches.\n\n"
+    "Every alpha_2 has a band, as in `steady`. The figure is like the paper's Fig. 6, without measurements.",
+)
+gain_map = _sine(
+    MapRequest,
+    "gain_map",
+    "Gain maps: alpha_1 and alpha_2 over frequency and stiffness, both branches, with stability.\n\n"
+    "The figure is like the paper's Fig. 4: surfaces and contour maps.",
+)
+stability = _sine(
+    StabilityRequest,
+    "stability",
+    "Boundaries of stability of the rocking motions over frequency, on fixed ground and on a table.\n\n"
+    "The block pushes the table, which changes how a disturbance grows or decays: a motion may be stable on the table "
+    "and unstable on fixed ground. The motion of the table is a sine up to --harmonics, under a drive that does not "
+    "react within a period. Lists the boundaries; --csv, --json and --plot have the multipliers of every point.",
+)
+seismic = _under_records(
+    SeismicRequest,
+    "seismic",
+    "Gain curves under earthquake records: alpha_1 and alpha_2 against the stiffness.\n\n"
+    "Each record is trimmed, limited to the band of the table, scaled to its peak, and on request fitted to the "
+    "stroke; motions start at rest. For a block that topples, the time of toppling is given instead of a gain. The "
+    "figure is like the paper's "
+    "Fig. 8(a) and 9(a).",
+    drawable=28,
+)
+band_study = _under_records(
+    BandStudyRequest,
+    "band_study",
+    "Gain and toppling under earthquake records, against the lower end of the table's band.\n\n"
+    "Like `seismic`, with each record scaled to its peak at every lower end. The figure has a panel for each record.",
+    drawable=15,
+)

@@ -1,0 +1,294 @@
+"""Predictions under a sine, with their tables, texts and figures: modes, histories, steady motions, spectra, maps."""
+
+import sys
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bench.app.cli.output import Result, cell, columns_text
+from bench.app.cli.predict import Subject
+from bench.app.formatting import ABSENT
+from bench.datafile.tables import Table, arrays
+from bench.figures.text_table import TextColumn, text_table
+from bench.prediction.files import plain, provenance, rows_of
+from bench.prediction.history import History, histories, history_table, runs_table
+from bench.prediction.requests import (
+    GainRequest,
+    HistoryRequest,
+    MapRequest,
+    ModesRequest,
+    SpectrumRequest,
+    StabilityRequest,
+    SteadyRequest,
+)
+from bench.prediction.steady import modes_table, predict_points, predict_spectra, steady_table
+from bench.progress import Progress, counting
+from sim.errors import RockbenchError
+from sim.extras import require
+from sim.gain import GainPrediction
+from sim.loading import load_model
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from bench.figures.map_figure import Layer
+
+MOST_SPECTRA = 12
+"""Maximum number of stiffnesses with separate lines."""
+
+_MODES = {
+    "system": "system",
+    "beta": "beta",
+    "mode": "mode",
+    "frequency_hz": "frequency",
+    "omega_rad_s": "omega",
+    "growth_rate_per_s": "divergent",
+    "shape_u1": "u1",
+    "shape_u2": "u2",
+    "shape_theta_rad_per_m": "theta",
+}
+
+_HISTORY = {
+    "omega_rad_s": "omega",
+    "beta": "beta",
+    "motion": "motion",
+    "sampled_max_drift_m": "max drift",
+    "sampled_max_bare_drift_m": "bare",
+    "sampled_max_theta_rad": "max theta",
+    "impacts": "impacts",
+    "end_time_s": "end",
+    "status": "status",
+}
+
+_STEADY = {
+    "omega_rad_s": "omega",
+    "beta": "beta",
+    "layer": "layer",
+    "alpha_1": "alpha_1",
+    "alpha_2": "alpha_2",
+    "alpha_2_low": "from",
+    "alpha_2_high": "to",
+    "theta_max_rad": "max theta",
+    "impacts_per_period": "impacts",
+    "floquet_modulus": "Floquet",
+    "stable": "stable",
+    "status": "status",
+}
+
+_BOUNDARIES = {
+    "beta": "beta",
+    "ground": "ground",
+    "omega_rad_s": "boundary at omega",
+    "kind": "kind",
+    "argument_rad": "argument",
+}
+
+
+def modes(request: ModesRequest, subject: Subject, _progress: Progress) -> Result:
+    """Modes of the bare frame and of the linearised coupled system."""
+    table = modes_table(subject.specimen, request.beta)
+
+    def figure() -> "Figure":
+        from bench.figures.modes_figure import modes_figure
+
+        return modes_figure(arrays(table), subject.specimen)
+
+    return Result(
+        title="modes of the bare frame and of the linearised coupled system",
+        tables={"modes": table},
+        content=lambda: {"modes": rows_of(table)},
+        text=lambda: columns_text(table, _MODES),
+        metadata=provenance(request, subject.specimen),
+        figure=figure,
+    )
+
+
+def history(request: HistoryRequest, subject: Subject, progress: Progress) -> Result:
+    """Time histories from rest, or of steady motions."""
+    load_model(progress)
+    found = histories(subject.specimen, request, progress)
+    runs = runs_table(found)
+    samples = ({name: plain(values) for name, values in each.values.items()} for each in found)
+    return Result(
+        title="time histories under a sine",
+        tables={"histories": history_table(found), "runs": runs},
+        content=lambda: {"histories": [{**row, **values} for row, values in zip(rows_of(runs), samples, strict=True)]},
+        text=lambda: columns_text(runs, _HISTORY),
+        metadata=provenance(request, subject.specimen),
+        figure=lambda: _history_figure(found),
+    )
+
+
+def steady(request: SteadyRequest, subject: Subject, progress: Progress) -> Result:
+    """Steady motions at single points."""
+    load_model(progress)
+    table = _table(request, subject, predict_points(subject.specimen, request, progress), progress)
+
+    def figure() -> "Figure":
+        shared = request.model_dump(include={"omega", "beta", "amplitude_factor"})
+        return _history_figure(histories(subject.specimen, HistoryRequest(**shared, steady=True, periods=2)))
+
+    shown = {name: heading for name, heading in _STEADY.items() if name in table}
+    return _result("steady motions under a sine", request, subject, table, lambda: columns_text(table, shown), figure)
+
+
+def spectrum(request: SpectrumRequest, subject: Subject, progress: Progress) -> Result:
+    """Gain spectra, one for each stiffness."""
+    load_model(progress)
+    table = _table(request, subject, predict_spectra(subject.specimen, request, progress), progress)
+
+    def figure() -> "Figure":
+        from bench.figures.spectra_figure import gain_spectra
+
+        columns = arrays(table)
+        return gain_spectra([], {**columns, "omega": columns["omega_rad_s"]})
+
+    return _result("gain spectra", request, subject, table, lambda: extremes(table), figure)
+
+
+def stability(request: StabilityRequest, subject: Subject, progress: Progress) -> Result:
+    """Multipliers of the rocking orbits, and the boundaries of stability."""
+    from bench.prediction.stability import boundaries_table, multipliers_table
+
+    load_model(progress)
+    shaker = subject.configuration.simulation.bench.shaker
+    if request.table_mass is not None:
+        shaker = shaker.model_copy(update={"moving_mass": request.table_mass})
+    points = multipliers_table(subject.specimen, shaker, request, progress)
+    _print_lost(len(request.omega) * len(request.beta) - points["beta"].values.size)
+    if missing := int(np.isnan(points["table_modulus"].values).sum()):
+        print(f"rockbench: the shaker cannot move this table as requested at {missing} points", file=sys.stderr)
+    boundaries = boundaries_table(subject.specimen, shaker, request, points, progress)
+
+    def text() -> str:
+        if not boundaries["beta"].values.size:
+            return "no boundary of stability lies in the range"
+        return columns_text(boundaries, _BOUNDARIES)
+
+    def figure() -> "Figure":
+        from bench.figures.stability_figure import stability_figure
+
+        if not points["beta"].values.size:
+            raise RockbenchError("no rocking motion was found, so there is nothing to draw: choose other points")
+        return stability_figure(arrays(points), arrays(boundaries))
+
+    return Result(
+        title="stability of the rocking motions",
+        tables={"points": points, "boundaries": boundaries},
+        content=lambda: {"points": rows_of(points), "boundaries": rows_of(boundaries)},
+        text=text,
+        metadata=provenance(request, subject.specimen),
+        figure=figure,
+    )
+
+
+def gain_map(request: MapRequest, subject: Subject, progress: Progress) -> Result:
+    """Gain maps."""
+    from bench.prediction.gain_map import grids, map_table, resting_margin
+
+    if request.scheduler is not None:
+        require("distributed", "--scheduler")
+    load_model(progress)
+    if request.solver == "taylor":
+        known = subject.known if request.band or request.members else None
+        table = map_table(subject.specimen, request, known, progress)
+        _print_lost(len(request.omega) * len(request.beta) - int((table["layer"].values == "rocking").sum()))
+    else:
+        spectra = predict_spectra(subject.specimen, request, progress)
+        table = _table(request, subject, spectra, progress, request.scheduler)
+
+    def figure() -> "Figure":
+        from bench.figures.map_figure import Layer, map_figure
+
+        columns = arrays(table)
+
+        def layer(name: str) -> "Layer":
+            gains = {gain: grids(columns, request, name, gain) for gain in ("alpha_1", "alpha_2")}
+            return Layer(gains, grids(columns, request, name, "floquet_modulus"))
+
+        axes = np.sort(request.omega), np.sort(request.beta)
+        return map_figure(*axes, layer("rocking"), layer("resting"), resting_margin(subject.specimen, request))
+
+    return _result("gain maps", request, subject, table, lambda: extremes(table), figure)
+
+
+def _table(
+    request: GainRequest,
+    subject: Subject,
+    predictions: list[GainPrediction],
+    progress: Progress,
+    scheduler: str | None = None,
+) -> Table:
+    _print_lost(sum(prediction.rocking is None for prediction in predictions))
+    if request.solver == "taylor":
+        return steady_table(predictions, known=subject.known, members=request.members, progress=progress)
+    from bench.prediction.steady import timed_gains
+
+    timed = timed_gains(subject.specimen, request, predictions, scheduler, counting(progress, "simulating in time"))
+    return steady_table(predictions, timed)
+
+
+def _print_lost(points: int) -> None:
+    if points:
+        print(f"rockbench: no rocking orbit was found at {points} point{'s' * (points > 1)}", file=sys.stderr)
+
+
+def _result(
+    title: str,
+    request: GainRequest,
+    subject: Subject,
+    table: Table,
+    text: Callable[[], str],
+    figure: "Callable[[], Figure]",
+) -> Result:
+    exists = bool(table["layer"].values.size)
+
+    def checked() -> "Figure":
+        if not exists:
+            raise RockbenchError("no steady motion was found, so there is nothing to draw: choose other points")
+        return figure()
+
+    return Result(
+        title=title,
+        tables={"points": table},
+        content=lambda: {"points": rows_of(table)},
+        text=text if exists else lambda: "no steady motion was found",
+        metadata=provenance(request, subject.specimen, subject.known),
+        figure=checked,
+    )
+
+
+def _history_figure(found: Sequence[History]) -> "Figure":
+    from bench.figures.history_figure import Motion, history_figure
+
+    return history_figure(
+        [
+            Motion(omega=each.omega, beta=each.beta, name=each.motion, status=each.status, values=each.values)
+            for each in found
+        ]
+    )
+
+
+def extremes(table: "Table") -> str:
+    """Least and greatest alpha_2 of each branch at each stiffness; for a map, of each branch over the whole map."""
+    omega, beta, layer, alpha, stable = (
+        table[name].values for name in ("omega_rad_s", "beta", "layer", "alpha_2", "stable")
+    )
+    stiffnesses = np.unique(beta)
+    each = [(value, beta == value) for value in stiffnesses]
+    groups = each if len(each) <= MOST_SPECTRA else [(None, np.full(beta.size, True))]
+    where = (TextColumn("at omega", "rad/s"), TextColumn("beta"))
+    group = (TextColumn("beta"), TextColumn("layer"), TextColumn("points"), TextColumn("unstable"))
+    columns = (*group, TextColumn("least alpha_2"), *where, TextColumn("greatest"), *where)
+    rows: list[list[str]] = []
+    for value, chosen in groups:
+        for name in ("rocking", "resting"):
+            here = np.flatnonzero(chosen & (layer == name))
+            if not here.size:
+                continue
+            least, most = here[alpha[here].argmin()], here[alpha[here].argmax()]
+            known: list[Any] = [ABSENT if value is None else float(value), name, here.size, int((~stable[here]).sum())]
+            found = [float(x) for k in (least, most) for x in (alpha[k], omega[k], beta[k])]
+            rows.append([cell(each) for each in (*known, *found)])
+    return text_table(columns, rows)

@@ -1,0 +1,235 @@
+"""`rockbench run <protocol>`: checks everything, runs the session, reports how it ended."""
+
+import sys
+from collections.abc import Callable, Mapping
+from contextlib import redirect_stdout
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cyclopts import App
+
+from bench.app.catalogue import CHECK, load_protocol, protocol_names
+from bench.app.cli.options import Handed, RunOptions, with_flags
+from bench.app.cli.output import Code, print_error, print_result, report_error
+from bench.progress import Progress, silent
+from bench.results import SUMMARY
+from sim.errors import InvalidInput, RockbenchError
+
+if TYPE_CHECKING:
+    from bench.app.session import SessionResult
+    from bench.config.model import BenchConfiguration
+    from bench.engine.interface import Operator
+    from bench.protocol import Prepared, Protocol
+    from sim.parameters import Parameters
+
+GOOD = ("completed", "stopped")
+"""Statuses of a session with valid results."""
+
+_EXIT_CODES = (
+    "The exit code is 0 when the campaign was carried out (also when a point was not reached, see its status), "
+    "1 when it failed or was aborted, 2 when it was refused before it began, 130 after Ctrl-C. "
+    "With --dry-run it is 0 when the campaign would be carried out."
+)
+
+
+def __getattr__(name: str) -> App:
+    """The command of the protocol `name`; cyclopts imports it from this module when it is used or listed."""
+    if name not in protocol_names():
+        raise AttributeError(name)
+    try:
+        protocol = load_protocol(name)
+    except InvalidInput as refused:
+        # reported when it is listed or run, so that the others stay usable
+        failure = refused
+    else:
+        command = name if name == CHECK else f"run {name}"
+        app = App(
+            name=name, help_epilogue=f"Example: rockbench {command} {protocol.example}".rstrip(), version_flags=()
+        )
+        app.default(command_of(protocol))
+        return app
+
+    def unavailable(*_tokens: str) -> int:
+        raise failure
+
+    app = App(name=name, help=f"Not available: {failure.allowed}", version_flags=())
+    app.default(unavailable)
+    return app
+
+
+def command_of(protocol: "Protocol[Any]") -> Callable[..., int]:
+    """The command function of a protocol, with the protocol's flags and the options of every run."""
+
+    def command(
+        typed: Mapping[str, Any],
+        *,
+        options: RunOptions = RunOptions(),  # noqa: B008 - immutable
+        progress: Handed = silent,
+    ) -> int:
+        return _run(protocol, typed, options, progress)
+
+    command.__doc__ = f"{protocol.summary}\n\n{protocol.details}\n\n{_EXIT_CODES}"
+    title = f"Parameters of the {protocol.name} protocol"
+    return with_flags(protocol.parameters, title, command, protocol.positional)
+
+
+def _run(protocol: "Protocol[Any]", typed: Mapping[str, Any], options: RunOptions, progress: Progress) -> int:
+    progress("reading protocol and bench")
+    from bench.app.cli.inputs import configuration_from, parameters_from
+    from bench.app.cli.terminal import choose
+    from bench.app.folders import check_folder, default_folder, make_folder, remove_unused, result_names
+
+    parameters = parameters_from(protocol.parameters, typed, options.protocol_file)
+    configuration = configuration_from(options.config, options.seed, options.specimen)
+    out = options.out or default_folder(protocol.name, datetime.now())
+    check_folder(out, result_names(protocol))
+    if options.queue is not None:
+        return _add_to_queue(options.queue, protocol, parameters, configuration, options, progress)
+    if options.dry_run:
+        from bench.app.cli.dry_run import dry_run
+
+        return dry_run(protocol, parameters, configuration, out, progress, as_json=options.json)
+    operator = choose(
+        serves_itself=configuration.serves_itself, yes=options.yes, ask=options.ask, terminal=sys.stdin.isatty()
+    )
+
+    def prepared_here(progress: Progress) -> "Prepared[Any]":
+        from bench.app.preflight import prepare
+
+        return prepare(protocol, parameters, configuration, progress)
+
+    if options.out is None:
+        out = make_folder(out)
+    try:
+        ended, interrupted = carry_out(
+            protocol,
+            prepared_here,
+            out,
+            operator,
+            realtime=options.realtime,
+            about=options.about,
+        )
+    finally:
+        if options.out is None:
+            remove_unused(out)
+    if isinstance(ended, Exception):
+        report_error(ended)
+        return interrupted or 1
+    return _print_result(ended, out, options.json, interrupted)
+
+
+def _add_to_queue(
+    path: Path,
+    protocol: "Protocol[Any]",
+    parameters: "Parameters",
+    configuration: "BenchConfiguration",
+    options: RunOptions,
+    progress: Progress,
+) -> int:
+    """`rockbench run ... --queue FILE`: check the plan and append the test to the queue. Returns the exit code.
+
+    Raises InvalidInput also while another program owns the queue.
+    """
+    progress("loading the program")
+    from bench.app.preflight import compile_run, prepare
+    from bench.app.queue.file import QueueFile, owned
+    from bench.app.queue.queue import Queue, queued
+
+    with owned(path, "`rockbench run --queue`"):
+        store = QueueFile(path)
+        queue = Queue(store.read(), store.write)
+        prepared = prepare(protocol, parameters, configuration, progress)
+        compile_run(protocol.name, prepared, options.out or Path(), progress).require()
+        queue.add(
+            queued(
+                protocol,
+                parameters,
+                options.out,
+                operator=options.operator,
+                note="\n".join(options.note),
+                realtime=options.realtime,
+                ask=options.ask,
+                unattended=options.yes,
+            )
+        )
+    print(f"added as test {len(queue.tests)} of {path}")
+    return 0
+
+
+def carry_out(
+    protocol: "Protocol[Any]",
+    prepare: "Callable[[Progress], Prepared[Any]]",
+    out: Path,
+    operator: "Operator",
+    *,
+    realtime: bool,
+    about: Mapping[str, str],
+) -> "tuple[SessionResult | Exception, int | None]":
+    """Run a protocol and display its progress. Returns its result or error, and the exit code of the signal that
+    requested its end, or None. Raises InvalidInput when it is refused.
+    """
+    from bench.app.cli.interrupt import interruptible
+    from bench.app.cli.streams import lasting
+    from bench.app.cli.terminal import AtTheConsole, progress_on
+    from bench.engine.interface import Requests
+
+    person = operator if isinstance(operator, AtTheConsole) else None
+    requests, stderr = Requests(), lasting(sys.stderr)
+    with (
+        interruptible(requests, asking=lambda: person is not None and person.asking) as interrupts,
+        progress_on(stderr, person is not None, protocol) as progress,
+        # standard output is reserved for the result
+        redirect_stdout(stderr),
+    ):
+        try:
+            progress.prepare("loading the program")
+            with requests.without_rig():
+                from bench.app.session import run_session
+
+                prepared = prepare(progress.prepare)
+            ended = run_session(
+                protocol,
+                prepared,
+                out=out,
+                operator=operator,
+                subscribers=[progress],
+                requests=requests,
+                realtime=realtime,
+                about=about,
+                progress=progress.prepare,
+            )
+        except InvalidInput:
+            raise
+        except KeyboardInterrupt:
+            # a summary exists only after a run: `check_folder` refuses a folder that has one before
+            if (out / SUMMARY).exists():
+                raise KeyboardInterrupt(f"interrupted after the run: {out} has its results, without figures") from None
+            raise KeyboardInterrupt("interrupted: ended before anything moved") from None
+        except (RockbenchError, OSError) as error:
+            ended = error
+    return ended, interrupts.exit_code
+
+
+def _print_result(result: "SessionResult", out: Path, as_json: bool, interrupted: int | None) -> int:
+    """Print the result; returns the exit code."""
+    error, code = _error(result)
+    print_result(
+        lambda: {"status": result.status, "reason": result.reason, **result.summary},
+        lambda: f"{result.table.rstrip()}\nResults are in {out}",
+        as_json=as_json,
+        error=error,
+        code=code,
+    )
+    if result.status in GOOD:
+        # a request to end that arrived after the end has no effect
+        return 0 if error is None else 1
+    print_error(f"the run was {result.status}: {result.reason}")
+    return interrupted or (130 if result.interrupted else 1)
+
+
+def _error(result: "SessionResult") -> tuple[str | None, Code]:
+    """The error in the JSON object of a run, None for a run that ended well, and its code."""
+    if result.status not in GOOD:
+        return result.reason, "run_failed" if result.status == "failed" else "run_aborted"
+    return None if result.passed else "at least one check failed: see the points", "check_failed"

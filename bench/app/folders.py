@@ -1,0 +1,88 @@
+"""Folders for results: a new one for each run, checked before the start so that nothing is overwritten."""
+
+import tempfile
+from collections.abc import Container, Iterable
+from contextlib import suppress
+from datetime import datetime
+from itertools import count
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from bench.results import FILE, SUMMARY
+from bench.unfinished import reserve
+from sim.errors import InvalidInput
+
+if TYPE_CHECKING:
+    from bench.protocol import Protocol
+
+
+def result_names(protocol: "Protocol[Any]") -> tuple[str, ...]:
+    """Names of all files that a run of `protocol` may write to its folder."""
+    return (FILE, *protocol.figures, SUMMARY, *protocol.files)
+
+
+def default_folder(protocol: str, now: datetime) -> Path:
+    """`runs/<protocol>-<date>T<time>`; hyphens in the time, because a colon is not allowed on every system."""
+    return Path("runs", f"{protocol}-{now:%Y-%m-%dT%H-%M-%S}")
+
+
+def make_folder(first: Path, taken: Container[Path] = ()) -> Path:
+    """Create a unique folder: `first`, or if that exists or is `taken`, the same name with -2, -3 and so on.
+
+    Concurrent processes get different folders. Raises InvalidInput when none can be created.
+    """
+    for number in count(1):
+        folder = first if number == 1 else first.with_name(f"{first.name}-{number}")
+        if folder in taken:
+            continue
+        try:
+            # another process may remove an empty parent in between
+            for _ in range(100):
+                with suppress(FileNotFoundError):
+                    _make_parent(folder)
+                    folder.mkdir()
+                    reserve(folder)
+                    return folder
+        except FileExistsError:
+            continue
+        except OSError as error:
+            raise InvalidInput("--out", str(folder), f"it cannot be created: {error.strerror}") from None
+        break
+    raise InvalidInput(
+        "--out", str(first), f"{first.parent} is repeatedly removed by another program; give another folder"
+    )
+
+
+def _make_parent(folder: Path) -> None:
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+    except FileExistsError:
+        raise InvalidInput("--out", str(folder), f"{folder.parent} is a file; give a folder") from None
+
+
+def remove_unused(folder: Path) -> None:
+    """Remove a folder created by `make_folder`, and its parent, if they are empty."""
+    with suppress(OSError):
+        folder.rmdir()
+        folder.parent.rmdir()
+
+
+def check_folder(folder: Path, results: Iterable[str]) -> None:
+    """Refuse a folder to which the `results` of a run cannot be written. Creates no folder.
+
+    Raises InvalidInput naming the obstacle.
+    """
+    existing = folder
+    try:
+        for name in results:
+            if (folder / name).exists():
+                raise InvalidInput("--out", str(folder), f"it contains {name} already; results are never overwritten")
+        while not existing.exists() and existing != existing.parent:
+            existing = existing.parent
+        if not existing.is_dir():
+            raise InvalidInput("--out", str(folder), f"{existing} is a file; give a folder")
+        # permission bits are not reliable on every file system
+        with tempfile.TemporaryFile(dir=existing):
+            pass
+    except OSError as error:
+        raise InvalidInput("--out", str(folder), f"{existing} cannot be written: {error.strerror}") from None

@@ -1,0 +1,93 @@
+"""Background work: functions in a thread, commands in a separate process."""
+
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from typing import IO
+
+from PySide6.QtCore import QObject, QThreadPool, QTimer, Signal
+
+from sim.errors import RockbenchError
+
+LOOK = 100
+"""Interval between checks of a process [ms]."""
+BELOW_NORMAL = 0x4000
+"""BELOW_NORMAL_PRIORITY_CLASS (Windows)."""
+
+
+class Reader(QObject):
+    """Calls functions in a thread, one at a time; only the last call returns its result, in the window's thread. The
+    functions must only compute: the slots of `found` draw.
+    """
+
+    found = Signal(object)
+    """The value that the function returned, or the error that it raised. Errors other than RockbenchError and OSError
+    are raised in the window's thread as well.
+    """
+    _done = Signal(int, object)
+
+    def __init__(self, parent: QObject) -> None:
+        super().__init__(parent)
+        self._pool = QThreadPool(self)
+        self._pool.setMaxThreadCount(1)
+        self._latest = 0
+        self._done.connect(self._tell)
+
+    def call(self, function: Callable[[], object]) -> None:
+        """Schedule a call of `function`; calls that are still pending are dropped."""
+        self._latest += 1
+        number = self._latest
+        self._pool.clear()
+
+        def work() -> None:
+            try:
+                answer: object = function()
+            except Exception as error:
+                # reported by the window's thread, like every error
+                answer = error
+            # the window may have been closed
+            with suppress(RuntimeError):
+                self._done.emit(number, answer)
+
+        self._pool.start(work)
+
+    def _tell(self, number: int, answer: object) -> None:
+        if number == self._latest:
+            self.found.emit(answer)
+        if isinstance(answer, Exception) and not isinstance(answer, RockbenchError | OSError):
+            raise answer
+
+
+class Command(QObject):
+    """A `rockbench` command in a separate process at low priority, which continues when the window closes."""
+
+    over = Signal(int, str)
+    """Exit code and output."""
+
+    def __init__(self, arguments: Sequence[str], parent: QObject) -> None:
+        super().__init__(parent)
+        self._written: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115 - closed with the process
+        nice = shutil.which("nice") if sys.platform != "win32" else None
+        self._process = subprocess.Popen(
+            [*([nice, "-n", "10"] if nice else []), sys.executable, "-m", "bench", *arguments],
+            stdin=subprocess.DEVNULL,
+            stdout=self._written,
+            stderr=subprocess.STDOUT,
+            creationflags=BELOW_NORMAL if sys.platform == "win32" else 0,
+            start_new_session=sys.platform != "win32",
+        )
+        self._timer = QTimer(self, interval=LOOK)
+        self._timer.timeout.connect(self._look)
+        self._timer.start()
+
+    def _look(self) -> None:
+        code = self._process.poll()
+        if code is not None:
+            self._timer.stop()
+            self._written.seek(0)
+            text = self._written.read().decode(errors="replace").strip()
+            self._written.close()
+            self.over.emit(code, text)

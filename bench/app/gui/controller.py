@@ -1,0 +1,302 @@
+"""The connection between session and widgets: turns messages into state and signals, and user input into requests.
+
+It is independent of the protocols: the command line offers the same operations.
+"""
+
+from collections import deque
+from collections.abc import Mapping
+from contextlib import suppress
+from math import inf
+
+from PySide6.QtCore import QObject, Qt, QTimer, Signal
+
+from bench.app.gui import texts
+from bench.app.gui.status import DRIVEN, Status, bench_status
+from bench.app.ipc.client import SessionClient
+from bench.app.ipc.messages import (
+    BEAT,
+    SILENCE,
+    Beat,
+    Ended,
+    FromSession,
+    Opened,
+    PlanCheck,
+    PlanChecked,
+    Preparing,
+    Published,
+    Question,
+    Refused,
+    Run,
+    SafetyInputs,
+    Traces,
+)
+from bench.app.run_display import Notice, RunDisplay
+from bench.events import State, StateChanged
+from drivers.clock import now
+
+PERIOD = 28
+"""Redraw interval [ms], slightly over thirty per second; and maximum interval between checks of the connection."""
+
+BUDGET = 0.02
+"""Maximum time for handling messages in one iteration of the main loop [s]; the rest waits for the next iteration."""
+
+DELIBERATE = 0.7
+"""Time after a press of STOP in which further presses are ignored [s]: a double click counts as one press."""
+
+
+class Controller(QObject):
+    """The only user of the session connection; lives in the window's thread."""
+
+    changed = Signal()
+    """The state, a time or the connection changed."""
+    opened = Signal(object)
+    """`Opened`: the rig of the run is open."""
+    traced = Signal(object)
+    """A list of `Traces`."""
+    noticed = Signal(object)
+    """A `bench.app.run_display.Notice` for the log."""
+    event_received = Signal(object)
+    """An event of the engine."""
+    asked = Signal(object)
+    """A `Question`; None when it is no longer open."""
+    plan_checked = Signal(object, object)
+    """Result of `check_plan`: `PlanChecked` or `Refused`, and the object that requested it."""
+    began = Signal(object)
+    """The `Run` that was just started."""
+    ended = Signal(object)
+    """`Ended` or `Refused`: how the run ended."""
+    _heard = Signal()
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._link: SessionClient | None = None
+        self._plan_checks: dict[object, SessionClient] = {}
+        self._waiting = deque[FromSession]()
+        self._running = False
+        self._question: Question | None = None
+        self._spoken = self._started = 0.0
+        self._stopped_at: float | None = None
+        self.scene = RunDisplay()
+        self.inputs: Mapping[str, bool] = {}
+        self._inputs_heard: float | None = None
+        self.driven = False
+        """Whether the rig was armed in the current or last run."""
+        self.held = ""
+        """Why only the queue may start a run; empty otherwise."""
+        self.lost = (0, 0)
+        self._quiet, self._longest_quiet = 0.0, inf
+        self._failure = ""
+        self.latched = False
+        """Whether STOP was pressed and not cleared since."""
+        self._pressed_at = 0.0
+        self._timer = QTimer(self, interval=PERIOD, timerType=Qt.TimerType.PreciseTimer)
+        self._timer.timeout.connect(self._look)
+        self._timer.start()
+        self._called = False
+        self._heard.connect(self._hear, Qt.ConnectionType.QueuedConnection)
+
+    @property
+    def running(self) -> bool:
+        """Whether a run is in progress, or was when the connection was lost."""
+        return self._running
+
+    @property
+    def inputs_age(self) -> float | None:
+        """Time since the last message on the safety inputs of the current run [s]; None before the first."""
+        if not self._running or self._inputs_heard is None:
+            return None
+        return now() - self._inputs_heard
+
+    @property
+    def armed(self) -> bool:
+        """Whether the rig is armed, or its state is unknown."""
+        return self._running and (self.scene.state in DRIVEN or self.status.level == "alarm")
+
+    @property
+    def elapsed(self) -> float:
+        """Wall-clock time since the run was started [s]."""
+        if not self._started:
+            return 0.0
+        return (self._stopped_at or now()) - self._started
+
+    @property
+    def status(self) -> Status:
+        """Status shown in the header."""
+        link, scene = self._link if self._running else None, self.scene
+        if self._failure:
+            return Status(texts.FAILED_WORD, self._failure, "alarm", "cross")
+        if link is None:
+            return bench_status("over" if self._started else "none", scene.state, scene.reason, 0.0)
+        if link.status == "linked" and scene.state in DRIVEN and self._quiet > self._longest_quiet:
+            # the process runs but its engine does not respond: the last known state may be outdated
+            return bench_status("no link", scene.state, scene.reason, self._quiet)
+        if link.status == "linked" and scene.preparing and scene.state is State.IDLE:
+            return Status(texts.PLANNING, scene.reason, "wait", "ring")
+        return bench_status(link.status, scene.state, scene.reason, link.silence)
+
+    def check_plan(self, asked: PlanCheck, by: object) -> None:
+        """Request a plan check, also while a run is under way; `plan_checked` emits the result. It replaces an earlier
+        plan check requested `by` the same object.
+        """
+        self.give_up(by)
+        self._plan_checks[by] = SessionClient(asked, self._call)
+
+    def give_up(self, by: object) -> None:
+        """Cancel the plan check requested `by` this object."""
+        if (link := self._plan_checks.pop(by, None)) is not None:
+            link.leave()
+
+    def start(self, run: Run) -> None:
+        """Start a run. Has no effect while one is under way or STOP is latched."""
+        if self._running or self.latched:
+            return
+        self.scene, self.inputs, self.lost, self._failure = RunDisplay(), {}, (0, 0), ""
+        self._inputs_heard, self.driven = None, False
+        self._waiting.clear()
+        # a simulated bench that is not in real time lags with its model
+        paced = run.realtime or run.configuration.real_time_only
+        self._quiet, self._longest_quiet = 0.0, SILENCE + run.configuration.acquisition.block_duration if paced else inf
+        self._link, self._running = SessionClient(run, self._call), True
+        self._started, self._stopped_at = now(), None
+        self.began.emit(run)
+        self.changed.emit()
+
+    def press_stop(self) -> None:
+        """STOP: the first press ramps out fast, another at least `DELIBERATE` later cuts the enable line. STOP
+        latches.
+        """
+        first = not self.latched
+        if first:
+            self._pressed_at = now()
+        if self._link is not None and (first or now() - self._pressed_at >= DELIBERATE):
+            self._link.ask("abort" if first else "halt")
+        self.latched = True
+        self.changed.emit()
+
+    def clear_stop(self) -> None:
+        """Allow a new run; has no effect while the stopped run is still under way."""
+        self.latched = self.latched and self._running
+        self.changed.emit()
+
+    def ramp_out(self) -> None:
+        """End the run gently."""
+        if self._link is not None:
+            self._link.ask("stop")
+
+    def answer(self, *, agreed: bool) -> None:
+        """Answer the open question."""
+        if self._link is not None and self._question is not None:
+            self._link.answer(self._question.number, agreed=agreed)
+            self._question = None
+            self.asked.emit(None)
+
+    def close(self) -> None:
+        """Disconnect from the session: the run ramps out, unless it is to continue without a client."""
+        self._timer.stop()
+        for by in list(self._plan_checks):
+            self.give_up(by)
+        link, self._link, self._running = self._link, None, False
+        if link is not None:
+            link.leave()
+
+    def _call(self) -> None:
+        """Called in a thread of the connection when messages have arrived; at most one call is pending."""
+        if not self._called:
+            self._called = True
+            # the window may have been closed
+            with suppress(RuntimeError):
+                self._heard.emit()
+
+    def _hear(self) -> None:
+        self._called = False
+        self._look()
+
+    def _look(self) -> None:
+        links = [*self._plan_checks.values(), *([self._link] if self._link is not None else [])]
+        if links and now() - self._spoken >= BEAT / 2:
+            self._spoken = now()
+            for link in links:
+                link.alive()
+            self.changed.emit()
+        for by, link in list(self._plan_checks.items()):
+            for message in link.take():
+                self._take_answer(by, message)
+        if self._link is None:
+            return
+        messages = self._link.take()
+        # the number of columns must be known before traces are drawn
+        for message in messages:
+            if isinstance(message, Opened):
+                self.opened.emit(message)
+        if traces := [message for message in messages if isinstance(message, Traces)]:
+            self.traced.emit(traces)
+        self._waiting.extend(message for message in messages if not isinstance(message, Traces))
+        if self._waiting:
+            self._handle_waiting()
+
+    def _handle_waiting(self) -> None:
+        """Handle messages in order for up to `BUDGET` seconds, and emit the change once."""
+        end = now() + BUDGET
+        while self._waiting:
+            self._take(self._waiting.popleft())
+            if now() >= end:
+                break
+        self.changed.emit()
+        if self._waiting:
+            self._call()
+
+    def _take_answer(self, by: object, message: FromSession) -> None:
+        if isinstance(message, PlanChecked | Refused) and self._plan_checks.pop(by, None) is not None:
+            self.plan_checked.emit(message, by)
+            self.changed.emit()
+
+    def _take(self, message: FromSession) -> None:
+        match message:
+            case Published(event):
+                notice = self.scene.update(event)
+                self.event_received.emit(event)
+                if notice is not None:
+                    self.noticed.emit(notice)
+                if isinstance(event, StateChanged):
+                    self._entered(event.after)
+            case Beat():
+                # holds even if the change itself was lost
+                self.scene.state, self.scene.time = message.state, message.time
+                if not self.scene.preparing:
+                    self.scene.reason = message.reason
+                self.driven = self.driven or message.state in DRIVEN
+                self.lost, self._quiet = (message.lost_events, message.lost_traces), message.quiet
+            case Preparing():
+                self.scene.prepare(message.phase, message.done, message.total)
+            case Opened():
+                self.scene.expect(message.duration)
+            case Question():
+                self._question = message
+                self.asked.emit(message)
+            case SafetyInputs():
+                self.inputs, self._inputs_heard = message.good, now()
+            case Ended():
+                self._over(message, Notice(self.scene.time, "end", f"{message.status}: {message.reason}"))
+            case Refused():
+                self._over(message, Notice(self.scene.time, "end", message.text, grave=True))
+            case _:
+                pass
+
+    def _entered(self, state: State) -> None:
+        self.driven = self.driven or state in DRIVEN
+        if state is not State.WAITING and self._question is not None:
+            self._question = None
+            self.asked.emit(None)
+
+    def _over(self, message: Ended | Refused, notice: Notice) -> None:
+        self._link, self._running, self._question = None, False, None
+        self._stopped_at = now()
+        if isinstance(message, Ended):
+            self.scene.preparing, self.scene.reason = False, message.reason
+        else:
+            self.scene.state = State.CLOSED
+            self.scene.reason = message.text
+            self._failure = texts.FAILED.format(text=message.text) if message.failed else ""
+        self.asked.emit(None)
+        self.noticed.emit(notice)
+        self.ended.emit(message)

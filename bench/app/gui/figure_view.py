@@ -1,0 +1,56 @@
+"""The figures that a run wrote beside its data file."""
+
+from pathlib import Path
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QPixmap, QResizeEvent
+from PySide6.QtWidgets import QComboBox, QLabel, QSizePolicy, QVBoxLayout, QWidget
+
+from bench.app.gui import texts
+
+
+class FigureView(QWidget):
+    """One of the figures, as large as the space allows; selected by its name."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.choice, self.picture = QComboBox(), QLabel(alignment=Qt.AlignmentFlag.AlignCenter)
+        self.choice.setAccessibleName(texts.FIGURE)
+        self.picture.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Ignored)
+        self._pixmap = QPixmap()
+        self.choice.currentIndexChanged.connect(self._load)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(self.choice)
+        column.addWidget(self.picture, 1)
+
+    def use(self, file: Path | None) -> None:
+        """List the figures in the folder of this data file for selection."""
+        found = [] if file is None else sorted(file.parent.glob("*.png"))
+        self.choice.blockSignals(True)
+        self.choice.clear()
+        for path in found:
+            self.choice.addItem(path.stem.replace("_", " "), str(path))
+        self.choice.blockSignals(False)
+        self._load()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Scale the figure to the new size."""
+        super().resizeEvent(event)
+        self._fit()
+
+    def _load(self) -> None:
+        path = self.choice.currentData()
+        self._pixmap = QPixmap() if path is None else QPixmap(str(path))
+        self._fit()
+
+    def _fit(self) -> None:
+        if self._pixmap.isNull():
+            self.picture.setText(texts.NO_FIGURE)
+            return
+        ratio = self.devicePixelRatioF()
+        scaled = self._pixmap.scaled(
+            self.picture.size() * ratio, Qt.AspectRatioMode.KeepAspectRatio, Qt.TransformationMode.SmoothTransformation
+        )
+        scaled.setDevicePixelRatio(ratio)
+        self.picture.setPixmap(scaled)

@@ -1,0 +1,221 @@
+"""Forms generated from the declared parameters of a protocol, and the options of a run."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QCheckBox, QComboBox, QFormLayout, QLabel, QLineEdit, QVBoxLayout, QWidget
+
+from bench.app.formatting import as_typed
+from bench.app.gui import texts
+from bench.app.gui.widgets import ignore_wheel, label, set_level, typeset, unit_text
+from bench.app.ipc.messages import PlanCheck, Run
+from bench.app.queue.queue import Queued
+from bench.config.declared import Declared, declared
+from bench.config.model import BenchConfiguration
+from bench.config.validation import problems, read_fields, validated
+from sim.parameters import Parameters
+
+Field = QLineEdit | QComboBox | QCheckBox
+
+
+class Form(QWidget):
+    """One line per parameter: name, value, unit, and error message. An empty line means the default. The parameter
+    model validates the values strictly; a refused value stays as it was typed.
+    """
+
+    edited = Signal()
+
+    def __init__(self, model: type[Parameters], values: Mapping[str, Any] | None = None) -> None:
+        super().__init__()
+        self._model = model
+        self.fields: dict[str, Field] = {}
+        self.errors: dict[str, QLabel] = {}
+        layout = QFormLayout(self)
+        for entry in declared(model):
+            if entry.group is None:
+                layout.addRow(_name(entry), self._line(entry, (values or {}).get(entry.name, entry.default)))
+        self._check()
+
+    def parameters(self) -> Parameters:
+        """Parameters as entered. Raises InvalidInput for the first invalid value."""
+        return validated(self._model, self._data())
+
+    @property
+    def refused(self) -> bool:
+        """Whether any value is invalid."""
+        return self._refused
+
+    def _line(self, entry: Declared, value: Any) -> QWidget:
+        field = _field(entry, value)
+        field.setToolTip(_tip(entry))
+        field.setAccessibleName(f"{entry.name} {entry.unit}".strip())
+        self.fields[entry.name], self.errors[entry.name] = field, QLabel(wordWrap=True)
+        self.errors[entry.name].hide()
+        changed = (
+            field.textChanged
+            if isinstance(field, QLineEdit)
+            else field.currentTextChanged
+            if isinstance(field, QComboBox)
+            else field.toggled
+        )
+        changed.connect(self._on_change)
+        line = QWidget()
+        column = QVBoxLayout(line)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(field)
+        column.addWidget(self.errors[entry.name])
+        return line
+
+    def _on_change(self) -> None:
+        self._check()
+        self.edited.emit()
+
+    def _check(self) -> None:
+        found: dict[str, str] = {}
+        for problem in problems(self._model, self._data()):
+            found.setdefault(problem.item.split("[")[0].split(".")[0], typeset(problem.allowed))
+        self._refused = bool(found)
+        for name, error in self.errors.items():
+            error.setVisible(name in found)
+            error.setText(f"▲ {found.get(name, '')}")
+            set_level(error, "alarm")
+
+    def _data(self) -> dict[str, Any]:
+        """Plain data as in a file; empty lines are omitted."""
+        typed: dict[str, Any] = {}
+        for entry in declared(self._model):
+            field = self.fields.get(entry.name)
+            if isinstance(field, QCheckBox):
+                typed[entry.name] = field.isChecked()
+            elif isinstance(field, QComboBox):
+                typed[entry.name] = field.currentText() or None
+            elif isinstance(field, QLineEdit) and (text := field.text().strip()):
+                typed[entry.name] = _parts(entry, text) if entry.many else text
+        return read_fields(self._model, typed)
+
+
+def _parts(entry: Declared, text: str) -> list[str]:
+    """Split a list of values: texts, which may contain spaces, at semicolons; numbers at spaces, as everywhere."""
+    return [part.strip() for part in text.split(";") if part.strip()] if entry.kind is str else [text]
+
+
+def _field(entry: Declared, value: Any) -> Field:
+    if entry.kind is bool:
+        box = QCheckBox()
+        box.setChecked(bool(value))
+        return box
+    if entry.choices and not entry.many:
+        choice = QComboBox()
+        ignore_wheel(choice)
+        choice.addItems([*([""] if entry.optional else []), *entry.choices])
+        choice.setCurrentText("" if value is None else str(getattr(value, "value", value)))
+        return choice
+    return QLineEdit(_typed(entry, value))
+
+
+def _typed(entry: Declared, value: Any) -> str:
+    if value is None or type(value).__name__ == "PydanticUndefinedType":
+        return ""
+    if entry.many:
+        return ("; " if entry.kind is str else " ").join(as_typed(each) for each in value)
+    return as_typed(value)
+
+
+def _name(entry: Declared) -> str:
+    unit = "" if entry.unit in ("", "1") else f" [{unit_text(entry.unit)}]"
+    return f"{label(entry.name)}{unit}"
+
+
+def _tip(entry: Declared) -> str:
+    """Description, limits and default."""
+    lines = [
+        f"{entry.description[:1].upper()}{entry.description[1:]}.",
+        texts.MUST_BE.format(allowed=typeset(entry.allowed_in_unit)),
+    ]
+    default = _typed(entry, entry.default)
+    return "\n".join([*lines, texts.DEFAULT_TIP.format(default=default)] if default else lines)
+
+
+class RunOptions(QWidget):
+    """Folder of the results, operator, note, pace, and source of answers to questions."""
+
+    def __init__(self, configuration: BenchConfiguration) -> None:
+        super().__init__()
+        self._configuration = configuration
+        self.folder, self.operator, self.note = QLineEdit(), QLineEdit(), QLineEdit()
+        self.realtime, self.person, self.keep_going = (
+            QCheckBox(name) for name in (texts.REALTIME, texts.ASK, texts.GO_ON)
+        )
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        lines = QFormLayout()
+        for name, field, tip in (
+            (texts.FOLDER, self.folder, texts.FOLDER_TIP),
+            (texts.OPERATOR, self.operator, texts.OPERATOR_TIP),
+            (texts.NOTE, self.note, texts.NOTE_TIP),
+        ):
+            lines.addRow(name, field)
+            field.setToolTip(tip)
+            field.setAccessibleName(name)
+        column.addLayout(lines)
+        for box in (self.realtime, self.person, self.keep_going):
+            column.addWidget(box)
+        self.realtime.setToolTip(texts.REALTIME_TIP)
+        self.keep_going.setToolTip(texts.GO_ON_TIP)
+        self.use(configuration)
+
+    def use(self, configuration: BenchConfiguration) -> None:
+        """Reset to the defaults of this bench: on a real bench the operator answers."""
+        self._configuration = configuration
+        self.realtime.setChecked(True)
+        self.realtime.setEnabled(not configuration.real_time_only)
+        self.person.setChecked(not configuration.serves_itself)
+        self.person.setToolTip(texts.ASK_TIP if configuration.serves_itself else texts.ASK_REAL_TIP)
+
+    @property
+    def out(self) -> Path | None:
+        """The folder in the text field; None if the field is empty."""
+        text = self.folder.text().strip()
+        return Path(text) if text else None
+
+    @property
+    def unattended(self) -> bool:
+        """Whether questions are answered with yes automatically although the bench needs an operator."""
+        return not self.person.isChecked() and not self._configuration.serves_itself
+
+    @property
+    def for_queue(self) -> dict[str, object]:
+        """The options as fields of a queued test."""
+        return {
+            "operator": self.operator.text().strip(),
+            "note": self.note.text().strip(),
+            "realtime": self.realtime.isChecked() and self.realtime.isEnabled(),
+            "ask": self.person.isChecked() and self._configuration.serves_itself,
+            "unattended": self.unattended,
+            "keep_going": self.keep_going.isChecked(),
+        }
+
+    def run(self, plan: PlanCheck) -> Run:
+        """The run of a plan."""
+        told = {"operator": self.operator.text().strip(), "notes": self.note.text().strip()}
+        return Run(
+            plan.protocol,
+            plan.parameters,
+            plan.configuration,
+            plan.out,
+            realtime=self.realtime.isChecked(),
+            person=self.person.isChecked(),
+            keep_going=self.keep_going.isChecked(),
+            about={name: text for name, text in told.items() if text},
+        )
+
+    def load(self, test: Queued) -> None:
+        """Show the options of a queued test."""
+        self.folder.setText(test.out or "")
+        self.operator.setText(test.operator)
+        self.note.setText(test.note)
+        self.realtime.setChecked(test.realtime)
+        self.person.setChecked((test.ask or not self._configuration.serves_itself) and not test.unattended)
+        self.keep_going.setChecked(test.keep_going)

@@ -1,0 +1,288 @@
+"""The header, always visible: state of the bench, safety inputs, times, step, and STOP."""
+
+from textwrap import shorten
+from typing import cast
+
+from PySide6.QtCore import QEvent, QObject, QPoint, QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen, QPolygonF
+from PySide6.QtWidgets import (
+    QApplication,
+    QGridLayout,
+    QHBoxLayout,
+    QLabel,
+    QProgressBar,
+    QPushButton,
+    QSizePolicy,
+    QVBoxLayout,
+    QWidget,
+)
+
+from bench.app.formatting import clock
+from bench.app.gui import texts
+from bench.app.gui.controller import DELIBERATE, Controller
+from bench.app.gui.palette import Theme
+from bench.app.gui.status import Shape
+from bench.app.gui.widgets import give_key, set_level, typeset
+
+KEY = Qt.Key.Key_F12
+
+
+class StopButton(QPushButton):
+    """Requests the end of the run; it is not the emergency stop, which is hardware."""
+
+    def __init__(self, controller: Controller, parent: QWidget | None = None) -> None:
+        super().__init__(texts.STOP, parent)
+        self.setObjectName("stop")
+        self.setAccessibleName(texts.STOP_NAME)
+        self.setToolTip(f"{texts.STOP_TIP.format(after=DELIBERATE)}\n{texts.GUARD}")
+        # a filter handles its keys: the space bar must not press it by accident, and a click must not move the focus
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        # on press, not on release
+        self.pressed.connect(controller.press_stop)
+
+    def holds(self, place: QPoint) -> bool:
+        """Whether a point of the screen is on the visible part of the button."""
+        return self.isVisible() and self.rect().contains(self.mapFromGlobal(place))
+
+
+class StopFilter(QObject):
+    """Receives key and mouse events before every widget and dialog of the application. A shortcut does not receive the
+    key behind a modal dialog, and a press on `button` while a list is open would only close the list.
+    """
+
+    def __init__(self, controller: Controller, button: StopButton) -> None:
+        super().__init__(controller)
+        self._controller, self._button = controller, button
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: ARG002 - the signature is Qt's
+        """Consume events for STOP; a key held down counts once."""
+        if isinstance(event, QKeyEvent) and event.key() == KEY:
+            return self._take_key(event)
+        if isinstance(event, QMouseEvent) and event.type() == QEvent.Type.MouseButtonPress:
+            return self._take_press(event)
+        return False
+
+    def _take_key(self, event: QKeyEvent) -> bool:
+        if event.type() == QEvent.Type.KeyPress:
+            if not event.isAutoRepeat():
+                self._controller.press_stop()
+            return True
+        # a focused widget could otherwise claim the key as its own shortcut
+        if event.type() == QEvent.Type.ShortcutOverride:
+            event.accept()
+            return True
+        return False
+
+    def _take_press(self, event: QMouseEvent) -> bool:
+        popup, place = QApplication.activePopupWidget(), event.globalPosition().toPoint()
+        # without an open list the button receives the press itself
+        if popup is None or not self._button.holds(place) or popup.frameGeometry().contains(place):
+            return False
+        if event.button() is not Qt.MouseButton.LeftButton:
+            return False
+        self._controller.press_stop()
+        popup.close()
+        return True
+
+
+STALE = 2.0
+"""Age above which the safety inputs are unknown [s]."""
+STEP = 90
+"""Largest length of the displayed step; its tooltip has all of it."""
+SIDE, HEIGHT, LOW = 56, 120, 72
+"""Side of the lamp, height of the header, and its height in a small window [px]: its text never moves STOP."""
+ROOMY, MEDIUM = (1150, 600), 700
+"""Size of the window below which the header is low, and width below which it shows no times [px]."""
+
+
+class Lamp(QWidget):
+    """A status lamp; each state has its own shape and colour."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self.shape: Shape = "ring"
+        self._level = "calm"
+        self._on_red = False
+        self.setFixedSize(SIDE, SIDE)
+
+    def show_as(self, shape: Shape, level: str, *, on_red: bool) -> None:
+        """Change shape and colour; on a red background the colour is white."""
+        if (shape, level, on_red) != (self.shape, self._level, self._on_red):
+            self.shape, self._level, self._on_red = shape, level, on_red
+            self.update()
+
+    def use_theme(self, theme: Theme) -> None:
+        """Use the colours of another theme."""
+        self._theme = theme
+        self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002 - the signature is Qt's
+        """Draw the shape."""
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        colour = QColor("white" if self._on_red else str(getattr(self._theme, self._level)))
+        painter.setPen(QPen(colour, 6))
+        painter.setBrush(colour if self.shape not in ("ring", "cross") else Qt.BrushStyle.NoBrush)
+        box = QRectF(6, 6, SIDE - 12, SIDE - 12)
+        if self.shape in ("ring", "disc"):
+            painter.drawEllipse(box)
+        elif self.shape == "cross":
+            painter.drawLine(box.topLeft(), box.bottomRight())
+            painter.drawLine(box.topRight(), box.bottomLeft())
+        else:
+            painter.drawPolygon(_corners(self.shape, box))
+        painter.end()
+
+
+def _corners(shape: Shape, box: QRectF) -> QPolygonF:
+    if shape == "octagon":
+        places = ((0.3, 0), (0.7, 0), (1, 0.3), (1, 0.7), (0.7, 1), (0.3, 1), (0, 0.7), (0, 0.3))
+    elif shape == "triangle":
+        places = ((0.5, 0), (1, 1), (0, 1))
+    else:
+        places = ((0, 0), (1, 0), (1, 1), (0, 1))
+    return QPolygonF([QPointF(box.x() + x * box.width(), box.y() + y * box.height()) for x, y in places])
+
+
+class Header(QWidget):
+    """Updated by the signals of the controller."""
+
+    def __init__(self, controller: Controller, theme: Theme) -> None:
+        super().__init__()
+        self._controller = controller
+        self.lamp = Lamp(theme)
+        self.word, self.reason = _label("word"), _label("faint")
+        self.word.setAccessibleName(texts.NAMES["state"])
+        self.reason.setWordWrap(True)
+        self.inputs, self.step = _label(""), _label("")
+        self.elapsed, self.remaining = _label("value"), _label("value")
+        self.inputs.setToolTip(texts.INPUTS_TIP.format(stale=STALE))
+        self.progress = QProgressBar(maximum=1000, textVisible=False)
+        self.progress.setMaximumHeight(8)
+        self.stop, self.clear = StopButton(controller), QPushButton(texts.CLEAR)
+        self.clear.setObjectName("clear")
+        self.clear.setToolTip(texts.CLEAR_TIP)
+        # a key press meant for the form must not clear it
+        self.clear.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        give_key(self.clear, "Ctrl+Shift+K")
+        self.clear.clicked.connect(controller.clear_stop)
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
+        self.setObjectName("header")
+        words = QVBoxLayout()
+        words.addWidget(self.word)
+        words.addWidget(self.reason)
+        self.times = QWidget()
+        times = QGridLayout(self.times)
+        times.setContentsMargins(0, 0, 0, 0)
+        for column, (name, value) in enumerate(((texts.ELAPSED, self.elapsed), (texts.REMAINING, self.remaining))):
+            times.addWidget(_label("faint", name), 0, column)
+            times.addWidget(value, 1, column)
+            value.setMinimumWidth(110)
+        self.details = QWidget()
+        details = QGridLayout(self.details)
+        details.setContentsMargins(0, 0, 0, 0)
+        for row, (name, value) in enumerate(((texts.STEP, self.step), (texts.INPUTS, self.inputs))):
+            details.addWidget(_label("faint", name), row, 0)
+            details.addWidget(value, row, 1)
+            value.setWordWrap(True)
+            # a long text is elided and does not widen the label
+            value.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        details.addWidget(self.progress, 2, 0, 1, 2)
+        details.setColumnStretch(1, 1)
+        for part in (self.word, self.reason):
+            # a long text is truncated, with the full text in the tooltip, so that it does not widen the header
+            part.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        words.setSpacing(0)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(6, 4, 6, 4)
+        row.addWidget(self.lamp)
+        row.addLayout(words, 3)
+        row.addWidget(self.times)
+        row.addWidget(self.details, 4)
+        row.addWidget(self.clear)
+        row.addWidget(self.stop)
+        self.setFixedHeight(HEIGHT)
+        controller.changed.connect(self.refresh)
+        application().applicationStateChanged.connect(self.refresh)
+        self.refresh()
+
+    def fit(self, width: int, height: int) -> None:
+        """Choose the layout for a window of this size [px]: a small one shows state, reason, remaining time, STOP."""
+        low = width < ROOMY[0] or height < ROOMY[1]
+        self.details.setVisible(not low)
+        self.times.setVisible(not low or width >= MEDIUM)
+        self.lamp.setVisible(not low or width >= MEDIUM)
+        self.setFixedHeight(LOW if low else HEIGHT)
+        for part in (self.stop, self.word):
+            _set_property(part, "low", "yes" if low else "no")
+
+    def refresh(self) -> None:
+        """Show the current state."""
+        controller, scene = self._controller, self._controller.scene
+        shown = controller.status
+        self.lamp.show_as(shown.shape, shown.level, on_red=controller.latched)
+        self.word.setText(shown.word)
+        set_level(self.word, shown.level)
+        key_acts = application().applicationState() == Qt.ApplicationState.ApplicationActive
+        said = ([texts.STOPPED + "."] if controller.latched else []) + [typeset(shown.reason)]
+        if not key_acts:
+            said.insert(0, texts.KEY_NEEDS_FOCUS)
+        self.reason.setText(" ".join(said))
+        self.reason.setToolTip(self.reason.text())
+        _set_property(self, "latched", "yes" if controller.latched else "no")
+        self.elapsed.setText(clock(controller.elapsed))
+        self.remaining.setText(clock(scene.time_left if controller.running else float("nan")))
+        now = (scene.step, scene.activity) if controller.running else ()
+        step = " · ".join(typeset(part) for part in now if part)
+        self.step.setText(shorten(step, STEP, placeholder=" …") or "–")
+        self.step.setToolTip(step)
+        self.progress.setValue(round(1000 * scene.fraction))
+        again = controller.latched and controller.running
+        self.stop.setText(texts.STOP_AGAIN if again else texts.STOP if key_acts else texts.STOP_BY_MOUSE)
+        self.clear.setVisible(controller.latched)
+        self.clear.setEnabled(not controller.running)
+        self.clear.setToolTip(texts.CLEAR_BUSY if controller.running else texts.CLEAR_TIP)
+        self._show_inputs()
+
+    def use_theme(self, theme: Theme) -> None:
+        """Use the colours of another theme."""
+        self.lamp.use_theme(theme)
+
+    def _show_inputs(self) -> None:
+        """Show the safety inputs; values older than `STALE` are shown as unknown."""
+        controller = self._controller
+        age, wired = controller.inputs_age, controller.inputs
+        known = age is not None and age <= STALE
+        if not controller.running:
+            text = texts.INPUTS_UNREAD
+        elif age is not None and not wired:
+            text = texts.NO_INPUTS
+        elif known:
+            words = (texts.INPUT_OPEN, texts.INPUT_GOOD)
+            text = ", ".join(f"{name} {words[good]}" for name, good in wired.items())
+        else:
+            text = ", ".join(f"{name} {texts.INPUT_UNKNOWN}" for name in wired) or texts.INPUT_UNKNOWN
+        self.inputs.setText(text)
+        unknown = controller.running and not known and (bool(wired) or age is None)
+        set_level(self.inputs, "wait" if unknown else "calm" if all(wired.values()) or not known else "alarm")
+
+
+def application() -> QApplication:
+    """The running application."""
+    return cast(QApplication, QApplication.instance())
+
+
+def _set_property(part: QWidget, name: str, value: str) -> None:
+    """Set a property used as a selector in the style sheet, and update the style of the child widgets."""
+    if part.property(name) != value:
+        part.setProperty(name, value)
+        for each in (part, *part.findChildren(QWidget)):
+            each.style().unpolish(each)
+            each.style().polish(each)
+
+
+def _label(role: str, text: str = "") -> QLabel:
+    label = QLabel(text)
+    label.setProperty("role", role)
+    return label

@@ -1,0 +1,97 @@
+"""Colours after Okabe and Ito, for a light and a dark desktop, and the style of the widgets."""
+
+from dataclasses import dataclass
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QColor, QGuiApplication, QPalette
+from PySide6.QtWidgets import QApplication
+
+BASE, SMALL, VALUE, BANNER = 11, 14, 20, 26
+"""Font sizes [pt]: text, STOP in a small window, live values, and the state of the bench, readable at two metres."""
+
+
+@dataclass(frozen=True)
+class Theme:
+    """Colours as #rrggbb; `lines` are those of curves, with enough contrast on `ground`."""
+
+    ground: str
+    raised: str
+    text: str
+    faint: str
+    calm: str
+    good: str
+    wait: str
+    alarm: str
+    lines: tuple[str, ...]
+
+
+LIGHT = Theme(
+    *("#efefef", "#ffffff", "#000000", "#5a5a5a", "#5a5a5a", "#00694d", "#0072B2", "#b34700"),
+    lines=("#000000", "#0072B2", "#b34700", "#00694d", "#8a4a70"),
+)
+DARK = Theme(
+    *("#1e1e1e", "#2a2a2a", "#f0f0f0", "#a8a8a8", "#a8a8a8", "#00AB7D", "#56B4E9", "#E69F00"),
+    lines=("#f0f0f0", "#56B4E9", "#E69F00", "#F0E442", "#CC79A7"),
+)
+
+
+def desktop_theme() -> Theme:
+    """The theme of the desktop; light if it has none."""
+    return DARK if QGuiApplication.styleHints().colorScheme() == Qt.ColorScheme.Dark else LIGHT
+
+
+def qt_palette(theme: Theme) -> QPalette:
+    """The Qt palette of a theme."""
+    palette = QPalette()
+    role = QPalette.ColorRole
+    for roles, colour in (
+        ((role.Window, role.AlternateBase), theme.ground),
+        ((role.Base, role.Button, role.ToolTipBase), theme.raised),
+        ((role.WindowText, role.Text, role.ButtonText, role.ToolTipText), theme.text),
+        ((role.PlaceholderText,), theme.faint),
+        ((role.Highlight,), theme.wait),
+        ((role.HighlightedText,), theme.raised),
+    ):
+        for each in roles:
+            palette.setColor(each, QColor(colour))
+    for each in (role.WindowText, role.Text, role.ButtonText):
+        palette.setColor(QPalette.ColorGroup.Disabled, each, QColor(theme.faint))
+    return palette
+
+
+def style_sheet(theme: Theme) -> str:
+    """Style beyond the palette; the dynamic property `level` selects the colours of states."""
+    return f"""
+    * {{ font-size: {BASE}pt; }}
+    QPushButton {{ min-height: 32px; padding: 2px 14px; }}
+    QLineEdit, QComboBox {{ min-height: 26px; }}
+    QTabBar::tab {{ min-height: 32px; min-width: 76px; }}
+    QLabel[role="word"] {{ font-size: {BANNER}pt; font-weight: bold; }}
+    QLabel[role="value"] {{ font-size: {VALUE}pt; font-weight: bold; }}
+    QLabel[role="faint"] {{ color: {theme.faint}; }}
+    QLabel[level="calm"] {{ color: {theme.calm}; }}
+    QLabel[level="good"] {{ color: {theme.good}; }}
+    QLabel[level="wait"] {{ color: {theme.wait}; }}
+    QLabel[level="alarm"] {{ color: {theme.alarm}; font-weight: bold; }}
+    QFrame#prompt {{ border: 3px solid {theme.wait}; background: {theme.raised}; }}
+    QFrame#trouble, QFrame#leave {{ border: 3px solid {theme.alarm}; background: {theme.raised}; }}
+    QFrame#welcome {{ border: 1px solid {theme.faint}; background: {theme.raised}; }}
+    QPushButton#stop {{ background: #b30000; color: white; font-size: {BANNER}pt; font-weight: bold;
+        min-width: 250px; min-height: 84px; padding: 2px; border: 3px solid {theme.text}; border-radius: 8px; }}
+    QPushButton#stop[low="yes"] {{ font-size: {SMALL}pt; min-width: 130px; min-height: 50px; }}
+    QPushButton#stop:pressed {{ background: #700000; }}
+    QLabel[role="word"][low="yes"] {{ font-size: {VALUE}pt; }}
+    QWidget#header[latched="yes"] {{ background: #b30000; }}
+    QWidget#header[latched="yes"] QPushButton#stop {{ background: #4d0000; border-color: white; }}
+    QWidget#header[latched="yes"] QLabel {{ color: white; }}
+    """
+
+
+def dress(application: QApplication, theme: Theme) -> None:
+    """Apply a theme to every widget."""
+    # styling every widget takes long: a theme that is in use is kept
+    if application.styleSheet() == style_sheet(theme):
+        return
+    application.setStyle("Fusion")
+    application.setPalette(qt_palette(theme))
+    application.setStyleSheet(style_sheet(theme))

@@ -1,0 +1,187 @@
+"""Results of a data file as rows of measured value, prediction, difference and verdict. Independent of Qt."""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import hypot, isfinite, nan
+from typing import Any, cast
+
+from bench.app.formatting import ABSENT, measurement
+from bench.app.gui import texts
+from bench.app.gui.widgets import in_screen_unit, label, spaced, typeset
+from bench.datafile.tables import Column
+from bench.document.typography import first_words
+
+_UNCERTAINTY, _PREDICTED = "_uncertainty", ("_predicted", "_nominal")
+_GOOD = ("", "steady", "measured", "resting")
+"""States of a point that are not displayed beside its verdict."""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A measured quantity of a point in the SI `unit`; expanded uncertainties (k = 2). NaN where there is no value.
+
+    `agrees` is None without a comparison; `low` and `high` bound a predicted interval that is stated instead of an
+    uncertainty. `status` describes the point.
+    """
+
+    point: str
+    quantity: str
+    unit: str
+    value: float
+    uncertainty: float
+    predicted: float = nan
+    predicted_uncertainty: float = nan
+    low: float = nan
+    high: float = nan
+    agrees: bool | None = None
+    status: str = ""
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """Texts of the row, one for each of `texts.POINT_TITLES`."""
+        factor, unit = in_screen_unit(self.unit)
+        predicted = measurement(factor * self.predicted, factor * self.predicted_uncertainty, unit)
+        if isfinite(self.low) and isfinite(self.high):
+            predicted = texts.INTERVAL.format(value=predicted, low=factor * self.low, high=factor * self.high)
+        off = self.value - self.predicted
+        share = f" ({100.0 * off / self.predicted:+.1f} %)" if isfinite(off) and self.predicted else ""
+        return (
+            self.point,
+            self.quantity,
+            measurement(factor * self.value, factor * self.uncertainty, unit),
+            predicted,
+            f"{factor * off:+.3g}{'' if unit in ('', '1') else f' {unit}'}{share}" if isfinite(off) else ABSENT,
+            self._verdict,
+        )
+
+    @property
+    def _verdict(self) -> str:
+        words = [] if self.status in _GOOD else [self.status]
+        if self.agrees is not None:
+            words.append(texts.AGREES if self.agrees else texts.DISAGREES)
+        return typeset(", ".join(words)) or ABSENT
+
+
+def rows_of(results: Mapping[str, Column], points: Sequence[Mapping[str, Any]]) -> list[Measured]:
+    """Quantities of all points: those with an uncertainty, or where there is none, every number."""
+    stems = {name: _stem(name, column.unit) for name, column in results.items()}
+    if {"measured", "expected", "unit"} <= results.keys():
+        return [_line(point) for point in points]
+    named = {stem: name for name, stem in stems.items()}
+    found = [name for name, stem in stems.items() if stem + _UNCERTAINTY in named and not stem.endswith(_PREDICTED)]
+    if not found:
+        numbers = [name for name, column in results.items() if column.unit and not name.endswith("uncertainty")]
+        found = [name for name in numbers[1:] if any(isinstance(point[name], float) for point in points)] or numbers
+    return [row for point in points for row in _rows(point, found, stems, named, results)]
+
+
+def every_field(
+    results: Mapping[str, Column], points: Sequence[Mapping[str, Any]]
+) -> tuple[list[str], list[list[str]]]:
+    """Headings with units, and the texts of every field of every point."""
+    headings: list[str] = []
+    for name, column in results.items():
+        unit = in_screen_unit(column.unit)[1]
+        heading = label(_stem(name, column.unit))
+        headings.append(heading if unit in ("", "1") else f"{heading} [{unit}]")
+    return headings, [[_text(point[name], column.unit) for name, column in results.items()] for point in points]
+
+
+def _rows(
+    point: Mapping[str, Any],
+    quantities: Sequence[str],
+    stems: Mapping[str, str],
+    named: Mapping[str, str],
+    results: Mapping[str, Column],
+) -> Iterator[Measured]:
+    def value(stem: str) -> float:
+        found = point.get(named.get(stem, ""))
+        return float(found) if isinstance(found, int | float) and not isinstance(found, bool) else nan
+
+    where, status = _point(point, results), str(point.get("status") or point.get("remarks") or "")
+    for name in quantities:
+        stem = stems[name]
+        own, its = value(stem), value(stem + _UNCERTAINTY)
+        beside = next((stem + each for each in _PREDICTED if stem + each in named), "")
+        predicted, spread = value(beside), value(beside + _UNCERTAINTY)
+        agrees = point.get(f"{stem}_agrees", point.get("agrees") if stem == "alpha_2" else None)
+        if agrees is None and isfinite(own - predicted) and isfinite(spread) and its > 0.0:
+            agrees = abs(own - predicted) <= hypot(its, spread)
+        if isfinite(own) or stem == "alpha_2":
+            yield Measured(
+                where,
+                _quantity(stem, results[name].description),
+                results[name].unit,
+                own,
+                its,
+                predicted,
+                spread,
+                value(f"{stem}_low") if isfinite(predicted) else nan,
+                value(f"{stem}_high") if isfinite(predicted) else nan,
+                None if agrees is None else bool(agrees),
+                status,
+            )
+
+
+def _line(point: Mapping[str, Any]) -> Measured:
+    """Table row for one result of the loop check, in its own unit."""
+
+    def number(name: str) -> float:
+        value = point.get(name)
+        return nan if value is None else float(value)
+
+    return Measured(
+        point=label(str(point["subject"])),
+        quantity=spaced(str(point["what"])),
+        unit=str(point["unit"]),
+        value=number("measured"),
+        uncertainty=number("uncertainty"),
+        predicted=number("expected"),
+        status=str(point["verdict"]),
+    )
+
+
+def _point(point: Mapping[str, Any], results: Mapping[str, Column]) -> str:
+    beta = point.get("beta")
+    if "record" in point and beta is not None:
+        return texts.RECORD_POINT.format(record=point["record"], beta=beta)
+    if point.get("omega_rad_s") is not None and beta is not None:
+        return texts.SINE_POINT.format(omega=point["omega_rad_s"], beta=beta)
+    name, column = next(iter(results.items()), ("", None))
+    value = point.get(name)
+    if column is None or value is None:
+        return ABSENT
+    if isinstance(value, str):
+        return typeset(label(value))
+    factor, unit = in_screen_unit(column.unit)
+    shown = f"{factor * float(value):.4g}"
+    return f"{label(_stem(name, column.unit))} {shown}{'' if unit in ('', '1') else f' {unit}'}"
+
+
+def _quantity(stem: str, description: str) -> str:
+    """α₂ by its symbol, any other quantity by the first words of its description."""
+    return label(stem) if stem.startswith("alpha_") and stem[6:].isdigit() else spaced(first_words(description) or stem)
+
+
+def _stem(name: str, unit: str) -> str:
+    """A name without the suffix that repeats its unit: `k1_n_m` in N/m is k1."""
+    suffix = unit.lower().replace("1/", "per_").replace("/", "_").replace(" ", "_").replace("^0.5", "")
+    return name.removesuffix(f"_{suffix}") if suffix not in ("", "1") else name
+
+
+def _text(value: object, unit: str) -> str:
+    if value is None or value != value:
+        return ABSENT
+    if isinstance(value, bool):
+        return texts.YES if value else texts.NO
+    if isinstance(value, float):
+        return f"{in_screen_unit(unit)[0] * value:.5g}"
+    text = str(value)
+    if text.startswith("{"):
+        try:
+            parts = cast(dict[str, object], json.loads(text))
+        except ValueError:
+            return text
+        return "; ".join(f"{label(name)} {_text(each, '')}" for name, each in parts.items())
+    return spaced(text)

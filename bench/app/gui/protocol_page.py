@@ -1,0 +1,268 @@
+"""The Protocol page: form of the parameters, check of the plan, start or queueing of a run."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from datetime import datetime
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, cast
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QComboBox, QHBoxLayout, QPushButton, QScrollArea, QSplitter, QVBoxLayout, QWidget
+
+from bench.app.folders import check_folder, default_folder, make_folder, remove_unused, result_names
+from bench.app.gui import texts
+from bench.app.gui.controller import Controller
+from bench.app.gui.form import Form, RunOptions
+from bench.app.gui.plan_view import PlanView
+from bench.app.gui.widgets import FITTING, give_key, ignore_wheel, scrolling
+from bench.app.ipc.messages import PlanCheck, PlanChecked, Refused
+from bench.app.queue.queue import Queued, queued
+from bench.config.model import BenchConfiguration
+from bench.protocol import Protocol
+from sim.errors import RockbenchError
+
+
+class ProtocolPage(QWidget):
+    """Form and plan of a run. A plan must be checked before it is started or queued, and again after each change."""
+
+    queued = Signal(object)
+    """A `Queued` to append to the queue."""
+    saved = Signal(object, object)
+    """The edited `Queued`, and its replacement."""
+    left = Signal()
+    """Editing of a queued test has ended."""
+    predicted = Signal(object)
+    """The prediction of the run that is about to begin."""
+
+    def __init__(
+        self, controller: Controller, configuration: BenchConfiguration, entries: Sequence[Protocol[Any]], tour: bool
+    ) -> None:
+        super().__init__()
+        self._controller, self._configuration, self._entries = controller, configuration, tuple(entries)
+        self._first_values = {"omega": (16.0,), "beta": (0.4,)} if tour else None
+        self._checked: PlanChecked | None = None
+        self._checking = self._began = False
+        self._edited_test: Queued | None = None
+        self._made: Path | None = None
+        self.choice = QComboBox()
+        self.choice.addItems([entry.name for entry in entries])
+        self.choice.setAccessibleName(texts.NAMES["protocol"])
+        ignore_wheel(self.choice)
+        self._forms: dict[str, Form] = {}
+        self.form_area = QScrollArea(widgetResizable=True)
+        self.plan, self.options = PlanView(), RunOptions(configuration)
+        self.folder, self.operator = self.options.folder, self.options.operator
+        self.realtime, self.person, self.keep_going = (
+            self.options.realtime,
+            self.options.person,
+            self.options.keep_going,
+        )
+        self.check, self.start, self.add, self.leave = (
+            QPushButton(name) for name in (texts.CHECK, texts.START, texts.ADD, texts.LEAVE)
+        )
+        self._arrange()
+        self._choose(0)
+        self.choice.currentIndexChanged.connect(self._choose)
+        self.folder.textChanged.connect(self._edited)
+        for box in (self.realtime, self.person):
+            box.toggled.connect(self.refresh)
+        self.check.clicked.connect(self.check_plan)
+        self.start.clicked.connect(self.begin)
+        self.add.clicked.connect(self.enqueue)
+        self.leave.clicked.connect(self.leave_editing)
+        controller.plan_checked.connect(self._plan_checked)
+        controller.changed.connect(self.refresh)
+        controller.ended.connect(self._ended)
+
+    @property
+    def entry(self) -> Protocol[Any]:
+        """The selected protocol."""
+        return self._entries[self.choice.currentIndex()]
+
+    @property
+    def why_not_planned(self) -> str:
+        """Why no plan can be started or queued; empty if one can."""
+        if self.form.refused:
+            return texts.START_BAD
+        if self._checked is None:
+            return texts.CHECKING if self._checking else texts.START_UNCHECKED
+        return texts.START_REFUSED if self._checked.refusal else ""
+
+    @property
+    def why_not(self) -> str:
+        """Why a run cannot be started now; empty if it can."""
+        if self._controller.running:
+            return texts.START_BUSY
+        if self._controller.latched:
+            return texts.LATCHED
+        return self._controller.held or self.why_not_planned
+
+    def use(self, configuration: BenchConfiguration) -> None:
+        """Use another bench."""
+        self._configuration = configuration
+        self.options.use(configuration)
+        self._edited()
+
+    def check_plan(self) -> None:
+        """Request a plan check."""
+        try:
+            asked = self._asked()
+        except RockbenchError as error:
+            self.plan.refuse(str(error))
+            return
+        self._checked, self._checking = None, True
+        self.plan.say(texts.CHECKING)
+        self._controller.check_plan(asked, by=self)
+        self.refresh()
+
+    def begin(self) -> None:
+        """Start the run that was checked."""
+        checked = self._checked
+        if self.why_not or checked is None:
+            return
+        try:
+            asked = self._asked()
+            if self.options.out is None:
+                self._made = make_folder(asked.out)
+                asked = replace(asked, out=self._made)
+        except RockbenchError as error:
+            self.plan.refuse(str(error))
+            return
+        self._began = True
+        self.predicted.emit(checked.prediction)
+        self._controller.start(self.options.run(asked))
+
+    def enqueue(self) -> None:
+        """Append the checked plan to the queue, or replace the test being edited."""
+        if self.why_not_planned:
+            return
+        test = queued(self.entry, self.form.parameters(), self.options.out, **self.options.for_queue)
+        edited = self._edited_test
+        if edited is None:
+            self.folder.clear()
+            self.queued.emit(test)
+        else:
+            self.saved.emit(edited, test)
+            self.leave_editing()
+
+    def edit(self, test: Queued, number: int) -> None:
+        """Edit test `number` of the queue, which has not begun."""
+        self._edited_test = test
+        self.choice.setCurrentIndex([entry.name for entry in self._entries].index(test.protocol))
+        self._show_form(Form(self.entry.parameters, test.parameters))
+        self.options.load(test)
+        self.add.setText(texts.SAVE)
+        self.add.setToolTip(texts.SAVE_TIP.format(number=number))
+        self.leave.show()
+        self.refresh()
+
+    def leave_editing(self) -> None:
+        """End the editing of a queued test."""
+        if self._edited_test is not None:
+            self._edited_test = None
+            self.folder.clear()
+            self.add.setText(texts.ADD)
+            self.leave.hide()
+            self.refresh()
+            self.left.emit()
+
+    def refresh(self) -> None:
+        """Enable the buttons; their tooltips give the reason where they are disabled."""
+        why, unplanned = self.why_not, self.why_not_planned
+        self.start.setEnabled(not why)
+        self.start.setToolTip(why or texts.START_TIP)
+        self.add.setEnabled(not unplanned)
+        if self._edited_test is None:
+            self.add.setToolTip(unplanned or texts.ADD_TIP)
+        self.check.setEnabled(not self._checking and not self.form.refused)
+        self.check.setToolTip(texts.START_BAD if self.form.refused else texts.CHECK_TIP)
+        self.plan.warn(texts.UNATTENDED if self.options.unattended else "")
+
+    def _asked(self) -> PlanCheck:
+        """The plan in the form. Raises InvalidInput."""
+        entry, parameters = self.entry, self.form.parameters()
+        out = self.options.out or Path(self.folder.placeholderText())
+        check_folder(out, result_names(entry))
+        return PlanCheck(entry.name, parameters, self._configuration, out)
+
+    def _choose(self, index: int) -> None:
+        entry = self._entries[index]
+        self.choice.setToolTip(f"{entry.summary}\n{entry.details}")
+        values = self._first_values if entry.name == "harmonic" else None
+        self._show_form(self._forms.get(entry.name) or Form(entry.parameters, values))
+
+    def _show_form(self, form: Form) -> None:
+        """Show the form of the selected protocol; the other forms keep their values."""
+        former = cast(Form | None, self.form_area.takeWidget())
+        if former is not None:
+            former.edited.disconnect(self._edited)
+        self.form = self._forms[self.entry.name] = form
+        form.edited.connect(self._edited)
+        self.form_area.setWidget(form)
+        form.show()
+        order = [self.choice, *form.fields.values(), self.folder]
+        for before, after in pairwise(order):
+            QWidget.setTabOrder(before, after)
+        self._edited()
+
+    def _edited(self) -> None:
+        self._checked, self._checking = None, False
+        self._controller.give_up(self)
+        self.folder.setPlaceholderText(str(default_folder(self.entry.name, datetime.now())))
+        self.plan.say(texts.START_UNCHECKED.capitalize() + ".")
+        self.refresh()
+
+    def _plan_checked(self, found: PlanChecked | Refused, by: object) -> None:
+        if by is not self or not self._checking:
+            return
+        self._checking = False
+        if isinstance(found, PlanChecked):
+            self._checked = found
+            self.plan.show_plan(found)
+        else:
+            self.plan.refuse(found.text)
+        self.refresh()
+
+    def _ended(self) -> None:
+        if self._made is not None:
+            remove_unused(self._made)
+            self._made = None
+        if self._began:
+            # the folder is now in use: the next run needs another
+            self._began = False
+            self.folder.clear()
+            self._edited()
+
+    def _arrange(self) -> None:
+        for button, key, tip in (
+            (self.check, "Ctrl+K", texts.CHECK_TIP),
+            (self.start, "Ctrl+Return", texts.START_TIP),
+            (self.add, "Ctrl+J", texts.ADD_TIP),
+            (self.leave, "Esc", texts.LEAVE_TIP),
+        ):
+            give_key(button, key)
+            button.setToolTip(tip)
+            button.setMinimumHeight(48)
+        # a key press meant for the form must not start a run
+        self.start.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.leave.hide()
+        left, right = QWidget(), QWidget()
+        asked, found = QVBoxLayout(left), QVBoxLayout(right)
+        for part in (self.choice, self.form_area, self.options):
+            asked.addWidget(part, int(part is self.form_area))
+        found.addWidget(self.plan, 1)
+        buttons = QHBoxLayout()
+        buttons.addStretch(1)
+        for button in (self.check, self.add, self.leave, self.start):
+            buttons.addWidget(button)
+        halves = QSplitter()
+        halves.setChildrenCollapsible(False)
+        for half, column in ((left, asked), (right, found)):
+            column.setContentsMargins(0, 0, 0, 0)
+            halves.addWidget(half)
+        halves.setSizes([500, 740])
+        whole = QVBoxLayout(self)
+        whole.addWidget(scrolling(halves, *FITTING), 1)
+        # the buttons never scroll
+        whole.addLayout(buttons)

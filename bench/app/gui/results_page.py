@@ -1,0 +1,271 @@
+"""The Results page: points, gains and samples of data files, with comparison, report and export."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QDragEnterEvent, QDropEvent
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QCheckBox,
+    QHBoxLayout,
+    QHeaderView,
+    QLabel,
+    QLineEdit,
+    QPushButton,
+    QSplitter,
+    QTableWidget,
+    QTableWidgetItem,
+    QTabWidget,
+    QVBoxLayout,
+    QWidget,
+)
+
+from bench.app.formatting import ABSENT, number
+from bench.app.gui import texts
+from bench.app.gui.controller import Controller
+from bench.app.gui.figure_view import FigureView
+from bench.app.gui.gain_plot import GainPlot
+from bench.app.gui.gains import Difference, compare, kind_of
+from bench.app.gui.open_files import FileList, HistoryView, Place, read_file
+from bench.app.gui.outputs import Outputs
+from bench.app.gui.palette import Theme
+from bench.app.gui.point_table import every_field, rows_of
+from bench.app.gui.widgets import (
+    FITTING,
+    ask_for_files,
+    give_key,
+    scrolling,
+    set_level,
+    typeset,
+    why_no_dialog,
+)
+from bench.app.ipc.messages import Ended, Refused
+from bench.datafile.tables import Column
+from bench.results import FILE
+from sim.errors import RockbenchError
+
+
+def read_only(name: str) -> QTableWidget:
+    """An empty read-only table with the accessible name `name`."""
+    table = QTableWidget(0, 0)
+    table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+    table.setAccessibleName(name)
+    return table
+
+
+def show_points(
+    table: QTableWidget, results: Mapping[str, Column], points: Sequence[Mapping[str, object]], *, everything: bool
+) -> None:
+    """Show the quantities of every point with prediction and verdict; with `everything` every field of the file."""
+    if everything:
+        headings, rows = every_field(results, points)
+        _fill(table, headings, [of.description for of in results.values()], rows)
+    else:
+        _fill(table, texts.POINT_TITLES, texts.POINT_TIPS, [each.cells for each in rows_of(results, points)])
+    header = table.horizontalHeader()
+    header.setSectionResizeMode(QHeaderView.ResizeMode.Interactive)
+    if not everything:
+        # all six columns in view: a long quantity is elided, its tooltip has all of it
+        header.setSectionResizeMode(1, QHeaderView.ResizeMode.Stretch)
+
+
+def show_differences(table: QTableWidget, runs: Sequence[tuple[str, Sequence[Difference]]]) -> None:
+    """Show the points of each run compared with those of the reference."""
+    rows = [
+        [
+            name,
+            each.point,
+            *(number(value) for value in (each.reference, each.other, each.value, each.uncertainty, each.score)),
+            _verdict(each),
+        ]
+        for name, differences in runs
+        for each in differences
+    ]
+    _fill(table, texts.DIFFERENCES, texts.DIFFERENCE_TIPS, rows)
+
+
+def _verdict(each: Difference) -> str:
+    if each.score != each.score:
+        return ABSENT
+    return texts.WITHIN if each.score <= 1.0 else texts.BEYOND
+
+
+def _fill(table: QTableWidget, headings: Sequence[str], tips: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    table.setColumnCount(len(headings))
+    table.setRowCount(len(rows))
+    for column, (heading, tip) in enumerate(zip(headings, tips, strict=True)):
+        header = QTableWidgetItem(heading)
+        header.setToolTip(tip)
+        table.setHorizontalHeaderItem(column, header)
+        for row, cells in enumerate(rows):
+            item = QTableWidgetItem(cells[column])
+            item.setToolTip(cells[column])
+            item.setTextAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+            table.setItem(row, column, item)
+    table.resizeColumnsToContents()
+
+
+class ResultsPage(QWidget):
+    """Results of the last run or of any files; ticked files are drawn together."""
+
+    def __init__(self, controller: Controller, theme: Theme) -> None:
+        super().__init__()
+        self._controller = controller
+        self.message, self.files = QLabel(texts.RESULTS_EMPTY, wordWrap=True), FileList()
+        self.message.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.open_file, self.remove = QPushButton(texts.OPEN), QPushButton(texts.REMOVE)
+        give_key(self.open_file, "Ctrl+O")
+        self.open_file.clicked.connect(self._ask)
+        self.remove.clicked.connect(self.files.remove_chosen)
+        self.remove.setToolTip(texts.REMOVE_TIP)
+        self.path = QLineEdit(placeholderText=texts.PATH)
+        self.path.setAccessibleName(texts.PATH)
+        self.path.returnPressed.connect(self._open_typed)
+        self.files.chosen_changed.connect(self._choose)
+        self.files.ticked_changed.connect(self._draw)
+        self.gains, self.table, self.differences = (
+            GainPlot(theme),
+            read_only(texts.POINTS),
+            read_only(texts.COMPARISON),
+        )
+        self.histories, self.outputs, self.figures = HistoryView(theme), Outputs(), FigureView()
+        self.everything = QCheckBox(texts.EVERYTHING)
+        self.everything.setToolTip(texts.EVERYTHING_TIP)
+        self.everything.setShortcut("Ctrl+Shift+F")
+        self.everything.toggled.connect(self._list)
+        self.parts = QTabWidget()
+        self._arrange()
+        self.setAcceptDrops(True)
+        controller.ended.connect(self.show_end)
+        controller.changed.connect(self._refresh)
+        self._refresh()
+
+    def use_theme(self, theme: Theme) -> None:
+        """Use the colours of another theme."""
+        self.histories.use_theme(theme)
+        self.gains.use_theme(theme)
+        self._draw()
+
+    def show_end(self, ended: Ended | Refused) -> None:
+        """Show the status of the finished run and open its file, without changing a displayed comparison."""
+        if isinstance(ended, Ended):
+            compared = len(self.files.ticked) > 1
+            self.show_file(ended.out / FILE, place=Place.ASIDE if compared else Place.ALONE)
+            self._say(
+                texts.ENDED.format(status=ended.status, reason=ended.reason, out=ended.out),
+                "calm" if ended.status in ("completed", "stopped") else "alarm",
+            )
+        else:
+            text = texts.FAILED if ended.failed else texts.REFUSED
+            self._say(text.format(text=ended.text), "alarm")
+
+    def show_file(self, path: Path, *, place: Place = Place.TOO) -> None:
+        """Open a data file; after a read error, which is reported, the page stays unchanged."""
+        try:
+            file = read_file(path)
+        except (RockbenchError, OSError) as error:
+            self._say(str(error), "alarm")
+        else:
+            self.files.put(file, place)
+
+    def dragEnterEvent(self, event: QDragEnterEvent) -> None:
+        """Accept data files."""
+        if any(url.toLocalFile().endswith(".h5") for url in event.mimeData().urls()):
+            event.acceptProposedAction()
+
+    def dropEvent(self, event: QDropEvent) -> None:
+        """Open the dropped files."""
+        for url in event.mimeData().urls():
+            self.show_file(Path(url.toLocalFile()))
+
+    def _choose(self) -> None:
+        file = self.files.chosen
+        self.remove.setEnabled(file is not None)
+        self.outputs.use(None if file is None else file.path)
+        self.histories.use(file)
+        self.figures.use(None if file is None else file.path)
+        self._list()
+        if file is None:
+            self._say(texts.RESULTS_EMPTY, "calm")
+            return
+        self._say(typeset(file.headline), "calm")
+
+    def _list(self) -> None:
+        file = self.files.chosen
+        results: Mapping[str, Column] = {} if file is None else file.results
+        points = [] if file is None else file.points
+        show_points(self.table, results, points, everything=self.everything.isChecked())
+
+    def _draw(self) -> None:
+        """Draw the gains of all ticked files, with the predicted lines of the first."""
+        files = self.files.ticked
+        self.gains.predict(files[0].prediction if files else {})
+        for run, file in enumerate(files):
+            self.gains.add_all(file.points, run, file.name if len(files) > 1 else "")
+        others = [(file.name, compare(files[0].points, file.points)) for file in files[1:]]
+        show_differences(self.differences, others)
+        self.parts.setTabEnabled(self.parts.indexOf(self.differences), bool(others))
+        # for a protocol without gains only the table is shown
+        self.gains.setVisible(not files or any(kind_of(file.prediction) or file.has_gains for file in files))
+
+    def _say(self, text: str, level: str) -> None:
+        self.message.setText(f"▲ {text}" if level == "alarm" else text)
+        set_level(self.message, level)
+
+    def _ask(self) -> None:
+        ask_for_files(self, self._controller, texts.OPEN, texts.RUN_FILES, self._show_files, folder="runs", many=True)
+
+    def _show_files(self, paths: list[Path]) -> None:
+        for path in paths:
+            self.show_file(path)
+
+    def _open_typed(self) -> None:
+        if self.path.text().strip():
+            self.show_file(FileList.path_of(self.path.text()))
+
+    def _refresh(self) -> None:
+        why = why_no_dialog(self._controller)
+        self.open_file.setEnabled(not why)
+        self.open_file.setToolTip(texts.OPEN_BESIDE.format(why=why) if why else texts.OPEN_TIP)
+
+    def _arrange(self) -> None:
+        beside = QWidget()
+        column = QVBoxLayout(beside)
+        column.setContentsMargins(0, 0, 0, 0)
+        buttons = QHBoxLayout()
+        buttons.addWidget(self.open_file)
+        buttons.addWidget(self.remove)
+        column.addLayout(buttons)
+        column.addWidget(self.path)
+        column.addWidget(self.files, 1)
+        points = QSplitter(Qt.Orientation.Vertical)
+        points.addWidget(self.gains)
+        rows_below = QWidget()
+        below = QVBoxLayout(rows_below)
+        below.setContentsMargins(0, 0, 0, 0)
+        below.addWidget(self.everything)
+        below.addWidget(self.table, 1)
+        points.addWidget(rows_below)
+        points.setSizes([340, 200])
+        for part, name in (
+            (points, texts.GAINS),
+            (self.figures, texts.FIGURE),
+            (self.differences, texts.COMPARISON),
+            (self.histories, texts.SAMPLES),
+        ):
+            self.parts.addTab(part, name)
+        comparison = self.parts.indexOf(self.differences)
+        self.parts.setTabToolTip(comparison, texts.COMPARISON_TIP)
+        self.parts.setTabEnabled(comparison, False)
+        whole = QSplitter()
+        whole.addWidget(beside)
+        whole.addWidget(self.parts)
+        whole.setSizes([250, 1000])
+        content = QWidget()
+        rows = QVBoxLayout(content)
+        rows.setContentsMargins(0, 0, 0, 0)
+        rows.addWidget(self.message)
+        rows.addWidget(whole, 1)
+        rows.addWidget(self.outputs)
+        QVBoxLayout(self).addWidget(scrolling(content, *FITTING))

@@ -1,0 +1,305 @@
+"""The Setup page: configuration, devices, and the check of the loop."""
+
+from pathlib import Path
+from typing import cast
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import (
+    QHBoxLayout,
+    QHeaderView,
+    QLabel,
+    QPlainTextEdit,
+    QPushButton,
+    QSplitter,
+    QTreeWidget,
+    QTreeWidgetItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from bench.app.formatting import ABSENT, as_typed
+from bench.app.gui import texts
+from bench.app.gui.background import Command
+from bench.app.gui.check_panel import CheckPanel
+from bench.app.gui.controller import Controller
+from bench.app.gui.palette import Theme
+from bench.app.gui.widgets import (
+    FITTING,
+    ask_for_files,
+    give_key,
+    scrolling,
+    set_level,
+    typeset,
+    unit_text,
+    why_no_dialog,
+)
+from bench.config.declared import Declared, declared, summary
+from bench.config.model import BenchConfiguration
+from bench.config.result_files import read_specimen
+from bench.config.toml import read_configuration, with_identified
+from sim.errors import RockbenchError
+from sim.parameters import Parameters
+
+
+class ConfigurationTree(QTreeWidget):
+    """Read-only view of a configuration. Values that differ from their defaults are bold and their groups expanded."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setColumnCount(len(texts.CONFIGURATION_TITLES))
+        self.setHeaderLabels(texts.CONFIGURATION_TITLES)
+        self.setAccessibleName(texts.NAMES["configuration"])
+        self.setAlternatingRowColors(True)
+        self.header().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+
+    def use(self, configuration: BenchConfiguration) -> None:
+        """Show a configuration, without the tables of other backends."""
+        self.clear()
+        unused = {"simulation", "hardware", "rig"} - {configuration.table}
+        values, groups = list[QTreeWidgetItem](), list[QTreeWidgetItem]()
+        for of in declared(BenchConfiguration):
+            if of.name not in unused:
+                line = _line(of, getattr(configuration, of.name))
+                (groups if line.childCount() else values).append(line)
+        self.addTopLevelItems([*values, *groups])
+        for item in self._all():
+            if item.childCount():
+                item.setExpanded(item.parent() is None or item.data(0, Qt.ItemDataRole.UserRole) is True)
+
+    def value(self, *path: str) -> str:
+        """Value of a key, with its unit. Raises KeyError for an unknown key."""
+        items = [self.topLevelItem(k) for k in range(self.topLevelItemCount())]
+        found: QTreeWidgetItem | None = None
+        for key in path:
+            found = next((item for item in items if item is not None and item.text(0) == key), None)
+            if found is None:
+                raise KeyError(".".join(path))
+            items = [found.child(k) for k in range(found.childCount())]
+        return "" if found is None else f"{found.text(1)} {found.text(2)}".strip()
+
+    def _all(self) -> list[QTreeWidgetItem]:
+        waiting = [self.topLevelItem(k) for k in range(self.topLevelItemCount())]
+        found: list[QTreeWidgetItem] = []
+        while waiting:
+            item = waiting.pop()
+            if item is not None:
+                found.append(item)
+                waiting += [item.child(k) for k in range(item.childCount())]
+        return found
+
+
+def _line(of: Declared, value: object) -> QTreeWidgetItem:
+    """Add a key with everything below it; its first column stores whether any value there differs from the default."""
+    changed = value != of.default
+    item = QTreeWidgetItem([of.name, "", ""])
+    if isinstance(value, Parameters):
+        _fill(item, value)
+        tip = of.description or summary(type(value))
+    elif groups := _groups(value):
+        for number, each in enumerate(groups):
+            below = QTreeWidgetItem([str(number + 1), "", ""])
+            _fill(below, each)
+            item.addChild(below)
+        tip = of.description
+    else:
+        item.setText(1, _words(value))
+        item.setText(2, "" if of.unit == "1" or value is None else unit_text(of.unit))
+        tip = f"{of.description}\n{texts.MUST_BE.format(allowed=typeset(of.allowed_in_unit))}"
+    for column in range(3):
+        item.setToolTip(column, tip[:1].upper() + tip[1:])
+    item.setData(0, Qt.ItemDataRole.UserRole, changed)
+    font = item.font(1)
+    font.setBold(changed)
+    item.setFont(1, font)
+    return item
+
+
+def _fill(item: QTreeWidgetItem, group: Parameters) -> None:
+    for of in declared(type(group)):
+        item.addChild(_line(of, getattr(group, of.name)))
+
+
+def _groups(value: object) -> list[Parameters]:
+    """The groups of parameters in a value; empty for other values."""
+    several = cast(tuple[object, ...], value) if isinstance(value, tuple) else ()
+    return [each for each in several if isinstance(each, Parameters)]
+
+
+def _words(value: object) -> str:
+    if value is None:
+        return ABSENT
+    if isinstance(value, tuple):
+        return " ".join(as_typed(each) for each in cast(tuple[object, ...], value)) or ABSENT
+    return as_typed(getattr(value, "value", value))
+
+
+class DevicesPanel(QWidget):
+    """Search for devices, on request only and never while a run or the queue uses them."""
+
+    def __init__(self, controller: Controller) -> None:
+        super().__init__()
+        self._controller = controller
+        self._path: Path | None = None
+        self._command: Command | None = None
+        self.ask = QPushButton(texts.FIND)
+        give_key(self.ask, "Ctrl+D")
+        self.message = QLabel(texts.FIND_EMPTY, wordWrap=True)
+        self.found = QPlainTextEdit(readOnly=True)
+        self.found.setAccessibleName(texts.NAMES["devices"])
+        self.found.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
+        row = QHBoxLayout()
+        row.addWidget(self.message, 1)
+        row.addWidget(self.ask)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addLayout(row)
+        column.addWidget(self.found, 1)
+        self.ask.clicked.connect(self.look)
+        controller.changed.connect(self._refresh)
+        self._refresh()
+
+    def use(self, configuration: BenchConfiguration, path: Path | None) -> None:
+        """Use the server and the ports of this configuration, which was read from `path`."""
+        self._path = path
+        simulated = configuration.backend == "simulated"
+        self._say(texts.FIND_SIMULATED if simulated else texts.FIND_EMPTY, "calm")
+        self.found.clear()
+
+    def look(self) -> None:
+        """Start the search, which takes some seconds."""
+        if self._command is not None or not self.ask.isEnabled():
+            return
+        self._command = Command(["devices", *(["--config", str(self._path)] if self._path else [])], self)
+        self._command.over.connect(self._over)
+        self._say(texts.FINDING, "wait")
+        self._refresh()
+
+    def _over(self, code: int, text: str) -> None:
+        if self._command is not None:
+            self._command.deleteLater()
+        self._command = None
+        if code == 0:
+            self._say(texts.FOUND, "calm")
+            self.found.setPlainText(text)
+        else:
+            self._say(f"▲ {texts.FIND_FAILED.format(text=text.splitlines()[-1] if text else code)}", "alarm")
+        self._refresh()
+
+    def _say(self, text: str, level: str) -> None:
+        self.message.setText(text)
+        set_level(self.message, level)
+
+    def _refresh(self) -> None:
+        why = texts.START_BUSY if self._controller.running else self._controller.held
+        self.ask.setEnabled(not why and self._command is None)
+        self.ask.setToolTip(why or texts.FIND_TIP)
+
+
+class SetupPage(QWidget):
+    """Shows and selects the configuration; it is edited in its file, and another one is opened here while no run is
+    active.
+    """
+
+    opened = Signal(object)
+    """The `BenchConfiguration` of the following runs."""
+
+    def __init__(
+        self, controller: Controller, configuration: BenchConfiguration, path: Path | None, theme: Theme
+    ) -> None:
+        super().__init__()
+        self._controller = controller
+        self.configuration, self.path = configuration, path
+        self._specimen: Path | None = None
+        self.source = QLabel(wordWrap=True)
+        self.open_file, self.open_specimen = QPushButton(texts.OPEN_CONFIGURATION), QPushButton(texts.OPEN_SPECIMEN)
+        self.tree, self.devices = ConfigurationTree(), DevicesPanel(controller)
+        self.loop = CheckPanel(controller, theme)
+        self._arrange()
+        self.open_file.clicked.connect(self._ask_configuration)
+        self.open_specimen.clicked.connect(self._ask_specimen)
+        controller.changed.connect(self._refresh)
+        self._show()
+        self._refresh()
+
+    def open_configuration(self, path: Path) -> None:
+        """Use the configuration in a file; after a refusal, which is shown, the current one stays in use."""
+        try:
+            configuration = read_configuration(path)
+        except RockbenchError as error:
+            self._say(f"▲ {texts.CONFIGURATION_KEPT.format(text=error)}", "alarm")
+            return
+        self._specimen = None
+        self._use(configuration, path)
+
+    def open_identified(self, path: Path) -> None:
+        """Use the identified specimen in a file; after a refusal, which is shown, the current one stays in use."""
+        try:
+            configuration = with_identified(self.configuration, read_specimen(path))
+        except RockbenchError as error:
+            self._say(f"▲ {texts.CONFIGURATION_KEPT.format(text=error)}", "alarm")
+            return
+        self._specimen = path
+        self._use(configuration, self.path)
+
+    def use_theme(self, theme: Theme) -> None:
+        self.loop.use_theme(theme)
+
+    def _use(self, configuration: BenchConfiguration, path: Path | None) -> None:
+        self.configuration, self.path = configuration, path
+        self._show()
+        self.opened.emit(configuration)
+
+    def _show(self) -> None:
+        lines = [f"{texts.CONFIGURATION}: {self.path or texts.VIRTUAL}"]
+        if self._specimen is not None:
+            lines.append(texts.IDENTIFIED.format(path=self._specimen))
+        self._say("\n".join(lines), "calm")
+        self.tree.use(self.configuration)
+        self.devices.use(self.configuration, self.path)
+        self.loop.use(self.configuration)
+
+    def _say(self, text: str, level: str) -> None:
+        self.source.setText(text)
+        set_level(self.source, level)
+
+    def _ask_configuration(self) -> None:
+        kinds, title = texts.CONFIGURATION_FILES, texts.OPEN_CONFIGURATION
+        ask_for_files(self, self._controller, title, kinds, lambda paths: self.open_configuration(paths[0]))
+
+    def _ask_specimen(self) -> None:
+        kinds, title = texts.SPECIMEN_FILES, texts.OPEN_SPECIMEN
+        ask_for_files(self, self._controller, title, kinds, lambda paths: self.open_identified(paths[0]))
+
+    def _refresh(self) -> None:
+        why = why_no_dialog(self._controller)
+        for button, tip in (
+            (self.open_file, texts.OPEN_CONFIGURATION_TIP),
+            (self.open_specimen, texts.OPEN_SPECIMEN_TIP),
+        ):
+            button.setEnabled(not why)
+            button.setToolTip(why or tip)
+
+    def _arrange(self) -> None:
+        give_key(self.open_file, "Ctrl+Shift+O")
+        give_key(self.open_specimen, "Ctrl+Shift+P")
+        self.source.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        left = QWidget()
+        column = QVBoxLayout(left)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(self.source)
+        buttons = QHBoxLayout()
+        buttons.addWidget(self.open_file)
+        buttons.addWidget(self.open_specimen)
+        column.addLayout(buttons)
+        column.addWidget(self.tree, 1)
+        right = QSplitter(Qt.Orientation.Vertical)
+        right.setChildrenCollapsible(False)
+        for part in (self.devices, self.loop):
+            right.addWidget(part)
+        right.setSizes([150, 450])
+        whole = QSplitter()
+        whole.setChildrenCollapsible(False)
+        whole.addWidget(left)
+        whole.addWidget(right)
+        whole.setSizes([410, 830])
+        QVBoxLayout(self).addWidget(scrolling(whole, *FITTING))

@@ -1,0 +1,323 @@
+"""Texts of the window."""
+
+from bench.events import State
+
+TITLE = "rocking-bench"
+PAGES = ("Setup", "Protocol", "Queue", "Run", "Results")
+
+WORDS = {
+    State.IDLE: "IDLE",
+    State.ARMED: "ARMED",
+    State.RUNNING: "RUNNING",
+    State.WAITING: "WAITING",
+    State.STOPPING: "STOPPING",
+    State.ABORTING: "ABORTING",
+    State.HALTED: "HALTED",
+    State.CLOSED: "CLOSED",
+}
+NO_SESSION, STARTING, PLANNING, NO_LINK = "NO RUN", "STARTING", "PLANNING", "NO LINK"
+NO_SESSION_WHY = "this window has started no run; choose a protocol"
+STARTING_WHY = "starting the session process"
+NO_LINK_WHY = (
+    "no message from the bench for {age:.1f} s: its state is unknown. If the table moves, press the emergency stop."
+)
+GUARD = (
+    "This STOP is a request to the software, not an emergency stop. The emergency stop is the red button at the bench."
+)
+
+STOP, STOP_NAME = "STOP\nF12", "STOP"
+STOP_AGAIN = "STOP\nagain: CUT"
+STOP_BY_MOUSE = "STOP\nby mouse"
+KEY_NEEDS_FOCUS = "F12 acts only while this window has the focus: click on it."
+STOP_TIP = (
+    "Ramps the output to zero fast and ends the run (F12, from everywhere). Pressed again after {after:g} s or "
+    "more: cuts the enable line."
+)
+LATCHED = "STOP was pressed: clear it first"
+STOPPED = "STOP was pressed"
+CLEAR = "Clear STOP"
+CLEAR_TIP = "Allows a new run. The stopped run is not resumed (Ctrl+Shift+K)."
+CLEAR_BUSY = "The stopped run is still under way."
+
+ELAPSED, REMAINING, STEP, INPUTS = "elapsed", "remaining", "step", "safety inputs"
+NO_INPUTS = "none configured"
+INPUT_GOOD, INPUT_OPEN, INPUT_UNKNOWN = "good", "OPEN", "unknown"
+INPUTS_UNREAD = "read while a run is under way"
+INPUTS_TIP = (
+    "Second contacts of emergency stop, over-travel switches and amplifier. They are read twice a second during a "
+    "run, and shown as unknown after {stale:g} s without a reading."
+)
+
+CHECK = "Check the plan"
+CHECK_TIP = "Computes the whole run beforehand: prediction, margin to every limit, duration and disk space (Ctrl+K)."
+CHECKING = "Computing the plan …"
+START = "Start"
+START_TIP = "Starts the run (Ctrl+Return)."
+START_BUSY = "a run is under way"
+START_UNCHECKED = "check the plan first"
+START_BAD = "a value is invalid: see the form"
+START_REFUSED = "the plan was refused"
+REALTIME, REALTIME_TIP = "&Real time", "Runs the simulated bench in real time, not as fast as possible."
+ASK, ASK_TIP = "Ask me", "Requests operator tasks even if the bench performs them itself."
+ASK_REAL_TIP = (
+    "Every question waits for your answer. Unchecked, the run is unattended: every question is answered with yes, "
+    "as with --yes. Only for runs without operator tasks."
+)
+UNATTENDED = (
+    "Unattended: every question of this run is answered with yes. Complete all operator tasks before the start."
+)
+GO_ON = "Continue without this window"
+GO_ON_TIP = (
+    "Without this option, a run ramps out when its window is closed, freezes or crashes; with it, the run continues "
+    "to its end."
+)
+FOLDER, OPERATOR = "Results in", "Operator"
+NOTE, NOTE_TIP = "Note", "Free text; stored in the data file."
+FOLDER_TIP = "Folder for the results, created if missing. Existing results are never overwritten."
+OPERATOR_TIP = "Name of the operator; stored in the data file."
+DEFAULT_TIP = "If empty: {default}."
+MARGINS = ("quantity", "unit", "demand", "at 95 %", "limit", "margin at 95 % [%]", "where")
+MARGIN_TIP = (
+    "{margin:.1f} % for the nominal specimen; 95 % of the specimens within the uncertainty keep {likely:.1f} %."
+)
+TIME_AND_DISK = "Expected duration {duration}. Disk: up to {needed:.0f} MB needed, {free:.0f} MB free."
+TIGHTEST = "Tightest: {name}, limited by {owner}."
+MAY_RUN, MAY_NOT = "The plan is within all limits.", "Refused: {why}"
+NO_MARGINS = "This protocol does not predict margins."
+
+DONE, DECLINE = "Done, continue", "End the run"
+DONE_KEY, DECLINE_KEY = "Ctrl+Shift+Return", "Ctrl+Shift+Backspace"
+DONE_TIP = "The task is done: continues the run (Ctrl+Shift+Return)."
+DECLINE_TIP = "The task is not done: ends the run (Ctrl+Shift+Backspace)."
+PROMPT = "Operator task"
+PROMPT_PARTS = ("Why", "Checked afterwards")
+LEAVE_WINDOW, STAY = "Close the window", "Stay"
+LEAVE_RAMPS_OUT = "This window controls a run. If you close it, the output ramps out and the run ends."
+LEAVE_GOES_ON = "A run is under way. It continues without this window, and then cannot be stopped from here."
+
+RAMP_OUT = "Ramp out and keep"
+RAMP_OUT_TIP = "Ends the run gently: the output ramps out and the data are kept (Ctrl+E)."
+TRACES = (
+    ("drive", "V", 1.0),
+    ("table acceleration", "m/s²", 1.0),
+    ("storey 1, u1", "mm", 1e3),
+    ("storey 2, u2", "mm", 1e3),
+    ("drift, u2 − u1", "mm", 1e3),
+)
+"""Label, displayed unit, and displayed units per SI unit, of each trace."""
+SECONDS = "seconds before now"
+ALPHA, PREDICTED = "gain α₂", "predicted"
+TWIN = "live model"
+MODULATED = "hollow: modulated motion"
+OTHER_AXIS = "{name}: not drawn, needs another axis"
+BARE_SINE, BARE_RECORD = "ω = {omega:g} rad/s, bare frame", "{record}, bare frame"
+MEASURING, LAST_POINT = "measuring {point}", "last point, {status}: {point}"
+BAND = "Shaded: band from the uncertainty of the specimen's parameters (k = 2), where the motion is stable."
+BETA_AXIS = "stiffness ratio β [1]"
+OMEGA_AXIS, GAIN_AXIS = "circular frequency ω [rad/s]", "gain α₂ [1]"
+NO_GAIN, NO_RESULT, NO_GAIN_OF = "no gain yet", "no result yet", "no gain: {status}"
+RESPONSE = "table acceleration per drive"
+STEADY, SETTLING, GATHERING = "steady", "settling", "{done} of {needed} cycles"
+REPEATS = "repeats every {cycles} cycles"
+CHANGE = "{change:.2g} %"
+CYCLES, SO_FAR = "{cycles} cycles", "{seconds:.1f} s of {record}"
+NO_CHANGE = "< 0.01 %"
+SENSORS = ("table acceler.", "table displ.", "laser 1", "laser 2")
+STEADY_TIP = (
+    "For each sensor, the mean cycles of two windows of {window} cycles are compared; steady means that they agree "
+    "within a third of {tolerance:g} % (settle_tolerance). Computed from the traces; the run evaluates the samples."
+)
+LOST = "{events} events and {traces} blocks of traces were not shown; the file contains all of them."
+TRACES_OLD = "Traces and picture are not live: the newest sample is {age} old."
+DATA_AGE = "newest sample {age:.1f} s old"
+FRAME = "Bare frame: measured"
+FRAME_ONLY = "Frame: measured. Block (dashed): angle not known"
+BLOCK_BY_LASER = "Storey 1: measured. Block: by laser 2, {height:.0f} mm above the table. Storey 2: unknown"
+NOT_LIVE = "not live for {age:.0f} s"
+NOT_LIVE_AXIS = "seconds before the newest sample, " + NOT_LIVE
+ON_BLOCK = {
+    "storey 2, u2": "laser 2, block {height:.0f} mm above the table",
+    "drift, u2 − u1": "laser 2 − laser 1, no drift",
+}
+"""Labels of the laser 2 traces while it measures the block."""
+FRAME_AND_BLOCK = "Frame: measured. Block: model, driven by the measured table motion"
+FACTOR = "motion drawn"
+FACTOR_TIP = "Magnification of the motion relative to the frame: use the wheel, or + and −, on the picture."
+
+OPEN, OPEN_TIP = "Open a file …", "Opens the campaign.h5 of a run (Ctrl+O)."
+OPEN_BESIDE = "{why}; a path can be typed at any time"
+FILE_TOLD = "{path}\n{start}, {status}: {summary} ({length} of samples)"
+RUN_FILES = "campaign (*.h5)"
+CONFIGURATION_FILES, SPECIMEN_FILES = "configuration (*.toml)", "specimen (*.json)"
+REMOVE, REMOVE_TIP = "Close file", "Removes the selected file from this page; the file itself is kept."
+PATH, FILES = "or type a path, Enter", "open files"
+FILES_TIP = "The selected file is shown. Ticked files are drawn together; the first of them is the reference."
+GAINS, POINTS, COMPARISON, SAMPLES, FIGURE = "Points", "points", "Comparison", "Samples", "Figure"
+NO_FIGURE = "The run wrote no figure."
+POINT_TITLES = ("point", "quantity", "measured ± U", "predicted ± U", "difference", "verdict")
+POINT_TIPS = (
+    "point of the campaign",
+    "measured quantity; the lower list has every field of the file",
+    "measured value and expanded uncertainty (k = 2)",
+    "predicted or nominal value; its expanded uncertainty (k = 2), or the interval expected for the measured value",
+    "measured minus predicted",
+    "agrees: the difference is within the combined uncertainty, or the measured value within the predicted interval",
+)
+INTERVAL = "{value} ({low:.3g} to {high:.3g})"
+AGREES, DISAGREES = "✓ agrees", "▲ DISAGREES"
+YES, NO = "yes", "no"
+EVERYTHING, EVERYTHING_TIP = "All fields", "Shows every field of every point, with its unit (Ctrl+Shift+F)."
+COMPARISON_TIP = "Tick two or more files to compare the points of each with those of the first."
+DIFFERENCES = ("run", "point", "α₂, reference", "α₂", "difference", "uncertainty", "Eₙ", "verdict")
+DIFFERENCE_TIPS = (
+    "the compared run",
+    "point at which the gain was measured",
+    "gain in the first ticked file",
+    "gain in this run",
+    "this run minus the reference",
+    "expanded uncertainty (k = 2) of the difference: root sum of squares of both, assumed independent",
+    "|difference| / uncertainty (ISO 13528)",
+    "within: Eₙ is at most 1",
+)
+RECORD_POINT, SINE_POINT = "{record}, β = {beta:g}", "ω = {omega:g} rad/s, β = {beta:g}"
+WITHIN, BEYOND = "within", "▲ BEYOND"
+RUN, CHANNEL, WHOLE = "run", "channel", "Whole run"
+RUN_ITEM = "{number} ({seconds:.1f} s)"
+SINCE_ARMED = "seconds since the rig was armed"
+REPORT, EXPORT = "Create report", "Export"
+REPORT_TIP = (
+    "Runs `rockbench report` on the selected file, into the same folder; possible during a test, at low priority."
+)
+EXPORT_TIP = "Runs `rockbench export` on the selected file, into a new folder next to it."
+MAKING, MADE, NOT_MADE = "Creating {path} …", "Created: {path}", "No file was written. {text}"
+OPEN_MADE = "Open"
+RESULTS_EMPTY = "No file is open. The results of a run appear here when it has ended."
+ENDED = "The run was {status}: {reason}. Results are in {out}."
+REFUSED = "Nothing was started. {text}"
+FAILED_WORD = "FAILED"
+FAILED = (
+    "The session failed: {text}. Its file contains the data measured before. Look at the bench: if the table moves, "
+    "press the emergency stop."
+)
+
+WELCOME = (
+    "Guided tour: this is the simulated bench, no hardware moves. The form contains one harmonic point, which runs "
+    "as fast as the computer allows; tick Real time for the speed of a real bench, about four minutes."
+)
+TOUR = (
+    "Check the plan (Ctrl+K)",
+    "Start (Ctrl+Return)",
+    "Watch the gain converge to its prediction on the Run page",
+    "Open the file on the Results page",
+)
+WELCOME_CLOSE = "Hide"
+CONFIGURATION = "Configuration"
+VIRTUAL_SHORT = "simulated bench"
+VIRTUAL = "the simulated bench with the paper's specimen (no configuration file was given)"
+
+OWN_ERROR = "an error in the window, not in the bench: {error}. The run continues; details are in the terminal."
+
+
+TROUBLE, TROUBLE_DETAILS, TROUBLE_CLOSE = "Needs attention", "Details", "Hide"
+TROUBLE_PARTS = ("Event", "Reaction of the bench", "Next step")
+TROUBLE_DETAILS_TIP = "The full error message, for the developers (Ctrl+Shift+I)."
+TROUBLE_CLOSE_TIP = "Hides this message; it stays in the log and in the file (Ctrl+Shift+H)."
+CONFIGURATION_TITLES = ("key", "value", "unit")
+OPEN_CONFIGURATION = "Open a configuration …"
+OPEN_CONFIGURATION_TIP = (
+    "Opens another TOML file; if it is refused, the reason is shown and the current one stays in use (Ctrl+Shift+O)."
+)
+OPEN_SPECIMEN = "Open a specimen file …"
+OPEN_SPECIMEN_TIP = (
+    "Uses identified parameters of the specimen instead of the assumed ones, like --specimen (Ctrl+Shift+P)."
+)
+IDENTIFIED = "Specimen: {path}"
+CONFIGURATION_KEPT = "{text}. The previous one stays in use."
+MUST_BE = "It must be {allowed}."
+FIND = "Search for devices"
+FIND_TIP = (
+    "Queries NI's driver or server and every serial port, like `rockbench devices`; takes a few seconds (Ctrl+D)."
+)
+FIND_EMPTY = "No search yet."
+FIND_SIMULATED = "The simulated bench has no devices. You can still search for the devices of this computer."
+FINDING = "Searching …"
+FOUND = "Result of the last search."
+FIND_FAILED = "The search for devices failed: {text}"
+CHECK_LOOP = "Check the loop"
+CHECK_LOOP_TIP = (
+    "Records at rest, then drives low-level sines with the frame locked to the table: checks polarity, scale and "
+    "delay of every sensor, and the drive. Same as `rockbench check` (Ctrl+L)."
+)
+CHECK_LOOP_IDLE = "No check since the window was opened."
+CHECK_LOOP_RUNNING = "In progress; questions appear above."
+CHECK_LOOP_ENDED = "{passed} passed, {failed} failed, {other} without verdict. {how}"
+CHECK_IN = "Results are in {out}."
+CHECK_CUT = "The check was interrupted."
+CHECK_TABLE_TIP = "The tooltip of a failed line gives the remedy."
+ASK_CHECK_TIP = "The frame is clamped and unclamped by hand: on this bench the check always asks."
+CHECK_TITLES = ("verdict", "of", "what", "measured", "U (k = 2)", "allowed")
+
+ADD, ADD_TIP = "Add to queue", "Appends the checked plan to the queue (Ctrl+J)."
+SAVE, SAVE_TIP = "Save in queue", "Replaces test {number} of the queue by the checked plan (Ctrl+J)."
+LEAVE, LEAVE_TIP = "Discard changes", "Ends the editing; the test in the queue stays unchanged (Esc)."
+TAKE_IN = "Take in"
+QUEUE_TIP = "Tests run from the top. Enter opens a pending test in the form."
+QUEUE_TITLES = ("", "state", "protocol", "parameters", "results in", "result or options")
+STAGES = {
+    "waiting": "○ waiting",
+    "running": "● running",
+    "done": "✓ done",
+    "failed": "▲ failed",
+    "skipped": "– skipped",
+}
+QUEUE_EMPTY = "The queue is empty: check a plan on the Protocol page, then add it."
+QUEUE_STARTS, QUEUE_PAUSES = "Start the queue", "Pause after this test"
+QUEUE_STARTS_TIP = "Runs the pending tests from the top, each in a separate process (Ctrl+Shift+Q)."
+QUEUE_PAUSES_TIP = "The current test runs to its end; no further test begins (Ctrl+Shift+Q)."
+QUEUE_HOLDS = "the queue is running: pause it first"
+QUEUE_IDLE, QUEUE_GOING, QUEUE_LAST = "{n} waiting.", "Running; {n} waiting.", "Pausing after this test; {n} waiting."
+QUEUE_CHECKING = "Checking the plan of test {number}; {n} waiting."
+QUEUE_PAUSED = "▲ Paused: {why} {n} waiting."
+QUEUE_STOPPED = "STOP was pressed; clear it beside STOP."
+QUEUE_ENDED = "test {number} was {status}."
+QUEUE_REFUSED = "the plan of test {number} was refused."
+QUEUE_FILE = "Saved in {path}; `rockbench queue` runs the same file."
+QUEUE_UNKEPT = "Not saved: the queue is lost when this window closes."
+QUEUE_OWNER = "the operator's window"
+QUEUE_GONE = "The edited test has begun, or was skipped or removed: it was not changed."
+QUEUE_GONE_DID = "The queue is unchanged."
+QUEUE_GONE_NOW = "The edited values are still on the Protocol page: check and add them, or edit the test again."
+QUEUE_DID = "The queue is paused. The pending tests are unchanged in the file."
+QUEUE_UNREAD_DID = "The file is unchanged. The queue of this window is empty and is not saved."
+QUEUE_UNREAD_NOW = (
+    "Correct the problem or move the file, then reopen the window; or specify another file with --queue FILE."
+)
+QUEUE_NOW = (
+    "Free disk space or correct the permissions of the queue's file, or start the window with another file (--queue "
+    "FILE)."
+)
+OPTIONS = {
+    "realtime": "real time",
+    "ask": "asks",
+    "unattended": "unattended",
+    "keep_going": "continues without the window",
+}
+NAMES = {
+    "state": "state of the bench",
+    "alpha": "running result",
+    "live": "last result",
+    "log": "event log",
+    "queue": "queue",
+    "picture": "picture of the specimen",
+    "tour": "guided tour",
+    "traces": "live traces",
+    "protocol": "protocol",
+    "history": "history",
+    "details": "details",
+    "devices": "devices",
+    "margins": "margins",
+    "check": "loop check",
+    "configuration": "configuration",
+    "steady": "steady state",
+}
+"""Accessible names of widgets without a label."""

@@ -1,0 +1,171 @@
+# pyright: reportUnknownMemberType=false
+"""Shared parts of the pages: keys of buttons, levels of labels, axes of plots, the file dialog."""
+
+import re
+from collections.abc import Callable
+from math import floor, log10
+from pathlib import Path
+from typing import Any
+
+from PySide6.QtCore import QEvent, QObject, Qt
+from PySide6.QtGui import QKeySequence, QResizeEvent, QShortcut
+from PySide6.QtWidgets import QAbstractButton, QFileDialog, QFrame, QLabel, QScrollArea, QWidget
+
+from bench.app.gui import texts
+from bench.app.gui.controller import Controller
+from bench.app.gui.palette import Theme
+from bench.document import typography
+from bench.document.typography import unit_text as unit_text
+
+
+def set_level(label: QLabel, level: str) -> None:
+    """Give a label the style of a level; Qt re-reads a property only on request."""
+    if label.property("level") != level:
+        label.setProperty("level", level)
+        label.style().unpolish(label)
+        label.style().polish(label)
+
+
+def typeset(text: str) -> str:
+    """Typeset a text of files and journals for the window: ω, α₂, ±, m/s²."""
+    return typography.typeset(text).replace("Ω", "ω")
+
+
+_LETTERS = {"alpha": "α", "beta": "β", "xi": "ξ", "omega": "ω"}
+_SYMBOL = re.compile(r"\b(alpha|beta|xi|omega|k|c|m)([0-9]?)\b")
+_LOW = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
+_NAME = re.compile(r"(?<=[A-Za-z0-9])_(?=[A-Za-z0-9])")
+
+
+def spaced(text: str) -> str:
+    """Typeset a text that contains names of fields or channels, with spaces for their underscores."""
+    return typeset(_NAME.sub(" ", text))
+
+
+def label(name: str) -> str:
+    """Typeset the name of a field or channel for the window: `alpha_2_low` becomes α₂ low, `xi1` ξ₁."""
+    plain = name.removesuffix("_rad_s").replace("alpha_1", "α₁").replace("alpha_2", "α₂").replace("_", " ")
+    return typeset(_SYMBOL.sub(lambda found: _LETTERS.get(found[1], found[1]) + found[2].translate(_LOW), plain))
+
+
+_SCREEN = {"m": (1e3, "mm")}
+
+
+def in_screen_unit(unit: str) -> tuple[float, str]:
+    """Displayed units per SI `unit`, and the displayed unit, typeset: millimetres for lengths."""
+    factor, shown = _SCREEN.get(unit, (1.0, unit))
+    return factor, unit_text(shown)
+
+
+class _WheelFilter(QObject):
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: ARG002 - the signature is Qt's
+        if event.type() == QEvent.Type.Wheel:
+            # the event scrolls the page below
+            event.ignore()
+            return True
+        return False
+
+
+def ignore_wheel(field: QWidget) -> None:
+    """Ignore the wheel over a field, so that scrolling a page does not change its value."""
+    field.installEventFilter(_WheelFilter(field))
+
+
+FITTING = (860, 400)
+"""Size of the content of a page below which it scrolls [px]."""
+
+
+def scrolling(content: QWidget, width: int, height: int) -> QScrollArea:
+    """A scroll area around `content`, which scrolls in an area smaller than `width` x `height` [px]."""
+    area = QScrollArea(widgetResizable=True)
+    area.setFrameShape(QFrame.Shape.NoFrame)
+    area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+    holder = _Holder(content, width, height)
+    area.setWidget(holder)
+    # the background of the page is that of its tab
+    for part in (holder, area.viewport()):
+        part.setAutoFillBackground(False)
+    return area
+
+
+class _Holder(QWidget):
+    """Keeps `content` at its own size. It has no layout: with one, an area gives wrapped texts their preferred height,
+    and scrolls although the content would fit.
+    """
+
+    def __init__(self, content: QWidget, width: int, height: int) -> None:
+        super().__init__()
+        self._content = content
+        content.setParent(self)
+        self.setMinimumSize(width, height)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._content.setGeometry(self.rect())
+
+
+def give_key(button: QAbstractButton, key: str) -> None:
+    """Press the button with `key` while it is visible and enabled. A held key counts once, whereas the button's own
+    shortcut would repeat.
+    """
+    shortcut = QShortcut(QKeySequence(key), button, autoRepeat=False)
+    shortcut.activated.connect(button.click)
+
+
+def colour_axes(plot: Any, theme: Theme) -> None:
+    """Give the axes of a pyqtgraph plot item the colours of `theme`."""
+    for side in ("left", "bottom"):
+        axis = plot.getAxis(side)
+        axis.setPen(theme.faint)
+        axis.setTextPen(theme.text)
+        axis.enableAutoSIPrefix(False)
+
+
+def round_down(value: float) -> float:
+    """The largest short number, such as 0.3 or 15, not above `value`, which is positive."""
+    decade = 10.0 ** floor(log10(value))
+    digits = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
+    return max(digit * decade for digit in digits if digit * decade <= value * (1.0 + 1e-9))
+
+
+def why_no_dialog(controller: Controller) -> str:
+    """Why no dialog can be opened now; empty if one can."""
+    return texts.START_BUSY if controller.running else controller.held
+
+
+def ask_for_files(
+    parent: QWidget,
+    controller: Controller,
+    title: str,
+    kinds: str,
+    taken: Callable[[list[Path]], None],
+    *,
+    folder: str = "",
+    many: bool = False,
+) -> None:
+    """Show the dialog and return at once; `taken` is called with the selected files. The start of a run or a queue
+    closes the dialog.
+    """
+    dialog = QFileDialog(parent, title, folder, kinds)
+    # a native dialog blocks the window, and STOP with it
+    dialog.setOption(QFileDialog.Option.DontUseNativeDialog)
+    dialog.setFileMode(QFileDialog.FileMode.ExistingFiles if many else QFileDialog.FileMode.ExistingFile)
+    dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+
+    def shut() -> None:
+        if why_no_dialog(controller):
+            dialog.reject()
+
+    def take(names: list[str]) -> None:
+        if not why_no_dialog(controller):
+            taken([Path(name) for name in names])
+
+    def let_go(_result: int) -> None:
+        # a closure is not a slot of the dialog and would outlive it
+        controller.changed.disconnect(shut)
+
+    controller.changed.connect(shut)
+    dialog.filesSelected.connect(take)
+    dialog.finished.connect(let_go)
+    # `open` would make the dialog modal
+    dialog.show()

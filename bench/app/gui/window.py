@@ -1,0 +1,285 @@
+"""The operator's window: the header with STOP, the panels below it, and the pages; and Qt's main loop."""
+
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+from PySide6.QtCore import QByteArray, QEvent, QObject, QSettings
+from PySide6.QtGui import QCloseEvent, QKeySequence, QResizeEvent, QShortcut
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QApplication,
+    QMainWindow,
+    QPlainTextEdit,
+    QSplitter,
+    QTabWidget,
+    QTextEdit,
+    QVBoxLayout,
+    QWidget,
+)
+
+from bench.app.gui import texts
+from bench.app.gui.controller import Controller
+from bench.app.gui.header import Header, StopFilter
+from bench.app.gui.palette import Theme, desktop_theme, dress
+from bench.app.gui.panels import LeavePanel, PanelArea, Prompt, Tour
+from bench.app.gui.protocol_page import ProtocolPage
+from bench.app.gui.queue_page import QueuePage
+from bench.app.gui.queue_runner import QueueRunner
+from bench.app.gui.results_page import ResultsPage
+from bench.app.gui.run_page import RunPage
+from bench.app.gui.setup_page import SetupPage
+from bench.app.gui.trouble import OwnErrors, Trouble, TroublePanel
+from bench.app.ipc.messages import Run
+from bench.app.queue.file import QueueFile
+from bench.app.queue.queue import Queued
+from bench.config.model import BenchConfiguration
+from bench.protocol import Protocol
+from sim.errors import RockbenchError
+
+
+def remember(window: QMainWindow, pages: QTabWidget, settings: QSettings) -> None:
+    """Store size and position of the window, and the positions of the splitters of its pages."""
+    settings.setValue("geometry", window.saveGeometry())
+    for key, splitter in _splitters(pages):
+        settings.setValue(key, splitter.saveState())
+
+
+def restore(window: QMainWindow, pages: QTabWidget, settings: QSettings) -> None:
+    """Restore the stored layout; parts that were not stored, or no longer fit, stay unchanged."""
+    kept = settings.value("geometry")
+    if isinstance(kept, QByteArray):
+        window.restoreGeometry(kept)
+    for key, splitter in _splitters(pages):
+        state = settings.value(key)
+        if isinstance(state, QByteArray):
+            splitter.restoreState(state)
+
+
+def _splitters(pages: QTabWidget) -> list[tuple[str, QSplitter]]:
+    """Each splitter with a name composed of its page, its index there, and its number of parts."""
+    return [
+        (f"splitters/{pages.tabText(place)}/{number}-{splitter.count()}", splitter)
+        for place in range(pages.count())
+        if (page := pages.widget(place)) is not None
+        for number, splitter in enumerate(page.findChildren(QSplitter))
+    ]
+
+
+def free_tab_key(whole: QWidget) -> None:
+    """Make Tab move to the next field from everywhere, also from lists and texts."""
+    for view in whole.findChildren(QAbstractItemView):
+        view.setTabKeyNavigation(False)
+    for kind in (QPlainTextEdit, QTextEdit):
+        for text in whole.findChildren(kind):
+            text.setTabChangesFocus(True)
+
+
+SMALLEST = (500, 260)
+"""Minimum size of the window [px]: that of a 1024x600 screen at 200 % scale, less the title bar."""
+FIRST = (1280, 800)
+
+
+class Window(QMainWindow):
+    """The operator's window. Every part is a client of `controller`. `settings` stores the layout, None does not;
+    `queue` is the file of the queue, None does not store it. With `tour` the guided tour is shown.
+    """
+
+    def __init__(
+        self,
+        controller: Controller,
+        configuration: BenchConfiguration,
+        entries: Sequence[Protocol[Any]],
+        theme: Theme,
+        *,
+        path: Path | None = None,
+        settings: QSettings | None = None,
+        queue: Path | None = None,
+        tour: bool = False,
+    ) -> None:
+        super().__init__()
+        self._controller, self._settings = controller, settings
+        self.setMinimumSize(*SMALLEST)
+        self.resize(*FIRST)
+        self._leaving = False
+        self._goes_on = False
+        self.header, self.prompt, self.trouble = Header(controller, theme), Prompt(controller), TroublePanel(controller)
+        self.runner = self._runner(configuration, queue)
+        self.setup = SetupPage(controller, configuration, path, theme)
+        self.protocol = ProtocolPage(controller, configuration, entries, tour)
+        # the tour is finished within a minute
+        self.protocol.realtime.setChecked(not tour)
+        self.queue = QueuePage(controller, self.runner, entries)
+        self.run, self.results = RunPage(controller, theme), ResultsPage(controller, theme)
+        self.pages = QTabWidget()
+        for number, (name, page) in enumerate(
+            zip(texts.PAGES, (self.setup, self.protocol, self.queue, self.run, self.results), strict=True)
+        ):
+            self.pages.addTab(page, name)
+            self.pages.setTabToolTip(number, f"Ctrl+{number + 1}")
+            QShortcut(QKeySequence(f"Ctrl+{number + 1}"), self, partial(self.pages.setCurrentIndex, number))
+        self.welcome = Tour(controller)
+        if not tour:
+            self.welcome.leave()
+        self.leave_panel = LeavePanel(self.leave)
+        for part in (self.prompt, self.trouble, self.leave_panel):
+            part.installEventFilter(self)
+        self.panels = PanelArea((self.leave_panel, self.prompt, self.trouble, self.welcome))
+        whole = QWidget()
+        column = QVBoxLayout(whole)
+        column.setContentsMargins(6, 6, 6, 6)
+        for part in (self.header, self.panels):
+            column.addWidget(part)
+        column.addWidget(self.pages, 1)
+        self.setCentralWidget(whole)
+        self.pages.setCurrentWidget(self.protocol)
+        free_tab_key(whole)
+        self._connect()
+        self._entitle()
+        if settings is not None:
+            restore(self, self.pages, settings)
+
+    def use_theme(self, theme: Theme) -> None:
+        """Use the colours of another theme."""
+        for part in (self.header, self.setup, self.run, self.results):
+            part.use_theme(theme)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Choose the size of header and panels."""
+        self.header.fit(self.width(), self.height())
+        self.panels.fit(self.height() - self.header.height())
+        super().resizeEvent(event)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Hide the tour while a question or a fault report is open."""
+        if event.type() in (QEvent.Type.ShowToParent, QEvent.Type.HideToParent):
+            self.welcome.give_way(watched.objectName(), to=event.type() == QEvent.Type.ShowToParent)
+        return super().eventFilter(watched, event)
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        """Ask before closing during a run; otherwise store the layout and disconnect from the session."""
+        if self._controller.running and not self._leaving:
+            self.leave_panel.ask(goes_on=self._goes_on)
+            event.ignore()
+            return
+        if self._settings is not None:
+            remember(self, self.pages, self._settings)
+        self._controller.close()
+        self.runner.close()
+        super().closeEvent(event)
+
+    def leave(self) -> None:
+        """Close without asking: a run ramps out, or continues if its options allow it."""
+        self._leaving = True
+        self.close()
+
+    def _runner(self, configuration: BenchConfiguration, queue: Path | None) -> QueueRunner:
+        """The queue of the file; a file that cannot be read is not changed, and the queue is then not saved."""
+        try:
+            store = None if queue is None else QueueFile(queue)
+            return QueueRunner(self._controller, configuration, store, self)
+        except RockbenchError as error:
+            self.trouble.show_trouble(Trouble(str(error), texts.QUEUE_UNREAD_DID, texts.QUEUE_UNREAD_NOW))
+            return QueueRunner(self._controller, configuration, parent=self)
+
+    def _connect(self) -> None:
+        controller, runner = self._controller, self.runner
+        controller.began.connect(self._began)
+        controller.ended.connect(self._ended)
+        runner.troubled.connect(self.trouble.show_trouble)
+        self.setup.opened.connect(self._configure)
+        # the points of the last run stay until a run begins; a plan check does not remove them
+        for source in (runner, self.protocol, self.setup.loop):
+            source.predicted.connect(self.run.predict)
+        self.protocol.queued.connect(self._enqueue)
+        self.protocol.saved.connect(runner.replace)
+        self.protocol.left.connect(lambda: self.pages.setCurrentWidget(self.queue))
+        self.queue.edit_asked.connect(self._edit)
+
+    def _began(self, run: Run) -> None:
+        self._goes_on = run.keep_going
+        if self.pages.currentWidget() is self.protocol and not self.runner.going:
+            self.pages.setCurrentWidget(self.run)
+
+    def _ended(self) -> None:
+        self.leave_panel.hide()
+        if self.pages.currentWidget() is self.run and not self.runner.going:
+            self.pages.setCurrentWidget(self.results)
+
+    def _configure(self, configuration: BenchConfiguration) -> None:
+        self.protocol.use(configuration)
+        self.runner.configuration = configuration
+        self.welcome.give_way("a real bench", to=configuration.backend != "simulated")
+        self._entitle()
+
+    def _entitle(self) -> None:
+        name = self.setup.path.name if self.setup.path is not None else texts.VIRTUAL_SHORT
+        self.setWindowTitle(f"{texts.TITLE} · {name}")
+
+    def _enqueue(self, test: Queued) -> None:
+        if self.runner.do(lambda: self.runner.queue.add(test)):
+            self.queue.table.setCurrentCell(len(self.runner.queue.tests) - 1, 0)
+            self.pages.setCurrentWidget(self.queue)
+
+    def _edit(self, test: Queued, number: int) -> None:
+        self.protocol.edit(test, number)
+        self.pages.setCurrentWidget(self.protocol)
+
+
+def open_window(
+    configuration: BenchConfiguration, entries: Sequence[Protocol[Any]], path: Path | None, queue: Path | None
+) -> int:
+    """Show the window until it is closed; returns the exit code of Qt's main loop."""
+    application = QApplication(sys.argv[:1])
+    application.setOrganizationName("rocking-bench")
+    application.setApplicationName("rocking-bench")
+    theme = desktop_theme()
+    dress(application, theme)
+    controller = Controller()
+    window = Window(
+        controller, configuration, entries, theme, path=path, settings=QSettings(), queue=queue, tour=path is None
+    )
+    undo = attend(window, controller, application)
+    _follow_desktop(window, application)
+    window.show()
+    code = application.exec()
+    controller.close()
+    undo()
+    return code
+
+
+def attend(window: Window, controller: Controller, application: QApplication) -> Callable[[], None]:
+    """Install the STOP filter, the handler of uncaught errors, and a handler of Ctrl-C in the terminal, which closes
+    the window. Returns a function that removes them.
+    """
+    stop = StopFilter(controller, window.header.stop)
+    application.installEventFilter(stop)
+    forget = OwnErrors(controller, window.trouble).install()
+
+    def close(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - the signature is Python's
+        window.leave()
+        application.quit()
+
+    before = signal.signal(signal.SIGINT, close)
+
+    def undo() -> None:
+        application.removeEventFilter(stop)
+        forget()
+        signal.signal(signal.SIGINT, before)
+
+    return undo
+
+
+def _follow_desktop(window: Window, application: QApplication) -> None:
+    """Follow the desktop's light or dark theme, also when it changes."""
+
+    def follow() -> None:
+        theme = desktop_theme()
+        dress(application, theme)
+        window.use_theme(theme)
+
+    application.styleHints().colorSchemeChanged.connect(follow)

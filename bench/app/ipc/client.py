@@ -1,0 +1,177 @@
+"""The client's side of the connection: starts the session process, sends requests, buffers its messages."""
+
+import json
+import secrets
+import subprocess
+import sys
+import tempfile
+import threading
+from collections import deque
+from collections.abc import Callable
+from contextlib import suppress
+from multiprocessing.connection import Client, Connection, Listener
+from queue import SimpleQueue
+from typing import Literal
+
+from bench.app.ipc.messages import (
+    SILENCE,
+    Alive,
+    Answer,
+    Ask,
+    Ended,
+    FromClient,
+    FromSession,
+    Leave,
+    PlanCheck,
+    PlanChecked,
+    Refused,
+    Run,
+    Traces,
+)
+from bench.results import SUMMARY
+from drivers.clock import now
+
+KEPT = 20_000
+"""Maximum number of buffered messages; beyond it the oldest are discarded."""
+
+# Ctrl-C in the terminal must reach only the client, which sends a request to the session
+_OWN_GROUP = 0x200 if sys.platform == "win32" else 0
+"""CREATE_NEW_PROCESS_GROUP (Windows); elsewhere a new session has the same effect."""
+_GIVES_WAY = 0x4000 if sys.platform == "win32" else 0
+"""BELOW_NORMAL_PRIORITY_CLASS (Windows), for plan checks; elsewhere the process lowers its own priority."""
+
+
+class SessionClient:
+    """A session process and the connection to it. All methods return at once, and may be called by any thread. The
+    client's main loop must call `alive` at least every `bench.app.ipc.messages.BEAT` seconds; otherwise the session
+    considers the client frozen. `heard` is called in a thread of the connection when messages have arrived.
+    """
+
+    def __init__(self, assignment: PlanCheck, heard: Callable[[], None] = lambda: None) -> None:
+        self._tell = heard
+        self._received: deque[FromSession] = deque(maxlen=KEPT)
+        self._outgoing = SimpleQueue[FromClient | None]()
+        self._heard = now()
+        self._begun = self._over = False
+        self._errors = tempfile.TemporaryFile()  # noqa: SIM115 - closed with the process
+        self._checks_plan = not isinstance(assignment, Run)
+        # an existing summary belongs to another run
+        summary = assignment.out / SUMMARY
+        self._out = None if self._checks_plan or summary.exists() else assignment.out
+        key = secrets.token_bytes(32)
+        self._listener = Listener(authkey=key)
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "bench.app.ipc.process"],
+            stdin=subprocess.PIPE,
+            stdout=self._errors,
+            stderr=self._errors,
+            text=True,
+            creationflags=_OWN_GROUP | (_GIVES_WAY if self._checks_plan else 0),
+            start_new_session=sys.platform != "win32",
+        )
+        assert self.process.stdin is not None
+        with suppress(OSError), self.process.stdin as stdin:
+            stdin.write(json.dumps({"address": self._listener.address, "key": key.hex()}) + "\n")
+        self._address = self._listener.address
+        self._talking = threading.Thread(target=self._talk, args=(assignment,), name="link", daemon=True)
+        self._talking.start()
+        threading.Thread(target=self._wait, args=(key,), name="session's process", daemon=True).start()
+
+    def alive(self) -> None:
+        """Report that the client's main loop is running."""
+        if self._begun and not self._over:
+            self._outgoing.put(Alive())
+
+    def ask(self, end: Literal["stop", "abort", "halt"]) -> None:
+        """Request an end, possibly before the connection is established, and any number of times."""
+        self._outgoing.put(Ask(end))
+
+    def answer(self, number: int, *, agreed: bool) -> None:
+        """Answer question `number`."""
+        self._outgoing.put(Answer(number, agreed))
+
+    def take(self) -> list[FromSession]:
+        """Messages since the last call, in order."""
+        return [self._received.popleft() for _ in range(len(self._received))]
+
+    @property
+    def silence(self) -> float:
+        """Time since the last message of the session process [s]."""
+        return now() - self._heard
+
+    @property
+    def status(self) -> Literal["starting", "linked", "no link", "over"]:
+        """State of the connection: "no link" when the process has died or is silent before its final message."""
+        if self._over:
+            return "over"
+        if self.process.poll() is not None:
+            return "no link"
+        if not self._begun:
+            return "starting"
+        return "linked" if self.silence <= SILENCE else "no link"
+
+    def leave(self) -> None:
+        """Disconnect: a run ramps out, unless it is to continue without a client. A plan check is cancelled."""
+        self._outgoing.put(Leave())
+        if self._checks_plan:
+            self.process.kill()
+
+    def _talk(self, assignment: PlanCheck) -> None:
+        """Body of the receiving thread, which starts and ends the sending one."""
+        with suppress(OSError, EOFError):
+            with self._listener:
+                connection = self._listener.accept()
+            with connection:
+                connection.send(assignment)
+                sender = threading.Thread(target=self._send, args=(connection,), name="link, sending", daemon=True)
+                sender.start()
+                try:
+                    while True:
+                        message = connection.recv()
+                        self._heard, self._begun = now(), True
+                        self._keep(message)
+                        self._tell()
+                finally:
+                    self._outgoing.put(None)
+                    sender.join(SILENCE)
+
+    def _keep(self, message: FromSession) -> None:
+        # traces are discarded first when the client does not read
+        if isinstance(message, Traces) and len(self._received) > KEPT // 2:
+            return
+        self._received.append(message)
+        self._over = self._over or isinstance(message, Ended | Refused | PlanChecked)
+
+    def _send(self, connection: Connection) -> None:
+        with suppress(OSError):
+            while (message := self._outgoing.get()) is not None:
+                connection.send(message)
+
+    def _wait(self, key: bytes) -> None:
+        """Report a process that ends without a final message, and wake the receiving thread if it never connected."""
+        code = self.process.wait()
+        with suppress(OSError, EOFError):
+            Client(self._address, authkey=key).close()
+        # its last messages may not have been received yet
+        self._talking.join(SILENCE)
+        if not self._over and code == 0 and (ended := self._by_the_files()) is not None:
+            self._keep(ended)
+            self._tell()
+        if not self._over:
+            self._errors.seek(0)
+            last_words = self._errors.read().decode(errors="replace").strip()
+            told = f": {last_words.splitlines()[-1]}" if last_words else ""
+            text = f"the session process ended without a message (exit code {code}){told}"
+            self._received.append(Refused(text, failed=True, details=last_words))
+            self._tell()
+        self._errors.close()
+
+    def _by_the_files(self) -> Ended | None:
+        """The end of a run from its summary file, if there is one, when the final message was lost."""
+        if self._out is None:
+            return None
+        with suppress(OSError, ValueError, KeyError):
+            content = json.loads((self._out / SUMMARY).read_text(encoding="utf-8"))
+            passed = content.get("passed", True) is not False
+            return Ended(content["status"], content["reason"], content, "", self._out, passed)
+        return None

@@ -1,0 +1,250 @@
+"""Messages between the session process and its client, pickled over a connection that only the client's child can
+open.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.analysis.signals import ACCELERATION, DISPLACEMENT, DRIFT, SIGNALS, U1, Further
+from bench.config.model import BenchConfiguration
+from bench.datafile.tables import Table
+from bench.events import Acquired, Event, State
+from bench.preflight.margins import Margin
+from drivers.clock import now
+from sim.errors import UNKNOWN, Cause
+from sim.parameters import Parameters
+
+BEAT = 0.25
+"""Longest interval between messages of either side [s]."""
+SILENCE = 1.0
+"""Silence of the session process after which the client shows no link [s]."""
+PATIENCE = 3.0
+"""Silence of the client after which the session considers it lost [s]."""
+
+
+@dataclass(frozen=True)
+class PlanCheck:
+    """Request to compute the whole run beforehand, without opening a device. `protocol` is the name of an installed
+    one.
+    """
+
+    protocol: str
+    parameters: Parameters
+    configuration: BenchConfiguration
+    out: Path
+
+
+@dataclass(frozen=True)
+class Run(PlanCheck):
+    """Request to run a protocol; its results are written to `out`. With `person` the client answers the questions;
+    otherwise a bench that serves itself performs the operator tasks, and on any other bench every question is answered
+    with yes. With `keep_going` a lost client does not end the run. `about` is stored in the data file.
+    """
+
+    realtime: bool = False
+    person: bool = False
+    keep_going: bool = False
+    about: Mapping[str, str] = field(default_factory=dict[str, str])
+
+
+@dataclass(frozen=True)
+class Ask:
+    """The client requests an end: "stop", "abort" or "halt"."""
+
+    end: str
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The answer to question `number`; ignored unless that question is pending."""
+
+    number: int
+    agreed: bool
+
+
+@dataclass(frozen=True)
+class Alive:
+    """The client's main loop is running."""
+
+
+@dataclass(frozen=True)
+class Leave:
+    """The client disconnects in an orderly way."""
+
+
+@dataclass(frozen=True)
+class PlanChecked:
+    """Result of a plan check: `refusal` is the reason for a refusal; sizes in bytes, `duration` in seconds."""
+
+    margins: tuple[Margin, ...]
+    refusal: str | None
+    warnings: tuple[str, ...]
+    duration: float | None
+    needed: float | None
+    free: float | None
+    plan_hash: str
+    prediction: Table
+
+
+@dataclass(frozen=True)
+class Opened:
+    """The rig is open: the names of its channels, its sample rate [1/s], and the description of its devices. `further`
+    are the signals that follow those of `bench.app.ipc.messages.TRACES` in every block of traces. `duration` is the
+    expected length of the run [s], None if not predicted.
+    """
+
+    channels: tuple[str, ...]
+    sample_rate: float
+    devices: Mapping[str, str]
+    further: tuple[Further, ...] = ()
+    duration: float | None = None
+
+
+@dataclass(frozen=True)
+class Preparing:
+    """A stage before the rig is opened or after it is closed; `done` of its `total` parts are complete, 0 of 0 where
+    they cannot be counted.
+    """
+
+    phase: str
+    done: int = 0
+    total: int = 0
+
+
+@dataclass(frozen=True)
+class Published:
+    """An event of the engine other than a block of samples."""
+
+    event: Event
+
+
+@dataclass(frozen=True)
+class Question:
+    """The plan waits for a person, whose answer must have the same `number`."""
+
+    number: int
+    request: str
+
+
+@dataclass(frozen=True)
+class SafetyInputs:
+    """The safety inputs by name, and whether each was good at bench time `time` [s]; empty without safety inputs."""
+
+    time: float
+    good: Mapping[str, bool]
+
+
+@dataclass(frozen=True, eq=False)
+class Traces:
+    """Signals of one block: `low` and `high` have shape (n_bins, n_signals), extremes in bins of `step` seconds.
+
+    The first bin begins at bench time `begin` [s]; the signals are `bench.app.ipc.messages.TRACES`. `read` is the
+    second of the machine's clock (`drivers.clock.now`) at which the block had been read, `origin` the bench time of the
+    run's first sample [s].
+    """
+
+    run: int
+    begin: float
+    step: float
+    low: NDArray[np.float32]
+    high: NDArray[np.float32]
+    read: float
+    origin: float = 0.0
+
+
+@dataclass(frozen=True)
+class Beat:
+    """Heartbeat of the session process: the engine's state, bench time [s], numbers of events and of blocks of traces
+    lost because the client did not read, and the time since the last event of the engine [s]. While the rig is armed,
+    the engine publishes every block.
+    """
+
+    state: State
+    reason: str
+    time: float
+    lost_events: int
+    lost_traces: int
+    quiet: float = 0.0
+
+
+@dataclass(frozen=True)
+class Ended:
+    """The run has ended and its files are written; `summary` can be converted to JSON, `table` is plain text. `passed`
+    is the verdict of a protocol that tests the bench, True for any other. The cause is unknown if the end is known only
+    from the files.
+    """
+
+    status: str
+    reason: str
+    summary: dict[str, object]
+    table: str
+    out: Path
+    passed: bool = True
+    cause: Cause = UNKNOWN
+
+
+@dataclass(frozen=True)
+class Refused:
+    """The request was refused, or the session failed (`failed`): `text` is the message, `cause` its cause, where known.
+    `details` are for developers, and may be long.
+    """
+
+    text: str
+    cause: Cause = UNKNOWN
+    failed: bool = False
+    details: str = ""
+
+
+FromSession = PlanChecked | Preparing | Opened | Published | Question | SafetyInputs | Traces | Beat | Ended | Refused
+FromClient = Ask | Answer | Alive | Leave
+
+
+TRACES = ("drive", "acceleration", "displacement", "u1", "u2", "drift")
+"""Columns of traces: drive [V], table acceleration [m/s2] and displacement [m], storeys and their difference [m], the
+last three relative to the table. Further channels follow, as in `bench.analysis.signals`.
+"""
+
+BIN = 0.002
+"""Shortest bin [s], less than a pixel of any window of a second or longer."""
+
+
+def extremes(values: NDArray[np.float64], width: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Minimum and maximum of every `width` rows of `values`, shape (n, m); the last bin contains the remainder. NaN
+    only if a bin has no other values.
+    """
+    starts = np.arange(0, len(values), width)
+    low = np.fmin.reduceat(values, starts, axis=0)
+    high = np.fmax.reduceat(values, starts, axis=0)
+    return low.astype(np.float32), high.astype(np.float32)
+
+
+class Reduction:
+    """Turns the blocks of a rig into traces."""
+
+    def __init__(self, sample_rate: float) -> None:
+        self._rate = sample_rate
+        self._width = max(round(BIN * sample_rate), 1)
+        self._run, self._origin = 0, 0.0
+
+    def __call__(self, event: Acquired) -> Traces:
+        """The traces of a block."""
+        signals = event.signals
+        if event.run != self._run:
+            # samples are equally spaced; the times at which blocks are read are not
+            self._run, self._origin = event.run, event.time - (event.block.first + len(signals)) / self._rate
+        chosen = np.column_stack(
+            (
+                event.drive,
+                signals[:, [ACCELERATION, DISPLACEMENT, U1]],
+                signals[:, U1] + signals[:, DRIFT],
+                signals[:, DRIFT],
+                signals[:, len(SIGNALS) :],
+            )
+        )
+        low, high = extremes(chosen, self._width)
+        begin = self._origin + event.block.first / self._rate
+        return Traces(event.run, begin, self._width / self._rate, low, high, now(), self._origin)

@@ -1,0 +1,126 @@
+"""The session process: `python -m bench.app.ipc.process`, started only by `bench.app.ipc.client`.
+
+It reads the client's address and key from standard input, connects, receives one assignment and carries it out.
+"""
+
+import json
+import os
+import signal
+import sys
+import traceback
+from multiprocessing.connection import Client, Connection
+from types import FrameType
+
+from bench.app.catalogue import load_protocol
+from bench.app.ipc.messages import Ended, FromSession, PlanCheck, PlanChecked, Refused, Run
+from bench.app.ipc.server import Publisher, RemoteOperator, SessionServer
+from bench.app.preflight import compile_run, prepare
+from bench.app.session import run_session
+from bench.config.model import BenchConfiguration
+from bench.engine.interface import Requests, Unattended
+from sim.errors import CauseCode, InvalidInput, RockbenchError, cause_of
+
+FAREWELL = 2.0
+"""Longest wait at the end for a client that does not read its messages [s]."""
+
+
+def main() -> None:
+    """Connect, carry out the assignment, send its result."""
+    told = json.loads(sys.stdin.readline())
+    with Client(told["address"], authkey=bytes.fromhex(told["key"])) as connection:
+        serve(connection)
+
+
+def serve(connection: Connection) -> None:
+    """Carry out the assignment received over `connection`."""
+    assignment = connection.recv()
+    requests = Requests()
+    keep_going = isinstance(assignment, Run) and assignment.keep_going
+
+    def lost(why: str) -> None:
+        if not keep_going:
+            requests.stop(f"{why}, and the run was not set to continue without it", CauseCode.CLIENT_LOST)
+
+    host = SessionServer(connection, requests, lost)
+    try:
+        last = _run(assignment, host, requests) if isinstance(assignment, Run) else _check_plan(assignment)
+    except KeyboardInterrupt:
+        last = Refused(f"ended before anything moved: {requests.reason}", requests.cause)
+    except InvalidInput as error:
+        last = Refused(str(error), error.cause)
+    except (RockbenchError, OSError) as error:
+        last = Refused(str(error), cause_of(error), failed=True, details=traceback.format_exc())
+    except Exception as error:
+        text = f"{type(error).__name__}: {error}"
+        host.close(Refused(text, failed=True, details=traceback.format_exc()), FAREWELL)
+        raise
+    host.close(last, FAREWELL)
+
+
+def _check_plan(asked: PlanCheck) -> FromSession:
+    _give_way()
+    prepared = load_protocol(asked.protocol).prepare(asked.parameters, asked.configuration, None)
+    found = compile_run(asked.protocol, prepared, asked.out)
+    room = found.room
+    return PlanChecked(
+        margins=found.margins,
+        refusal=None if found.refusal is None else str(found.refusal),
+        warnings=found.warnings,
+        duration=found.forecast.duration,
+        needed=None if room is None else room.needed,
+        free=None if room is None else room.free,
+        plan_hash=found.plan_hash,
+        prediction=prepared.prediction,
+    )
+
+
+def _run(asked: Run, host: SessionServer, requests: Requests) -> FromSession:
+    configuration = asked.configuration
+    _abort_on_terminate(requests)
+
+    protocol, teller = load_protocol(asked.protocol), Publisher(host)
+    with requests.without_rig():
+        if requests.strongest is not None:
+            raise KeyboardInterrupt
+        prepared = prepare(protocol, asked.parameters, configuration, teller.prepare)
+    ended = run_session(
+        protocol,
+        prepared,
+        out=asked.out,
+        operator=RemoteOperator(host, requests) if asked.person else Unattended(_policy(configuration)),
+        subscribers=[teller],
+        opened=lambda rig: teller.opened(rig, prepared.forecast.duration),
+        progress=teller.prepare,
+        requests=requests,
+        realtime=asked.realtime,
+        about=asked.about,
+    )
+    return Ended(ended.status, ended.reason, ended.summary, ended.table, asked.out, ended.passed, ended.cause)
+
+
+def _policy(configuration: BenchConfiguration) -> str:
+    """Recorded name of the operator for automatic answers."""
+    return "the bench itself" if configuration.serves_itself else "unattended run (chosen at the window)"
+
+
+def _give_way() -> None:
+    """Lower the priority of a plan check, since another session may be driving the table; on Windows it is set at
+    creation.
+    """
+    if sys.platform != "win32":
+        os.nice(10)
+
+
+def _abort_on_terminate(requests: Requests) -> None:
+    def handle(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - the signature is Python's
+        # the receiving thread raises this signal too, on a client's request
+        if requests.strongest is None:
+            requests.abort("the session process received a request to terminate")
+        if requests.breaking is not None:
+            raise requests.breaking()
+
+    signal.signal(signal.SIGTERM, handle)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""Queue of tests in a file, which the command line and the window can run."""

@@ -1,0 +1,141 @@
+"""The file of a queue, replaced atomically at each change, and owned by one program at a time."""
+
+import json
+import os
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any, cast
+
+from bench.app.queue.queue import Queued, Stage
+from bench.bounded import read_bounded, require_shallow
+from bench.config.validation import dotted, validated
+from bench.unfinished import replace
+from sim.errors import InvalidInput
+from sim.parameters import Parameters, quantity
+
+ITEM = "queue file"
+FORMAT, VERSION = "rocking-bench queue", 1
+REMEDY = "add the test there, close that program first, or choose another file"
+LEFT = "abandoned during its run: see the status in its folder"
+
+
+class _Tests(Parameters):
+    tests: tuple[Queued, ...] = quantity((), "", "the tests in order")
+
+
+class QueueFile:
+    """Reads and writes a queue file, and detects changes by another program."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._known: str | None = None
+
+    def read(self) -> tuple[Queued, ...]:
+        """The tests in the file; empty if there is no file yet. A test abandoned during its run has failed. Raises
+        InvalidInput naming file and key.
+        """
+        text = self._text()
+        if text is None:
+            self._known = None
+            return ()
+        try:
+            content: Any = json.loads(text)
+            require_shallow(content)
+        except (ValueError, RecursionError) as error:
+            raise InvalidInput(ITEM, str(self.path), f"it is not JSON: {error}") from None
+        data = cast(dict[str, Any], content) if isinstance(content, dict) else {}
+        if data.get("format") != FORMAT or data.get("format_version") != VERSION:
+            raise InvalidInput(ITEM, str(self.path), f'it must have "format": "{FORMAT}", "format_version": {VERSION}')
+        rest = {key: value for key, value in data.items() if key not in ("format", "format_version")}
+        tests = validated(_Tests, rest, lambda where: f"{self.path.name}: {dotted(where)}").tests
+        self._known = text
+        left = {"stage": Stage.FAILED, "told": LEFT}
+        return tuple(test.model_copy(update=left) if test.stage is Stage.RUNNING else test for test in tests)
+
+    def write(self, tests: Sequence[Queued]) -> None:
+        """Replace the file atomically. Raises InvalidInput when that fails."""
+        if self._text() != self._known:
+            allowed = (
+                "another program has changed it: open it again, in the window or on the command line but not in both"
+            )
+            raise InvalidInput(ITEM, str(self.path), allowed)
+        plain = [test.model_dump(mode="json", exclude_defaults=True) for test in tests]
+        content = {"format": FORMAT, "format_version": VERSION, "tests": plain}
+        text = json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+        beside = self.path.with_name(f"{self.path.name}.{os.getpid()}.new")
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            try:
+                with beside.open("w", encoding="utf-8", newline="\n") as file:
+                    file.write(text)
+                    file.flush()
+                    os.fsync(file.fileno())
+                replace(beside, self.path)
+            finally:
+                beside.unlink(missing_ok=True)
+        except OSError as error:
+            raise InvalidInput(ITEM, str(self.path), f"it cannot be written: {error.strerror}") from None
+        self._known = text
+
+    def _text(self) -> str | None:
+        try:
+            return read_bounded(self.path).decode().replace("\r\n", "\n")
+        except FileNotFoundError:
+            return None
+        except UnicodeDecodeError:
+            raise InvalidInput(ITEM, str(self.path), "it cannot be read: it is not UTF-8 text") from None
+        except (OSError, ValueError) as error:
+            why = error.strerror if isinstance(error, OSError) else str(error)
+            raise InvalidInput(ITEM, str(self.path), f"it cannot be read: {why}") from None
+
+
+class Owner:
+    """Ownership of the queue in `path` until `release`; `who` is the owner's name for other programs. The lock is on a
+    separate, permanent file, since the queue file itself is replaced at each change. The name is in a second file,
+    since a locked file cannot be read on Windows. Raises InvalidInput with the current owner, or the reason why locking
+    is impossible.
+    """
+
+    def __init__(self, path: Path, who: str) -> None:
+        from filelock import FileLock, Timeout
+
+        # the existence of the file is not the lock, since it would outlive a crashed program
+        self._lock = FileLock(
+            path.with_name(f"{path.name}.lock"), blocking=False, thread_local=False, fallback_to_soft=False
+        )
+        self._name = path.with_name(f"{path.name}.owner")
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._lock.acquire()
+        except Timeout:
+            raise InvalidInput(ITEM, str(path), f"{self._other()} has it: {REMEDY}") from None
+        except OSError as error:
+            reason = f"{self._lock.lock_file} cannot be locked: {error.strerror or error}"
+            raise InvalidInput(ITEM, str(path), reason) from None
+        # on a full disk the owner has no name, but the lock still works
+        with suppress(OSError):
+            self._name.write_text(f"{who} (process {os.getpid()})", encoding="utf-8")
+
+    def release(self) -> None:
+        """Release the lock; may be called repeatedly."""
+        if self._lock.is_locked:
+            with suppress(OSError):
+                self._name.unlink(missing_ok=True)
+            self._lock.release()
+
+    def _other(self) -> str:
+        try:
+            return self._name.read_text(encoding="utf-8", errors="replace") or "another program"
+        except OSError:
+            return "another program"
+
+
+@contextmanager
+def owned(path: Path, who: str) -> Generator[None, None, None]:
+    """Context manager that owns the queue in `path`. Raises InvalidInput like `Owner`."""
+    owner = Owner(path, who)
+    try:
+        yield
+    finally:
+        owner.release()

@@ -1,0 +1,1 @@
+"""Reports: of a campaign from its data file, and of the paper from simulation."""

@@ -1,0 +1,294 @@
+"""Report of a campaign from its data file: sections of its protocol, then sections common to all campaigns."""
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from bench.app.reports.provenance import provenance_line, provenance_section
+from bench.app.reports.specimen import identified_section, modes_section, specimen_section
+from bench.config.declared import declared
+from bench.datafile.tables import Column as Stored
+from bench.document.campaign import Campaign
+from bench.document.document import Column, Document, Listing, Notice, Part, Picture, Section, Table
+from bench.document.typography import (
+    ABSENT,
+    counted,
+    first_words,
+    listed,
+    moment,
+    plain,
+    typeset,
+    unit_text,
+    with_uncertainty,
+)
+from bench.events import FitFinished
+from bench.figures.fit_figure import fit_figure
+from bench.progress import Progress, silent
+from bench.protocol import Protocol
+from sim.loading import load_model
+
+MOST_CELLS = 60
+"""Maximum number of listed rows."""
+
+
+def points_section(campaign: Campaign) -> Section | None:
+    """Report section with a row for each result; None without results."""
+    results = campaign.record.results
+    if not campaign.points:
+        return None
+    columns = [
+        Column(_heading(name), unit_text(each.unit), each.values.dtype.kind in "SU") for name, each in results.items()
+    ]
+    rows = [[_cell(each, row) for each in results.values()] for row in range(min(len(campaign.points), MOST_CELLS))]
+    parts: list[Part] = [Table(f"Results of the protocol {campaign.protocol}", columns, rows)]
+    if len(campaign.points) > MOST_CELLS:
+        parts.append(f"The file has {len(campaign.points) - MOST_CELLS} more.")
+    meanings = [f"{_heading(name)}: {first_words(each.description)}" for name, each in results.items()]
+    return Section("points", "Results", [*parts, Listing(meanings)])
+
+
+def _heading(name: str) -> str:
+    return typeset(name.replace("_", " "))
+
+
+def _cell(stored: Stored, row: int) -> str:
+    value: Any = stored.values[row]
+    if isinstance(value, str | bytes):
+        text = value.decode() if isinstance(value, bytes) else value
+        return typeset(text) or ABSENT
+    if isinstance(value, bool | np.bool_):
+        return "yes" if value else "no"
+    return plain(float(value))
+
+
+COVERAGE = 2.0
+
+
+def fits_section(campaign: Campaign) -> Section | None:
+    """Report section with a table and a figure for each fit; None without fits."""
+    fits = campaign.record.fits
+    if not fits:
+        return None
+    parts: list[Part] = []
+    for fit in fits:
+        parts += [typeset(fit.text)] if fit.text else []
+        parts += [_parameters(fit)] if fit.parameters else []
+        meanings = ", ".join(f"{_words(name)}: {typeset(each.description)}" for name, each in fit.columns.items())
+        parts.append(
+            Picture(fit_figure(fit), f"Fit {fit.name}. {meanings}.", "Measured and fitted values over the axis.")
+        )
+    return Section("fits", "Fitted models", parts)
+
+
+def _parameters(fit: FitFinished) -> Table:
+    columns = [Column("parameter", words=True), Column("found"), Column("unit", words=True)]
+    rows = [
+        [_words(name), with_uncertainty(found.value, COVERAGE * found.uncertainty), unit_text(found.unit)]
+        for name, found in fit.parameters.items()
+    ]
+    return Table(f"Results of the fit {fit.name} (expanded uncertainties, k = 2)", columns, rows)
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
+
+
+MOST_LISTED = 40
+"""Maximum number of listed warnings; further ones are counted."""
+
+GRAVE = ("Warned", "LimitExceeded")
+ENDINGS = ("-> aborting", "-> halted")
+SHORT = 60
+"""Seconds per minute."""
+
+
+def limits_section(campaign: Campaign) -> Section:
+    """Damage, warnings, limits of model and measurement, margins."""
+    record, damaged = campaign.record, campaign.integrity.failing
+    parts: list[Part] = []
+    if damaged:
+        parts += ["Changed since it was written:", Listing(list(damaged.values())[:MOST_LISTED])]
+    if record.status not in ("completed",):
+        parts.append(Notice(f"The campaign was not completed: {record.status}. {typeset(record.summary)}".strip()))
+    warnings = list(_warnings(campaign))
+    if warnings:
+        parts += [
+            f"The journal of the file contains {counted(len(warnings), 'warning')}:",
+            Listing(warnings[:MOST_LISTED]),
+        ]
+        if len(warnings) > MOST_LISTED:
+            parts.append(f"The file has {len(warnings) - MOST_LISTED} more.")
+    else:
+        parts.append("No warning was given and no limit was exceeded.")
+    parts.append(
+        "Limits of the model: a rigid block that neither slides nor flies free, Housner's impact, a shear frame with "
+        f"linear springs and dashpots{', a pure sine' if campaign.harmonic_points else ''}. Limits of the measurement: "
+        "the motion of the block is not measured; it is known only from the model and from the first storey."
+    )
+    parts += list(_margins(campaign))
+    if campaign.configuration is not None:
+        parts.append(_limits(campaign))
+    return Section("limits", "Limits and warnings", parts)
+
+
+def damage_notice(campaign: Campaign) -> list[Notice]:
+    """The first notice of a report: datasets that do not match their checksum, or have none."""
+    found = campaign.integrity
+    if found.failing:
+        what = counted(len(found.failing), "dataset")
+        text = (
+            f"DAMAGED OR CHANGED since it was written: {what} of the file, listed in the section Limits and "
+            "warnings, do not match their checksums. Results in this report that depend on them are not reliable."
+        )
+        return [Notice(text)]
+    if found.unchecked:
+        return [Notice(f"{counted(len(found.unchecked), 'dataset')} of the file have no checksum to verify.")]
+    return []
+
+
+def _warnings(campaign: Campaign) -> Iterator[str]:
+    for event in campaign.record.events:
+        stopped = event.kind == "StateChanged" and any(word in event.text for word in ENDINGS)
+        if event.kind in GRAVE or stopped:
+            minutes, seconds = divmod(event.time, SHORT)
+            yield f"{int(minutes)}:{seconds:04.1f} min  {typeset(event.text)}"
+
+
+def _margins(campaign: Campaign) -> Iterator[Table]:
+    """Demands predicted by the preflight, by limited quantity."""
+    table = campaign.record.tables.get("preflight", {})
+    needed = ("quantity", "demand", "limit", "unit", "margin", "where")
+    if not set(needed) <= table.keys():
+        return
+    rows = [
+        [
+            str(quantity),
+            plain(demand),
+            plain(limit),
+            unit_text(str(unit)),
+            ABSENT if margin != margin else f"{100.0 * margin:.0f}",
+            typeset(str(where)),
+        ]
+        for quantity, demand, limit, unit, margin, where in zip(
+            *(table[name].values.tolist() for name in needed), strict=True
+        )
+    ]
+    columns = [
+        Column("quantity", words=True),
+        Column("foreseen"),
+        Column("limit"),
+        Column("unit", words=True),
+        Column("margin", "%"),
+        Column("where", words=True),
+    ]
+    yield Table("Largest demand on every limited quantity, predicted by the preflight", columns, rows)
+
+
+def _limits(campaign: Campaign) -> Table:
+    limits = campaign.configuration.limits if campaign.configuration else None
+    rows = [
+        [first_words(entry.description) or entry.name, plain(getattr(limits, entry.name)), unit_text(entry.unit)]
+        for entry in (declared(type(limits)) if limits is not None else ())
+        if isinstance(getattr(limits, entry.name), float)
+    ]
+    columns = [Column("limit", words=True), Column("value"), Column("unit", words=True)]
+    return Table("Limits enforced by the guard", columns, rows)
+
+
+USUAL_BETAS = (0.25, 0.64, 0.97)
+MOST_MODES = 4
+"""Maximum number of stiffnesses with drawn modes."""
+
+
+def campaign_report(campaign: Campaign, protocol: Protocol[Any] | None = None, progress: Progress = silent) -> Document:
+    """The whole report. Raises InvalidInput for a file without a usable specimen."""
+    load_model(progress)
+    makers: list[Callable[[], Sequence[Section | None]]] = [
+        lambda: _results(campaign, protocol),
+        lambda: [identified_section(campaign), fits_section(campaign)],
+        lambda: _specimen(campaign),
+        lambda: [limits_section(campaign), provenance_section(campaign)],
+    ]
+    sections: list[Section] = []
+    for number, make in enumerate(makers):
+        progress("computing and drawing the report", number, len(makers))
+        sections += [section for section in make() if section is not None]
+    return Document(
+        title=f"Test report: {campaign.path.stem}" if campaign.path.stem != "campaign" else _title(campaign),
+        summary=_summary(campaign),
+        sections=sections,
+        provenance=provenance_line(),
+    )
+
+
+def _results(campaign: Campaign, protocol: Protocol[Any] | None) -> list[Section | None]:
+    """The sections of the protocol; if they contain no table, also the points field by field."""
+    own: Sequence[Section] = [] if protocol is None or protocol.report is None else protocol.report(campaign)
+    tabulated = any(isinstance(part, Table) for section in own for part in section.parts)
+    return [*own, None if tabulated else points_section(campaign)]
+
+
+def _specimen(campaign: Campaign) -> list[Section | None]:
+    configuration = campaign.configuration
+    identified = None if configuration is None else configuration.identified
+    return [
+        specimen_section(campaign.specimen, campaign.uncertainty, identified),
+        modes_section(campaign.specimen, _betas(campaign)[:MOST_MODES]),
+    ]
+
+
+def _title(campaign: Campaign) -> str:
+    return f"Test report: {campaign.protocol or 'campaign'} of {campaign.record.start_time[:10]}"
+
+
+def _summary(campaign: Campaign) -> list[Part]:
+    record = campaign.record
+    tested = _tested(campaign)
+    betas = listed([f"{beta:g}" for beta in _betas(campaign)]) if tested else ""
+    springs = f", bare and coupled by springs of β = {betas}" if betas else ""
+    what = listed(tested) or f"{campaign.protocol or 'an experiment'}, which measures no gain,"
+    backend = str(campaign.devices.get("backend", "not stated"))
+    ended = f"ended {moment(record.end_time)}" if record.end_time else "not ended"
+    parts: list[Part] = [
+        *damage_notice(campaign),
+        f"Tested: {what} on a two-storey frame with a rocking block{springs}. Bench: {backend}. Started "
+        f"{moment(record.start_time)}, {ended}; status: {record.status}.{_people(campaign)}",
+    ]
+    if backend == "simulated":
+        parts.append(
+            Notice(
+                "The bench was simulated: measured values are those of the simulated bench, with its noise and errors."
+            )
+        )
+    absent = [
+        kind
+        for kind, there in (("harmonic", campaign.harmonic_points), ("earthquake", campaign.seismic_points))
+        if not there
+    ]
+    if absent:
+        parts.append(f"The file contains no {' and no '.join(absent)} test.")
+    return parts
+
+
+def _tested(campaign: Campaign) -> list[str]:
+    kinds: list[str] = []
+    if campaign.harmonic_points:
+        omegas = sorted({row["omega_rad_s"] for row in campaign.harmonic_points})
+        frequencies = listed([f"{omega:g}" for omega in omegas])
+        kinds.append(f"steady sine tests at {frequencies} rad/s, {campaign.amplitude_factor:g} g/λ")
+    if campaign.seismic_points:
+        records = dict.fromkeys(str(row["record"]) for row in campaign.seismic_points)
+        kinds.append(f"{'earthquake records' if len(records) > 1 else 'the earthquake record'} {listed([*records])}")
+    return kinds
+
+
+def _people(campaign: Campaign) -> str:
+    given = campaign.record.metadata
+    words = (("Operator", given.get("operator")), ("Notes", given.get("notes")))
+    return "".join(f" {name}: {text.rstrip('.')}." for name, text in words if text)
+
+
+def _betas(campaign: Campaign) -> list[float]:
+    points: list[dict[str, Any]] = [*campaign.harmonic_points, *campaign.seismic_points]
+    return sorted({float(row["beta"]) for row in points if row["beta"]}) or list(USUAL_BETAS)

@@ -1,0 +1,237 @@
+"""Displayed state of a run, updated from the stream of events; shared by all clients."""
+
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import isfinite, nan
+from time import monotonic
+from typing import Any
+
+from bench.app.formatting import ABSENT, difference, measurement, number, one_line, plus_minus, setpoint
+from bench.events import (
+    Estimate,
+    Event,
+    LiveValue,
+    PointFinished,
+    Progress,
+    RunningGain,
+    State,
+    StateChanged,
+    StepStarted,
+    TwinEstimate,
+)
+
+NOTICES = 5
+"""Number of displayed recent events."""
+
+
+@dataclass(frozen=True)
+class Notice:
+    """A line of the log: `kind` is a word, `grave` marks a line that needs the operator's attention."""
+
+    time: float
+    kind: str
+    text: str
+    grave: bool = False
+
+
+@dataclass(frozen=True)
+class Row:
+    """A point of the campaign as text, finished or in progress; the name of a record replaces the frequency."""
+
+    omega: str
+    beta: str
+    status: str
+    alpha_2: str
+    predicted: str
+    difference: str
+    agrees: str
+    effort: str
+    under_record: bool = False
+
+    @staticmethod
+    def finished(point: Mapping[str, Any]) -> "Row":
+        """Row of a finished point; missing values are shown as absent."""
+        value, predicted = point.get("alpha_2"), point.get("alpha_2_predicted")
+        agrees, starts = point.get("agrees"), point.get("starts_tried")
+        unstable = point.get("predicted_stable") is False
+        passes = f"{point.get('passes', 0)} passes"
+        effort = f"{point['cycles_measured']} cycles" if "cycles_measured" in point else passes
+        return Row(
+            omega=one_line(str(point["record"])) if "record" in point else setpoint(point.get("omega_rad_s")),
+            beta=setpoint(point.get("beta")),
+            status=str(point.get("status", ABSENT)),
+            alpha_2=plus_minus(value, point.get("alpha_2_uncertainty")),
+            predicted=number(predicted) + (" unstable" if unstable else ""),
+            # a motion that is not compared with the prediction may be another one
+            difference=ABSENT if agrees is None else difference(value, predicted),
+            agrees=ABSENT if agrees is None else "yes" if agrees else "NO",
+            effort=f"{effort}, {starts} starts" if starts and starts > 1 else effort,
+            under_record="record" in point,
+        )
+
+    @staticmethod
+    def running(estimate: Estimate) -> "Row":
+        """Row of the running estimate of the current point."""
+        return Row(
+            omega=setpoint(estimate.omega),
+            beta="bare" if estimate.beta is None else setpoint(estimate.beta),
+            status="measuring",
+            alpha_2=plus_minus(estimate.alpha_2, estimate.uncertainty),
+            predicted=number(estimate.predicted),
+            difference=difference(estimate.alpha_2, estimate.predicted),
+            agrees=ABSENT,
+            effort=f"{estimate.cycles} cycles",
+        )
+
+    @staticmethod
+    def during_record(running: RunningGain) -> "Row":
+        """Row of the running gain under the current record."""
+        return Row(
+            omega=one_line(running.record),
+            beta="bare" if running.beta is None else setpoint(running.beta),
+            status="measuring",
+            alpha_2=number(running.alpha_2),
+            predicted=number(running.predicted),
+            difference=difference(running.alpha_2, running.predicted),
+            agrees=ABSENT,
+            effort=f"{running.seconds:.1f} s",
+            under_record=True,
+        )
+
+    @property
+    def where(self) -> str:
+        """The frequency with its unit, or the record."""
+        return self.omega if self.under_record else f"omega {self.omega} rad/s"
+
+    @property
+    def sentence(self) -> str:
+        """The row as a log line."""
+        return (
+            f"{self.where}, beta {self.beta}: {self.status}, alpha_2 {self.alpha_2}, "
+            f"predicted {self.predicted}, difference {self.difference}, agrees: {self.agrees}, {self.effort}"
+        )
+
+
+def live_line(live: LiveValue) -> str:
+    """A live value of a protocol with its prediction, as text."""
+    text = f"{one_line(live.label)}  {measurement(live.value, live.uncertainty, live.unit)}"
+    if not isfinite(live.predicted):
+        return text
+    predicted = measurement(live.predicted, nan, live.unit)
+    return f"{text}, predicted {predicted}, difference {difference(live.value, live.predicted)}"
+
+
+def notice_of(event: Event) -> Notice | None:
+    """The event as a line of the log; None for an event that is not logged."""
+    match event:
+        case PointFinished():
+            if "alpha_2" not in type(event.point).model_fields:
+                return None
+            point = event.point.model_dump()
+            reason = one_line(str(point.get("reason") or ""))
+            text = Row.finished(point).sentence + (f" ({reason})" if reason else "")
+            return Notice(event.time, event.notice, text, grave=point.get("status") == "overturned")
+        case StateChanged(after=State.ABORTING | State.HALTED):
+            return Notice(event.time, str(event.after), one_line(event.reason), grave=True)
+        case _:
+            return Notice(event.time, event.notice, one_line(event.line), grave=event.grave) if event.notice else None
+
+
+def twin_line(event: TwinEstimate) -> str:
+    """Peak drifts, difference of measured and modelled drift, and gains where there are any, with the model's band."""
+    words = [f"drift peak {_millimetres(event.drift_peak_measured)}, model {_millimetres(event.drift_peak)}"]
+    words.append(f"residual {_share(event.residual)}, outside the band {_share(event.excess)}")
+    if isfinite(event.alpha_2):
+        band = f"{number(event.alpha_2_low)} to {number(event.alpha_2_high)}"
+        words.append(f"alpha_2 {number(event.alpha_2_measured)}, model {number(event.alpha_2)} ({band})")
+    if event.standing < 1.0:
+        words.append(f"blocks standing {event.standing:.0%}")
+    return "; ".join(words)
+
+
+def _millimetres(metres: float) -> str:
+    return f"{1e3 * metres:.2f} mm" if isfinite(metres) else ABSENT
+
+
+def _share(value: float) -> str:
+    return f"{100.0 * value:.1f} %" if isfinite(value) else ABSENT
+
+
+@dataclass
+class RunDisplay:
+    """The displayed state: `rows` of finished points, the last `notices` that are not points, and other values. `live`
+    has the live values of the protocol, one line each, by label.
+    """
+
+    time: float = 0.0
+    state: State = State.IDLE
+    reason: str = ""
+    step: str = ""
+    activity: str = ""
+    fraction: float = 0.0
+    remaining: float = float("nan")
+    rows: list[Row] = field(default_factory=list[Row])
+    running: Row | None = None
+    twin: str = ""
+    live: dict[str, str] = field(default_factory=dict[str, str])
+    notices: deque[Notice] = field(default_factory=lambda: deque[Notice](maxlen=NOTICES))
+    preparing: bool = False
+    """Whether the session is computing before the rig is opened or after it is closed."""
+    _begun: float = 0.0
+    _told: float = 0.0
+
+    def prepare(self, phase: str, done: int, total: int) -> None:
+        """Show a stage before the rig is opened or after it is closed."""
+        now = monotonic()
+        if phase != self.reason:
+            self.reason, self._begun = one_line(phase), now
+        self.fraction = done / total if total else 0.0
+        self.remaining = (now - self._begun) * (total - done) / done if done else float("nan")
+        self._told, self.preparing = self.time, True
+
+    def expect(self, duration: float | None) -> None:
+        """The rig is open: show the `duration` [s] of the plan, None if unknown, until the run reports its progress."""
+        self.fraction, self.remaining, self.preparing = 0.0, nan if duration is None else duration, False
+        self.reason, self._told = "", self.time
+
+    @property
+    def time_left(self) -> float:
+        """Remaining time [s], less the bench time since it was estimated; NaN if unknown."""
+        return max(self.remaining - max(self.time - self._told, 0.0), 0.0) if isfinite(self.remaining) else nan
+
+    def update(self, event: Event) -> Notice | None:
+        """Update the state with an event other than a block of samples; returns its line of the log, if it has one."""
+        if self.preparing:
+            self.fraction, self.remaining, self.preparing = 0.0, float("nan"), False
+        self.time = max(self.time, event.time)
+        match event:
+            case StateChanged():
+                self.state, self.reason = event.after, one_line(event.reason)
+                if event.after in (State.IDLE, State.HALTED, State.CLOSED):
+                    self.twin = ""
+                    self.live.clear()
+            case TwinEstimate():
+                self.twin = twin_line(event)
+            case LiveValue():
+                self.live[one_line(event.label)] = live_line(event)
+            case StepStarted():
+                self.step, self.running = one_line(event.text), None
+            case Progress():
+                self.fraction = min(max(event.fraction, 0.0), 1.0)
+                self.activity = one_line(event.activity)
+                if isfinite(event.remaining):
+                    self.remaining, self._told = event.remaining, self.time
+            case Estimate():
+                self.running = Row.running(event)
+            case RunningGain():
+                self.running = Row.during_record(event)
+            case PointFinished() if "alpha_2" in type(event.point).model_fields:
+                self.rows.append(Row.finished(event.point.model_dump()))
+                self.running = None
+            case _:
+                pass
+        notice = notice_of(event)
+        if notice is not None and not isinstance(event, PointFinished):
+            self.notices.append(notice)
+        return notice

@@ -1,0 +1,183 @@
+"""A campaign from configuration to result files: rig, guard, engine, recorder, summary."""
+
+import json
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from bench.app.preflight import compile_run
+from bench.config.model import BenchConfiguration
+from bench.datafile.recorder import PATIENCE, Recorder
+from bench.engine.engine import configured_engine
+from bench.engine.interface import Ending, EventStream, Operator, Requests
+from bench.events import Subscriber, Warned
+from bench.figures.summary import Summary, write_summary
+from bench.plugins import plugin_code, plugin_generator
+from bench.progress import Progress, silent
+from bench.protocol import Prepared, Protocol, Result
+from bench.provenance import revision, software
+from bench.results import FILE, SUMMARY
+from bench.rigs import open_rig, require_drivers
+from bench.twin.live import live_twin
+from drivers.clock import VirtualClock
+from drivers.errors import RigError
+from drivers.rig import Rig
+from sim.errors import UNKNOWN, Cause
+from sim.parameters import Parameters
+
+
+@dataclass(frozen=True)
+class SessionResult:
+    """Result of a campaign. `summary` can be converted to JSON, `table` is text for the terminal. `passed` is the
+    verdict of a protocol that tests the bench, True for any other.
+    """
+
+    status: str
+    reason: str
+    summary: dict[str, object]
+    table: str
+    interrupted: bool
+    passed: bool = True
+    cause: Cause = UNKNOWN
+
+
+def run_session(
+    protocol: Protocol[Any],
+    prepared: Prepared[Any],
+    *,
+    out: Path,
+    operator: Operator,
+    subscribers: Sequence[Subscriber],
+    requests: Requests,
+    realtime: bool,
+    about: Mapping[str, str] | None = None,
+    opened: Callable[[Rig], None] = lambda _rig: None,
+    progress: Progress = silent,
+) -> SessionResult:
+    """Run a `prepared` protocol on its bench; write data file, figures and summary to the folder `out`. `opened` is
+    called with the rig before the table moves; the rig may be used only while the engine calls a subscriber. `about` is
+    stored in the data file with the metadata of the run: the operator's name, notes. `progress` reports the stages
+    before the rig is opened and after it is closed. Raises InvalidInput, or KeyboardInterrupt when an end was
+    requested, before the table moves. Once the rig is armed, every ending is a result with a status.
+    """
+    started = time.monotonic()
+    name = f"the protocol {protocol.name}"
+    with requests.without_rig():
+        if requests.strongest is not None:
+            raise KeyboardInterrupt
+        require_drivers(prepared.configuration)
+        with plugin_code(name, files=True):
+            preflight = compile_run(protocol.name, prepared, out, progress)
+        preflight.require()
+        # after the hash of the plan, which does not depend on the speed
+        configuration = prepared.configuration.at_pace(realtime=realtime)
+        progress("predicting the results")
+        with plugin_code(name):
+            prediction = {"prediction": prepared.prediction} if prepared.prediction else {}
+            sources = prepared.sources
+        tables = {**prediction, **preflight.tables, **sources}
+        metadata = _metadata(protocol, prepared.parameters, configuration)
+        metadata |= {"plan_hash": preflight.plan_hash, **(about or {})}
+    if requests.strongest is not None:
+        raise KeyboardInterrupt
+    rig = open_rig(configuration, realtime=realtime)
+    try:
+        # opening takes long: an end requested meanwhile leaves neither folder nor file
+        if requests.strongest is not None:
+            raise KeyboardInterrupt
+        out.mkdir(parents=True, exist_ok=True)
+        recorder = Recorder(
+            out / FILE,
+            channels=rig.channels,
+            sample_rate=rig.sample_rate,
+            point_type=protocol.point,
+            metadata=metadata | {"devices": json.dumps(rig.description)},
+            tables=tables,
+            # virtual time does not advance while waiting for the disk
+            hold_up=PATIENCE if isinstance(rig.clock, VirtualClock) else 0.0,
+        )
+        stream = EventStream(rig.clock, [recorder, *subscribers])
+        status, reason = "failed", "the program failed"
+        try:
+            opened(rig)
+            engine = configured_engine(rig, configuration, stream, requests, operator)
+            strange = configuration.calibrated.strange(rig.description) if configuration.calibrated else ()
+            for warning in (*strange, *preflight.warnings):
+                stream.publish(Warned(warning))
+            # in virtual time the bench waits while the model computes
+            patient = isinstance(rig.clock, VirtualClock)
+            with live_twin(stream, rig, configuration, requests, patient=patient):
+                ending = engine.run(plugin_generator(name, prepared.plan()))
+            ending = ending.then(_closing(rig))
+            status, reason = ending.status, ending.reason
+        finally:
+            recorder.close(status, reason)
+    finally:
+        _closing(rig)
+    with plugin_code(name):
+        result = result_of(engine.returned, prepared, stream.points)
+    figures = [out / file for file in protocol.figures if file in result.figures]
+    summary = Summary(
+        protocol=protocol.name,
+        status=ending.status,
+        points=stream.points,
+        file=out / FILE,
+        figure=figures[0] if figures else None,
+        reason=ending.reason,
+        software=f"rocking-bench {software()['rocking-bench']}",
+        seed=configuration.seed,
+        elapsed=time.monotonic() - started,
+        bench_time=stream.now(),
+        plan_hash=preflight.plan_hash,
+        further_figures=figures[1:],
+        findings=result.findings if result.passed is None else {"passed": result.passed, **result.findings},
+    )
+    write_summary(out / SUMMARY, summary)
+    # result files of other runs first: a failing figure must not prevent a result
+    with plugin_code(name, files=True):
+        for file in protocol.files:
+            if file in result.files:
+                result.files[file](out / file)
+    if not requests.interrupted:
+        # after an interrupt no figures are drawn: `rockbench report` draws them from the file
+        with requests.without_rig(), plugin_code(name, files=True):
+            progress("drawing the figures")
+            for path in figures:
+                result.figures[path.name](path)
+    return SessionResult(
+        status=ending.status,
+        reason=ending.reason,
+        cause=ending.cause,
+        summary=summary.as_dict(),
+        table=result.text,
+        interrupted=requests.strongest is not None,
+        passed=result.passed is not False,
+    )
+
+
+def _closing(rig: Rig) -> Ending | None:
+    """Close the rig. Returns an ending if that fails, else None."""
+    try:
+        rig.close()
+    except RigError as error:
+        return Ending.failed(error)
+    return None
+
+
+def result_of(returned: object, prepared: Prepared[Any], points: Sequence[Parameters]) -> Result:
+    """The result `returned` by a plan, or that of an interrupted run with these `points`."""
+    return returned if isinstance(returned, Result) else prepared.result(points)
+
+
+def _metadata(protocol: Protocol[Any], parameters: Parameters, configuration: BenchConfiguration) -> dict[str, str]:
+    return {
+        "protocol": protocol.name,
+        "parameters": parameters.model_dump_json(),
+        "configuration": configuration.model_dump_json(),
+        "specimen": configuration.known_specimen.model_dump_json(),
+        **({} if configuration.seed is None else {"seed": str(configuration.seed)}),
+        **software(),
+        "git": revision(),
+    }

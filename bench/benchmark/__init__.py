@@ -1,1 +1,0 @@
-"""Run time against error, and the cost of what the software does, measured and written down."""

@@ -1,1 +1,0 @@
-"""The command line: an equal client of the engine."""

@@ -1,0 +1,72 @@
+# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false
+"""How HDF5 opens files: format, locks and retries."""
+
+import ctypes
+import os
+import sys
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Literal, cast
+
+import h5py
+import h5py.h5f
+import h5py.h5p
+
+h5f, h5p = cast(Any, h5py.h5f), cast(Any, h5py.h5p)
+
+# The oldest format that can be read while it is written; a fixed version, so that older tools can read files of newer
+# writers.
+VERSIONS = ("v110", "v110")
+
+RETRIES = 28
+"""Attempts at reading metadata of a file that is written: pauses of 1 ns doubled each time, 0.3 s in all.
+
+HDF5's own 100 attempts at data that another program has cut off take longer than anybody waits, and the whole process
+with its drive waits with them.
+"""
+
+
+def locking(system: str = sys.platform) -> Literal["best-effort"] | bool:
+    """The locks of every file, for h5py.
+
+    On Windows locks are mandatory: a reader of a file that is written would make its writer fail at the next flush or
+    at the end, with errno 13. There nobody locks; single-writer mode and creation without replacement protect the file.
+    Elsewhere locks are advisory, and network shares may have none.
+    """
+    return False if system == "win32" else "best-effort"
+
+
+def open_living(path: Path) -> Any:
+    """Open a file that is written, in single-writer mode, to read it."""
+    return _opened(path, h5f.ACC_RDONLY | h5f.ACC_SWMR_READ)
+
+
+def open_to_write(path: Path) -> Any:
+    """Open a new, closed file in single-writer mode to append to its datasets.
+
+    A file that is switched to this mode while open would have HDF5's own number of attempts.
+    """
+    return _opened(path, h5f.ACC_RDWR | h5f.ACC_SWMR_WRITE)
+
+
+def _opened(path: Path, mode: int) -> Any:
+    made = h5p.create(h5p.FILE_ACCESS)
+    made.set_libver_bounds(h5f.LIBVER_V110, h5f.LIBVER_V110)
+    made.set_alignment(1, 1)
+    made.set_file_locking(bool(locking()), ignore_when_disabled=True)
+    if (limit := _retry_limit()) is not None:
+        limit(made.id, RETRIES)
+    return h5py.File(h5f.open(os.fsencode(path), mode, fapl=made))
+
+
+@lru_cache(maxsize=1)
+def _retry_limit() -> Any:
+    """The function of the HDF5 library that limits retries, which h5py does not offer; None if it cannot be found."""
+    for library in (cast(str, h5p.__file__), str(Path(h5py.__file__).parent / "hdf5.dll")):
+        try:
+            found = ctypes.CDLL(library).H5Pset_metadata_read_attempts
+        except (OSError, AttributeError):
+            continue
+        found.argtypes, found.restype = [ctypes.c_int64, ctypes.c_uint], ctypes.c_int
+        return found
+    return None

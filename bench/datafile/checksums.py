@@ -1,0 +1,224 @@
+"""Checksums of datasets: those of fixed datasets at the start of the run, those of growing datasets at its end.
+
+A checksum is the SHA-256 of the stored values' bytes, uncompressed and in order, in hexadecimal digits. Those of
+attributes cover their names and values as JSON, to detect a later change of a conversion. Checksums of groups
+cover their attributes and link targets, such as the plotted data and their axes.
+"""
+
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from hashlib import sha256
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.datafile import hdf5
+from bench.datafile.declared import FIT_VIEWS
+from bench.datafile.hdf5_reading import UNREADABLE, reason
+from sim.sweep import Done
+
+GROUP = "checksums"
+WIDTH = 64
+ROWS_AT_ONCE = 2**18
+_DATASETS, _VALUES, _ATTRIBUTES = f"{GROUP}/dataset", f"{GROUP}/values", f"{GROUP}/attributes"
+_GROUPS, _CONTENTS = f"{GROUP}/group", f"{GROUP}/group_attributes"
+
+
+class Checksums:
+    """The checksum table of a new file; created last, when every dataset exists."""
+
+    def __init__(self, entry: hdf5.Group, changing: Iterable[str]) -> None:
+        """`changing` are the paths of datasets not yet final: their checksums are empty until `seal`."""
+        stored, groups = list[hdf5.Dataset](), {"/": of_group(hdf5.group(entry, "/"))}
+        _walk(entry, stored, groups)
+        later = {*changing}
+        self._entry, self._paths = entry, [each.name for each in stored]
+        self._values = {each.name: "" if each.name in later else of_values(each) for each in stored}
+        attributes = [of_attributes(each) for each in stored]
+        group = hdf5.create_group(entry, GROUP, "NXcollection")
+        hdf5.write_texts(group, "dataset", self._paths, description="path of each dataset other than the checksums")
+        self._stored = hdf5.write_texts(
+            group,
+            "values",
+            self._values.values(),
+            description="SHA-256 of its uncompressed values; empty until closing for datasets that grow",
+        )
+        hdf5.write_texts(group, "attributes", attributes, description="SHA-256 of its attributes as JSON")
+        hdf5.write_texts(group, "group", groups, description="path of each group other than this one and views of fits")
+        hdf5.write_texts(
+            group, "group_attributes", groups.values(), description="SHA-256 of its attributes and links as JSON"
+        )
+
+    def reopen(self, entry: hdf5.Group) -> None:
+        """Continue in the reopened file."""
+        self._entry, self._stored = entry, hdf5.dataset(entry, f"{GROUP}/values")
+
+    def seal(self, grown: Mapping[str, str]) -> None:
+        """Add the missing checksums: `grown` by path, the others from the file."""
+        for path, known in self._values.items():
+            if not known:
+                self._values[path] = grown.get(path) or of_values(hdf5.dataset(self._entry, path))
+        self._stored[...] = np.array([text.encode() for text in self._values.values()], dtype=hdf5.text_type(WIDTH))
+
+
+def of_values(stored: hdf5.Dataset) -> str:
+    """SHA-256 of the values of a dataset, read piece by piece."""
+    digest = sha256()
+    if not stored.shape:
+        digest.update(_bytes(np.asarray(stored[()], dtype=stored.dtype)))
+    else:
+        for start in range(0, stored.shape[0], ROWS_AT_ONCE):
+            digest.update(_bytes(stored[start : start + ROWS_AT_ONCE]))
+    return digest.hexdigest()
+
+
+def of_attributes(stored: hdf5.Dataset) -> str:
+    """SHA-256 of the attributes of a dataset as JSON: names in order, arrays as lists."""
+    return _of_json(_attributes(stored))
+
+
+def of_group(group: hdf5.Group) -> str:
+    """SHA-256 of a group's attributes and link targets, both by name, as JSON."""
+    return _of_contents(group, {name: target for name, target in hdf5.members(group) if isinstance(target, str)})
+
+
+def _of_contents(group: hdf5.Group, links: Mapping[str, str]) -> str:
+    return _of_json({"attributes": _attributes(group), "links": links})
+
+
+def _walk(group: hdf5.Group, stored: list[hdf5.Dataset], groups: dict[str, str]) -> None:
+    """Collect every dataset and the checksum of every group; opens each object only once, to save time."""
+    links = dict[str, str]()
+    groups[group.name] = ""
+    for name, member in hdf5.members(group):
+        if isinstance(member, str):
+            links[name] = member
+        elif hdf5.is_dataset(member):
+            stored.append(member)
+        else:
+            _walk(cast(hdf5.Group, member), stored, groups)
+    groups[group.name] = _of_contents(group, links)
+
+
+def covered_groups(entry: hdf5.Group) -> Iterator[hdf5.Group]:
+    """The root, the entry and its contents, without the checksums and the views, which are created later."""
+    yield hdf5.group(entry, "/")
+    yield from (each for each in hdf5.groups(entry) if each.name.split("/")[2:3] not in ([GROUP], [FIT_VIEWS]))
+
+
+def read_groups(entry: hdf5.Group) -> dict[str, str]:
+    """The checksums of the groups by path; none in older files."""
+    if _GROUPS not in entry:
+        return {}
+    return dict(zip(*(hdf5.read_texts(hdf5.dataset(entry, path)[:]) for path in (_GROUPS, _CONTENTS)), strict=True))
+
+
+def read(entry: hdf5.Group) -> dict[str, tuple[str, str]]:
+    """The checksums of values and attributes by path; those of values are empty if the file was not closed."""
+    columns = [hdf5.read_texts(hdf5.dataset(entry, path)[:]) for path in (_DATASETS, _VALUES, _ATTRIBUTES)]
+    return {path: (values, attributes) for path, values, attributes in zip(*columns, strict=True)}
+
+
+def _bytes(values: NDArray[Any]) -> bytes:
+    return values.tobytes()
+
+
+def _of_json(content: Mapping[str, Any]) -> str:
+    # an attribute of a type that this software never writes has no JSON form: its checksum is wrong
+    return sha256(json.dumps(content, sort_keys=True, default=repr).encode()).hexdigest()
+
+
+def _attributes(owner: hdf5.Group | hdf5.Dataset) -> dict[str, Any]:
+    return {name: _plain(owner.attrs[name]) for name in owner.attrs}
+
+
+def _plain(value: Any) -> Any:
+    return value if isinstance(value, str | int | float) else np.asarray(value).tolist()
+
+
+SMALL = 2**20
+"""Size of a dataset that is hashed in a few milliseconds [bytes]."""
+
+
+@dataclass(frozen=True)
+class Integrity:
+    """`failing` are the changed datasets by path, `compared` is the number of datasets compared with a checksum.
+
+    `unchecked` are the others: without a checksum, as in a file that was not closed, or too large for the requested
+    check.
+    """
+
+    compared: int
+    failing: dict[str, str] = field(default_factory=dict[str, str])
+    unchecked: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        """One-line summary."""
+        if self.failing:
+            return "damaged or changed since it was written: " + "; ".join(self.failing.values())
+        left = f"; {len(self.unchecked)} were not checked" if self.unchecked else ""
+        return f"{self.compared} datasets are unchanged{left}"
+
+
+def integrity(entry: hdf5.Group, largest: int | None = SMALL, done: Done = lambda _done, _all: None) -> Integrity:
+    """Compare datasets of at most `largest` bytes, or all, and all attributes with the checksums.
+
+    `done` counts the datasets.
+    """
+    if not hdf5.has(entry, GROUP):
+        lost: dict[str, str] = {}
+        return Integrity(0, lost, tuple(each.name for each in hdf5.datasets(entry, lost)))
+    try:
+        known, groups = read(entry), read_groups(entry)
+    except UNREADABLE as error:
+        return Integrity(0, {f"/entry/{GROUP}": f"the checksums cannot be read ({reason(error)})"})
+    failing: dict[str, str] = {}
+    unchecked: list[str] = []
+    for number, (path, (values, attributes)) in enumerate(known.items()):
+        done(number, len(known))
+        try:
+            stored = hdf5.dataset(entry, path)
+            looked = bool(values) and (largest is None or stored.nbytes <= largest)
+            if told := _compared(stored, values if looked else "", attributes):
+                failing[path] = told
+            elif not looked:
+                unchecked.append(path)
+        except UNREADABLE as error:
+            failing[path] = _lost(entry, path, error)
+    for path, attributes in groups.items():
+        try:
+            if of_group(hdf5.group(entry, path)) != attributes:
+                failing[path] = f"the attributes or links of {path} were changed"
+        except UNREADABLE as error:
+            failing[path] = _lost(entry, path, error)
+    return Integrity(sum(path not in failing for path in known) - len(unchecked), failing, tuple(unchecked))
+
+
+def added(entry: hdf5.Group) -> Iterator[str]:
+    """Problems of objects added to the file after its checksums."""
+    known, groups = read(entry), read_groups(entry)
+    for each in hdf5.datasets(entry):
+        if each.name not in known and not each.name.startswith(f"/entry/{GROUP}/"):
+            yield f"{each.name} has no checksum: it was added later"
+    for each in covered_groups(entry) if groups else ():
+        if each.name not in groups:
+            yield f"{each.name} has no checksum: it was added later"
+
+
+def _compared(stored: hdf5.Dataset, values: str, attributes: str) -> str:
+    told: list[str] = []
+    if of_attributes(stored) != attributes:
+        told.append(f"the attributes of {stored.name} were changed")
+    if values and of_values(stored) != values:
+        told.append(f"{stored.name} was changed: its checksum is wrong")
+    return "; ".join(told)
+
+
+def _lost(entry: hdf5.Group, path: str, error: BaseException) -> str:
+    try:
+        there = path in entry
+    except UNREADABLE:
+        there = True
+    return f"{path} cannot be read ({reason(error)})" if there else f"{path} is missing"

@@ -1,0 +1,174 @@
+"""Copy of a damaged file: its intact, readable objects, truncated to complete rows."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.datafile import hdf5
+from bench.datafile.declared import TABLES, part_of
+from bench.datafile.fields import Kind, Rows
+from bench.datafile.hdf5 import Dataset, Group
+from bench.datafile.hdf5_reading import UNREADABLE, DataFileError, reason
+from bench.datafile.opening import intact_rows, is_within
+from bench.datafile.samples import create_drive, read_channel, read_channels
+
+BYTES_AT_ONCE = 2**22
+
+
+@dataclass
+class Copying:
+    """Scope of a copy: `counted` rows of every part, in a file of `size` bytes, without the paths in `leave`.
+
+    `lost` receives the reason for each unreadable path; growing datasets are copied up to the last readable row.
+    """
+
+    counted: Mapping[str, int]
+    size: int
+    leave: frozenset[str]
+    lost: dict[str, str] = field(default_factory=dict[str, str])
+
+    def copy(self, source: Group, target: Group) -> None:
+        """Copy attributes and members into an empty group."""
+        copy_attributes(source, target, self.lost)
+        for name, member in hdf5.members(source, self.lost):
+            path = f"{source.name.rstrip('/')}/{name}"
+            if path in self.leave:
+                continue
+            if isinstance(member, str):
+                hdf5.link(target, name, member)
+            elif hdf5.is_dataset(member):
+                self._copy_dataset(member, target, name)
+            else:
+                self.copy(hdf5.group(source, name), target.create_group(name, track_order=True))
+
+    def _copy_dataset(self, stored: Dataset, target: Group, name: str) -> None:
+        try:
+            attributes = {each: stored.attrs[each] for each in stored.attrs}
+            if "kind" in attributes:
+                Kind(attributes["kind"])
+            if hdf5.grows(stored):
+                copied = self._copy_grown(stored, target, name)
+            elif is_within(stored, self.size):
+                copied = target.create_dataset(name, data=stored[()], dtype=stored.dtype)
+            else:
+                self.lost[stored.name] = f"{stored.name} lies beyond the end of the file"
+                return
+        except UNREADABLE as error:
+            # without its attributes the numbers have no meaning
+            self.lost[stored.name] = f"{stored.name} cannot be read ({reason(error)})"
+            return
+        for each, value in attributes.items():
+            copied.attrs[each] = value
+
+    def _copy_grown(self, stored: Dataset, target: Group, name: str) -> Dataset:
+        filters = {} if stored.compression is None else hdf5.FILTERS
+        copied = target.create_dataset(
+            name, shape=(0,), maxshape=(None,), dtype=stored.dtype, chunks=stored.chunks, **filters
+        )
+        rows = min(self.counted[part_of(stored.name)], intact_rows(stored, self.size))
+        done, step = 0, max(1, BYTES_AT_ONCE // stored.dtype.itemsize)
+        while done < rows:
+            count = min(step, rows - done)
+            try:
+                values = stored[done : done + count]
+            except (OSError, RuntimeError):
+                # narrow the search down to the first unreadable row
+                if count == 1:
+                    break
+                step = count // 2
+                continue
+            hdf5.append(copied, values)
+            done += len(values)
+        return copied
+
+
+def copy_attributes(source: Group, target: Group, lost: dict[str, str]) -> None:
+    """Every readable attribute of a group, unchanged."""
+    try:
+        for name in source.attrs:
+            target.attrs[name] = source.attrs[name]
+    except UNREADABLE as error:
+        lost[f"{source.name} attributes"] = f"attributes of {source.name} cannot be read ({reason(error)})"
+
+
+_ROWS_AT_ONCE = 2**18
+
+
+def drop_channels(entry: hdf5.Group, lost: dict[str, str]) -> None:
+    """Remove channels without a readable conversion of their counts; the reason is added to `lost`."""
+    instrument = hdf5.group(entry, "instrument")
+    for name in hdf5.names(instrument):
+        if hdf5.has(instrument, f"{name}/counts"):
+            try:
+                read_channel(instrument, name)
+            except DataFileError as error:
+                lost[f"/entry/instrument/{name}/counts"] = str(error)
+                hdf5.delete(instrument, f"{name}/counts")
+
+
+def renew_drive(entry: hdf5.Group) -> None:
+    """Replace a lost drive by NaN at every sample."""
+    instrument = hdf5.group(entry, "instrument")
+    if hdf5.has(instrument, "drive/voltage"):
+        return
+    counts = [hdf5.dataset(instrument, f"{each.name}/counts") for each in read_channels(instrument)]
+    if hdf5.has(instrument, "drive"):
+        hdf5.delete(instrument, "drive")
+    made = create_drive(instrument, (counts[0].chunks or (1,))[0])
+    rows = min(each.shape[0] for each in counts)
+    for start in range(0, rows, _ROWS_AT_ONCE):
+        hdf5.append(made, np.full(min(_ROWS_AT_ONCE, rows - start), np.nan, dtype=np.float32))
+
+
+def renew_tables(entry: hdf5.Group, lost: Iterable[str]) -> None:
+    """Empty every table with a `lost` path; the journal may refill it."""
+    gone = tuple(lost)
+    for path, fields in TABLES.items():
+        if any(each == f"/entry/{path}" or each.startswith(f"/entry/{path}/") for each in gone):
+            folder, _, name = path.rpartition("/")
+            parent = hdf5.group(entry, folder) if folder else entry
+            if name in parent:
+                hdf5.delete(parent, name)
+            Rows(parent, name, fields)
+
+
+def cut(entry: hdf5.Group, counted: Mapping[str, int]) -> dict[str, int]:
+    """Truncate the datasets of each part to the shortest, and match samples and blocks.
+
+    The last known block is omitted if later `counted` ones were lost, because its end is unknown. Returns the rows of
+    every part.
+    """
+    parts: dict[str, list[hdf5.Dataset]] = {name: [] for name in counted}
+    for stored in hdf5.datasets(entry):
+        if hdf5.grows(stored):
+            parts[part_of(stored.name)].append(stored)
+    rows = {name: min((each.shape[0] for each in stored), default=0) for name, stored in parts.items()}
+    row, run, first = (
+        hdf5.dataset(entry, f"instrument/blocks/{name}")[: rows["blocks"]] for name in ("row", "run", "first")
+    )
+    lost = rows["blocks"] < counted["blocks"]
+    rows["blocks"], rows["samples"] = _placed(row, run, first, rows["samples"], lost=lost)
+    for name, stored in parts.items():
+        for each in stored:
+            each.resize((rows[name],))
+    return rows
+
+
+def _placed(
+    row: NDArray[np.int64], run: NDArray[np.int64], first: NDArray[np.int64], samples: int, *, lost: bool
+) -> tuple[int, int]:
+    """Numbers of blocks and samples at valid positions.
+
+    Rows begin at 0 and ascend, run numbers never fall, and within a run samples may be missing but not repeated.
+    """
+    if not len(row) or row[0] != 0 or run[0] < 1 or first[0] < 0:
+        return 0, 0
+    length, runs = np.diff(row), np.diff(run)
+    fits = (length > 0) & (runs >= 0) & (first[1:] >= np.where(runs == 0, first[:-1] + length, 0))
+    # of two inconsistent blocks either may be wrong
+    last = len(row) - 1 if fits.all() else int(np.argmin(fits))
+    if lost or not fits.all():
+        samples = min(samples, int(row[last]))
+    return int(np.searchsorted(row[: last + 1], samples)), samples

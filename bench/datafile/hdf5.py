@@ -1,0 +1,293 @@
+# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false
+"""Typed interface of the part of h5py used here; h5py publishes no types.
+
+Every numeric dataset is created by `write_numbers` or `grow_numbers`, which require its unit.
+"""
+
+import io
+import os
+import struct
+from collections.abc import Iterable
+from contextlib import AbstractContextManager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
+
+import h5py
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from bench.datafile.access import VERSIONS, locking, open_living, open_to_write
+from bench.datafile.hdf5_reading import Dataset as Dataset
+from bench.datafile.hdf5_reading import File as File
+from bench.datafile.hdf5_reading import Group as Group
+from bench.datafile.hdf5_reading import attribute as attribute
+from bench.datafile.hdf5_reading import dataset as dataset
+from bench.datafile.hdf5_reading import datasets as datasets
+from bench.datafile.hdf5_reading import group as group
+from bench.datafile.hdf5_reading import groups as groups
+from bench.datafile.hdf5_reading import grows as grows
+from bench.datafile.hdf5_reading import has as has
+from bench.datafile.hdf5_reading import is_dataset as is_dataset
+from bench.datafile.hdf5_reading import members as members
+from bench.datafile.hdf5_reading import names as names
+from bench.datafile.hdf5_reading import place as place
+from bench.datafile.hdf5_reading import places_of_chunks as places_of_chunks
+from bench.datafile.hdf5_reading import read as read
+from bench.datafile.hdf5_reading import read_text as read_text
+from bench.datafile.hdf5_reading import read_texts as read_texts
+
+if TYPE_CHECKING:
+    from _typeshed import WriteableBuffer
+
+
+PAGE = 1024
+# Filters available in every HDF5 library, so that MATLAB and web viewers can read the file; measured in decision 10.
+FILTERS: dict[str, Any] = {"shuffle": True, "compression": "gzip", "compression_opts": 1}
+
+
+def create(path: Path) -> File:
+    """Create a new file; raises FileExistsError if it exists."""
+    # metadata in pages of the disk's sectors: a power failure does not split an item (measured in decision 10)
+    return cast(File, h5py.File(path, "x", libver=VERSIONS, locking=locking(), fs_strategy="page", fs_page_size=PAGE))
+
+
+def reopen_to_write(file: File) -> File:
+    """Close a new file and open it in single-writer mode, in which its datasets can be read while they grow."""
+    path = Path(file.filename)
+    file.close()
+    return cast(File, open_to_write(path))
+
+
+def let_go(file: File) -> None:
+    """Close a file that can no longer be written, keeping the flushed data on the disk.
+
+    HDF5 tries to write its pending data. If that fails, it frees half of its state and later crashes the process, at
+    the latest on exit, which is unacceptable in a program that drives a shaker. So the remaining writes go to the null
+    device.
+    """
+    with suppress(OSError, RuntimeError, ValueError):
+        nowhere = os.open(os.devnull, os.O_RDWR)
+        os.dup2(nowhere, cast(int, cast(h5py.File, file).id.get_vfd_handle()), inheritable=False)
+        os.close(nowhere)
+    with suppress(OSError, RuntimeError, ValueError):
+        file.close()
+
+
+def open_again(path: Path) -> AbstractContextManager[File]:
+    """Open a finished file for additions. Raises OSError when this program has it open."""
+    return cast("AbstractContextManager[File]", h5py.File(path, "r+", libver=VERSIONS, locking=locking()))
+
+
+def open_to_read(path: Path) -> File:
+    """Open a finished file, one being written, or one left by a killed writer."""
+    # in single-writer mode HDF5 retries damaged data for hours, so only files that were not closed use it
+    if not is_let_go(path):
+        return cast(File, open_living(path))
+    return cast(File, h5py.File(path, "r", libver=VERSIONS, locking=locking()))
+
+
+def open_to_judge(path: Path) -> File:
+    """Open any file, even a damaged one, as if its writer had closed it at full length."""
+    return cast(File, h5py.File(Quiet(path), "r", libver=VERSIONS))
+
+
+def is_hdf5(path: Path) -> bool:
+    """Whether the file has the signature of an HDF5 file."""
+    return cast(bool, h5py.is_hdf5(path))
+
+
+def create_group(parent: Group, name: str, nx_class: str) -> Group:
+    """Create a group of a NeXus class; its members keep their order of creation."""
+    made = parent.create_group(name, track_order=True)
+    made.attrs["NX_class"] = nx_class
+    return made
+
+
+def delete(parent: Group, name: str) -> None:
+    """Remove a member from a group."""
+    del cast(h5py.Group, parent)[name]
+
+
+def link(parent: Group, name: str, target: str) -> None:
+    """Create a soft link to an absolute path."""
+    parent[name] = h5py.SoftLink(target)
+
+
+def view(parent: Group, name: str, source: Dataset, part: slice) -> Dataset:
+    """Create a virtual dataset that shows part of another one of the same file."""
+    layout = h5py.VirtualLayout(shape=(part.stop - part.start,), dtype=source.dtype)
+    layout[:] = h5py.VirtualSource(".", source.name, shape=source.shape, dtype=source.dtype)[part]
+    return cast(Dataset, cast(h5py.Group, parent).create_virtual_dataset(name, layout))
+
+
+def write_numbers(parent: Group, name: str, values: object, *, unit: str, description: str) -> Dataset:
+    """Create a dataset with all its numbers; a scalar if `values` is one."""
+    made = parent.create_dataset(name, data=np.asarray(values))
+    made.attrs["units"], made.attrs["description"] = unit, description
+    return made
+
+
+def grow_numbers(
+    parent: Group, name: str, dtype: DTypeLike, *, unit: str, description: str, chunk: int, compress: bool
+) -> Dataset:
+    """Create an empty, growing dataset of numbers."""
+    filters = FILTERS if compress else {}
+    made = parent.create_dataset(name, shape=(0,), maxshape=(None,), dtype=dtype, chunks=(chunk,), **filters)
+    made.attrs["units"], made.attrs["description"] = unit, description
+    return made
+
+
+def text_type(width: int) -> np.dtype[Any]:
+    """Texts of `width` bytes of UTF-8, in memory and in the file: HDF5 does not convert from plain bytes."""
+    return cast("np.dtype[Any]", h5py.string_dtype("utf-8", width))
+
+
+def grow_texts(parent: Group, name: str, width: int, *, description: str, chunk: int) -> Dataset:
+    """Create an empty, growing dataset of texts of at most `width` bytes of UTF-8.
+
+    HDF5 stores texts of variable length apart from their dataset, and a reader of a live file may see one without the
+    other; so all texts have a fixed length.
+    """
+    made = parent.create_dataset(name, shape=(0,), maxshape=(None,), dtype=text_type(width), chunks=(chunk,))
+    made.attrs["description"] = description
+    return made
+
+
+def write_text(parent: Group, name: str, text: str, *, width: int = 0, description: str = "") -> Dataset:
+    """Create a scalar string as long as `text`, or of `width` bytes if it will be replaced later."""
+    stored = text.encode()
+    kind = text_type(max(width, len(stored), 1))
+    made = parent.create_dataset(name, data=np.array(stored, dtype=kind), dtype=kind)
+    if description:
+        made.attrs["description"] = description
+    return made
+
+
+def write_texts(parent: Group, name: str, texts: Iterable[str], *, description: str) -> Dataset:
+    """Create a dataset with all its texts."""
+    stored = [text.encode() for text in texts]
+    kind = text_type(max([1, *map(len, stored)]))
+    made = parent.create_dataset(name, data=np.array(stored, dtype=kind), dtype=kind)
+    made.attrs["description"] = description
+    return made
+
+
+def clip_text(text: str, width: int) -> bytes:
+    """UTF-8 of at most `width` bytes; a longer text ends with an ellipsis, without splitting a character."""
+    stored = text.encode()
+    if len(stored) <= width:
+        return stored
+    return stored[: width - 3].decode(errors="ignore").encode() + "…".encode()
+
+
+def replace_text(target: Dataset, text: str, width: int) -> None:
+    """Replace the text of a scalar of `width` bytes, truncated if necessary."""
+    target[()] = np.array(clip_text(text, width), dtype=text_type(width))
+
+
+def append(target: Dataset, values: NDArray[Any]) -> None:
+    """Add rows at the end."""
+    start = target.shape[0]
+    target.resize((start + len(values),))
+    target[start:] = values
+
+
+def append_chunks(target: Dataset, packed: Iterable[bytes], count: int, rows: int) -> None:
+    """Append `count` complete, already filtered chunks of `rows` rows each."""
+    raw, start = cast(h5py.Dataset, target).id, target.shape[0]
+    target.resize((start + count * rows,))
+    for number, data in enumerate(packed):
+        raw.write_direct_chunk((start + number * rows,), data)
+
+
+_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+_SUPERBLOCK = struct.Struct("<8s4B4QI")
+_32_BITS = 0xFFFFFFFF
+
+
+def is_let_go(path: Path) -> bool:
+    """Whether the file was closed by its writer; also True for another layout or a damaged superblock."""
+    head = _superblock(path)
+    return head is None or head[4] == 0 or lookup3(_SUPERBLOCK.pack(*head)[:-4]) != head[-1]
+
+
+MISSING = b"\xff"
+"""Value returned for every byte beyond the end: a heap of texts has no checksum, and in one of zeros HDF5 would loop
+for ever.
+"""
+
+
+class Quiet(io.RawIOBase):
+    """A file as if its writer had closed it, with the length of its superblock; missing bytes are MISSING.
+
+    Metadata have checksums, which these bytes do not pass. Uncompressed values have none: their readers must first
+    determine their end with `bench.datafile.opening`.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._file = path.open("rb")
+        self._place, self._head = 0, b""
+        self._size = path.stat().st_size
+        if (head := _superblock(path)) is not None:
+            *front, _, base, extension, end, root, _ = head
+            self._size = max(self._size, min(end, 2 * self._size + 2**24))
+            fields = _SUPERBLOCK.pack(*front, 0, base, extension, self._size, root, 0)[:-4]
+            self._head = fields + struct.pack("<I", lookup3(fields))
+
+    def readable(self) -> bool:
+        return True
+
+    def seekable(self) -> bool:
+        return True
+
+    def seek(self, offset: int, whence: int = io.SEEK_SET, /) -> int:
+        self._place = offset + (0, self._place, self._size)[whence]
+        return self._place
+
+    def tell(self) -> int:
+        return self._place
+
+    def readinto(self, buffer: "WriteableBuffer", /) -> int:
+        target = memoryview(buffer).cast("B")
+        self._file.seek(self._place)
+        # always the requested length, also beyond the end: h5py would repeat the request for ever
+        wanted = len(target)
+        found = self._file.read(wanted).ljust(wanted, MISSING)
+        covered = self._head[self._place :][:wanted]
+        target[:wanted] = covered + found[len(covered) :]
+        self._place += wanted
+        return wanted
+
+    def close(self) -> None:
+        self._file.close()
+        super().close()
+
+
+def lookup3(data: bytes) -> int:
+    """Jenkins' lookup3 hash of bytes, a multiple of 4, as used by HDF5."""
+    a = b = c = (0xDEADBEEF + len(data)) & _32_BITS
+    words = list(struct.unpack(f"<{len(data) // 4}I", data))
+    while len(words) > 3:
+        a, b, c = (a + words[0]) & _32_BITS, (b + words[1]) & _32_BITS, (c + words[2]) & _32_BITS
+        for turn in (4, 6, 8, 16, 19, 4):
+            a = ((a - c) & _32_BITS) ^ _rotated(c, turn)
+            c = (c + b) & _32_BITS
+            a, b, c = b, c, a
+        words = words[3:]
+    a, b, c = ((x + y) & _32_BITS for x, y in zip((a, b, c), [*words, 0, 0], strict=False))
+    for turn in (14, 11, 25, 16, 4, 14, 24):
+        c = ((c ^ b) - _rotated(b, turn)) & _32_BITS
+        a, b, c = b, c, a
+    return b
+
+
+def _rotated(value: int, bits: int) -> int:
+    return ((value << bits) | (value >> (32 - bits))) & _32_BITS
+
+
+def _superblock(path: Path) -> tuple[Any, ...] | None:
+    with path.open("rb") as file:
+        head = file.read(_SUPERBLOCK.size)
+    if len(head) < _SUPERBLOCK.size or not head.startswith(_SIGNATURE) or head[8] not in (2, 3):
+        return None
+    return _SUPERBLOCK.unpack(head)

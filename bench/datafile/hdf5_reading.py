@@ -1,0 +1,236 @@
+# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false
+"""Access to a file's objects through h5py; damage raises a DataFileError naming the object."""
+
+import re
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager, suppress
+from typing import Any, Protocol, Self, TypeGuard, cast
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.errors import RockbenchError
+
+
+class Attributes(Protocol):
+    """The attributes of a group or dataset."""
+
+    def __getitem__(self, name: str) -> Any: ...
+    def __setitem__(self, name: str, value: object) -> None: ...
+    def __contains__(self, name: object) -> bool: ...
+    def __iter__(self) -> Iterator[str]: ...
+    def get(self, name: str, default: object = None) -> Any: ...
+
+
+class Dataset(Protocol):
+    """An array in the file, or a scalar (shape ())."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def attrs(self) -> Attributes: ...
+    @property
+    def dtype(self) -> np.dtype[Any]: ...
+    @property
+    def shape(self) -> tuple[int, ...]: ...
+    @property
+    def nbytes(self) -> int: ...
+    @property
+    def maxshape(self) -> tuple[int | None, ...]: ...
+    @property
+    def chunks(self) -> tuple[int, ...] | None: ...
+    @property
+    def compression(self) -> str | None: ...
+    def __getitem__(self, key: object) -> Any: ...
+    def __setitem__(self, key: object, value: object) -> None: ...
+    def resize(self, size: tuple[int, ...]) -> None: ...
+    def refresh(self) -> None: ...
+
+
+class Group(Protocol):
+    """A folder in the file."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def attrs(self) -> Attributes: ...
+    def create_group(self, name: str, track_order: bool) -> "Group": ...
+    def create_dataset(self, name: str, **options: Any) -> Dataset: ...
+    def __getitem__(self, name: str) -> object: ...
+    def __setitem__(self, name: str, value: object) -> None: ...
+    def __contains__(self, name: object) -> bool: ...
+    def __iter__(self) -> Iterator[str]: ...
+
+
+class File(Group, Protocol):
+    """An open file."""
+
+    @property
+    def filename(self) -> str: ...
+    def __enter__(self) -> Self: ...
+    def __exit__(self, *error: object) -> None: ...
+    def flush(self) -> None: ...
+    def close(self) -> None: ...
+
+
+class DataFileError(RockbenchError):
+    """The file could not be written or read further; complete earlier data stay readable."""
+
+    error_code = "data_file"
+
+
+UNREADABLE = (OSError, RuntimeError, KeyError, ValueError, TypeError, IndexError, OverflowError, DataFileError)
+"""Exceptions from a damaged file: errors of HDF5, of its Python library, and of decoding."""
+
+
+def reason(error: BaseException) -> str:
+    """One line for a multi-line error of the HDF5 library: the system's message if it has one."""
+    text = str(error).strip()
+    found = re.search(r"error message = '([^']+)'", text)
+    return found.group(1) if found else text.partition("\n")[0] or type(error).__name__
+
+
+@contextmanager
+def reading(what: str) -> Generator[None]:
+    """Convert exceptions from reading a damaged file to a DataFileError naming `what`."""
+    try:
+        yield
+    except DataFileError:
+        raise
+    except UNREADABLE as error:
+        raise DataFileError(f"{what} cannot be read ({reason(error)}): the file is damaged") from error
+
+
+def dataset(parent: Group, path: str) -> Dataset:
+    """The dataset at `path` below `parent`. Raises DataFileError when there is none."""
+    return cast(Dataset, _member(parent, path, h5py.Dataset))
+
+
+def group(parent: Group, path: str) -> Group:
+    """The group at `path` below `parent`. Raises DataFileError when there is none."""
+    return cast(Group, _member(parent, path, h5py.Group))
+
+
+def members(parent: Group, lost: dict[str, str] | None = None) -> Iterator[tuple[str, "Dataset | Group | str"]]:
+    """Members of a group, by name: datasets, groups, and the target path of a soft link.
+
+    Unreadable members are added to `lost`, as reason by path; without `lost` they raise DataFileError.
+    """
+    try:
+        names = list(parent)
+    except UNREADABLE as error:
+        names = _give_up(parent.name, error, lost)
+    for name in names:
+        try:
+            found = cast(object, cast(h5py.Group, parent).get(name, getlink=True))
+            member = found.path if isinstance(found, h5py.SoftLink) else cast("Dataset | Group", parent[name])
+        except UNREADABLE as error:
+            _give_up(f"{parent.name.rstrip('/')}/{name}", error, lost)
+        else:
+            yield name, member
+
+
+def datasets(parent: Group, lost: dict[str, str] | None = None) -> Iterator[Dataset]:
+    """Every dataset below `parent`, in the order of creation; link targets once, views excluded. Unreadable members are
+    treated as by `members`.
+    """
+    for _, member in members(parent, lost):
+        if isinstance(member, h5py.Dataset):
+            if not cast(bool, member.is_virtual):
+                yield cast(Dataset, member)
+        elif not isinstance(member, str):
+            yield from datasets(cast(Group, member), lost)
+
+
+def groups(parent: Group) -> Iterator[Group]:
+    """A group and every group below it, in the order of creation."""
+    yield parent
+    for name, member in members(parent):
+        if not isinstance(member, str | h5py.Dataset):
+            yield from groups(group(parent, name))
+
+
+def names(parent: Group) -> list[str]:
+    """The names of the members of a group. Raises DataFileError when they cannot be read."""
+    with reading(parent.name):
+        return list(parent)
+
+
+def has(parent: Group, path: str) -> bool:
+    """Whether `path` exists below `parent`. Raises DataFileError when damage prevents the answer."""
+    with reading(f"{parent.name.rstrip('/')}/{path}"):
+        return path in parent
+
+
+def is_dataset(member: object) -> TypeGuard[Dataset]:
+    """Whether a member of a group is a dataset."""
+    return isinstance(member, h5py.Dataset)
+
+
+def grows(stored: Dataset) -> bool:
+    """Whether rows can be appended to a dataset."""
+    return stored.maxshape == (None,)
+
+
+def place(stored: Dataset) -> tuple[int, int] | None:
+    """Offset and size in the file [bytes] of a fixed dataset; None if it is stored in its header."""
+    raw = cast(h5py.Dataset, stored).id
+    begin = cast("int | None", raw.get_offset())
+    return None if begin is None else (begin, cast(int, raw.get_storage_size()))
+
+
+def places_of_chunks(stored: Dataset) -> dict[int, tuple[int, int]]:
+    """Offset and size in the file [bytes] of every written chunk, by its first row, as far as the index can be read.
+    All in one pass: HDF5 searches from the first chunk for each single lookup.
+    """
+    found: dict[int, tuple[int, int]] = {}
+
+    def note(chunk: Any) -> None:
+        found[chunk.chunk_offset[0]] = (chunk.byte_offset, chunk.size)
+
+    with suppress(*UNREADABLE):
+        cast(Any, cast(h5py.Dataset, stored).id).chunk_iter(note)
+    return found
+
+
+def read(stored: Dataset, key: object = ()) -> Any:
+    """Values of a dataset, or the value of a scalar. Raises DataFileError when they cannot be read."""
+    with reading(stored.name):
+        return stored[key]
+
+
+def attribute(owner: Group | Dataset, name: str) -> Any:
+    """An attribute. Raises DataFileError when there is none, or it cannot be read."""
+    with reading(f"the attribute {name} of {owner.name}"):
+        return owner.attrs[name]
+
+
+def read_text(parent: Group, path: str) -> str:
+    """A scalar text."""
+    stored = dataset(parent, path)
+    with reading(stored.name):
+        return bytes(stored[()]).decode()
+
+
+def read_texts(stored: NDArray[Any]) -> list[str]:
+    """Decode the fixed-length strings of a dataset."""
+    return [bytes(text).decode() for text in stored]
+
+
+def _give_up(path: str, error: BaseException, lost: dict[str, str] | None) -> list[str]:
+    told = f"{path} cannot be read ({reason(error)})"
+    if lost is None:
+        raise DataFileError(f"{told}: the file is damaged") from error
+    lost[path] = told
+    return []
+
+
+def _member(parent: Group, path: str, kind: type) -> object:
+    name = f"{parent.name.rstrip('/')}/{path.lstrip('/')}"
+    with reading(name):
+        there = path in parent
+        found = parent[path] if there else None
+    if not isinstance(found, kind):
+        raise DataFileError(f"the file has no {kind.__name__.lower()} {name}: it is damaged")
+    return found

@@ -1,0 +1,157 @@
+"""The skeleton of the file: everything is created before the first sample, because nothing can be added with concurrent
+readers. `docs/file-format.md` describes the layout for users.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime
+from enum import StrEnum
+from importlib.metadata import PackageNotFoundError, version
+
+import numpy as np
+
+from bench.datafile import hdf5, tables
+from bench.datafile.checksums import Checksums
+from bench.datafile.declared import COUNTED, FIXED_ENTRIES, FIXED_GROUPS, FIXED_INSTRUMENTS, TABLES
+from bench.datafile.fields import Growing, Rows, fields_of
+from bench.datafile.opening import FORMAT, FORMAT_VERSION, WORDING
+from bench.datafile.samples import Samples, chunk_of, companions, create_plot
+from bench.datafile.tables import Table
+from drivers.rig import Channel
+from sim.errors import InvalidInput
+from sim.parameters import Parameters
+
+STATUS_WIDTH, TIME_WIDTH, SUMMARY_WIDTH = 16, 40, 4096
+
+
+class Status(StrEnum):
+    """Status of the campaign."""
+
+    RUNNING = "running"
+    COMPLETED = "completed"
+    STOPPED = "stopped"
+    ABORTED = "aborted"
+    HALTED = "halted"
+    FAILED = "failed"
+    INTERRUPTED = "interrupted"
+
+
+@dataclass(frozen=True)
+class Skeleton:
+    """Planned contents of the file; checked before its creation."""
+
+    title: str
+    channels: Sequence[Channel]
+    sample_rate: float
+    point_type: type[Parameters]
+    metadata: Mapping[str, str]
+    tables: Mapping[str, Table]
+
+    def check(self) -> None:
+        """Raise InvalidInput for contents that the file cannot store."""
+        if not self.channels:
+            raise InvalidInput("channels", 0, "a data file needs at least one")
+        if not self.sample_rate > 0.0:
+            raise InvalidInput("sample_rate", self.sample_rate, "it must be positive samples per second")
+        names = [channel.name for channel in self.channels]
+        _check_names("channel", names, (*FIXED_INSTRUMENTS, *(each for name in names for each in companions(name))))
+        _check_names("metadata entry", list(self.metadata), ())
+        _check_names("table", list(self.tables), (*FIXED_GROUPS, *FIXED_ENTRIES))
+        for name, table in self.tables.items():
+            _check_names(f"column of table {name}", list(table), ())
+            tables.check(name, table)
+        fields_of(self.point_type)
+
+
+@dataclass(frozen=True)
+class Parts:
+    """The growing or changing parts of a new file."""
+
+    samples: Samples
+    rows: Mapping[str, Rows]
+    grown: Sequence[Growing]
+    complete: hdf5.Dataset
+    status: hdf5.Dataset
+    summary: hdf5.Dataset
+    end_time: hdf5.Dataset
+    checksums: Checksums
+
+    def reopened(self, file: hdf5.File) -> "Parts":
+        """Use the same groups and datasets in the reopened file."""
+        for each in self.grown:
+            each.reopen(file)
+        self.checksums.reopen(hdf5.group(file, "entry"))
+        ends = {name: hdf5.dataset(file, f"entry/{name}") for name in ("complete", "status", "summary", "end_time")}
+        return replace(self, **ends)
+
+
+def build(file: hdf5.File, skeleton: Skeleton) -> Parts:
+    """Create every group and dataset of a checked skeleton."""
+    file.attrs["NX_class"], file.attrs["default"] = "NXroot", "entry"
+    file.attrs["format"], file.attrs["format_version"] = FORMAT, FORMAT_VERSION
+    file.attrs["wording"] = WORDING
+    entry = hdf5.create_group(file, "entry", "NXentry")
+    entry.attrs["default"] = "data"
+    hdf5.write_text(entry, "title", skeleton.title)
+    hdf5.write_text(entry, "start_time", now(), description="wall clock at the creation of this file, ISO 8601")
+    hdf5.write_text(entry, "program_name", "rocking-bench").attrs["version"] = software_version()
+
+    metadata = hdf5.create_group(entry, "metadata", "NXcollection")
+    for name, text in skeleton.metadata.items():
+        hdf5.write_text(metadata, name, text)
+    if operator := skeleton.metadata.get("operator"):
+        hdf5.write_text(hdf5.create_group(entry, "user", "NXuser"), "name", operator)
+    if notes := skeleton.metadata.get("notes"):
+        hdf5.write_text(hdf5.create_group(entry, "notes", "NXnote"), "data", notes)
+    for name, table in skeleton.tables.items():
+        tables.write(entry, name, table)
+
+    instrument = hdf5.create_group(entry, "instrument", "NXinstrument")
+    hdf5.write_numbers(
+        instrument, "sample_rate", skeleton.sample_rate, unit="Hz", description="samples per second of every channel"
+    )
+    time = create_plot(entry, skeleton.channels, chunk_of(skeleton.sample_rate))
+    samples = Samples(instrument, skeleton.channels, skeleton.sample_rate, time)
+    rows = dict[str, Rows]()
+    for path, fields in {**TABLES, "points": fields_of(skeleton.point_type)}.items():
+        folder, _, name = path.rpartition("/")
+        rows[name] = Rows(instrument if folder else entry, name, fields)
+    replaced = create_ends(entry)
+    grown = [*samples.grown, *(each for table in rows.values() for each in table.grown)]
+    checksums = Checksums(entry, [*(each.path for each in grown), *(each.name for each in replaced)])
+    return Parts(samples, rows, grown, *replaced, checksums)
+
+
+def create_ends(entry: hdf5.Group) -> tuple[hdf5.Dataset, hdf5.Dataset, hdf5.Dataset, hdf5.Dataset]:
+    """`complete`, `status`, `summary` and `end_time`, with their initial values."""
+    return (
+        hdf5.write_numbers(
+            entry, "complete", np.zeros(len(COUNTED), dtype=np.int64), unit="1", description=f"rows of {COUNTED}"
+        ),
+        hdf5.write_text(entry, "status", Status.RUNNING, width=STATUS_WIDTH),
+        hdf5.write_text(entry, "summary", "", width=SUMMARY_WIDTH, description="reason for the end of the campaign"),
+        hdf5.write_text(
+            entry, "end_time", "", width=TIME_WIDTH, description="wall clock at its end, ISO 8601; empty while running"
+        ),
+    )
+
+
+def now() -> str:
+    """The wall clock as ISO 8601 with the zone."""
+    return datetime.now().astimezone().isoformat(timespec="milliseconds")
+
+
+def software_version() -> str:
+    """The installed version of this software."""
+    try:
+        return version("rocking-bench")
+    except PackageNotFoundError:
+        return "unknown"
+
+
+def _check_names(item: str, names: Sequence[str], taken: Sequence[str]) -> None:
+    for name in names:
+        if not name or "/" in name or "\0" in name or name.strip(".") == "":
+            raise InvalidInput(item, name, "a name in the file must not be empty, be only dots, or contain '/'")
+        if name in taken or names.count(name) > 1:
+            raise InvalidInput(item, name, "this name is already used in the file")

@@ -1,0 +1,191 @@
+"""Opening of a data file: checks of kind, version and completeness.
+
+Files of wording 1 have some data only in the sentences of their journal, from which `columns_from` reads them.
+"""
+
+import re
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from bench.datafile import hdf5
+from bench.datafile.declared import COUNTED, part_of
+from bench.datafile.hdf5 import is_let_go
+from bench.datafile.hdf5_reading import UNREADABLE, DataFileError, reason
+from bench.datafile.structure import check_attributes, check_structure
+from bench.events import LimitExceeded, OperatorAnswered, StateChanged, Warned
+from sim.errors import CauseCode, InvalidInput
+
+
+def intact_rows(stored: hdf5.Dataset, size: int) -> int:
+    """Number of rows before the first chunk that is lost or not entirely in the first `size` bytes of the file."""
+    length, chunk = stored.shape[0], (stored.chunks or (1,))[0]
+    places = hdf5.places_of_chunks(stored)
+    for start in range(0, length, chunk):
+        place = places.get(start)
+        if place is None or place[0] + place[1] > size:
+            return start
+    return length
+
+
+def is_within(stored: hdf5.Dataset, size: int) -> bool:
+    """Whether a fixed dataset is entirely in the first `size` bytes of the file."""
+    place = hdf5.place(stored)
+    return place is None or place[0] + place[1] <= size
+
+
+def check_whole(entry: hdf5.Group, counted: Mapping[str, int], size: int) -> None:
+    """Read all metadata, and locate the counted rows.
+
+    Raises HDF5's exceptions for damage, and DataFileError for rows beyond `size` bytes.
+    """
+    for group in hdf5.groups(entry):
+        for name in group.attrs:
+            _ = group.attrs[name]
+    for stored in hdf5.datasets(entry):
+        for name in stored.attrs:
+            _ = stored.attrs[name]
+        if hdf5.grows(stored):
+            whole = intact_rows(stored, size) >= min(counted[part_of(stored.name)], stored.shape[0])
+        else:
+            whole = is_within(stored, size)
+        if not whole:
+            raise DataFileError(f"{stored.name} reaches beyond the end of the file: it is truncated")
+
+
+FORMAT, FORMAT_VERSION = "rocking-bench record", 2
+"""Format of the file of a campaign."""
+
+WORDING = 4
+"""Version of the sentences in journal and results; replay compares them with those of a file of the same version."""
+
+ANALYSIS, ANALYSIS_VERSION = "rocking-bench analysis", 1
+"""Format of the file of a re-analysis, stored next to that of its campaign."""
+
+_VERSIONS = {FORMAT: FORMAT_VERSION, ANALYSIS: ANALYSIS_VERSION}
+_ATTEMPTS, _PAUSE = 3, 0.1
+"""Attempts to open, and the pause between them [s]: a read may coincide with a write."""
+
+_HINT = "`rockbench file recover` restores the readable part"
+
+
+def open_file(path: Path, *, judging: bool = False, kinds: tuple[str, ...] = (FORMAT,)) -> hdf5.File:
+    """Open a file of one of these kinds, see `bench.datafile.reader.open_datafile`."""
+    if path.is_dir():
+        raise InvalidInput("record", str(path), "it is a directory; name the file in it")
+    if not path.is_file():
+        raise InvalidInput("record", str(path), "there is no such file")
+    file = _opened(path, judging)
+    try:
+        _check_format(path, file, kinds)
+        check_structure(file, path)
+    except BaseException:
+        file.close()
+        raise
+    return file
+
+
+def _opened(path: Path, judging: bool) -> hdf5.File:
+    try:
+        if judging:
+            return hdf5.open_to_judge(path)
+        if not is_let_go(path):
+            _rehearse(path)
+        return hdf5.open_to_read(path)
+    except PermissionError as error:
+        raise InvalidInput("record", str(path), f"it cannot be opened ({error.strerror})") from error
+    except UNREADABLE as error:
+        if not hdf5.is_hdf5(path):
+            raise InvalidInput("record", str(path), "it is not an HDF5 file") from error
+        told = f"{path} cannot be read ({reason(error)}): another program has locked it, or it is damaged; {_HINT}"
+        raise DataFileError(told) from error
+
+
+def _rehearse(path: Path) -> None:
+    """Raise the exceptions of a damaged file; in single-writer mode HDF5 would try to read it for hours."""
+    for left in reversed(range(_ATTEMPTS)):
+        try:
+            with hdf5.open_to_judge(path) as file:
+                check_attributes(file, "/")
+                if hdf5.attribute(file, "format") == FORMAT:
+                    check_structure(file, path)
+                    entry = hdf5.group(file, "entry")
+                    counted = counts(entry)
+                    check_whole(entry, counted, path.stat().st_size)
+                return
+        except UNREADABLE:
+            if not left:
+                raise
+        time.sleep(_PAUSE)
+
+
+def counts(entry: hdf5.Group) -> Mapping[str, int]:
+    """Number of complete rows of every part; older files have fewer parts, newer ones may have more."""
+    stored = [max(0, count) for count in hdf5.read(hdf5.dataset(entry, "complete"), slice(None)).tolist()]
+    return dict(zip(COUNTED, [*stored, *[0] * (len(COUNTED) - len(stored))], strict=False))
+
+
+def _check_format(path: Path, file: hdf5.File, kinds: tuple[str, ...]) -> None:
+    try:
+        check_attributes(file, "/")
+        found = {name: file.attrs[name] for name in ("format", "format_version") if name in file.attrs}
+    except UNREADABLE as error:
+        told = f"{path} is damaged: the attributes of / cannot be read ({reason(error)}); {_HINT}"
+        raise DataFileError(told) from error
+    kind = str(found.get("format"))
+    if kind not in _VERSIONS or "format_version" not in found:
+        raise InvalidInput("record", str(path), "it is an HDF5 file but not a data file of rocking-bench")
+    try:
+        version = int(found["format_version"])
+    except (TypeError, ValueError):
+        version = 0
+    if version < 1:
+        told = f"its format version {found['format_version']!r} is invalid: the file is damaged"
+        raise InvalidInput("record", str(path), told)
+    if version > _VERSIONS[kind]:
+        raise InvalidInput("record", str(path), f"its format version {version} is newer: update this software")
+    if kind not in kinds:
+        of = hdf5.read_text(file, "entry/original/file")
+        raise InvalidInput("record", str(path), f"it is a re-analysis of {of}; name the file of the campaign")
+
+
+Columns = dict[str, Any]
+
+_STATE = re.compile(r"^[^:]+ -> (?P<after>[^:]+): (?P<reason>.*)$", re.DOTALL)
+_REQUESTED = re.compile(r"^(stop|abort|halt) was asked for")
+_OPENED = re.compile(r"^(.+?) opened(?:;|$)")
+_ANSWER = re.compile(r"\(answered by (.+)\)$")
+_TIMING = ("delay of a block of samples", "difference of the clocks")
+_TWIN_BEHIND = "the twin did not keep up, and is off until the rig is armed again"
+
+
+def columns_from(kind: str, text: str) -> Columns:
+    """The columns of an entry of the journal that replay needs, under the names of later files."""
+    read = _READERS.get(kind)
+    return {} if read is None else read(text)
+
+
+def _state_changed(text: str) -> Columns:
+    found = _STATE.search(text)
+    if found is None:
+        return {}
+    columns: Columns = found.groupdict()
+    if requested := _REQUESTED.search(columns["reason"]):
+        return columns | {"code": CauseCode.REQUEST, "subject": requested.group(1)}
+    if columns["after"] == "halted" and (opened := _OPENED.search(columns["reason"])):
+        return columns | {"code": CauseCode.SAFETY_INPUT, "subject": opened.group(1)}
+    return columns
+
+
+def _answered(text: str) -> Columns:
+    found = _ANSWER.search(text)
+    return {"by": found.group(1) if found else "operator"}
+
+
+_READERS: dict[str, Callable[[str], Columns]] = {
+    StateChanged.__name__: _state_changed,
+    OperatorAnswered.__name__: _answered,
+    LimitExceeded.__name__: lambda text: {"timing": text.startswith(_TIMING)},
+    Warned.__name__: lambda text: {"realtime": text.startswith(_TWIN_BEHIND)},
+}

@@ -1,0 +1,234 @@
+"""Reader of the file of a campaign: finished, being written, or left by a killed writer."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from bench.datafile import checksums, hdf5, tables
+from bench.datafile.checksums import SMALL, Integrity, integrity
+from bench.datafile.declared import EVENT_TABLES, FINDING_TABLES, FIXED_GROUPS, TABLES, last_findings, read_fits
+from bench.datafile.fields import Field, decode, field_of
+from bench.datafile.hdf5_reading import UNREADABLE, DataFileError, reading, reason
+from bench.datafile.opening import open_file
+from bench.datafile.samples import PLOT as PLOT
+from bench.datafile.samples import TIME
+from bench.datafile.series import SampleReader
+from bench.datafile.tables import Column, as_rows
+from bench.events import Event, FitFinished, SensorsAligned
+from drivers.rig import Alignment
+from sim.identified import Identified
+from sim.sweep import Done
+
+
+@dataclass(frozen=True)
+class JournalEntry:
+    """An entry of the journal: bench time [s], the name of the event, and one line of text."""
+
+    time: float
+    kind: str
+    text: str
+
+
+def open_datafile(path: Path, *, judging: bool = False) -> "DataFile":
+    """Open the file of a campaign; use it in a `with` statement.
+
+    A file being written can be followed, except when `judging`: then its state on the disk is read, and damage raises
+    an error at once. Raises InvalidInput when the file does not exist or is of another kind, DataFileError when it
+    cannot be read.
+    """
+    file = open_file(path, judging=judging)
+    try:
+        return DataFile(file)
+    except BaseException as error:
+        file.close()
+        if isinstance(error, UNREADABLE):
+            told = f"{path} is damaged: {reason(error)}; `rockbench file recover` restores the readable part"
+            raise DataFileError(told) from error
+        raise
+
+
+class DataFile(SampleReader):
+    """An open data file. Everything is read on access; `refresh` updates the view of a file being written."""
+
+    def __init__(self, file: hdf5.File) -> None:
+        super().__init__(hdf5.group(file, "entry"))
+        self._file = file
+        self._size = 0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file; may be called repeatedly."""
+        self._file.close()
+
+    def refresh(self) -> None:
+        """Include data added by the writer since. Raises DataFileError where the file was truncated meanwhile."""
+        self._check_size()
+        self._count_again()
+        for path in self._growing:
+            with reading(path):
+                hdf5.dataset(self._entry, path).refresh()
+
+    def _check_size(self) -> None:
+        # HDF5 would search for what is cut off
+        with reading(str(self._file.filename)):
+            size = Path(self._file.filename).stat().st_size
+        if size < self._size:
+            raise DataFileError(f"{self._file.filename} was truncated from {self._size} to {size} bytes meanwhile")
+        self._size = size
+
+    @property
+    def format_version(self) -> int:
+        """Version of the file's layout."""
+        return int(hdf5.attribute(self._file, "format_version"))
+
+    @property
+    def wording(self) -> int:
+        """Version of the journal's sentences, see `bench.datafile.opening.WORDING`."""
+        return int(hdf5.attribute(self._file, "wording")) if "wording" in self._file.attrs else 1
+
+    @property
+    def file(self) -> hdf5.File:
+        """The open HDF5 file."""
+        return self._file
+
+    @property
+    def recoveries(self) -> list[str]:
+        """Notes of the recovery from another file, one line each; usually none."""
+        if not hdf5.has(self._entry, "recovery/description"):
+            return []
+        return hdf5.read_text(self._entry, "recovery/description").splitlines()
+
+    @property
+    def checksums(self) -> dict[str, tuple[str, str]]:
+        """SHA-256 of values and attributes by dataset; those of values are empty if the file was not closed."""
+        return checksums.read(self._entry) if hdf5.has(self._entry, checksums.GROUP) else {}
+
+    def integrity(self, largest: int | None = SMALL, done: Done = lambda _done, _all: None) -> Integrity:
+        """Changed datasets: `record.integrity().failing`, one line by path; `str` of it is one line.
+
+        Reads datasets of at most `largest` bytes, or all if None. `done` counts them.
+        """
+        return integrity(self._entry, largest, done)
+
+    @property
+    def status(self) -> str:
+        """Status of the campaign; "running" while it is written, and permanently when its writer was killed."""
+        return hdf5.read_text(self._entry, "status")
+
+    @property
+    def summary(self) -> str:
+        """Reason of the campaign's end."""
+        return hdf5.read_text(self._entry, "summary")
+
+    @property
+    def title(self) -> str:
+        """Name of the campaign."""
+        return hdf5.read_text(self._entry, "title")
+
+    @property
+    def start_time(self) -> str:
+        """Time of the file's creation, ISO 8601 with zone."""
+        return hdf5.read_text(self._entry, "start_time")
+
+    @property
+    def end_time(self) -> str:
+        """Time of its closing, ISO 8601 with zone; empty when it was not closed."""
+        return hdf5.read_text(self._entry, "end_time")
+
+    @property
+    def software(self) -> str:
+        """Name and version of the software that wrote the file."""
+        name = hdf5.dataset(self._entry, "program_name")
+        return f"{hdf5.read_text(self._entry, 'program_name')} {hdf5.attribute(name, 'version')}"
+
+    @cached_property
+    def metadata(self) -> dict[str, str]:
+        """Metadata stored by the recorder, as text by name."""
+        group = hdf5.group(self._entry, "metadata")
+        return {name: hdf5.read_text(group, name) for name in hdf5.names(group)}
+
+    @property
+    def events(self) -> list[JournalEntry]:
+        """The journal."""
+        return [JournalEntry(**row) for row in self._rows("events")]
+
+    @property
+    def points(self) -> list[dict[str, Any]]:
+        """The results, one dict per point with the fields of its type; enumerations are texts, absent values None."""
+        return self._rows("points")
+
+    @property
+    def results(self) -> dict[str, Column]:
+        """The results as a table: columns with units, rows as in `points`; missing values in their stored form."""
+        group, whole = hdf5.group(self._entry, "points"), len(self.points)
+        return {name: Column(c.values[:whole], c.unit, c.description) for name, c in tables.read(group).items()}
+
+    def columns_of(self, event: type[Event]) -> dict[str, list[Any]]:
+        """Recorded events of a kind with a table, one list per column, in the order of declaration.
+
+        An absent value is None, an unknown one NaN. Empty for an older file without this table.
+        """
+        return {field.name: values for field, values in self.growing(EVENT_TABLES[event].path).items()}
+
+    def rows_of(self, event: type[Event]) -> list[dict[str, Any]]:
+        """The columns of `columns_of` as one dict per row."""
+        return as_rows(self.columns_of(event))
+
+    def growing(self, path: str) -> dict[Field, list[Any]]:
+        """The complete rows of the table at `path` below /entry, by column as the file declares it."""
+        if not hdf5.has(self._entry, path):
+            return {}
+        group = hdf5.group(self._entry, path)
+        stored = {name: hdf5.dataset(group, name) for name in hdf5.names(group)}
+        columns = {field_of(name, each): decode(each) for name, each in stored.items()}
+        whole = min([self._complete(path.rpartition("/")[2]), *(len(values) for values in columns.values())])
+        return {field: values[:whole] for field, values in columns.items()}
+
+    @property
+    def fits(self) -> list[FitFinished]:
+        """The published fits; none in a file of an older version without them."""
+        return read_fits(self._entry, self._complete("fits")) if hdf5.has(self._entry, "fits") else []
+
+    @property
+    def identified(self) -> Identified | None:
+        """The last identified properties of the specimen; None where the run identified none."""
+        return last_findings(*(self._rows(name) for name in FINDING_TABLES))
+
+    @property
+    def alignments(self) -> dict[int, tuple[Alignment, ...]]:
+        """Alignments of sensors with free clocks to the sample clock, by run; empty without such sensors."""
+        found: dict[int, list[Alignment]] = {}
+        for row in self.rows_of(SensorsAligned):
+            found.setdefault(row.pop("run"), []).append(Alignment(**row))
+        return {run: tuple(found[run]) for run in sorted(found)}
+
+    @cached_property
+    def tables(self) -> dict[str, dict[str, Column]]:
+        """The tables stored before the run, such as "prediction"."""
+        return {
+            name: tables.read(hdf5.group(self._entry, name))
+            for name, member in hdf5.members(self._entry)
+            if name not in FIXED_GROUPS and not hdf5.is_dataset(member)
+        }
+
+    @cached_property
+    def _growing(self) -> list[str]:
+        """Paths of the datasets that change during recording."""
+        paths = [f"instrument/{channel.name}/counts" for channel in self.channels]
+        folders = [*TABLES, "points"]
+        folders = [folder for folder in folders if hdf5.has(self._entry, folder)]
+        paths += [f"{folder}/{name}" for folder in folders for name in hdf5.names(hdf5.group(self._entry, folder))]
+        paths += [f"{PLOT}/{TIME}"] if self.format_version > 1 else []
+        return [*paths, "instrument/drive/voltage", "status", "summary", "end_time"]
+
+    def _rows(self, path: str) -> list[dict[str, Any]]:
+        return as_rows({field.name: values for field, values in self.growing(path).items()})

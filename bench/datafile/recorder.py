@@ -1,0 +1,232 @@
+"""The recorder, a subscriber that writes a campaign to its file in a thread: a slow disk never delays the drive."""
+
+import queue
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.datafile.hdf5_reading import DataFileError, reason
+from bench.datafile.layout import Skeleton, Status
+from bench.datafile.tables import Table
+from bench.datafile.writer import DataFileWriter
+from bench.events import Acquired, Event, PointFinished, Progress, StateChanged
+from drivers.rig import Channel, Counts
+from sim.errors import InvalidInput
+from sim.parameters import Parameters
+
+PERIOD = 0.5
+"""Longest time between two writes of waiting data [s]; the length of a chunk of samples in real time."""
+
+PAUSE = 0.05
+"""Shortest time between two writes of events [s], so that a slow disk writes many at once."""
+
+BATCH = 100
+"""Number of chunks written at once when samples arrive faster than real time."""
+
+BACKLOG = 4096
+"""Largest number of events that wait for the disk: minutes in real time. A longer backlog ends the run."""
+
+PATIENCE = 60.0
+"""Longest wait for the disk with the bench at rest [s]: at the end, and in `sync`."""
+
+
+@dataclass(frozen=True)
+class _Block:
+    time: float
+    run: int
+    first: int
+    counts: Counts
+    drive: NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class _Sync:
+    done: threading.Event
+
+
+@dataclass(frozen=True)
+class _End:
+    status: Status
+    summary: str
+
+
+class Recorder:
+    """Writes a new HDF5 file; called with each event of the engine, and closed at the end.
+
+    Samples are on the disk within a second, journalled events almost at once. An error of the disk is raised as
+    DataFileError by the next call, once; later data are not recorded, and earlier data stay
+    readable. A disk that does not keep up is such an error: a call waits at most `hold_up` seconds, non-zero only in
+    virtual time.
+
+    `metadata` is stored as texts under /entry/metadata, `tables` (such as {"prediction": ...}) under /entry.
+    Raises InvalidInput, without creating a file, when `path` exists or cannot be created, or a name or table is
+    invalid.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        *,
+        channels: Sequence[Channel],
+        sample_rate: float,
+        point_type: type[Parameters],
+        metadata: Mapping[str, str],
+        tables: Mapping[str, Table] | None = None,
+        title: str = "rocking-bench campaign",
+        hold_up: float = 0.0,
+    ) -> None:
+        self.path = path
+        self._point_type = point_type
+        self._n_channels = len(channels)
+        self._writer = DataFileWriter(
+            path, Skeleton(title, tuple(channels), sample_rate, point_type, metadata, tables or {})
+        )
+        self._queue: queue.Queue[_Block | Event | _Sync] = queue.Queue(BACKLOG)
+        self._end: _End | None = None
+        self._hold_up = hold_up
+        self._failure: DataFileError | None = None
+        self._behind: DataFileError | None = None
+        self._told = False
+        self._closed = False
+        self._committed, self._pressing, self._partial = time.monotonic(), False, False
+        # a daemon thread: a program that ends with an error does not wait for its recorder; the file remains readable
+        self._thread = threading.Thread(target=self._work, name="recorder", daemon=True)
+        self._thread.start()
+
+    def __call__(self, event: Event) -> None:
+        """Queue an event. Raises DataFileError when it cannot be recorded or an earlier one could not be written."""
+        if self._closed:
+            raise DataFileError(f"{self.path} is closed: {type(event).__name__} at {event.time:.3f} s was not recorded")
+        self._raise_failure()
+        if self._failure is not None or self._behind is not None:
+            return
+        if isinstance(event, Acquired):
+            self._offer(self._checked(event))
+        elif isinstance(event, PointFinished) and not isinstance(event.point, self._point_type):
+            raise DataFileError(
+                f"point of type {type(event.point).__name__} was not recorded: {self.path} is for"
+                f" {self._point_type.__name__}"
+            )
+        elif not isinstance(event, Progress):
+            self._offer(event)
+
+    def sync(self) -> None:
+        """Wait until all queued events are in the file. Raises DataFileError, once, when they could not be written."""
+        if not self._closed:
+            marker = _Sync(threading.Event())
+            if not (self._put(marker, PATIENCE) and marker.done.wait(PATIENCE)):
+                self._fall_behind(f"has not answered for {PATIENCE:g} s")
+        self._raise_failure()
+
+    def close(self, status: Status | str, summary: str = "") -> None:
+        """Write pending data, status and end time, and close the file; closing again has no effect.
+
+        Raises InvalidInput for an unknown status, DataFileError when the end could not be written. An unresponsive disk
+        does not block the end of the program.
+        """
+        ends = [str(end) for end in Status if end not in (Status.RUNNING, Status.INTERRUPTED)]
+        if status not in ends:
+            raise InvalidInput("status of the record", str(status), "one of " + ", ".join(ends))
+        if self._closed:
+            return
+        self._closed = True
+        self._end = _End(Status(status), summary)
+        # wakes a waiting thread; a busy one checks for the end itself
+        self._put(_Sync(threading.Event()), 0.0)
+        self._thread.join(PATIENCE)
+        if self._thread.is_alive():
+            self._fall_behind(f"has not answered for {PATIENCE:g} s")
+        self._raise_failure()
+
+    def _offer(self, item: _Block | Event) -> None:
+        if not self._put(item, self._hold_up):
+            self._fall_behind(f"is {BACKLOG} events behind")
+            self._raise_failure()
+
+    def _put(self, item: _Block | Event | _Sync, patience: float) -> bool:
+        """Queue an item if there is room within `patience` seconds."""
+        try:
+            self._queue.put(item, block=patience > 0.0, timeout=patience)
+        except queue.Full:
+            return False
+        return True
+
+    def _fall_behind(self, how: str) -> None:
+        """Record the failure of a slow disk: pending data are still written if it recovers, new data are ignored."""
+        told = f"{self.path} is not recorded further, its disk {how}: earlier data are readable; check the disk"
+        self._behind = self._behind or DataFileError(told)
+
+    def _checked(self, event: Acquired) -> _Block:
+        """The block's own copy of the arrays, transposed: a driver may reuse its buffer."""
+        counts, n = event.block.counts, len(event.block)
+        if counts.shape != (n, self._n_channels) or event.drive.shape != (n,):
+            raise DataFileError(
+                f"block at sample {event.block.first} has inputs {counts.shape} and drive {event.drive.shape};"
+                f" expected ({n}, {self._n_channels}) and ({n},)"
+            )
+        copy = np.array(counts.T, order="C")
+        return _Block(event.time, event.run, event.block.first, copy, event.drive.astype(np.float32))
+
+    def _raise_failure(self) -> None:
+        """Raise a failure only once: the events of bringing the bench to rest must not raise it again."""
+        failure = self._failure or self._behind
+        if failure is not None and not self._told:
+            self._told = True
+            raise failure
+
+    def _work(self) -> None:
+        """Thread function: record until the end; after a failure, only drain the queue."""
+        while self._end is None or not self._queue.empty():
+            try:
+                item = self._queue.get(timeout=PAUSE if self._pressing else PERIOD)
+            except queue.Empty:
+                item = None
+            self._attempt(partial(self._take, item))
+            if isinstance(item, _Sync):
+                item.done.set()
+        self._attempt(partial(self._writer.finish, self._end.status, self._end.summary))
+
+    def _attempt(self, work: Callable[[], None]) -> None:
+        if self._failure is not None:
+            return
+        try:
+            work()
+        except Exception as error:
+            # any failure must end the run: an unrecorded campaign is worthless
+            failure = DataFileError(
+                f"{self.path} cannot be written further ({reason(error)}): check the disk, start a new run"
+            )
+            failure.__cause__ = error
+            self._failure = failure
+            # what failed may fail again
+            with suppress(Exception):
+                self._writer.abandon()
+
+    def _take(self, item: _Block | Event | _Sync | None) -> None:
+        match item:
+            case _Block():
+                self._writer.add_block(item.time, item.run, item.first, item.counts, item.drive)
+            case Event():
+                self._writer.add_event(item)
+                self._pressing |= item.journalled
+                self._partial |= isinstance(item, StateChanged)
+            case _Sync():
+                self._commit(partial=True)
+            case None:
+                # no events for a while: flush the rows that wait for a full chunk
+                self._commit(partial=self._partial or not self._pressing)
+        waited, chunks = time.monotonic() - self._committed, self._writer.full_chunks
+        at_once = self._pressing and waited >= PAUSE and self._queue.empty()
+        if at_once or chunks >= BATCH or (chunks and waited >= 0.75 * PERIOD) or waited >= PERIOD:
+            self._commit(partial=self._partial or not (chunks or at_once))
+
+    def _commit(self, *, partial: bool) -> None:
+        self._writer.commit(partial=partial)
+        self._committed, self._pressing, self._partial = time.monotonic(), False, False

@@ -1,0 +1,244 @@
+"""Recovery of a clean file after a killed writer, a full disk or truncation, or from an old version.
+
+The original is only read. The copy has the intact data in the present layout, with checksums.
+"""
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.datafile import hdf5
+from bench.datafile.checksums import GROUP as CHECKSUMS
+from bench.datafile.checksums import Checksums, Integrity
+from bench.datafile.copying import Copying, cut, drop_channels, renew_drive, renew_tables
+from bench.datafile.declared import COUNTED, ENTRY_TABLES, FIT_VIEWS, add_fit_views, part_of, whole_fits
+from bench.datafile.fields import field_of
+from bench.datafile.hdf5_reading import UNREADABLE, DataFileError, reason
+from bench.datafile.layout import STATUS_WIDTH, SUMMARY_WIDTH, TIME_WIDTH, Status, create_ends, now
+from bench.datafile.opening import FORMAT, FORMAT_VERSION
+from bench.datafile.reader import DataFile, open_datafile
+from bench.datafile.samples import Timeline, chunk_of, create_plot, read_channels
+from bench.datafile.writer import FileSync, journal_path, read_journal
+from bench.progress import Progress, counting, silent
+from bench.unfinished import unfinished
+from sim.errors import InvalidInput
+
+Row = Mapping[str, Any]
+
+
+def add_lost_events(entry: hdf5.Group, lines: Sequence[Row]) -> tuple[int, int]:
+    """Append the journal's additional rows to the tables of events and points; returns the number of each.
+
+    Points are checked separately, because they can be missing without their event. Raises DataFileError, without
+    appending, for the journal of another file, which has a different beginning.
+    """
+    points = [line["point"] for line in lines if "point" in line]
+    events = _beyond(hdf5.group(entry, "events"), lines, ("time", "kind"))
+    results = _beyond(hdf5.group(entry, "points"), points)
+    columns: list[tuple[hdf5.Dataset, NDArray[Any]]] = []
+    for kind, table in ENTRY_TABLES.items():
+        rows = [line["columns"] for line in lines if line["kind"] == kind.__name__ and "columns" in line]
+        if rows and hdf5.has(entry, table.path):
+            columns += _beyond(hdf5.group(entry, table.path), rows)
+    for stored, values in (*events, *results, *columns):
+        hdf5.append(stored, values)
+    return max((len(values) for _, values in events), default=0), max((len(values) for _, values in results), default=0)
+
+
+def _beyond(
+    table: hdf5.Group, rows: Sequence[Row], compared: Sequence[str] | None = None
+) -> list[tuple[hdf5.Dataset, NDArray[Any]]]:
+    """Every dataset of a table with the rows to add; the preceding rows must equal those of the table."""
+    new: list[tuple[hdf5.Dataset, NDArray[Any]]] = []
+    for name in table:
+        stored = hdf5.dataset(table, name)
+        known, field = hdf5.read(stored, slice(None)), field_of(name, stored)
+        try:
+            values = np.array([field.encode(row.get(name)) for row in rows], dtype=field.dtype)
+        except UNREADABLE as error:
+            raise DataFileError(f"the journal has no {name} for {table.name}: it is damaged") from error
+        if compared is None or name in compared:
+            told = values[: len(known)]
+            # JSON has only finite numbers
+            same = (told == known[: len(told)]) | ((told != told) if told.dtype.kind == "f" else False)
+            if not np.all(same):
+                raise DataFileError(f"journal and file differ in {stored.name}: it is the journal of another file")
+        new.append((stored, values[len(known) :]))
+    return new
+
+
+NOTE = "recovery"
+
+
+@dataclass(frozen=True)
+class Recovery:
+    """Result: the new file, its rows of samples, and the numbers of events and points from the journal.
+
+    `lost` are the counted rows of the original missing in the copy, by part. `damage` names objects that are missing,
+    or were copied although they differ from their checksum.
+    """
+
+    target: Path
+    rows: int
+    from_journal: int
+    points_from_journal: int
+    lost: Mapping[str, int]
+    damage: tuple[str, ...] = ()
+
+    @property
+    def unreadable(self) -> int:
+        """Lost samples per channel."""
+        return self.lost.get("samples", 0)
+
+    @property
+    def loss(self) -> str:
+        """The losses as text; empty if there are none."""
+        return ", ".join(f"{count} rows of {part}" for part, count in self.lost.items())
+
+
+def write_ends(record: DataFile, path: Path, entry: hdf5.Group, lengths: Mapping[str, int], loss: str) -> None:
+    """Write the values set at the end of a run: the original ones, or replacements with the reason.
+
+    `lengths` are the rows of every part, `loss` describes the missing data.
+    """
+    complete, status, summary, end_time = create_ends(entry)
+    complete[...] = [lengths.get(name, 0) for name in COUNTED]
+    was, told, end = (_text(record, name) for name in ("status", "summary", "end_time"))
+    if was not in [each.value for each in Status] or was == Status.RUNNING:
+        # the last known activity of the crashed writer
+        end = datetime.fromtimestamp(path.stat().st_mtime).astimezone().isoformat(timespec="milliseconds")
+        was, told = Status.INTERRUPTED, "the recording ended without being closed; recovered from the data on the disk"
+        told += f", without {loss}" if loss else ""
+    elif loss:
+        told = f"part of the file was lost: {loss}; the campaign had ended as {was}" + (f": {told}" if told else "")
+        was = Status.INTERRUPTED
+    for stored, text, width in zip(
+        (status, summary, end_time), (was, told, end), (STATUS_WIDTH, SUMMARY_WIDTH, TIME_WIDTH), strict=True
+    ):
+        hdf5.replace_text(stored, text, width)
+
+
+def write_note(record: DataFile, path: Path, entry: hdf5.Group, result: Recovery) -> None:
+    """Add a note on the recovery, and one on each damaged object."""
+    told = (
+        f"from {path.name} of format {record.format_version}: {result.rows} samples per channel kept,"
+        f" {result.loss or 'no rows'} lost, {result.from_journal} events and {result.points_from_journal} points from"
+        " the journal"
+    )
+    before = [f"damaged before: {each}" for each in result.damage]
+    note = hdf5.create_group(entry, NOTE, "NXnote")
+    hdf5.write_text(note, "date", now())
+    hdf5.write_text(note, "description", "\n".join([*record.recoveries, told, *before]))
+
+
+def _text(record: DataFile, path: str) -> str:
+    try:
+        return hdf5.read_text(hdf5.group(record.file, "entry"), path)
+    except DataFileError:
+        return ""
+
+
+_MADE_ANEW = frozenset(
+    f"/entry/{name}" for name in ("complete", "status", "summary", "end_time", "data", CHECKSUMS, FIT_VIEWS, NOTE)
+)
+_ROWS_TOGETHER = 2**18
+
+
+def recover(path: Path, target: Path, progress: Progress = silent) -> Recovery:
+    """Recover the contents of `path` to `target`.
+
+    Raises InvalidInput when `target` exists or `path` is not a data file, DataFileError when it is too damaged.
+    """
+    with open_datafile(path, judging=True) as record:
+        temporary = target.with_name(f"{target.name}.part")
+        for taken in (target, temporary):
+            if taken.exists():
+                raise InvalidInput("recovered file", str(taken), "the file exists and is never overwritten")
+        try:
+            with unfinished(temporary):
+                result = _rebuild(record, path, temporary, target, progress)
+                os.rename(temporary, target)
+        except UNREADABLE as error:
+            raise DataFileError(f"{path} could not be recovered into {target} ({reason(error)})") from error
+    return result
+
+
+def _rebuild(record: DataFile, path: Path, temporary: Path, target: Path, progress: Progress) -> Recovery:
+    judged = record.integrity(None, counting(progress, "verifying the checksums"))
+    progress("copying the intact data")
+    file = hdf5.create(temporary)
+    try:
+        copying = Copying(_counted(record, judged), path.stat().st_size, _MADE_ANEW)
+        copying.copy(hdf5.group(record.file, "/"), hdf5.group(file, "/"))
+        file.attrs["format"], file.attrs["format_version"] = FORMAT, FORMAT_VERSION
+        entry = hdf5.group(file, "entry")
+        drop_channels(entry, copying.lost)
+        _require_channels(entry)
+        renew_drive(entry)
+        renew_tables(entry, copying.lost)
+        cut(entry, copying.counted)
+        gone = {at: told for at, told in copying.lost.items() if not _is_made_anew(at)}
+        damage = gone | {at: told for at, told in judged.failing.items() if not _is_made_anew(at)}
+        events = points = 0
+        try:
+            events, points = add_lost_events(entry, list(read_journal(journal_path(path))))
+        except DataFileError as error:
+            damage["journal"] = str(error)
+        grown = {each.name: each.shape[0] for each in hdf5.datasets(entry) if hdf5.grows(each)}
+        lengths = {part_of(at): rows for at, rows in grown.items()}
+        lost = {part: left for part, rows in copying.counted.items() if (left := rows - lengths.get(part, 0)) > 0}
+        # a truncated dataset differs from its checksum, and has been reported
+        damage = {at: told for at, told in damage.items() if at not in grown or part_of(at) not in lost}
+        _fill_plot(entry, lengths["samples"])
+        result = Recovery(target, lengths["samples"], events, points, lost, tuple(damage.values()))
+        write_ends(record, path, entry, lengths, "; ".join(filter(None, (result.loss, *gone.values()))))
+        write_note(record, path, entry, result)
+        progress("computing the checksums of the new file")
+        add_fit_views(entry, whole_fits(entry))
+        Checksums(entry, ())
+    finally:
+        file.close()
+    file_sync = FileSync(temporary)
+    file_sync.sync()
+    file_sync.close()
+    return result
+
+
+def _require_channels(entry: hdf5.Group) -> None:
+    if not read_channels(hdf5.group(entry, "instrument")):
+        raise DataFileError("no channel can be read")
+
+
+def _is_made_anew(path: str) -> bool:
+    return any(path == each or path.startswith(f"{each}/") for each in _MADE_ANEW)
+
+
+def _counted(record: DataFile, judged: Integrity) -> Mapping[str, int]:
+    """The rows written to the disk or, if unknown, the length of the datasets."""
+    if "/entry/complete" not in judged.failing:
+        return record.counted
+    lengths = dict.fromkeys(record.counted, 0)
+    for stored in hdf5.datasets(hdf5.group(record.file, "entry"), {}):
+        if hdf5.grows(stored):
+            lengths[part_of(stored.name)] = max(lengths[part_of(stored.name)], stored.shape[0])
+    return lengths
+
+
+def _fill_plot(entry: hdf5.Group, rows: int) -> None:
+    instrument = hdf5.group(entry, "instrument")
+    rate, channels = float(hdf5.read(hdf5.dataset(instrument, "sample_rate"))), read_channels(instrument)
+    time = create_plot(entry, channels, chunk_of(rate))
+    columns = [hdf5.dataset(instrument, f"blocks/{name}")[:] for name in ("time", "run", "first", "row")]
+    timeline, ends = Timeline(rate), np.append(columns[-1][1:], rows)[: len(columns[-1])]
+    waiting: list[NDArray[np.float64]] = []
+    for read, run, first, begin, end in zip(*columns, ends, strict=True):
+        waiting.append(timeline.seconds(float(read), int(run), int(first), int(end - begin)))
+        if end - time.shape[0] >= _ROWS_TOGETHER or end == rows:
+            hdf5.append(time, np.concatenate(waiting))
+            waiting.clear()

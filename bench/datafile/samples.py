@@ -1,0 +1,205 @@
+"""The samples of all channels and of the drive with their times, appended in whole chunks.
+
+Rewriting a compressed chunk leaves its first copy as unused space, so rows are buffered until a chunk is full unless
+they must be written now.
+"""
+
+import json
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.datafile import hdf5
+from bench.datafile.fields import Growing, Packer
+from bench.datafile.hdf5_reading import reading
+from drivers.rig import Channel, Counts
+
+PLOT, TIME = "data", "time"
+
+
+def create_plot(entry: hdf5.Group, channels: Sequence[Channel], chunk: int) -> hdf5.Dataset:
+    """Create the plot of the first channel and those of its kind against time, with links to all others; the time axis
+    is filled later. Counts remain counts: by the NXdata standard, values are (counts + `<name>_offset`) *
+    `<name>_scaling_factor`.
+    """
+    data = hdf5.create_group(entry, PLOT, "NXdata")
+    first, *others = channels
+    data.attrs["signal"], data.attrs["axes"] = first.name, [TIME]
+    data.attrs[f"{TIME}_indices"] = 0
+    # channels of another kind have another scale and would flatten the plot
+    alike = [channel.name for channel in others if (channel.quantity, channel.unit) == (first.quantity, first.unit)]
+    if alike:
+        data.attrs["auxiliary_signals"] = alike
+    data.attrs["title"] = f"{first.quantity}, raw counts"
+    time = hdf5.grow_numbers(
+        data,
+        TIME,
+        "<f8",
+        unit="s",
+        description="bench time of each row, for plots; blocks place the rows exactly",
+        chunk=chunk,
+        compress=True,
+    )
+    time.attrs["long_name"] = "bench time [s]"
+    for channel in channels:
+        hdf5.link(data, channel.name, f"/entry/instrument/{channel.name}/counts")
+        factor, offset = companions(channel.name)
+        hdf5.write_numbers(data, factor, channel.scale, unit=channel.unit, description="value of a count, NXdata")
+        hdf5.write_numbers(
+            data, offset, channel.offset / channel.scale, unit="counts", description="added before scaling, NXdata"
+        )
+    return time
+
+
+def companions(name: str) -> tuple[str, str]:
+    """Names of a channel's scaling factor and offset in the plot."""
+    return f"{name}_scaling_factor", f"{name}_offset"
+
+
+class Timeline:
+    """Times that rise by one sample period within a run, and jump where samples are missing.
+
+    A run is placed by the time at which its first block had been read; all times of the run include the delay of that
+    read.
+    """
+
+    def __init__(self, sample_rate: float) -> None:
+        self._rate = sample_rate
+        self._run: int | None = None
+        self._origin = 0.0
+        self._last = -np.inf
+
+    def seconds(self, time: float, run: int, first: int, n: int) -> NDArray[np.float64]:
+        """Times [s], shape (n,), of a block from sample `first` of `run`, read at `time` [s]."""
+        if run != self._run:
+            # whole microseconds compress better; runs never overlap, whatever the bench clock reads
+            begin = max(time - n / self._rate, self._last + 1.0 / self._rate)
+            self._run, self._origin = run, round(begin - first / self._rate, 6)
+        times = self._origin + np.arange(first, first + n) / self._rate
+        self._last = float(times[-1]) if n else self._last
+        return times
+
+
+CHUNK_TIME = 0.5
+"""Duration of a chunk of samples [s]: the buffered time in a real-time run."""
+
+
+class Samples:
+    """Counts per channel, the drive as float32 and the time as float64, always of equal length.
+
+    `time` is the dataset of the times, with chunks of `chunk_of(sample_rate)` rows.
+    """
+
+    def __init__(
+        self, instrument: hdf5.Group, channels: Sequence[Channel], sample_rate: float, time: hdf5.Dataset
+    ) -> None:
+        self.chunk = chunk_of(sample_rate)
+        stored = [_create_channel(instrument, channel, self.chunk) for channel in channels]
+        stored += [create_drive(instrument, self.chunk), time]
+        self._packer = Packer()
+        self.grown = [Growing(each, self._packer) for each in stored]
+        self._pending: list[tuple[Counts, NDArray[np.float32], NDArray[np.float64]]] = []
+        self._waiting = 0
+        self._written = 0
+
+    def __len__(self) -> int:
+        return self._written + self._waiting
+
+    @property
+    def written(self) -> int:
+        """Rows that have been given to the file."""
+        return self._written
+
+    @property
+    def full_chunks(self) -> int:
+        """Number of chunks completed by the pending rows."""
+        return len(self) // self.chunk - self._written // self.chunk
+
+    def add(self, counts: Counts, drive: NDArray[np.float32], seconds: NDArray[np.float64]) -> None:
+        """Append rows: counts of shape (n_channels, n), drive [V] and bench time [s] of shape (n,)."""
+        self._pending.append((counts, drive, seconds))
+        self._waiting += len(drive)
+
+    def write(self, *, partial: bool) -> None:
+        """Write the pending rows to the file: all of them, or only complete chunks."""
+        end = len(self) if partial else len(self) // self.chunk * self.chunk
+        count = end - self._written
+        if count <= 0:
+            return
+        blocks, drives, times = zip(*self._pending, strict=True)
+        counts, drive, seconds = np.concatenate(blocks, axis=1), np.concatenate(drives), np.concatenate(times)
+        for stored, values in zip(self.grown, (*counts, drive, seconds), strict=True):
+            stored.append(values[:count])
+        self._written = end
+        self._waiting -= count
+        self._pending = [(counts[:, count:], drive[count:], seconds[count:])] if self._waiting else []
+
+    def close(self) -> None:
+        """Release the compression threads."""
+        self._packer.close()
+
+
+def chunk_of(sample_rate: float) -> int:
+    """Rows in a chunk of the samples."""
+    return max(1, round(CHUNK_TIME * sample_rate))
+
+
+def read_channels(instrument: hdf5.Group) -> tuple[Channel, ...]:
+    """The inputs, in the order of the rig. Raises DataFileError where one is damaged."""
+    names = [name for name in hdf5.names(instrument) if hdf5.has(instrument, f"{name}/counts")]
+    return tuple(read_channel(instrument, name) for name in names)
+
+
+def read_channel(instrument: hdf5.Group, name: str) -> Channel:
+    """The stored channel."""
+    stored = hdf5.dataset(instrument, f"{name}/counts")
+    with reading(f"the conversion of {stored.name}"):
+        attrs = stored.attrs
+        low, high = (int(end) for end in attrs["valid"])
+        return Channel(
+            name=name,
+            quantity=str(attrs["quantity"]),
+            unit=str(attrs["value_units"]),
+            scale=float(attrs["scale"]),
+            offset=float(attrs["offset"]),
+            valid=(low, high),
+            device=str(attrs["device"]),
+            higher=tuple(float(term) for term in attrs.get("higher", ())),
+            faults={int(count): text for count, text in json.loads(attrs.get("faults", "{}")).items()},
+            delay=float(attrs.get("delay", 0.0)),
+            delay_uncertainty=float(attrs.get("delay_uncertainty", 0.0)),
+        )
+
+
+def _create_channel(instrument: hdf5.Group, channel: Channel, chunk: int) -> hdf5.Dataset:
+    sensor = hdf5.create_group(instrument, channel.name, "NXsensor")
+    hdf5.write_text(sensor, "measurement", channel.quantity)
+    hdf5.write_text(sensor, "model", channel.device)
+    description = f"{channel.quantity} as converted: counts * scale + offset is in {channel.unit}"
+    counts = hdf5.grow_numbers(
+        sensor, "counts", channel.storage, unit="counts", description=description, chunk=chunk, compress=True
+    )
+    counts.attrs["long_name"] = f"{channel.name} [counts]"
+    counts.attrs["scale"], counts.attrs["offset"] = channel.scale, channel.offset
+    if channel.higher:
+        counts.attrs["higher"] = np.array(channel.higher)
+    if channel.faults:
+        counts.attrs["faults"] = json.dumps({str(count): text for count, text in channel.faults.items()})
+    if channel.delay or channel.delay_uncertainty:
+        counts.attrs["delay"], counts.attrs["delay_uncertainty"] = channel.delay, channel.delay_uncertainty
+    counts.attrs["value_units"] = channel.unit
+    counts.attrs["valid"] = np.array(channel.valid, dtype=np.int64)
+    counts.attrs["quantity"], counts.attrs["device"] = channel.quantity, channel.device
+    return counts
+
+
+def create_drive(instrument: hdf5.Group, chunk: int) -> hdf5.Dataset:
+    """The empty dataset of the drive, with chunks of `chunk` rows."""
+    # a 24-bit mantissa resolves full scale 256 times finer than a 16-bit converter: the played values are preserved
+    drive = hdf5.create_group(instrument, "drive", "NXcollection")
+    voltage = hdf5.grow_numbers(
+        drive, "voltage", np.float32, unit="V", description="drive as sent to the amplifier", chunk=chunk, compress=True
+    )
+    voltage.attrs["long_name"] = "drive [V]"
+    return voltage

@@ -1,0 +1,190 @@
+"""Lazy arrays of a file's samples: channels, drive and time, by row and by run."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from math import inf
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.datafile import hdf5
+from bench.datafile.hdf5_reading import DataFileError, reading
+from bench.datafile.opening import counts
+from bench.datafile.samples import read_channels
+from drivers.rig import Channel, Counts
+from sim.errors import InvalidInput
+
+ROWS_AT_ONCE = 2**18
+
+
+@dataclass(frozen=True)
+class Series:
+    """An array of one dimension in the file: `series[i]`, `series[a:b]`, `series[:]` and `numpy.asarray(series)`.
+
+    `unit` and `quantity` are those of its values. Nothing is kept in memory.
+    """
+
+    name: str
+    quantity: str
+    unit: str
+    read: Callable[[slice], NDArray[Any]]
+    rows: range
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __getitem__(self, key: int | slice) -> Any:
+        if isinstance(key, slice):
+            part = self.rows[key]
+            if part.step < 0:
+                return self.read(slice(part[-1], part[0] + 1, -part.step))[::-1] if part else self.read(slice(0, 0))
+            return self.read(slice(part.start, max(part.start, part.stop), part.step))
+        row = self.rows[key]
+        return self.read(slice(row, row + 1))[0]
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
+        if copy is False:
+            raise ValueError("values of a file require a copy")
+        return np.asarray(self[:], dtype=dtype)
+
+    def pieces(self, size: int = ROWS_AT_ONCE) -> Iterator[NDArray[Any]]:
+        """The values in order, at most `size` at once."""
+        for start in range(0, len(self), size):
+            yield self[start : start + size]
+
+
+@dataclass(frozen=True)
+class RecordedRun:
+    """One run, from arming to stopping: its `number` from 1, its `rows` in the file and its arrays by channel.
+
+    `time` is in seconds since the rig was armed; it jumps where samples are missing.
+    """
+
+    number: int
+    rows: range
+    channels: Mapping[str, Series]
+    drive: Series
+    time: Series
+
+
+ALL = slice(None)
+
+
+class SampleReader:
+    """The samples of an open file. Everything is read on access."""
+
+    def __init__(self, entry: hdf5.Group) -> None:
+        self._entry = entry
+        self._instrument = hdf5.group(entry, "instrument")
+        self._count_again()
+
+    @cached_property
+    def sample_rate(self) -> float:
+        """Samples per second per channel [1/s]."""
+        rate = hdf5.read(hdf5.dataset(self._instrument, "sample_rate"))
+        with reading(f"{self._instrument.name}/sample_rate"):
+            rate = float(rate)
+        if not 0.0 < rate < inf:
+            raise DataFileError(f"{self._instrument.name}/sample_rate is {rate}: the file is damaged")
+        return rate
+
+    @cached_property
+    def channels(self) -> tuple[Channel, ...]:
+        """The inputs, in the order of the rig."""
+        return read_channels(self._instrument)
+
+    @property
+    def rows(self) -> int:
+        """Number of samples of every channel and the drive."""
+        stored = [self._counts(channel.name) for channel in self.channels]
+        stored.append(hdf5.dataset(self._instrument, "drive/voltage"))
+        return min(self._complete("samples"), *(data.shape[0] for data in stored))
+
+    def counts(self, name: str, rows: slice = ALL) -> Counts:
+        """Raw counts of a channel. Raises InvalidInput for an unknown channel."""
+        return self._cut(self._counts(self._channel_named(name).name), rows)
+
+    def values(self, name: str, rows: slice = ALL) -> NDArray[np.float64]:
+        """Values of a channel in its unit; NaN where the counts are invalid."""
+        return self._channel_named(name).to_unit(self.counts(name, rows))
+
+    def drive(self, rows: slice = ALL) -> NDArray[np.float32]:
+        """The drive as sent [V]."""
+        return self._cut(hdf5.dataset(self._instrument, "drive/voltage"), rows)
+
+    @cached_property
+    def blocks(self) -> dict[str, NDArray[Any]]:
+        """Starts of the blocks: arrays `row`, `run`, `first` (sample index in the run) and `time` [s] when read."""
+        stored = {name: hdf5.dataset(self._instrument, f"blocks/{name}") for name in ("row", "run", "first", "time")}
+        columns = {name: hdf5.read(each, slice(None)) for name, each in stored.items()}
+        whole = min(self._complete("blocks"), *(len(values) for values in columns.values()))
+        # the samples of the last blocks may not be written yet
+        count = int(np.searchsorted(columns["row"][:whole], self.rows))
+        return {name: values[:count] for name, values in columns.items()}
+
+    def time(self, rows: slice = ALL) -> NDArray[np.float64]:
+        """Seconds since the rig was armed, per row: sample index over sample rate. Runs are concatenated."""
+        index = np.arange(*rows.indices(self.rows))
+        blocks = self.blocks
+        block = np.searchsorted(blocks["row"], index, side="right") - 1
+        return (blocks["first"][block] + index - blocks["row"][block]) / self.sample_rate
+
+    @property
+    def runs(self) -> tuple[RecordedRun, ...]:
+        """The runs in order, as far as they are in the file, with their channels as arrays."""
+        blocks, rows = self.blocks, self.rows
+        begins = np.flatnonzero(np.diff(blocks["run"], prepend=-1))
+        ends = [*blocks["row"][begins[1:]].tolist(), rows][: len(begins)]
+        return tuple(
+            self._run(int(blocks["run"][block]), range(int(blocks["row"][block]), end))
+            for block, end in zip(begins, ends, strict=True)
+        )
+
+    def _run(self, number: int, rows: range) -> RecordedRun:
+        series = {
+            channel.name: Series(
+                channel.name,
+                channel.quantity,
+                channel.unit,
+                lambda part, name=channel.name: self.values(name, part),
+                rows,
+            )
+            for channel in self.channels
+        }
+        drive = Series("drive", "drive as sent", "V", self.drive, rows)
+        return RecordedRun(number, rows, series, drive, Series("time", "time since arming", "s", self.time, rows))
+
+    @cached_property
+    def counted(self) -> Mapping[str, int]:
+        """Number of complete rows of every part, independent of the length of its datasets; older files have fewer
+        parts.
+
+        It is read once, before the data, for a consistent view of a growing file.
+        """
+        return counts(self._entry)
+
+    def _count_again(self) -> None:
+        hdf5.dataset(self._entry, "complete").refresh()
+        self.__dict__.pop("counted", None)
+        self.__dict__.pop("blocks", None)
+        _ = self.counted
+
+    def _complete(self, name: str) -> int:
+        return self.counted[name]
+
+    def _counts(self, name: str) -> hdf5.Dataset:
+        return hdf5.dataset(self._instrument, f"{name}/counts")
+
+    def _cut(self, stored: hdf5.Dataset, rows: slice) -> NDArray[Any]:
+        start, stop, step = rows.indices(self.rows)
+        if step < 1:
+            raise InvalidInput("step of the rows", step, "it must be positive")
+        return hdf5.read(stored, slice(start, max(start, stop), step))
+
+    def _channel_named(self, name: str) -> Channel:
+        for channel in self.channels:
+            if channel.name == name:
+                return channel
+        raise InvalidInput("channel", name, "one of " + ", ".join(channel.name for channel in self.channels))

@@ -1,0 +1,151 @@
+# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
+# pyright: reportUnknownArgumentType=false
+"""Validation of the structure of an untrusted file before its contents are read.
+
+Values, link targets and external storage are not accessed. Refused structures would take hours or all memory, crash the
+process, or refer to other files.
+"""
+
+from pathlib import Path
+from typing import Any, cast
+
+import h5py
+import h5py.h5a
+import h5py.h5d
+import h5py.h5g
+import h5py.h5s
+
+from bench.datafile.declared import FIT_VIEWS
+from bench.datafile.hdf5_reading import UNREADABLE, DataFileError, File
+
+MOST_OBJECTS = 20_000
+"""Maximum number of groups and datasets; the file of a long campaign has some hundred."""
+DEEPEST = 8
+MOST_ATTRIBUTES = 64
+LARGEST_ATTRIBUTE = 2**20
+LARGEST_CHUNK = 2**25
+"""Maximum size of a chunk [bytes], which is decompressed as a whole."""
+LARGEST_VALUE = 2**24
+"""Maximum size of one text or number [bytes]."""
+UNPACKED = 200
+"""Largest ratio of the size of all values to that of the file; constant columns are compressed about a hundredfold."""
+SPARE = 2**26
+"""Total size of the values up to which `UNPACKED` does not apply [bytes]."""
+FILTERS = frozenset({1, 2, 3})
+"""Compression, shuffling and checksum filters built into HDF5; others are loaded as plugins."""
+KINDS = frozenset("iufSb")
+"""Kinds of values: numbers, texts of fixed length, Booleans."""
+
+
+class _Judge:
+    """Checks every object of a file of `size` bytes once."""
+
+    def __init__(self, size: int) -> None:
+        self._size = size
+        self._objects = 0
+        self._values = 0
+        self._seen: set[Any] = set()
+
+    def group(self, group: Any, depth: int = 0) -> None:
+        """Check a group and everything below it."""
+        path = group.name or "/"
+        self._note(group, path)
+        if depth > DEEPEST:
+            raise DataFileError(f"{path} is nested deeper than {DEEPEST} groups")
+        if (members := group.id.get_num_objs()) > MOST_OBJECTS:
+            raise DataFileError(f"{path} has {members} members; at most {MOST_OBJECTS} are allowed")
+        for name in group:
+            try:
+                self._member(group, name, f"{path.rstrip('/')}/{name}", depth)
+            except DataFileError:
+                raise
+            except UNREADABLE:
+                # damage is reported and recovered from where the object is read
+                continue
+
+    def _member(self, group: Any, name: str, path: str, depth: int) -> None:
+        link = group.get(name, getlink=True)
+        if isinstance(link, h5py.SoftLink):
+            if not link.path.startswith("/entry/") or "/data/" in link.path:
+                raise DataFileError(f"{path} is a link to {link.path!a:.80}, which is no dataset of the campaign")
+            return
+        if not isinstance(link, h5py.HardLink):
+            raise DataFileError(f"{path} is a link to another file; such links are never followed")
+        member = group[name]
+        if isinstance(member, h5py.Group):
+            self.group(member, depth + 1)
+        elif isinstance(member, h5py.Dataset):
+            self._note(member, path)
+            self._dataset(member, path)
+        else:
+            raise DataFileError(f"{path} is neither a group nor a dataset")
+
+    def _note(self, member: Any, path: str) -> None:
+        """Count an object. Raises DataFileError if it is linked twice, which could be a cycle."""
+        place = h5py.h5g.get_objinfo(member.id).objno
+        if place in self._seen:
+            raise DataFileError(f"{path} is linked twice")
+        self._seen.add(place)
+        self._objects += 1
+        if self._objects > MOST_OBJECTS:
+            raise DataFileError(f"it has more than {MOST_OBJECTS} objects")
+        check_attributes(member, path)
+
+    def _dataset(self, stored: Any, path: str) -> None:
+        made, dtype = stored.id.get_create_plist(), stored.dtype
+        # other programs may add texts of any length
+        known = dtype.kind in KINDS or h5py.check_string_dtype(dtype) is not None
+        if not known or dtype.itemsize > LARGEST_VALUE or dtype.subdtype is not None:
+            raise DataFileError(f"{path} has values of type {dtype!s:.40}, which this program never writes")
+        if len(stored.shape) > 2 or stored.id.get_space().get_simple_extent_type() == h5py.h5s.NULL:
+            raise DataFileError(f"{path} has the shape {stored.shape}; a table has one or two dimensions")
+        if made.get_layout() == h5py.h5d.VIRTUAL:
+            self._view(made, path)
+            return
+        if made.get_external_count():
+            raise DataFileError(f"{path} has its values in another file, which is never read")
+        for number in range(made.get_nfilters()):
+            if made.get_filter(number)[0] not in FILTERS:
+                raise DataFileError(f"{path} is compressed by a filter that this program does not use")
+        if stored.chunks is not None:
+            chunk = dtype.itemsize
+            for length in stored.chunks:
+                chunk *= length
+            if chunk > LARGEST_CHUNK:
+                raise DataFileError(f"{path} has chunks of {chunk} bytes; at most {LARGEST_CHUNK} are allowed")
+        self._values += int(stored.nbytes)
+        if self._values > UNPACKED * self._size + SPARE:
+            told = f"the datasets up to {path} declare {self._values} bytes in a file of {self._size}"
+            raise DataFileError(f"{told}: it is truncated or invalid")
+
+    def _view(self, made: Any, path: str) -> None:
+        """Check that a view refers to this file and is in the group of views."""
+        if not path.startswith(f"/entry/{FIT_VIEWS}/"):
+            raise DataFileError(f"{path} is virtual; only views of fits may be")
+        for number in range(made.get_virtual_count()):
+            if made.get_virtual_filename(number) != ".":
+                raise DataFileError(f"{path} shows values of another file, which is never read")
+
+
+def check_attributes(owner: Any, path: str) -> None:
+    """Raise DataFileError for more or larger attributes than this program writes."""
+    if (count := len(owner.attrs)) > MOST_ATTRIBUTES:
+        raise DataFileError(f"{path} has {count} attributes; at most {MOST_ATTRIBUTES} are allowed")
+    for name in owner.attrs:
+        size = h5py.h5a.open(owner.id, name.encode()).get_storage_size()
+        if size > LARGEST_ATTRIBUTE:
+            raise DataFileError(f"the attribute {name} of {path} has {size} bytes")
+
+
+def check_structure(file: File, path: Path) -> None:
+    """Raise DataFileError, which names the object, for a structure that this program never writes.
+
+    Unreadable members are left to the readers and to recovery.
+    """
+    root, judge = cast(Any, file), _Judge(path.stat().st_size)
+    try:
+        judge.group(root)
+    except DataFileError as error:
+        raise DataFileError(f"{path} is refused: {error}") from None
+    except UNREADABLE:
+        return

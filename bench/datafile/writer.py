@@ -1,0 +1,291 @@
+"""Writer of the file of a campaign, which can be read at any time and survives a crash of the writer."""
+
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.datafile import hdf5
+from bench.datafile.declared import COUNTED, EVENT_TABLES, add_findings, add_fit, add_fit_views
+from bench.datafile.hdf5_reading import DataFileError, reason
+from bench.datafile.layout import (
+    STATUS_WIDTH,
+    SUMMARY_WIDTH,
+    TIME_WIDTH,
+    Skeleton,
+    Status,
+    build,
+    now,
+)
+from bench.datafile.samples import Timeline
+from bench.events import Event, FitFinished, PointFinished, SpecimenIdentified
+from drivers.rig import Counts
+from sim.errors import InvalidInput
+
+
+class FileSync:
+    """Flushes a file from the system's cache to the disk, through its own handle: HDF5 does not share its handle on
+    some systems. Detects changes to the file by other programs.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._handle = os.open(path, os.O_RDWR)
+        self._size = 0
+        # on some network shares the identity of a file changes with every query
+        self._identified = os.path.samestat(os.fstat(self._handle), path.stat())
+        sync_folder(path.parent)
+
+    def sync(self) -> None:
+        """Flush the file to the disk. Raises OSError when the disk fails, DataFileError as `check`."""
+        os.fsync(self._handle)
+        self.check()
+        self._size = os.fstat(self._handle).st_size
+
+    def check(self) -> None:
+        """Raise DataFileError if another program has truncated, renamed, replaced or deleted the file.
+
+        To be called before HDF5 looks for its data in the file: for truncated data it searches for hours.
+        """
+        if (size := os.fstat(self._handle).st_size) < self._size:
+            raise DataFileError(f"another program has truncated it from {self._size} to {size} bytes")
+        try:
+            there = self._path.stat()
+        except FileNotFoundError:
+            raise DataFileError(f"another program has {self._gone()}") from None
+        if self._identified and not os.path.samestat(os.fstat(self._handle), there):
+            raise DataFileError("another program has replaced it")
+
+    def restore(self) -> None:
+        """Write a deleted file again, with the data flushed before, where nothing else has its name."""
+        with suppress(OSError):
+            if os.fstat(self._handle).st_nlink or self._path.exists():
+                return
+            with self._path.open("xb") as copy, os.fdopen(os.dup(self._handle), "rb") as kept:
+                kept.seek(0)
+                shutil.copyfileobj(kept, copy)
+                os.fsync(copy.fileno())
+
+    def close(self) -> None:
+        """Close the file; may be called repeatedly."""
+        with suppress(OSError):
+            os.close(self._handle)
+        self._handle = -1
+
+    def _gone(self) -> str:
+        if not os.fstat(self._handle).st_nlink:
+            return "deleted it"
+        with suppress(OSError):
+            # Linux knows the present name of an open file
+            return f"renamed it to {Path(os.readlink(f'/proc/self/fd/{self._handle}')).name}"
+        return "renamed or deleted it"
+
+
+def sync_folder(folder: Path) -> None:
+    """Flush the directory entry of a new file to the disk, where the system requires it."""
+    # Windows cannot open folders, and writes their entries itself
+    with suppress(OSError):
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+
+def journal_path(path: Path) -> Path:
+    """Path of a file's journal."""
+    return path.with_suffix(".events.jsonl")
+
+
+class JournalWriter:
+    """Appends to a new journal. Raises FileExistsError if it exists, and OSError when the disk fails."""
+
+    def __init__(self, path: Path) -> None:
+        self._handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+        self._written = False
+
+    def add(self, time: float, kind: str, text: str, more: Mapping[str, Any]) -> None:
+        """Append one event at `time` [s], with `more` of its content."""
+        line = json.dumps({"time": time, "kind": kind, "text": text, **more}, ensure_ascii=False) + "\n"
+        # one unbuffered call: a killed program leaves complete lines
+        os.write(self._handle, line.encode())
+        self._written = True
+
+    def sync(self) -> None:
+        """Flush the additions to the disk."""
+        if self._written:
+            os.fsync(self._handle)
+            self._written = False
+
+    def close(self) -> None:
+        """Close the file; may be called repeatedly."""
+        if self._handle >= 0:
+            os.close(self._handle)
+            self._handle = -1
+
+
+def read_journal(path: Path) -> Iterator[dict[str, Any]]:
+    """The lines of a journal before the first truncated or damaged one; empty without a journal."""
+    if not path.is_file():
+        return
+    # not splitlines: a text may contain other line separators
+    for line in path.read_text(encoding="utf-8", errors="replace").split("\n"):
+        try:
+            read = json.loads(line)
+        except (json.JSONDecodeError, RecursionError):
+            return
+        if not (isinstance(read, dict) and {"time", "kind", "text"} <= read.keys()):
+            return
+        yield read
+
+
+_EXISTS = "the file exists and is never overwritten; choose another name"
+
+ROOM = 1_000_000
+"""Free space required before a file is created [bytes]: many times an empty file."""
+
+
+def _try_folder(folder: Path) -> None:
+    """Raise OSError unless a file of some size can be created in `folder`.
+
+    HDF5 reports the cause of a failure poorly, and crashes the process when the disk fills up during creation.
+    """
+    with tempfile.TemporaryFile(dir=folder, prefix=".room-") as room:
+        room.write(bytes(ROOM))
+
+
+class DataFileWriter:
+    """Creates the file and appends to it.
+
+    When the disk fails, methods raise h5py's exceptions, mostly OSError. Raises InvalidInput when the file exists,
+    cannot be created, or has contents that cannot be stored, and DataFileError when the disk fails during creation.
+    """
+
+    def __init__(self, path: Path, skeleton: Skeleton) -> None:
+        skeleton.check()
+        self._path = path
+        for taken in (path, journal_path(path)):
+            if taken.exists():
+                raise InvalidInput("record", str(taken), _EXISTS)
+        try:
+            _try_folder(path.parent)
+            self._file = hdf5.create(path)
+        except FileExistsError:
+            raise InvalidInput("record", str(path), _EXISTS) from None
+        except OSError as error:
+            raise InvalidInput(
+                "record",
+                str(path),
+                f"the file cannot be created ({error.strerror or reason(error)}); choose another folder",
+            ) from error
+        try:
+            parts = build(self._file, skeleton)
+            self._file = hdf5.reopen_to_write(self._file)
+            self._parts = parts.reopened(self._file)
+            self._file.flush()
+            self._journal = JournalWriter(journal_path(path))
+            self._file_sync = FileSync(path)
+            self._file_sync.sync()
+        except (OSError, RuntimeError) as error:
+            hdf5.let_go(self._file)
+            path.unlink(missing_ok=True)
+            raise DataFileError(f"{path} could not be created ({reason(error)}): check the disk") from error
+        self._tables = [self._parts.rows[name] for name in COUNTED if name != "samples"]
+        self._timeline = Timeline(skeleton.sample_rate)
+        self._complete: list[int] = []
+        self._point_fields = tuple(skeleton.point_type.model_fields)
+
+    @property
+    def full_chunks(self) -> int:
+        """Number of pending chunks of samples."""
+        return self._parts.samples.full_chunks
+
+    def add_block(self, time: float, run: int, first: int, counts: Counts, drive: NDArray[np.float32]) -> None:
+        """Append a block: counts of shape (n_channels, n), drive of shape (n,) [V]."""
+        self._parts.rows["blocks"].add(len(self._parts.samples), run, first, time)
+        self._parts.samples.add(counts, drive, self._timeline.seconds(time, run, first, len(drive)))
+
+    def add_event(self, event: Event) -> None:
+        """Append an event other than a block."""
+        rows = self._parts.rows
+        more = dict[str, Any]()
+        if (table := EVENT_TABLES.get(type(event))) is not None:
+            for row in table.rows(event):
+                rows[table.name].add(*row)
+                if table.single:
+                    # JSON has only finite numbers
+                    more["columns"] = {
+                        field.name: None if value != value else value
+                        for field, value in zip(table.fields, row, strict=True)
+                    }
+        if isinstance(event, FitFinished):
+            add_fit(rows, event)
+        if isinstance(event, SpecimenIdentified):
+            add_findings(rows, event.time, event.identified)
+        if not event.journalled:
+            return
+        kind, text = type(event).__name__, event.line
+        if isinstance(event, PointFinished):
+            text = f"row {len(rows['points'])} of points"
+            rows["points"].add(*(getattr(event.point, name) for name in self._point_fields))
+            more["point"] = json.loads(event.point.model_dump_json())
+        if isinstance(event, SpecimenIdentified):
+            more["identified"] = event.identified.model_dump(mode="json")
+        rows["events"].add(event.time, kind, text)
+        self._journal.add(event.time, kind, text, more)
+
+    def commit(self, *, partial: bool) -> None:
+        """Write pending rows to the disk, visible to readers; incomplete chunks of samples only if `partial`."""
+        samples, tables = self._parts.samples, self._tables
+        self._file_sync.check()
+        samples.write(partial=partial)
+        for rows in tables:
+            rows.write()
+        complete = [samples.written, *(rows.written for rows in tables)]
+        if complete == self._complete:
+            return
+        # a failing disk or computer may store the new length of a dataset without its rows, so the count of complete
+        # rows is written afterwards, in place
+        self._journal.sync()
+        self._flush()
+        self._parts.complete[...] = complete
+        self._flush()
+        self._complete = complete
+
+    def finish(self, status: Status, summary: str) -> None:
+        """Write all pending data and the status, and close the file."""
+        self.commit(partial=True)
+        hdf5.replace_text(self._parts.summary, summary, SUMMARY_WIDTH)
+        hdf5.replace_text(self._parts.end_time, now(), TIME_WIDTH)
+        hdf5.replace_text(self._parts.status, status, STATUS_WIDTH)
+        self._parts.checksums.seal({grown.path: grown.checksum for grown in self._parts.grown})
+        self._flush()
+        self._file.close()
+        if whole := len(self._parts.rows["fits"]):
+            # the data are complete without them; recovery adds them if another program holds the file now
+            with suppress(OSError, RuntimeError), hdf5.open_again(self._path) as file:
+                add_fit_views(hdf5.group(file, "entry"), whole)
+        self._file_sync.sync()
+        self._let_go()
+
+    def abandon(self) -> None:
+        """Release the file after an error; committed data stay readable."""
+        hdf5.let_go(self._file)
+        self._file_sync.restore()
+        self._let_go()
+
+    def _flush(self) -> None:
+        self._file.flush()
+        self._file_sync.sync()
+
+    def _let_go(self) -> None:
+        self._parts.samples.close()
+        self._file_sync.close()
+        self._journal.close()

@@ -1,0 +1,62 @@
+"""Gain surface and map as in Fig. 4 of the paper: a section of a report."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from bench.config.numbers import spaced
+from bench.datafile.tables import arrays
+from bench.document.document import Part, Picture, Section
+from bench.figures.map_figure import Layer, MapPoint, map_figure
+from bench.prediction.gain_map import grids, map_table, resting_margin
+from bench.prediction.requests import MapRequest
+from sim.specimen import Specimen
+
+LOW, HIGH, STEP = 12.0, 21.0, 0.1
+BETA_LOW, BETA_HIGH, BETA_STEP = 0.1, 1.2, 0.02
+"""Frequencies [rad/s] and stiffness ratios of a map; measured points beyond them extend it."""
+
+MOST = 20_000
+"""Largest number of points of a map."""
+
+
+def map_section(specimen: Specimen, amplitude_factor: float, measured: Sequence[MapPoint] = ()) -> Section:
+    """Surface and map of both steady motions, with the measured points."""
+    request = MapRequest(
+        omega=_axis(LOW, HIGH, STEP, [point.omega for point in measured], 0.5),
+        beta=_axis(BETA_LOW, BETA_HIGH, BETA_STEP, [point.beta for point in measured], 0.05),
+        amplitude_factor=amplitude_factor,
+    )
+    columns = arrays(map_table(specimen, request))
+
+    def layer(name: str) -> Layer:
+        gains = {gain: grids(columns, request, name, gain) for gain in ("alpha_1", "alpha_2")}
+        return Layer(gains, grids(columns, request, name, "floquet_modulus"))
+
+    rocking, resting = layer("rocking"), layer("resting")
+    axes = np.array(request.omega), np.array(request.beta)
+    figure = map_figure(*axes, rocking, resting, resting_margin(specimen, request), measured)
+    lost = int(np.isnan(rocking.multiplier).sum())
+    amplitude = amplitude_factor * specimen.uplift_acceleration
+    text = (
+        f"Steady motions under a sine of {amplitude:.4g} m/s² ({amplitude_factor:g} g/λ), computed as periodic orbits "
+        f"at {len(request.omega)} frequencies by {len(request.beta)} stiffnesses, with their stability. Where the "
+        "block may rest, two steady motions exist and the start of a test decides which one it reaches. Hatched: the "
+        "rocking motion is unstable, so a test shows a modulated motion or the block topples."
+    )
+    parts: list[Part] = [text]
+    if lost:
+        parts.append(f"No rocking orbit was found at {lost} points; they are blank.")
+    found = " Circles are measured points with their α₂." if measured else ""
+    description = "Surfaces and contour maps of alpha 1 and alpha 2 over frequency and stiffness ratio."
+    parts.append(Picture(figure, f"Gain surfaces (a) and maps (b, c) of α₁ and α₂, predicted.{found}", description))
+    return Section("map", "Gain surface and map (as Fig. 4 of the paper)", parts)
+
+
+def _axis(low: float, high: float, step: float, places: Sequence[float], margin: float) -> tuple[float, ...]:
+    """Equal steps over the usual or the measured range, coarser where there would be too many."""
+    least = min([low, *(place - margin for place in places if place < low)])
+    most = max([high, *(place + margin for place in places if place > high)])
+    least = max(least, step)
+    count = min(round((most - least) / step), int(MOST**0.5)) + 1
+    return spaced(f"{least:.6g}", f"{most:.6g}", count)

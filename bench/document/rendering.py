@@ -1,0 +1,114 @@
+# pyright: reportUnknownMemberType=false
+"""Rendering of a report as one HTML file, and as A4 pages of a PDF.
+
+The HTML has no script and no reference to another file; its template escapes every text. For the PDF matplotlib draws
+each figure as a PDF file, which Typst embeds; texts reach the template `report.typ` as JSON and are never read as
+markup.
+"""
+
+import io
+import json
+import re
+from html import escape
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from bench.document.document import Document, Picture, template_content
+from bench.unfinished import temporary_folder
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_IDENTIFIER = re.compile(r' id="([^"]+)"')
+_REFERENCE = re.compile(r'(href="|url\()#([^")]+)')
+_OUTLINE = re.compile(r'( d=")([^"]+)(")')
+_DIGITS = re.compile(r"(\.\d\d)\d+")
+_RULE = re.compile(r"<defs>\s*<style.*?</style>\s*</defs>\s*", re.DOTALL)
+_OPENING = re.compile(r"<svg\b([^>]*)>")
+
+WIDTH, HEIGHT = 6.77, 9.4
+"""Largest figure [in]: the text area of an A4 page minus a caption of a few lines."""
+
+
+def html_page(document: Document) -> str:
+    """The complete HTML text, in UTF-8. Draws every figure."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+    from markupsafe import Markup
+
+    # matplotlib's own output, whose texts are outlines; every other text is escaped by the template
+    content = template_content(document, lambda picture, number: Markup(_inline_svg(picture, number)))
+    environment = Environment(
+        loader=PackageLoader("bench.document", ""),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    return environment.get_template("report.html.jinja").render(report=content)
+
+
+def write_pdf(path: Path, document: Document) -> None:
+    """Writes the pages to `path`, replacing any file. Draws every figure and keeps its size."""
+    import matplotlib
+    import typst
+
+    with temporary_folder() as folder:
+
+        def draw(picture: Picture, number: int) -> str:
+            file = f"figure-{number}.pdf"
+            _save_pdf(picture.figure, folder / file)
+            return file
+
+        (folder / "report.json").write_text(json.dumps(template_content(document, draw)), encoding="utf-8")
+        template = folder / "report.typ"
+        template.write_bytes(files("bench.document").joinpath(template.name).read_bytes())
+        fonts = Path(matplotlib.get_data_path()) / "fonts" / "ttf"
+        path.write_bytes(typst.compile(template, font_paths=[fonts], ignore_system_fonts=True))
+
+
+def _inline_svg(picture: Picture, number: int) -> str:
+    """An `<svg>` element without header and references, with identifiers unique on the page.
+
+    Letters are outlines, independent of fonts; title and description are for screen readers.
+    """
+    import matplotlib
+
+    text, prefix = io.StringIO(), f"f{number}"
+    # the salt makes the identifiers the same in every run
+    with matplotlib.rc_context({"svg.fonttype": "path", "svg.hashsalt": "rockbench"}):
+        metadata = {"Date": None, "Creator": None, "Format": None, "Type": None}
+        picture.figure.savefig(text, format="svg", metadata=metadata)
+    whole = text.getvalue()
+    body = whole[whole.index("<svg") :].strip()
+    used = {name for _, name in _REFERENCE.findall(body)}
+    body = _IDENTIFIER.sub(lambda found: f' id="{prefix}-{found[1]}"' if found[1] in used else "", body)
+    body = _REFERENCE.sub(rf"\g<1>#{prefix}-\g<2>", body)
+    # a hundredth of a point is finer than printers resolve
+    body = _OUTLINE.sub(lambda found: found[1] + _DIGITS.sub(r"\1", found[2]) + found[3], body)
+    # the page's style sheet has this rule
+    body = _RULE.sub("", body)
+    body = re.sub(r"<!--.*?-->\s*", "", body, flags=re.DOTALL)
+    attributes = f'role="img" aria-labelledby="{prefix}-title {prefix}-text"'
+    title = f'<title id="{prefix}-title">Fig. {number}</title>'
+    description = f'<desc id="{prefix}-text">{escape(picture.description)}</desc>'
+    return _OPENING.sub(lambda found: f"<svg {attributes}{found[1]}>{title}{description}", body, count=1)
+
+
+def _save_pdf(figure: "Figure", path: Path) -> None:
+    """Saves a figure no larger than a page; the height is reduced by the square root of the factor of the width.
+
+    The figure is drawn at that size instead of being scaled, so letters keep their size.
+    """
+    import matplotlib
+
+    width, height = (float(side) for side in figure.get_size_inches())
+    narrower = min(1.0, WIDTH / width)
+    figure.set_size_inches(narrower * width, min(HEIGHT, height * narrower**0.5))
+    try:
+        # embedded fonts instead of outlines: text can be searched and copied
+        with matplotlib.rc_context({"pdf.fonttype": 42}):
+            figure.savefig(path, format="pdf")
+    finally:
+        figure.set_size_inches(width, height)

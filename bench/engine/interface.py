@@ -1,0 +1,180 @@
+"""Interface of the engine to its session: operator and requests as inputs, events and an ending as outputs."""
+
+from collections.abc import Callable, Generator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field, replace
+from math import isnan
+from typing import Protocol
+
+from bench.events import Event, PointFinished, Subscriber
+from drivers.clock import Clock
+from drivers.errors import RigError
+from sim.errors import UNKNOWN, Cause, CauseCode, Interruption, RockbenchError
+from sim.parameters import Parameters
+
+SEVERITY = ("completed", "stopped", "aborted", "halted", "failed")
+"""All statuses, in ascending severity."""
+
+
+@dataclass(frozen=True)
+class Ending:
+    """Ending of a session: `status` (completed, stopped, aborted, halted or failed), reason and cause."""
+
+    status: str
+    reason: str
+    cause: Cause = field(default=UNKNOWN, compare=False)
+
+    @classmethod
+    def failed(cls, error: RockbenchError) -> "Ending":
+        """Ending caused by an error."""
+        return cls("failed", str(error), error.cause)
+
+    def then(self, later: "Ending | None") -> "Ending":
+        """This ending followed by a `later` one: the worse status, both reasons, the cause of the first."""
+        if later is None:
+            return self
+        status = max(self.status, later.status, key=SEVERITY.index)
+        return Ending(status, f"{self.reason}; then {later.reason}", self.cause)
+
+
+class Ended(Interruption):
+    """Raised to end the plan early."""
+
+    def __init__(self, ending: Ending) -> None:
+        super().__init__(ending.reason)
+        self.ending = ending
+
+
+class Operator(Protocol):
+    """Carries out the operator actions between two tests."""
+
+    @property
+    def name(self) -> str:
+        """Name recorded in the data file."""
+        ...
+
+    def confirm(self, request: str) -> bool:
+        """Return True once `request` is done, or False if it is declined, which ends the run.
+
+        May block for a long time.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class Unattended:
+    """Confirms every request at once: for tests, and for a simulated bench, which carries out the actions itself."""
+
+    name: str = "unattended run"
+
+    def confirm(self, request: str) -> bool:  # noqa: ARG002 - every request has the same answer
+        return True
+
+
+_Made = tuple[str, Cause]
+
+
+class Requests:
+    """Requests to end a run, from any thread or signal handler: stop, abort and halt, in ascending strength.
+
+    A request is never withdrawn. Plain flags need no lock, which could deadlock in a signal handler.
+    """
+
+    def __init__(self) -> None:
+        self._stop: _Made | None = None
+        self._abort: _Made | None = None
+        self._halt: _Made | None = None
+        self._cut: Callable[[], None] | None = None
+        self.interrupted = False
+        """Whether a signal caused the request: the session then exits as soon as the rig is at rest."""
+        self.breaking: Callable[[], BaseException] | None = None
+        """Exception that a signal handler raises in the main thread after its request; None while the loop polls."""
+        self.rig_closed = False
+        """Whether no rig is open, so that the process may exit at once."""
+
+    @contextmanager
+    def breakable(self, error: Callable[[], BaseException]) -> Generator[None]:
+        """Context manager in which signal handlers raise `error()`: for long computations that do not poll requests."""
+        before, self.breaking = self.breaking, error
+        try:
+            yield
+        finally:
+            self.breaking = before
+
+    @contextmanager
+    def without_rig(self) -> Generator[None]:
+        """Context manager for code without an open rig: a signal raises KeyboardInterrupt."""
+        self.rig_closed = True
+        with self.breakable(KeyboardInterrupt):
+            yield
+        # not reset after an error: the session then ends without opening a rig
+        self.rig_closed = False
+
+    def cut_by(self, cut: Callable[[], None]) -> None:
+        """Make `halt` call `cut`, in the requesting thread."""
+        self._cut = cut
+
+    def stop(self, why: str = "stop requested", code: CauseCode = CauseCode.REQUEST) -> None:
+        """Request the smooth ramp; the measurement remains valid. The first `why` is the reason recorded."""
+        self._stop = self._stop or (why, Cause(code, "stop"))
+
+    def abort(self, why: str = "abort requested", code: CauseCode = CauseCode.REQUEST) -> None:
+        """Request the fast ramp; the run becomes invalid."""
+        self._abort = self._abort or (why, Cause(code, "abort"))
+
+    def halt(self, why: str = "halt requested", code: CauseCode = CauseCode.REQUEST) -> None:
+        """Cut the enable line now, in this thread; the loop then finds the rig halted and ends."""
+        self._halt = self._halt or (why, Cause(code, "halt"))
+        if self._cut is not None:
+            # the loop cuts again and reports a failure
+            with suppress(RigError):
+                self._cut()
+
+    @property
+    def strongest(self) -> str | None:
+        """Strongest request so far: "halt", "abort", "stop" or None."""
+        if self._halt:
+            return "halt"
+        if self._abort:
+            return "abort"
+        return "stop" if self._stop else None
+
+    @property
+    def reason(self) -> str:
+        """Reason of the strongest request; empty without any."""
+        made = self._halt or self._abort or self._stop
+        return made[0] if made else ""
+
+    @property
+    def cause(self) -> Cause:
+        """Cause of the strongest request, as a code."""
+        made = self._halt or self._abort or self._stop
+        return made[1] if made else UNKNOWN
+
+
+class EventStream:
+    """Stamps events with the bench time since the start of the session [s] and calls the subscribers in order."""
+
+    def __init__(self, clock: Clock, subscribers: Sequence[Subscriber]) -> None:
+        self._clock = clock
+        self._origin = clock.now()
+        self._subscribers = tuple(subscribers)
+        self.points: list[Parameters] = []
+        """Finished points, in order."""
+
+    def join(self, subscriber: Subscriber) -> None:
+        """Add a subscriber, called after those that joined before it."""
+        self._subscribers += (subscriber,)
+
+    def now(self) -> float:
+        """Seconds of the bench's clock since the session began."""
+        return self._clock.now() - self._origin
+
+    def publish(self, event: Event) -> None:
+        """Pass `event` to every subscriber; stamp it first if it has no time."""
+        if isnan(event.time):
+            event = replace(event, time=self.now())
+        for subscriber in self._subscribers:
+            subscriber(event)
+        if isinstance(event, PointFinished):
+            self.points.append(event.point)

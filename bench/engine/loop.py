@@ -1,0 +1,270 @@
+"""Acquisition loop and the steps that run in it."""
+
+from typing import Never
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.analysis.cycles import Cycle, CycleAnalyser
+from bench.analysis.fall import FallWatch
+from bench.analysis.signals import SIGNALS, scatter
+from bench.control.oscillator import sweeps
+from bench.engine.interface import Ended, Ending, EventStream, Requests
+from bench.engine.output import Output
+from bench.engine.steps import (
+    AcquireAtRest,
+    Arm,
+    Done,
+    Dwell,
+    Fallen,
+    Measured,
+    Outcome,
+    Play,
+    Played,
+    RestSamples,
+    SetHarmonics,
+    Sweep,
+)
+from bench.events import LimitExceeded, State, Warned
+from bench.guard.guard import Exchange, Guard
+from bench.guard.limits import Violation
+from bench.plugins import plugin_code
+from drivers.rig import Counts, Rig
+from sim.errors import UNKNOWN, Cause, CauseCode, InvalidInput
+from sim.specimen import Specimen
+
+
+class Loop:
+    """Exchanges blocks until a request or an exceeded limit ends the run: raises `Ended` with the output at zero."""
+
+    def __init__(self, output: Output, guard: Guard, stream: EventStream, requests: Requests) -> None:
+        self.output = output
+        self._guard, self._stream, self._requests = guard, stream, requests
+        self.fall: FallWatch | None = None
+        """Detects the fall of the mounted block; None without a mounted specimen."""
+        self._over: Violation | None = None
+        self._runaway: Violation | None = None
+
+    def begin(self, reason: str) -> None:
+        """Arm the rig with zeros queued."""
+        self._over = self._runaway = None
+        self.check_requests()
+        self.output.arm(reason)
+        # a halt requested while the rig was being armed had no enable line to cut
+        self.check_requests()
+
+    def exchange(self) -> Exchange:
+        """Run one iteration: exchange a block, publish its warnings, check its limits and the requests."""
+        exchange = self.output.exchange()
+        for near in exchange.warnings:
+            self._stream.publish(
+                Warned(f"{near.quantity} {near.value:.4g} {near.unit} approaches its limit {near.limit:.4g}")
+            )
+        self._runaway = exchange.runaway
+        if exchange.violation is not None and self._over is None:
+            self._exceeded(exchange.violation)
+        self.check_requests()
+        return exchange
+
+    def signals(self) -> tuple[NDArray[np.float64], bool]:
+        """Run one iteration. Returns signals, shape (block, len(SIGNALS)), and whether the rocking block has fallen."""
+        # missing samples of a further channel must not invalidate the cycles of a plan
+        signals = self.exchange().signals[:, : len(SIGNALS)]
+        return signals, self.fall is not None and self.fall.fallen(signals)
+
+    def check_requests(self) -> None:
+        """End the run if a request is pending."""
+        asked, why, cause = self._requests.strongest, self._requests.reason, self._requests.cause
+        state = self.output.state
+        if asked == "halt":
+            raise Ended(self.output.cut(Ending("halted", why, cause)))
+        if asked == "abort" and state is not State.ABORTING:
+            self._end(State.ABORTING, Ending("aborted", why, cause))
+        if asked == "stop" and state not in (State.ABORTING, State.STOPPING):
+            self._end(State.STOPPING, Ending("stopped", why, cause))
+
+    def end_test(self, *, fast: bool) -> bool:
+        """Ramp out at the end of a test. Returns whether the block fell; an exceeded limit ends the run."""
+        fell = self.ramp_out(State.ABORTING if fast else State.STOPPING, "end of the test")
+        if self._over is not None:
+            raise Ended(Ending("aborted", str(self._over), _cause(self._over)))
+        return fell
+
+    def ramp_out(self, way: State, reason: str, cause: Cause = UNKNOWN) -> bool:
+        """Bring the output to zero along the ramp of `way` and stop the rig. Returns whether the block fell."""
+        begin = self._guard.abort if way is State.ABORTING else self._guard.stop
+        begin()
+        if self.output.state is not way:
+            self.output.machine.go(way, reason, cause)
+        fell = False
+        while not self._guard.at_zero:
+            fell |= self.signals()[1]
+        if self._runaway is not None:
+            reason = f"{self._runaway} after the drive was ramped to zero"
+            raise Ended(self.output.cut(Ending("halted", reason, _cause(self._runaway))))
+        self.output.rest()
+        return fell
+
+    def _exceeded(self, over: Violation) -> None:
+        """End the run at the first limit exceeded since arming; a fast ramp in progress continues."""
+        self._over = over
+        self._stream.publish(LimitExceeded(over.quantity, over.value, over.limit, over.unit, over.timing))
+        if self.output.state is not State.ABORTING:
+            self._end(State.ABORTING, Ending("aborted", str(over), _cause(over)))
+
+    def _end(self, way: State, ending: Ending) -> Never:
+        if self.output.state is not State.IDLE:
+            ending = ending.then(self.output.ending_of(lambda: self.ramp_out(way, ending.reason, ending.cause)))
+        raise Ended(ending)
+
+
+def _cause(over: Violation) -> Cause:
+    return Cause(CauseCode.LIMIT, over.quantity)
+
+
+class AtRest:
+    """Steps with the output at zero: arming and taring, and acquisition at rest."""
+
+    def __init__(self, loop: Loop, rig: Rig, guard: Guard, stream: EventStream) -> None:
+        self._loop, self._rig, self._guard, self._stream = loop, rig, guard, stream
+        self.measures_storeys = True
+        """Whether the laser of storey 2 is aimed at its storey, so that the difference of the lasers is the drift."""
+
+    def arm(self, step: Arm, specimen: Specimen | None) -> None:
+        """Arm, wait until the storeys are still, and tare every signal."""
+        self._loop.begin("start of a test")
+        rest = self._stillness(step)
+        self._guard.tare(rest, drift=self.measures_storeys)
+        self._loop.fall = FallWatch(specimen, self._rig.sample_rate) if specimen else None
+        self._loop.output.machine.go(State.RUNNING, "storeys at rest, signals tared")
+
+    def acquire(self, step: AcquireAtRest) -> RestSamples:
+        """Acquire samples. A violation ends the acquisition but not the plan, since the table is not driven."""
+        output = self._loop.output
+        self._loop.begin("acquisition with the output at zero")
+        counts: list[Counts] = []
+        violation: Violation | None = None
+        for _ in range(self._blocks(step.duration)):
+            exchange = output.exchange()
+            counts.append(exchange.block.counts)
+            violation = exchange.violation
+            if violation is not None:
+                self._guard.halt()
+                break
+            self._loop.check_requests()
+        output.machine.go(
+            State.STOPPING, "the acquisition at rest is complete" if violation is None else str(violation)
+        )
+        output.rest()
+        return RestSamples(self._rig.channels, np.concatenate(counts), violation)
+
+    def _stillness(self, step: Arm) -> NDArray[np.float64]:
+        """Channel values over an interval with the storeys at rest, shape (n, n_channels)."""
+        waited = 0.0
+        while True:
+            blocks = [self._loop.exchange() for _ in range(self._blocks(step.rest))]
+            values = np.concatenate([each.values for each in blocks])
+            if scatter(np.concatenate([each.signals for each in blocks])) <= step.still:
+                return values
+            waited += step.rest
+            if waited >= step.patience:
+                self._stream.publish(Warned(f"the storeys are still moving after {waited:g} s; tared anyway"))
+                return values
+
+    def _blocks(self, duration: float) -> int:
+        return max(round(duration * self._rig.sample_rate / self._loop.output.block), 1)
+
+
+class SineDrive:
+    """Sweeps and dwells of the oscillator; cycles are counted across dwells until the drive changes."""
+
+    def __init__(self, loop: Loop, sample_rate: float) -> None:
+        self._loop, self._rate = loop, sample_rate
+        self._cycles: CycleAnalyser | None = None
+
+    def restart(self) -> None:
+        """Start a new count of cycles with the next dwell."""
+        self._cycles = None
+
+    def sweep(self, step: Sweep) -> Outcome:
+        """Drive along the legs, from the present amplitude and frequency."""
+        output = self._loop.output
+        output.source.require_silence("legs")
+        oscillator = output.source.oscillator
+        self.restart()
+        for sweep in sweeps(step.legs, oscillator.amplitude, oscillator.omega):
+            oscillator.follow(sweep)
+        end = output.begins + oscillator.remaining
+        while output.read < end:
+            _, fell = self._loop.signals()
+            if fell:
+                return Fallen()
+        return Done()
+
+    def dwell(self, step: Dwell) -> Outcome:
+        """Hold the sine and measure its cycles."""
+        output = self._loop.output
+        output.source.require_silence("a dwell")
+        if self._cycles is None:
+            self._cycles = CycleAnalyser(output.source.oscillator.omega, self._rate, output.read)
+        done: list[Cycle] = []
+        end = self._cycles.completed + step.cycles
+        while self._cycles.completed < end:
+            signals, fell = self._loop.signals()
+            if fell:
+                return Fallen()
+            values = np.empty((len(signals), len(SIGNALS) + 1), order="F")
+            values[:, :-1], values[:, -1] = signals, output.drive
+            done += self._cycles.push(values)
+        return Measured(tuple(done))
+
+    def set_harmonics(self, step: SetHarmonics) -> None:
+        """Change the harmonics of the sine."""
+        self._loop.output.source.oscillator.trim(step.shares)
+
+
+Array = NDArray[np.float64]
+
+
+class PreparedDrive:
+    """Plays a prepared drive through the guard, block by block."""
+
+    def __init__(self, loop: Loop, guard: Guard, stream: EventStream) -> None:
+        self._loop, self._guard, self._stream = loop, guard, stream
+
+    def play(self, step: Play) -> Outcome:
+        """Play the whole drive, or until the block falls.
+
+        Raises InvalidInput before the first sample for a drive that is unsuitable or that the guard would refuse.
+        """
+        output = self._loop.output
+        if output.state is not State.RUNNING:
+            raise InvalidInput("prepared drive on a bench that is", str(output.state), "arm it first")
+        volts = np.asarray(step.volts, dtype=np.float64)
+        output.source.require_playable(volts)
+        if (refused := self._guard.refusal(volts)) is not None:
+            where = f"{refused.quantity} at sample {refused.sample} of a prepared drive"
+            raise InvalidInput(where, f"{refused.value:.4g} {refused.unit}", f"the limit is {refused.limit:g}")
+        output.source.play(volts)
+        start, end = output.begins, output.begins + volts.size
+        signals: list[Array] = [np.zeros((0, len(SIGNALS)))]
+        drive: list[Array] = []
+        while output.read < end:
+            first = output.read
+            block, fell = self._loop.signals()
+            during = slice(max(start - first, 0), min(end - first, len(block)))
+            if during.start < during.stop:
+                signals.append(block[during])
+                drive.append(output.drive[during])
+                self._show(step, signals[-1])
+            if fell:
+                return Fallen(np.concatenate(signals))
+        return Played(np.concatenate(signals), np.concatenate(drive))
+
+    def _show(self, step: Play, signals: Array) -> None:
+        if step.watch is None:
+            return
+        with plugin_code("the live value of the protocol"):
+            event = step.watch(signals)
+        if event is not None:
+            self._stream.publish(event)

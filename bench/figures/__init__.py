@@ -1,0 +1,1 @@
+"""Figures, the summary file and the text tables of a campaign."""

@@ -1,0 +1,61 @@
+"""Conversion of a block's counts to values, and the range of values of each channel."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.rig import Channel, Counts
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Extremes:
+    """Smallest and largest value of each channel, by column, in a block without missing samples."""
+
+    low: list[float]
+    high: list[float]
+
+    def magnitude(self, column: int) -> float:
+        """Largest magnitude of a channel."""
+        return max(-self.low[column], self.high[column])
+
+
+class Conversion:
+    """Converts blocks of counts, all channels at once if no sample is missing."""
+
+    def __init__(self, channels: tuple[Channel, ...]) -> None:
+        self._channels = channels
+        self._linear = [(float(each.scale), float(each.offset)) for each in channels if not each.higher]
+        self._scale, self._offset = (np.array([getattr(each, key) for each in channels]) for key in ("scale", "offset"))
+
+    def of(self, counts: Counts) -> tuple[Array, Extremes | None]:
+        """Values of counts of shape (n, n_channels), n > 0, same shape; NaN where the counts are not a measurement.
+        Their extremes are None if any sample is missing.
+        """
+        low, high = np.minimum.reduce(counts).tolist(), np.maximum.reduce(counts).tolist()
+        if len(self._linear) < len(self._channels) or self._missing(low, high):
+            return self._by_channel(counts)
+        values = counts.astype(np.float64, order="F")
+        values *= self._scale
+        values += self._offset
+        # same two operations as for the values, so that these are bit-identical to the array
+        for k, (scale, offset) in enumerate(self._linear):
+            first, last = low[k] * scale + offset, high[k] * scale + offset
+            low[k], high[k] = (first, last) if scale > 0.0 else (last, first)
+        return values, Extremes(low, high)
+
+    def _missing(self, low: list[int], high: list[int]) -> bool:
+        for channel, least, most in zip(self._channels, low, high, strict=True):
+            if least < channel.valid[0] or most > channel.valid[1]:
+                return True
+        return False
+
+    def _by_channel(self, counts: Counts) -> tuple[Array, Extremes | None]:
+        values = np.empty(counts.shape, order="F")
+        for column, channel in enumerate(self._channels):
+            values[:, column] = channel.to_unit(counts[:, column])
+        if np.isnan(values).any():
+            return values, None
+        return values, Extremes(values.min(axis=0).tolist(), values.max(axis=0).tolist())

@@ -1,0 +1,128 @@
+"""Multipliers of the rocking orbits on fixed ground and on the table, and the boundaries of stability."""
+
+from collections.abc import Sequence
+from math import nan, pi
+
+import numpy as np
+
+from bench.datafile.tables import Column, Table
+from bench.prediction.requests import StabilityRequest
+from bench.prediction.steady import amplitude_of, predict_spectra
+from bench.progress import Progress, counting, silent
+from sim.gain import predict_gain
+from sim.shaker import Shaker
+from sim.specimen import Specimen
+from sim.steady import NoOrbit, Orbit
+from sim.sweep import in_threads
+from sim.table_orbit import table_orbit
+
+GROUNDS = {"fixed ground": "modulus", "table": "table_modulus"}
+"""Column of the moduli of each ground."""
+
+BOUNDARY = 1e-4
+"""Largest error of the frequency of a boundary [rad/s]."""
+
+UNKNOWN = complex(nan, nan)
+
+REAL = 0.02
+"""Largest distance of a multiplier's angle from 0 or pi [rad] for a real one."""
+
+
+def multipliers_table(
+    specimen: Specimen, shaker: Shaker, request: StabilityRequest, progress: Progress = silent
+) -> Table:
+    """One row per rocking orbit, by stiffness and ascending frequency: its gain, and its slowest multiplier on fixed
+    ground and on the table, NaN where no orbit was found there.
+    """
+    found = predict_spectra(specimen, request, progress)
+    layers = [(each.beta, each.omega, each.rocking) for each in found if each.rocking is not None]
+    on_table = in_threads(
+        lambda layer: _slowest(layer[2].orbit, "table", shaker, request.harmonics),
+        layers,
+        counting(progress, "computing the orbits on the table"),
+    )
+    fixed = [layer.orbit.slowest for _, _, layer in layers]
+
+    def numbers(values: Sequence[float], unit: str, description: str) -> Column:
+        return Column(np.array(values, dtype=np.float64), unit, description)
+
+    moduli = "greatest |Floquet multiplier|: remaining share of a disturbance after a period,"
+    angles = "argument of that multiplier: 0 fold, pi flip, between them Neimark-Sacker,"
+    return {
+        "beta": numbers([beta for beta, _, _ in layers], "1", "stiffness ratio k_C/k1 of the coupling spring"),
+        "omega_rad_s": numbers([omega for _, omega, _ in layers], "rad/s", "circular frequency of the base motion"),
+        "alpha_2": numbers([layer.alpha_2 for _, _, layer in layers], "1", "gain of the peak drift on the orbit"),
+        "modulus": numbers([abs(each) for each in fixed], "1", f"{moduli} on fixed ground"),
+        "argument_rad": numbers([float(np.angle(each)) for each in fixed], "rad", f"{angles} on fixed ground"),
+        "table_modulus": numbers([abs(each) for each in on_table], "1", f"{moduli} on the table"),
+        "table_argument_rad": numbers([float(np.angle(each)) for each in on_table], "rad", f"{angles} on the table"),
+    }
+
+
+def boundaries_table(
+    specimen: Specimen, shaker: Shaker, request: StabilityRequest, table: Table, progress: Progress = silent
+) -> Table:
+    """One row per change of stability between neighbouring rows of `table`, located by bisection."""
+    amplitude = amplitude_of(specimen, request)
+    columns = {name: column.values for name, column in table.items()}
+    changes = [
+        (ground, k, float(columns["beta"][k]))
+        for ground, name in GROUNDS.items()
+        for k in np.flatnonzero(
+            (columns["beta"][1:] == columns["beta"][:-1]) & ((columns[name][1:] < 1.0) != (columns[name][:-1] < 1.0))
+        ).tolist()
+        if np.isfinite(columns[name][k : k + 2]).all()
+    ]
+
+    def located(change: tuple[str, int, float]) -> tuple[float, complex]:
+        ground, k, beta = change
+        low, high = (float(columns["omega_rad_s"][at]) for at in (k, k + 1))
+        stable = bool(columns[GROUNDS[ground]][k] < 1.0)
+        coupled, slowest = specimen.coupled(beta), UNKNOWN
+        while high - low > BOUNDARY:
+            middle = 0.5 * (low + high)
+            layer = predict_gain(coupled, middle, amplitude).rocking
+            slowest = UNKNOWN if layer is None else _slowest(layer.orbit, ground, shaker, request.harmonics)
+            if np.isnan(slowest):
+                return nan, UNKNOWN
+            if (abs(slowest) < 1.0) == stable:
+                low = middle
+            else:
+                high = middle
+        return 0.5 * (low + high), slowest
+
+    found = in_threads(located, changes, counting(progress, "locating the boundaries"))
+    return {
+        "beta": Column(
+            np.array([beta for *_, beta in changes], dtype=np.float64), "1", "stiffness ratio of the coupling spring"
+        ),
+        "ground": Column(np.array([ground for ground, *_ in changes], dtype=np.str_), "", "fixed ground, or table"),
+        "omega_rad_s": Column(np.array([omega for omega, _ in found]), "rad/s", "frequency at which the orbit changes"),
+        "argument_rad": Column(
+            np.array([float(np.angle(each)) for _, each in found]), "rad", "argument of the multiplier there"
+        ),
+        "kind": Column(
+            np.array([_kind(each) for _, each in found], dtype=np.str_),
+            "",
+            "fold, flip or Neimark-Sacker; empty where no orbit was found on the way",
+        ),
+    }
+
+
+def _slowest(orbit: Orbit, ground: str, shaker: Shaker, harmonics: int) -> complex:
+    """The slowest multiplier on a ground of GROUNDS; UNKNOWN where no orbit is found on the table."""
+    if ground == "fixed ground":
+        return orbit.slowest
+    try:
+        return table_orbit(orbit, shaker, harmonics).slowest
+    except NoOrbit:
+        return UNKNOWN
+
+
+def _kind(multiplier: complex) -> str:
+    if np.isnan(multiplier):
+        return ""
+    angle = float(np.angle(multiplier))
+    if angle < REAL:
+        return "fold"
+    return "flip" if pi - angle < REAL else "Neimark-Sacker"

@@ -1,1 +1,0 @@
-"""Tests in order, kept in a file: command line and window run the same ones."""

@@ -1,0 +1,226 @@
+"""Comparison of a replay with its recording: every drive sample, journal entry and result."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.datafile.declared import ENTRY_TABLES, EVENT_TABLES
+from bench.datafile.fields import TEXT_WIDTH
+from bench.datafile.hdf5 import clip_text
+from bench.datafile.reader import DataFile
+from bench.events import Acquired, Event, PointFinished, SensorsAligned, TwinEstimate
+from bench.replay.recording import RecordedCourse
+
+ROUNDING = 1e-9
+"""Relative difference of results attributed to rounding by another processor or library."""
+
+DRIVE_ROUNDING = 1e-6
+"""Difference of the drive [V] attributed to rounding: far below the step of a 16-bit converter."""
+
+ROWS_AT_ONCE = 2**16
+
+DRIVE, JOURNAL, POINTS, ENDING = "drive samples", "journal entries", "points", "ending"
+"""Compared parts, in addition to the other tables."""
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Difference from the recording in `part`; `rounding` if the last bits of a number explain it."""
+
+    text: str
+    part: str
+    rounding: bool = False
+
+
+@dataclass
+class Found:
+    """Number of compared values by part, and all differences."""
+
+    compared: dict[str, int] = field(default_factory=dict[str, int])
+    differences: list[Difference] = field(default_factory=list[Difference])
+
+
+class Comparison:
+    """A subscriber that collects the events of a replay and compares the drive block by block."""
+
+    def __init__(self, record: DataFile, course: RecordedCourse) -> None:
+        self._record, self._course = record, course
+        self._drive = _DriveComparison(record)
+        self._journal: list[tuple[str, str, int]] = []
+        self._blocks = 0
+        self._points: list[Mapping[str, Any]] = []
+        self._own: dict[type[Event], list[Mapping[str, Any]]] = {kind: [] for kind in EVENT_TABLES}
+
+    def __call__(self, event: Event) -> None:
+        if isinstance(event, Acquired):
+            self._drive.push(event)
+            self._blocks += 1
+            return
+        if (table := EVENT_TABLES.get(type(event))) is not None:
+            names = [each.name for each in table.fields]
+            self._own[type(event)] += (dict(zip(names, row, strict=True)) for row in table.rows(event))
+        if not self._course.journalled(event):
+            return
+        text = event.line
+        if isinstance(event, PointFinished):
+            text = f"row {len(self._points)} of points"
+            self._points.append({name: getattr(event.point, name) for name in type(event.point).model_fields})
+        self._journal.append((type(event).__name__, _clipped(text), self._blocks))
+
+    @property
+    def drive_played(self) -> int:
+        """Number of compared drive samples."""
+        return self._drive.played
+
+    def finish(self, broken_off: str | None) -> Found:
+        """Compare the replay with the recording.
+
+        If the recording is `broken_off`, the journals are compared up to the replay's entry with this text.
+        """
+        found = Found()
+        self._drive.report(found)
+        entries = Counter(kind for kind, *_ in self._compare_journal(found, broken_off))
+        same_wording = self._course.same_wording
+        _compare_rows(found, POINTS, self._record.points, self._points, same_wording)
+        for kind, rows in self._own.items():
+            if kind is TwinEstimate and not self._course.twin_in_time:
+                continue
+            stored = self._course.rows_of(kind)
+            if stored is None:
+                continue
+            common = max(len(stored), len(rows))
+            if broken_off is not None and kind in (TwinEstimate, SensorsAligned):
+                # the last samples of a killed program may be lost although the twin's estimates from them are not;
+                # the end of its run was not published at all
+                common = min(len(stored), len(rows))
+            elif broken_off is not None and kind in ENTRY_TABLES:
+                common = entries[kind.__name__]
+            name = EVENT_TABLES[kind].name.replace("_", " ")
+            _compare_rows(found, name, stored[:common], rows[:common], same_wording)
+        return found
+
+    def _compare_journal(self, found: Found, broken_off: str | None) -> list[tuple[str, str, int]]:
+        """Compare kind, order and text of the entries, or kind and preceding number of blocks if the wording differs.
+
+        Returns the entries of the replay that can be compared.
+        """
+        begin, same_wording = self._course.begin, self._course.same_wording
+        stored = [(entry.kind, entry.text, entry.blocks) for entry in self._course.journal]
+        came = self._journal
+        if broken_off is not None:
+            end = next((k for k, (_, text, _) in enumerate(came) if broken_off in text), len(came))
+            came = came[: min(end, len(stored))]
+        found.compared[JOURNAL] = len(came)
+        for index, (kind, text, blocks) in enumerate(came):
+            was_kind, was_text, was_blocks = stored[index] if index < len(stored) else ("nothing", "", 0)
+            same = was_text == text if same_wording else was_blocks == blocks
+            if index >= begin and not (was_kind == kind and same):
+                was, now = f"{was_kind} {was_text!r}", f"{kind} {text!r}"
+                if not same_wording:
+                    was, now = f"{was} after {was_blocks} blocks", f"{now} after {blocks}"
+                found.differences.append(Difference(f"journal entry {index + 1} was {was} and is {now}", JOURNAL))
+                return came
+        if broken_off is None and len(stored) > len(came):
+            kind, text, _ = stored[len(came)]
+            said = f"journal entry {len(came) + 1} is missing from the replay: {kind} {text!r}"
+            found.differences.append(Difference(said, JOURNAL))
+        return came
+
+
+class _DriveComparison:
+    """Compares the drive of the replay with the recorded drive in its stored precision."""
+
+    def __init__(self, record: DataFile) -> None:
+        self._record = record
+        self._held: NDArray[np.float32] = np.zeros(0, dtype=np.float32)
+        self._held_row = 0
+        self.played = 0
+        self._exact = 0
+        self._largest = 0.0
+        self._first: str | None = None
+
+    def push(self, event: Acquired) -> None:
+        n = event.drive.size
+        begin = self.played - self._held_row
+        if begin + n > self._held.size:
+            rows = slice(self.played, self.played + max(n, ROWS_AT_ONCE))
+            self._held, self._held_row, begin = self._record.drive(rows), self.played, 0
+        stored, came = self._held[begin : begin + n], event.drive.astype(np.float32)
+        self.played += n
+        same = stored == came[: stored.size]
+        self._exact += int(np.count_nonzero(same))
+        if same.all():
+            return
+        distance = np.abs(stored.astype(np.float64) - came[: stored.size])
+        self._largest = max(self._largest, float(distance.max()))
+        if self._first is None and (distance > DRIVE_ROUNDING).any():
+            at = int(np.argmax(distance > DRIVE_ROUNDING))
+            where = f"sample {event.block.first + at} of run {event.run}"
+            self._first = f"the drive differs from {where} on: recorded {stored[at]:.7g} V, replayed {came[at]:.7g} V"
+
+    def report(self, found: Found) -> None:
+        found.compared[DRIVE] = self.played
+        if self._first is not None:
+            said = f"{self._first}; largest difference {self._largest:.3g} V"
+            said = f"{said}; later recorded samples are not the response to the replayed drive"
+            found.differences.append(Difference(said, DRIVE))
+        elif self._exact < self.played:
+            said = f"{self.played - self._exact} samples of the drive differ by at most {self._largest:.2g} V"
+            found.differences.append(Difference(said, DRIVE, rounding=True))
+
+
+def _compare_rows(
+    found: Found,
+    what: str,
+    stored: Sequence[Mapping[str, Any]],
+    came: Sequence[Mapping[str, Any]],
+    same_wording: bool,
+) -> None:
+    """Compare the rows of a table field by field, except bench times."""
+    found.compared[what] = len(came)
+    if len(stored) != len(came):
+        found.differences.append(Difference(f"{len(stored)} rows of {what} recorded, {len(came)} replayed", what))
+    largest = 0.0
+    for number, (was, now) in enumerate(zip(stored, came, strict=False), 1):
+        for name in (now.keys() & was.keys()) - {"time"}:
+            if not same_wording and _are_sentences(was[name], now[name]):
+                continue
+            apart = _apart(was[name], now[name])
+            if apart > ROUNDING:
+                text = f"row {number} of {what}: {name} was {was[name]!r} and is {_plain(now[name])!r}"
+                found.differences.append(Difference(text, what))
+            else:
+                largest = max(largest, apart)
+    if largest > 0.0:
+        said = f"{what} differ by at most {largest:.1e} of a value"
+        found.differences.append(Difference(said, what, rounding=True))
+
+
+def _plain(value: Any) -> Any:
+    return value.value if isinstance(value, Enum) else value
+
+
+def _are_sentences(was: Any, now: Any) -> bool:
+    """Whether both are sentences, which depend on the wording, rather than names, codes or JSON."""
+    if isinstance(now, Enum) or not (isinstance(was, str) and isinstance(now, str) and was and now):
+        return False
+    return any(" " in text and text[0] not in "{[" for text in (was, now))
+
+
+def _apart(was: Any, now: Any) -> float:
+    """Relative difference of two values; infinite if they are unequal and not numbers."""
+    was, now = (None if each is None or each != each else each for each in (was, now))
+    if isinstance(now, str):
+        return 0.0 if was == _clipped(now) or (was is None and not now) else np.inf
+    if was is None or now is None or isinstance(was, str):
+        return 0.0 if was is now else np.inf
+    return 0.0 if was == now else abs(was - now) / max(abs(was), abs(now))
+
+
+def _clipped(text: str) -> str:
+    return clip_text(text, TEXT_WIDTH).decode()

@@ -1,0 +1,217 @@
+"""Replay of a recorded campaign with the engine, guard and analysis of live runs."""
+
+import time
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from bench.config.model import BenchConfiguration
+from bench.datafile.reader import DataFile
+from bench.engine.engine import configured_engine
+from bench.engine.interface import EventStream, Requests
+from bench.engine.steps import Plan
+from bench.events import (
+    Acquired,
+    Event,
+    OperatorAnswered,
+    OperatorAsked,
+    Subscriber,
+    Warned,
+)
+from bench.provenance import revision, software
+from bench.replay.compare import DRIVE, ENDING, Comparison, Difference, Found
+from bench.replay.recording import DataFileRecording, RecordedCourse
+from bench.twin.live import live_twin
+from drivers.clock import Clock, now
+from drivers.replay import ReplayRig
+from sim.parameters import Parameters
+
+LONGEST_WAIT = 1.0
+"""Longest pause replayed in real time [s]; pauses for operator actions are shortened to it."""
+
+
+class PacedClock:
+    """Recorded time at `speed` times real time; never late, however slow the computer.
+
+    With a real-time clock, the guard could find blocks late that were recorded in time.
+    """
+
+    def __init__(self, speed: float) -> None:
+        self._speed = speed
+        self._now = 0.0
+        self._due = now()
+
+    def now(self) -> float:
+        """Bench time [s]."""
+        return self._now
+
+    def wait_until(self, instant: float) -> None:
+        """Wait until bench time `instant` is due, and advance to it."""
+        ahead = instant - self._now
+        if ahead <= 0.0:
+            return
+        self._now = instant
+        # delays of slow computations are not made up
+        self._due = max(self._due + min(ahead, LONGEST_WAIT) / self._speed, now())
+        while (remaining := self._due - now()) > 0.0:
+            time.sleep(remaining)
+
+
+class RequestReplay:
+    """Subscriber that repeats the recorded requests to end the run."""
+
+    def __init__(self, course: RecordedCourse, requests: Requests) -> None:
+        self._waiting = deque(course.requests)
+        self._course, self._requests = course, requests
+        self._blocks = self._entries = 0
+
+    def __call__(self, event: Event) -> None:
+        self._blocks += isinstance(event, Acquired)
+        self._entries += self._course.journalled(event)
+        while self._waiting:
+            request = self._waiting[0]
+            if self._blocks < request.blocks or self._entries < request.entries:
+                return
+            self._waiting.popleft()
+            make = {"stop": self._requests.stop, "abort": self._requests.abort, "halt": self._requests.halt}
+            make[request.kind](request.reason, request.code)
+
+
+class RecordedOperator:
+    """Operator who answers as recorded; a request without a recorded answer is declined."""
+
+    def __init__(self, course: RecordedCourse) -> None:
+        self._answers: deque[str | None] = deque()
+        for entry in course.journal:
+            if entry.kind == OperatorAsked.__name__:
+                self._answers.append(None)
+            elif entry.kind == OperatorAnswered.__name__ and self._answers:
+                self._answers[-1] = entry.columns.get("by", "operator")
+        self.name = "operator"
+
+    def confirm(self, request: str) -> bool:  # noqa: ARG002 - the request is compared with the journal elsewhere
+        """Return the recorded answer and set `name` to its author."""
+        answer = self._answers.popleft() if self._answers else None
+        self.name = answer or self.name
+        return answer is not None
+
+
+UNFINISHED = "running"
+"""Status of a file whose writer was killed."""
+
+
+@dataclass(frozen=True)
+class Replayed:
+    """Result of a replay.
+
+    `ended` states where and why the recording broke off before the end of the plan: at an error of the rig or a killed
+    program, which recorded data cannot reproduce. `in_place` are violations that are not in the samples, replaced by
+    abort requests. `played` of `rows` samples were requested. `same_wording` is false for a file written with other
+    message texts, which were not compared. `returned` is the result of the plan, None where it broke off.
+    """
+
+    status: str
+    reason: str
+    points: tuple[Parameters, ...]
+    ended: str | None
+    in_place: tuple[str, ...]
+    played: int
+    rows: int
+    found: Found
+    changed: tuple[str, ...]
+    same_wording: bool
+    returned: object = None
+
+    def parted(self, part: str) -> str | None:
+        """First difference in `part` that rounding does not explain, or None."""
+        return next((each.text for each in self.found.differences if each.part == part and not each.rounding), None)
+
+    @property
+    def identical(self) -> bool:
+        """Whether replay and recording are identical to the last bit."""
+        return not self.found.differences
+
+    @property
+    def agrees(self) -> bool:
+        """Whether replay and recording agree except for rounding."""
+        return all(difference.rounding for difference in self.found.differences)
+
+
+def stored_configuration(record: DataFile) -> BenchConfiguration:
+    """Recorded configuration of the bench. Raises InvalidInput if there is none or its format is unknown."""
+    return DataFileRecording(record).configuration
+
+
+def replay(
+    record: DataFile,
+    plan: Plan,
+    configuration: BenchConfiguration,
+    *,
+    clock: Clock,
+    subscribers: Sequence[Subscriber],
+) -> Replayed:
+    """Carry out `plan` on the samples of an open file, with the recorded `configuration`, and compare.
+
+    `clock` begins at 0. Raises InvalidInput when the file cannot be played.
+    """
+    recording, course = DataFileRecording(record), RecordedCourse(record)
+    comparison, requests = Comparison(record, course), Requests()
+    with ReplayRig(recording, clock=clock, course=course) as rig:
+        # requests last: all subscribers have received the earlier events
+        stream = EventStream(clock, [comparison, *subscribers, RequestReplay(course, requests)])
+        engine = configured_engine(rig, configuration, stream, requests, RecordedOperator(course))
+        for warning in course.first_warnings:
+            stream.publish(Warned(warning))
+        with live_twin(stream, rig, configuration, requests, patient=True):
+            ending = engine.run(plan)
+        over = rig.over
+    broke_off = _broke_off(record, over)
+    found = comparison.finish(ending.reason.partition("; then ")[0] if broke_off else None)
+    same_summary = not course.same_wording or record.summary == ending.reason
+    if broke_off is None and not (record.status == ending.status and same_summary):
+        was = f"{record.status} ({record.summary})"
+        said = f"the run was {was}; the replay was {ending.status} ({ending.reason})"
+        found.differences.append(Difference(said, ENDING))
+    played, rows = comparison.drive_played, record.rows
+    # an incomplete block is not played
+    if rows - played >= (configuration.block_samples if broke_off else 1):
+        found.differences.append(Difference(f"{played} of {rows} recorded samples were requested", DRIVE))
+    return Replayed(
+        status=ending.status,
+        reason=ending.reason,
+        points=tuple(stream.points),
+        ended=broke_off,
+        in_place=course.in_place,
+        played=played,
+        rows=rows,
+        found=found,
+        changed=_changed(record.metadata),
+        same_wording=course.same_wording,
+        returned=engine.returned,
+    )
+
+
+def _broke_off(record: DataFile, over: str | None) -> str | None:
+    """Position and reason if the recording ends before its plan; None if the plan ended."""
+    if record.status == UNFINISHED:
+        return f"{over or 'it ends'}: the program that wrote it was killed, or still writes"
+    if over is None or record.status not in ("failed", "halted", "interrupted"):
+        return None
+    return f"{over}: the run {record.status} there, {record.summary}"
+
+
+def _changed(metadata: dict[str, str]) -> tuple[str, ...]:
+    """Changes of the software that results depend on since the file was written, by version or git hash."""
+    now = software()
+    known = {name: metadata.get(name, "unknown") for name in now}
+    versions = (f"{name} was {known[name]} and is {now[name]}" for name in now if known[name] != now[name])
+    return (*versions, *_changed_files(metadata.get("git", "unknown"), revision()))
+
+
+def _changed_files(was: str, now: str) -> tuple[str, ...]:
+    """Comparison of the git hashes; empty if equal, without uncommitted changes ("+") and known."""
+    if was != now:
+        return (f"git was {was} and is {now}",)
+    if now == "unknown" or now.endswith("+"):
+        return (f"git is {now} in both, which does not prove that the sources are identical",)
+    return ()

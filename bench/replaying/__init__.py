@@ -1,1 +1,0 @@
-"""Recorded campaigns once more: played through the same engine, and analysed anew."""

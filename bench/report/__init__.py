@@ -1,1 +1,0 @@
-"""What a person takes away from a campaign: figure, summary, table."""

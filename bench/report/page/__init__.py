@@ -1,1 +1,0 @@
-"""A report as data, and its two forms: one HTML file without references to others, and PDF pages."""

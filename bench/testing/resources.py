@@ -1,0 +1,39 @@
+"""Resources held by this process, for tests that all of them are released."""
+
+import threading
+import time
+from pathlib import Path
+
+_PATIENCE = 10.0
+"""Longest wait for threads, files and processes to end [s]."""
+
+
+def held() -> dict[str, int]:
+    """Number of threads and, on Linux, of open files (including ports and sockets) and child processes.
+
+    Excludes threads of an emulated laboratory in this process, which starts before a rig and outlives it.
+    """
+    counts = {"threads": sum(not thread.name.startswith("emulated") for thread in threading.enumerate())}
+    own = Path("/proc/self")
+    if own.is_dir():
+        counts["files"] = sum(1 for _ in (own / "fd").iterdir())
+        counts["processes"] = sum(len(_text(path).split()) for path in own.glob("task/*/children"))
+    return counts
+
+
+def held_at_last(allowed: dict[str, int]) -> dict[str, int]:
+    """Resources held, as soon as they are within `allowed` or after a timeout."""
+    deadline = time.monotonic() + _PATIENCE
+    now = held()
+    while any(count > allowed[kind] for kind, count in now.items()) and time.monotonic() < deadline:
+        time.sleep(0.01)
+        now = held()
+    return now
+
+
+def _text(path: Path) -> str:
+    """Text of a thread's file; empty if the thread has just ended."""
+    try:
+        return path.read_text()
+    except (FileNotFoundError, ProcessLookupError):
+        return ""

@@ -1,0 +1,31 @@
+"""Live twin of a run. Its model is loaded only if the configuration enables it."""
+
+from collections.abc import Generator
+from contextlib import contextmanager
+
+from bench.config.model import BenchConfiguration
+from bench.engine.interface import EventStream, Requests
+from drivers.rig import Rig
+
+
+@contextmanager
+def live_twin(
+    stream: EventStream,
+    rig: Rig,
+    configuration: BenchConfiguration,
+    requests: Requests,
+    *,
+    patient: bool,
+) -> Generator[None]:
+    """Context manager in which a `Twin`, if enabled by the configuration, subscribes to and publishes on `stream`."""
+    if not configuration.twin.enabled:
+        yield
+        return
+    from bench.twin.twin import Twin
+
+    twin = Twin(rig.sample_rate, configuration, stream.publish, requests, patient=patient)
+    stream.join(twin)
+    try:
+        yield
+    finally:
+        twin.close()

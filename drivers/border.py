@@ -1,0 +1,341 @@
+"""Validation of everything that a rig backend returns to the bench.
+
+A backend may belong to another package. An invalid rig, channel, block or Boolean, or an exception that a rig must not
+raise, causes a BackendFault, which names the backend.
+"""
+
+import re
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager, suppress
+from math import isfinite
+from typing import Any, NoReturn, Self, TypeGuard, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.clock import Clock, VirtualClock, WallClock
+from drivers.errors import BackendFault
+from drivers.rig import Alignment, Block, Channel, OperatorTask, Rig
+from sim.errors import RockbenchError
+
+MOST_CHANNELS = 256
+HIGHEST_RATE = 1e6
+"""Largest sample rate [1/s]: above it the buffers of this program would hold less than a second."""
+LONGEST_LEAD = 10.0
+"""Longest lead [s]: the guard cannot act on commands with a longer delay."""
+HIGHEST_VOLTAGE = 100.0
+"""Largest drive range [V]."""
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+
+
+class CheckedClock:
+    """Clock of a backend. After an invalid reading it returns the last valid one; `fault` describes the reading."""
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+        self._last = 0.0
+        self.fault = ""
+
+    def now(self) -> float:
+        try:
+            given: object = self._clock.now()
+        except Exception as error:
+            self.fault = f"its clock cannot be read ({_told(error)})"
+            return self._last
+        if _is_number(given):
+            self._last = float(given)
+        else:
+            self.fault = f"its clock shows {given!r}"
+        return self._last
+
+    def wait_until(self, instant: float) -> None:
+        self._clock.wait_until(instant)
+
+
+class _CheckedVirtualClock(CheckedClock, VirtualClock):
+    """Virtual clock of a backend."""
+
+
+class CheckedRig:
+    """`drivers.rig.Rig` that validates the rig of the backend of this name.
+
+    The description of the rig is read once, here. Blocks are copied. A safety input counts as open if it disappears or
+    is not a Boolean. Raises BackendFault for an invalid rig, after closing the backend's rig.
+    """
+
+    def __init__(self, rig: Rig, backend: str) -> None:
+        self._rig, self.backend = rig, backend
+        # every safety input named so far, in order; open unless it is reported good. A stopped rig may omit an input
+        # that it names only while armed, such as an amplifier that is ready only while it is enabled
+        self._inputs: dict[str, bool] = {}
+        self._while_armed: dict[str, bool] = {}
+        self._armed = False
+        try:
+            self._describe()
+        except BaseException:
+            with suppress(Exception):
+                rig.close()
+            raise
+
+    def _describe(self) -> None:
+        missing = [name for name in _CALLS if not callable(getattr(self._rig, name, None))]
+        if missing:
+            self._refuse(f"returned {type(self._rig).__name__}, which is no rig: it has no {', '.join(missing)}")
+        self.channels = self._checked_channels(self._given("channels"))
+        self.sample_rate = self._number("sample_rate", HIGHEST_RATE)
+        self.drive_range = self._number("drive_range", HIGHEST_VOLTAGE)
+        self.lead = self._checked_lead(self._given("lead"), self.sample_rate)
+        self.description = self._checked_description(self._given("description"))
+        self.clock = self._checked_clock(self._given("clock"))
+        self._require_clock()
+
+    def _given(self, name: str) -> Any:
+        """Property of the backend's rig, of any type."""
+        with self._calls(name.replace("_", " ")):
+            return getattr(self._rig, name)
+
+    @property
+    def alignments(self) -> tuple[Alignment, ...]:
+        """Alignments of sensors with their own clocks since `arm()`."""
+        given = self._given("alignments")
+        names = [channel.name for channel in self.channels]
+        if type(given) is not tuple or not all(_is_alignment(each, names) for each in cast("tuple[Any, ...]", given)):
+            self._refuse(f"returned {given!a:.80} as alignments of its sensors")
+        return cast("tuple[Alignment, ...]", given)
+
+    def interlocks(self) -> Mapping[str, bool]:
+        """Safety inputs by name; False for an input that has disappeared or is not a Boolean."""
+        with self._calls("interlocks"):
+            given: Any = self._rig.interlocks()
+        found: dict[str, bool] | None = None
+        if isinstance(given, Mapping):
+            with suppress(Exception):
+                found = {str(name): _is_good(good) for name, good in cast("Mapping[Any, Any]", given).items()}
+        if found is None:
+            return self._inputs | self._while_armed or {f"safety inputs of the backend {self.backend}": False}
+        named = self._while_armed if self._armed else self._inputs
+        named |= dict.fromkeys(found, False)
+        return self._inputs | self._while_armed | found
+
+    def arm(self) -> None:
+        """See `drivers.rig.Rig`, also for the methods below."""
+        with self._calls("arm"):
+            self._require_clock()
+            self._armed = True
+            self._rig.arm()
+
+    def write(self, volts: NDArray[np.float64]) -> None:
+        with self._calls("write"):
+            # the guard keeps its own: a backend may convert what it is given in place
+            self._rig.write(np.array(volts, dtype=np.float64))
+
+    def read(self, n: int) -> Block:
+        with self._calls("read"):
+            given: object = self._rig.read(n)
+            self._require_clock()
+            return self._checked_block(given)
+
+    def stop(self) -> None:
+        self._disarmed()
+        with self._calls("stop"):
+            self._rig.stop()
+
+    def halt(self) -> None:
+        self._disarmed()
+        with self._calls("halt"):
+            self._rig.halt()
+
+    def _disarmed(self) -> None:
+        self._armed, self._while_armed = False, {}
+
+    def close(self) -> None:
+        with self._calls("close"):
+            self._rig.close()
+
+    def perform(self, work: OperatorTask, amount: float | None = None) -> None:
+        with self._calls("perform"):
+            self._rig.perform(work, amount)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    @contextmanager
+    def _calls(self, call: str) -> Generator[None]:
+        """Context manager that converts exceptions that a rig must not raise to BackendFault."""
+        try:
+            yield
+        except RockbenchError:
+            raise
+        except MemoryError:
+            raise
+        except Exception as error:
+            raise BackendFault(self.backend, f"failed in {call} ({_told(error)})") from error
+
+    def _refuse(self, what: str) -> NoReturn:
+        raise BackendFault(self.backend, what)
+
+    def _require_clock(self) -> None:
+        clock = self.clock
+        if isinstance(clock, CheckedClock):
+            clock.now()
+            if clock.fault:
+                raise BackendFault(self.backend, f"has no time: {clock.fault}")
+
+    def _number(self, name: str, highest: float) -> float:
+        value, item = self._given(name), name.replace("_", " ")
+        if not _is_number(value) or not 0.0 < value <= highest:
+            self._refuse(f"has a {item} of {value!a}: it must be a number above 0 and at most {highest:g}")
+        return float(value)
+
+    def _checked_lead(self, lead: object, rate: float) -> int:
+        most = int(LONGEST_LEAD * rate)
+        if not _is_count(lead) or not 0 <= lead <= most:
+            self._refuse(f"has a lead of {lead!a} samples: it must be a whole number from 0 to {most}")
+        return int(lead)
+
+    def _checked_channels(self, given: Any) -> tuple[Channel, ...]:
+        if type(given) is not tuple or not 0 < len(cast("tuple[Any, ...]", given)) <= MOST_CHANNELS:
+            self._refuse(f"has channels {given!a:.80}: they must be a tuple of 1 to {MOST_CHANNELS}")
+        channels = cast("tuple[Channel, ...]", given)
+        known: set[str] = set()
+        for number, channel in enumerate(channels):
+            with self._calls("channels"):
+                wrong = _wrong_with(channel) or ("its name is repeated" if channel.name in known else "")
+            if wrong:
+                self._refuse(f"has channels of which number {number} is none: {wrong}")
+            known.add(channel.name)
+        return channels
+
+    def _checked_description(self, given: Any) -> dict[str, str]:
+        pairs = cast("Mapping[Any, Any]", given).items() if isinstance(given, Mapping) else [(None, None)]
+        if not all(_is_text(text) for pair in pairs for text in pair):
+            self._refuse(f"has a description {given!a:.80}: it must map texts to texts")
+        return dict(pairs)
+
+    def _checked_clock(self, clock: Any) -> Clock:
+        # clocks of this program need no check
+        if type(clock) in (VirtualClock, WallClock):
+            return clock
+        if not callable(getattr(clock, "now", None)) or not callable(getattr(clock, "wait_until", None)):
+            self._refuse(f"has a clock that is none: {type(clock).__name__}")
+        return _CheckedVirtualClock(clock) if isinstance(clock, VirtualClock) else CheckedClock(clock)
+
+    def _checked_block(self, given: Any) -> Block:
+        if not isinstance(given, Block):
+            self._refuse(f"returned {type(given).__name__} instead of a block")
+        first: object = given.first
+        counts: Any = given.counts
+        if not _is_count(first) or first < 0:
+            self._refuse(f"returned a block whose first sample is {first!a}")
+        if not isinstance(counts, np.ndarray):
+            self._refuse(f"returned a block of {type(counts).__name__} instead of an array of counts")
+        counts = cast("NDArray[Any]", counts)
+        if counts.dtype not in (np.dtype(np.int16), np.dtype(np.int32)):
+            self._refuse(f"returned a block of {counts.dtype} instead of int16 or int32")
+        if counts.ndim != 2 or counts.shape[1] != len(self.channels):
+            self._refuse(f"returned a block of shape {counts.shape} for {len(self.channels)} channels")
+        own = np.array(counts, order="K", subok=False)
+        if own.dtype != np.int16 and len(own):
+            self._require_storable(own)
+        return Block(int(first), own)
+
+    def _require_storable(self, counts: NDArray[Any]) -> None:
+        """Refuse counts beyond the range of their channel's storage, which the file would alter."""
+        low, high = counts.min(axis=0), counts.max(axis=0)
+        for column, channel in enumerate(self.channels):
+            span = np.iinfo(channel.storage)
+            if low[column] < span.min or high[column] > span.max:
+                told = f"from {low[column]} to {high[column]} of {channel.name}, which are stored in {span.bits} bits"
+                self._refuse(f"returned counts {told}")
+
+
+_CALLS = ("interlocks", "arm", "write", "read", "stop", "halt", "close", "perform")
+
+
+def _told(error: BaseException) -> str:
+    said = " ".join(str(error).split())
+    return f"{type(error).__name__}: {said}" if said else type(error).__name__
+
+
+def _is_number(value: object) -> TypeGuard[float]:
+    if isinstance(value, bool | np.bool_) or not isinstance(value, int | float | np.integer | np.floating):
+        return False
+    try:
+        return isfinite(cast(float, value))
+    except OverflowError:
+        return False
+
+
+def _is_count(value: object) -> TypeGuard[int]:
+    return isinstance(value, int | np.integer) and not isinstance(value, bool)
+
+
+def _is_good(value: object) -> bool:
+    """Whether a safety input is good; any value that is not a Boolean counts as open."""
+    return isinstance(value, bool | np.bool_) and bool(cast(bool, value))
+
+
+def _is_text(value: object, *, printable: bool = False) -> bool:
+    if not isinstance(value, str):
+        return False
+    try:
+        value.encode()
+    except UnicodeEncodeError:
+        return False
+    return not printable or value.isprintable()
+
+
+def _is_alignment(value: Any, sensors: list[str]) -> bool:
+    if not isinstance(value, Alignment) or value.sensor not in sensors:
+        return False
+    # offset and rate are NaN while they are not known, as in a run that ends before its first block
+    line = (value.offset, value.rate)
+    known = all(map(_is_number, line)) or all(each != each for each in line)
+    return (
+        known
+        and (_is_number(value.residual) or value.residual != value.residual)
+        and _is_number(value.delay)
+        and all(map(_is_count, (value.values, value.lost, value.late, value.implausible)))
+    )
+
+
+def _wrong_with(channel: Any) -> str:
+    """Defect of a channel; empty for a valid one."""
+    if not isinstance(channel, Channel):
+        return f"{type(channel).__name__} is no channel"
+    if not (_is_text(channel.name) and _NAME.fullmatch(channel.name)):
+        return f"its name is {channel.name!a}"
+    for item, text in (("unit", channel.unit), ("quantity", channel.quantity)):
+        if not _is_text(text, printable=True) or not text:
+            return f"the {item} of {channel.name} is {text!a}"
+    if not _is_text(channel.device):
+        return f"the device of {channel.name} is {channel.device!a}"
+    if not _is_number(channel.scale) or channel.scale == 0.0:
+        return f"the scale of {channel.name} is {channel.scale!a}"
+    if not _is_number(channel.offset):
+        return f"the offset of {channel.name} is {channel.offset!a}"
+    higher: Any = channel.higher
+    if type(higher) is not tuple or not all(map(_is_number, cast("tuple[Any, ...]", higher))):
+        return f"the higher terms of {channel.name} are {higher!a}"
+    return _wrong_with_counts(channel)
+
+
+def _wrong_with_counts(channel: Channel) -> str:
+    valid, faults, span = cast(Any, channel.valid), cast(Any, channel.faults), np.iinfo(np.int32)
+    if (
+        type(valid) is not tuple
+        or len(cast("tuple[Any, ...]", valid)) != 2
+        or not all(map(_is_count, cast("tuple[Any, ...]", valid)))
+        or not span.min <= valid[0] < valid[1] <= span.max
+    ):
+        return f"the valid counts of {channel.name} are {valid!a}"
+    if not isinstance(faults, Mapping) or not all(
+        _is_count(count) and _is_text(text, printable=True) for count, text in cast("Mapping[Any, Any]", faults).items()
+    ):
+        return f"the faults of {channel.name} are {faults!a}"
+    with np.errstate(all="ignore"):
+        limits = channel.limits
+    return "" if all(map(isfinite, limits)) else f"the values of {channel.name} reach from {limits[0]} to {limits[1]}"

@@ -1,0 +1,165 @@
+"""Estimators of a DAQ's sample clock and of a sensor's clock relative to the machine's clock."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.timebase.fit import Bounds, Points, bends, due, floor_below, rate_error, typical
+
+_TOLERANCE = 0.25
+"""Largest deviation of a history from a line, in sample periods, before its older half is discarded: counts are
+integers, so the bounds of a reader in step with the clock wander by a fraction of a period."""
+_RECENT = 2.0
+"""Longest time over which two bounds can be compared without the rate [s]."""
+_CONTRADICTION = 200e-6
+"""Smallest contradiction of such bounds [s]: clocks that differ by 50 ppm drift apart by 100 us in that time."""
+
+
+class SampleClock:
+    """Estimator of the sample clock, on which sample i of a run is at second i / `sample_rate`.
+
+    Each reading bounds the clock on both sides: by the last sample taken and by the next one. The estimate is midway
+    between the tightest bounds, and NaN before the first sample. With packet transfer, as over USB, the count lags, and
+    an uncounted sample may have been taken: the bounds then contradict each other. For the rest of the run only the
+    last counted sample is used, late by the shortest transfer: a constant that is part of the delay measured by a
+    check.
+    """
+
+    def __init__(self, sample_rate: float) -> None:
+        self._sample_rate = sample_rate
+        self._latest, self._earliest = Bounds(), Bounds()
+        self._looks: list[tuple[float, int, float]] = []
+        self._counts_lag = False
+        self._began = self._now = 0.0
+        self._fitted = -np.inf
+        self._slope = self._offset = self._residual = np.nan
+
+    def observe(self, before: float, count: int, after: float) -> None:
+        """Add a reading: `count` samples taken at a time between `before` and `after` [s of the machine's clock]."""
+        if count < 1:
+            return
+        if np.isinf(self._fitted) and not self._looks:
+            self._began = after
+        self._looks.append((before, count, after))
+        self._now = after
+
+    def seconds(self, host: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Seconds of the sample clock at `host` [s of the machine's clock], same shape."""
+        self._refresh()
+        return (host - self._offset) / (1.0 + self._slope)
+
+    @property
+    def rate(self) -> float:
+        """Seconds of the sample clock per second of the machine's."""
+        self._refresh()
+        return 1.0 / (1.0 + self._slope)
+
+    @property
+    def residual(self) -> float:
+        """Root mean square distance of the tightest bounds from the line used [s]."""
+        self._refresh()
+        return self._residual
+
+    def _refresh(self) -> None:
+        history = self._now - self._began
+        if not self._looks or not due(history, self._fitted):
+            return
+        self._fitted = history
+        self._take_looks()
+        self._slope = rate_error(self._sides())
+        tolerance = _TOLERANCE / self._sample_rate
+        while any(bends(points, sign * self._slope, tolerance) for points, sign in self._sides()):
+            self._latest.forget()
+            self._earliest.forget()
+            self._slope = rate_error(self._sides())
+        sides = self._sides()
+        self._offset = float(np.mean([sign * floor_below(points, sign * self._slope) for points, sign in sides]))
+        off = np.concatenate([self._off(points, sign) for points, sign in sides])
+        self._residual = float(np.sqrt(np.mean(off**2)))
+
+    def _sides(self) -> list[tuple[Points, float]]:
+        """Valid bounds, each with the sign of its delays' dependence on the slope."""
+        latest = (self._latest.points, 1.0)
+        return [latest] if self._counts_lag else [latest, (self._earliest.points, -1.0)]
+
+    def _take_looks(self) -> None:
+        before, count, after = np.array(self._looks, dtype=np.float64).T
+        taken, coming = (count - 1.0) / self._sample_rate, count / self._sample_rate
+        self._latest.add(taken, after - taken)
+        self._earliest.add(coming, coming - before)
+        self._looks.clear()
+        self._counts_lag |= _least(self._latest.points) + _least(self._earliest.points) < -_CONTRADICTION
+
+    def _off(self, points: Points, sign: float) -> NDArray[np.float64]:
+        return points.delay - sign * (self._offset + self._slope * points.seconds)
+
+
+def _least(points: Points) -> float:
+    """The least recent delay [s]."""
+    return float(points.delay[points.seconds >= points.seconds[-1] - _RECENT].min())
+
+
+_SENSOR_TOLERANCE = 100e-6
+"""Distance of a history from one line [s] beyond which its older half is discarded."""
+
+
+class SensorClock:
+    """Estimator of a sensor's clock: second t of the sensor is at second `offset + rate * t` of the machine's clock.
+
+    The line is the earliest consistent with the arrivals, so the least transfer delay is part of `offset`. To track
+    changes, the older half of a history that no single line fits is discarded. All values are NaN before the first
+    reading.
+    """
+
+    def __init__(self) -> None:
+        self._bounds = Bounds()
+        self._fitted = -np.inf
+        self._first = np.inf
+        self._last = -np.inf
+        self._slope = self._offset = self._residual = np.nan
+
+    def add(self, time: NDArray[np.float64], arrival: NDArray[np.float64]) -> None:
+        """Add readings, shape (n,): ascending seconds of the sensor's clock, and of the machine's clock at arrival."""
+        if time.size == 0:
+            return
+        # of values that arrived together, the last one has the smallest delay
+        last = np.flatnonzero(np.diff(arrival, append=np.inf))
+        self._bounds.add(time[last], arrival[last] - time[last])
+        self._first, self._last = min(self._first, float(time[0])), float(time[-1])
+
+    @property
+    def history(self) -> float:
+        """Length of the history, in seconds of the sensor's clock."""
+        return max(self._last - self._first, 0.0)
+
+    @property
+    def offset(self) -> float:
+        """Second of the machine's clock at second 0 of the sensor [s]."""
+        self._refresh()
+        return self._offset
+
+    @property
+    def rate(self) -> float:
+        """Seconds of the machine's clock per second of the sensor."""
+        self._refresh()
+        return 1.0 + self._slope
+
+    @property
+    def residual(self) -> float:
+        """Root mean square delay of the best readings after the line [s]."""
+        self._refresh()
+        return self._residual
+
+    def _refresh(self) -> None:
+        if not len(self._bounds.points) or not due(self.history, self._fitted):
+            return
+        self._fitted = self.history
+        self._slope = rate_error([(self._bounds.points, 1.0)])
+        while bends(self._bounds.points, self._slope, _SENSOR_TOLERANCE):
+            self._bounds.forget()
+            self._slope = rate_error([(self._bounds.points, 1.0)])
+        points = self._bounds.points
+        floor = floor_below(points, self._slope)
+        delay = points.delay - self._slope * points.seconds - floor
+        # delays of burst and scheduler add up and are rarely both short: the smallest of n remains above zero
+        self._offset = floor - typical(delay) / np.sqrt(len(points))
+        self._residual = float(np.sqrt(np.mean(delay**2)))

@@ -1,0 +1,376 @@
+"""Lines of the check: bench at rest, drive, and comparison of the sensors under a common motion."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import isinf
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.analysis.check_line import CheckLine, judged, passed, stated, untested
+from bench.analysis.cycles import COMPLETE
+from bench.analysis.gain import COVERAGE, SensorAccuracy
+from bench.config.model import BenchConfiguration
+from bench.engine.steps import RestSamples
+from drivers.optoncdt.codec import IMPLAUSIBLE, LATE, LOST
+from drivers.rig import Channel, Counts
+from drivers.timebase.common_motion import CommonMotion, common_motion
+from protocols.check.protocol import CheckParameters
+from sim.channel import STOREYS, TABLE_ACCELERATION, TABLE_DISPLACEMENT
+from sim.linear import steady_response
+from sim.specimen import Specimen
+
+Amplitudes = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class Sines:
+    """Complex amplitudes c at `omega` [rad/s], shape (n,) each, with signal = Re(c exp(-i omega t)).
+
+    The four sensors measure a common motion; amplitudes are displacements [m], for the accelerometer acceleration over
+    -omega^2. `drive` is in volts, `acceleration` in m/s2.
+    """
+
+    omega: NDArray[np.float64]
+    drive: NDArray[np.complex128]
+    acceleration: NDArray[np.complex128]
+    displacement: NDArray[np.complex128]
+    storey_1: NDArray[np.complex128]
+    storey_2: NDArray[np.complex128]
+
+    @property
+    def accelerometer(self) -> NDArray[np.complex128]:
+        """Table displacement from the accelerometer [m]: x'' = -omega^2 x."""
+        return -self.acceleration / self.omega**2
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """Sensor under comparison: field of its amplitudes in `Sines`, configuration keys of its polarity and scale."""
+
+    signal: str
+    polarity: str
+    scale: str
+
+
+TABLE = {
+    name: Sensor(signal, f"hardware.{name}.sensitivity", f"hardware.{name}.sensitivity")
+    for name, signal in ((TABLE_DISPLACEMENT, "displacement"), (TABLE_ACCELERATION, "accelerometer"))
+}
+LASERS = {
+    name: Sensor(signal, f"hardware.{name}.polarity", f"hardware.{name}.measuring_range and hardware.lasers.load")
+    for name, signal in zip(STOREYS, ("storey_1", "storey_2"), strict=True)
+}
+SENSORS = TABLE | LASERS
+
+_STUCK = 0.01
+"""Scatter [counts] below which a channel is stuck; one differing sample in ten thousand exceeds it."""
+
+_FINEST = 1e-5
+"""Step of the search for the dead time [s]."""
+
+_SIGN = "reverse the sign of {}, or the sensor: it moves against {}"
+_SCALE = "check {} and the calibration: it differs from {}"
+_OWN_LATENCY = "this is the latency of the laser itself: raise its measuring rate, and disable its averaging"
+_SKEW = (
+    "the two sensors show one motion at different times: connect both to inputs of one module, or see the input delays"
+    " in the description of the bench"
+)
+_UNKNOWN = "the program does not know the delay of this module: compare the delay lines, or use a module that it knows"
+_OF_THE_LINE = {
+    LATE: "the computer was busy, or the sensor is silent: close other programs, increase acquisition.block_duration,"
+    " or check the sensor's power and port",
+    LOST: "check the cable, the RS422 adapter and its latency timer",
+    IMPLAUSIBLE: "bits were changed on the line: check the cable, its shield and the RS422 adapter",
+}
+"""Remedies for values that the sensor measured but that did not arrive."""
+_MISSING = "the program does not read this input: make sure that it opens the enable chain by itself"
+_ALONE = "nothing opens the enable relay if the program crashes: wire a heartbeat relay, or set a watchdog"
+
+
+def resting_lines(heard: RestSamples, parameters: CheckParameters, accuracy: SensorAccuracy) -> Iterator[CheckLine]:
+    """Two lines for each channel: share of valid samples, and noise if enough of them are valid. The noise of a
+    laser may be one step of its output; larger noise originates in the target or the bench.
+    """
+    limits = {
+        TABLE_DISPLACEMENT: parameters.displacement_noise,
+        TABLE_ACCELERATION: parameters.acceleration_noise,
+        **dict.fromkeys(STOREYS, accuracy.laser_resolution),
+    }
+    for column, channel in enumerate(heard.channels):
+        counts = heard.counts[:, column]
+        valid = (counts >= channel.valid[0]) & (counts <= channel.valid[1])
+        share = float(valid.mean())
+        what = "valid samples at rest"
+        yield judged(channel.name, what, share, (COMPLETE, 1.0), "1", _reason(channel, counts[~valid]), expected=1.0)
+        if share >= COMPLETE:
+            yield _noise(channel, counts[valid], limits.get(channel.name))
+
+
+def safety_lines(configuration: BenchConfiguration) -> Iterator[CheckLine]:
+    """One line for each safety input after the acquisition at rest; none for a simulated bench.
+
+    They always pass: an open input would have prevented arming or ended the check.
+    """
+    if configuration.backend != "hardware":
+        return
+    daq = configuration.hardware.daq
+    for name, given in daq.safety_inputs.items():
+        yield passed(name, f"{given.line} was {given.good}: good")
+    for name in daq.missing_inputs:
+        yield untested(name, "safety input", _MISSING)
+    if daq.watchdog is None and daq.heartbeat is None:
+        yield untested("enable line", "heartbeat or watchdog", _ALONE)
+
+
+def input_lines(channels: Sequence[Channel]) -> Iterator[CheckLine]:
+    """A line for each input with a delay that was removed from its samples, or whose delay is not known."""
+    for channel in channels:
+        if isinf(channel.delay_uncertainty):
+            yield untested(channel.name, "delay of its input", _UNKNOWN)
+        elif channel.delay:
+            what = "removed delay of its input"
+            yield stated(channel.name, what, channel.delay, "s", uncertainty=COVERAGE * channel.delay_uncertainty)
+
+
+def table_delay_lines(
+    sines: Sines, parameters: CheckParameters, sample_rate: float, *, lasers: bool
+) -> Iterator[CheckLine]:
+    """A line for the accelerometer against the table's displacement sensor.
+
+    If their delays differ, also a line for each laser on the ground against the accelerometer, to find which of the two
+    differs from the others. Otherwise these pairs follow from the lasers' delays against the displacement. An
+    acceleration that follows each step of the held output lags by half a sample.
+    """
+    if parameters.delay_tolerance is None:
+        return
+    lowest, highest = -parameters.delay_tolerance, parameters.delay_tolerance + 0.5 / sample_rate
+    pair = _delay_between(sines.omega, sines.displacement, sines.accelerometer)
+    storeys = dict(zip(STOREYS, (sines.storey_1, sines.storey_2), strict=True)) if lasers else {}
+    against = {name: _delay_between(sines.omega, sines.accelerometer, seen) for name, seen in storeys.items()}
+    middle = float(np.mean([one.delay for one in against.values()])) if against else np.nan
+    # the lasers lag behind both by their own latency, the smaller of the two differences
+    alone = TABLE_ACCELERATION if abs(middle + pair.delay) < abs(middle) else TABLE_DISPLACEMENT
+    odd = f"{alone} differs from the lasers: " if lasers else ""
+    yield judged(
+        TABLE_ACCELERATION,
+        f"delay against {TABLE_DISPLACEMENT}",
+        pair.delay,
+        (lowest, highest),
+        "s",
+        f"{odd}{_SKEW}",
+        expected=0.0,
+        uncertainty=COVERAGE * pair.uncertainty,
+    )
+    if lowest <= pair.delay <= highest:
+        return
+    for name, one in against.items():
+        what = f"delay against {TABLE_ACCELERATION}"
+        yield stated(name, what, one.delay, "s", uncertainty=COVERAGE * one.uncertainty)
+
+
+def _delay_between(omega: NDArray[np.float64], first: Amplitudes, second: Amplitudes) -> CommonMotion:
+    # the cycles' amplitudes rotate with exp(-i omega t)
+    return common_motion(omega, first.conj(), second.conj())
+
+
+def drive_lines(sines: Sines, parameters: CheckParameters, configuration: BenchConfiguration) -> Iterator[CheckLine]:
+    """Dead time, and drive at each frequency, with limits if the shaker is known."""
+    yield judged(
+        "drive",
+        "dead time to table_acceleration",
+        dead_time(sines.omega, sines.drive, sines.acceleration, parameters.latency),
+        (0.0, parameters.latency),
+        "s",
+        "inputs and output do not share clock and trigger, or the delay of the input is not known: see hardware.daq and"
+        " the input delays in the description of the bench",
+    )
+    expected = expected_drive(sines.omega, configuration)
+    for index, omega in enumerate(sines.omega):
+        what = f"volts per m/s2 at {omega:g} rad/s"
+        measured = float(abs(sines.drive[index] / sines.acceleration[index]))
+        if expected is None:
+            yield stated("drive", what, measured, "V s2/m")
+            continue
+        usual, spread = float(expected[index]), parameters.drive_tolerance
+        remedy = "check the amplifier's gain, the moving mass, and the accelerometer's calibration"
+        allowed = usual * (1.0 - spread), usual * (1.0 + spread)
+        yield judged("drive", what, measured, allowed, "V s2/m", remedy, expected=usual)
+
+
+def expected_drive(omega: NDArray[np.float64], configuration: BenchConfiguration) -> NDArray[np.float64] | None:
+    """Drive per acceleration [V s2/m] of the simulated shaker, shape (n,); None for a real one."""
+    if configuration.backend != "simulated":
+        return None
+    specimen = configuration.simulation.specimen or configuration.specimen
+    response = configuration.simulation.bench.shaker.frequency_response(omega, specimen.bare().mass)
+    return 1.0 / np.abs(response)
+
+
+def dead_time(
+    omega: NDArray[np.float64], drive: NDArray[np.complex128], acceleration: NDArray[np.complex128], longest: float
+) -> float:
+    """Signed delay [s] between drive and motion that mass, dashpot and spring do not explain, up to twice `longest`.
+
+    drive / acceleration = (m + c / s + k / s^2) / G exp(s T) with s = i omega: for each T the three quotients follow
+    by linear least squares; the result is the T with the smallest residual. It includes the delay of the inputs'
+    filters, of the amplifier, and half a sample.
+    """
+    # the cycles' amplitudes rotate with exp(-i omega t)
+    wanted = np.conj(drive / acceleration)
+    s = 1j * omega
+    basis = np.column_stack((s**0, 1.0 / s, 1.0 / s**2))
+    tried = np.arange(-2.0 * longest, 2.0 * longest, _FINEST)
+    left = [_residual((basis.T * np.exp(s * time)).T, wanted) for time in tried]
+    return float(tried[int(np.argmin(left))])
+
+
+def scale_lines(sines: Sines, parameters: CheckParameters, *, lasers: bool) -> Iterator[CheckLine]:
+    """Two lines for each sensor except the reference.
+
+    The reference is the table's displacement sensor, unless the accelerometer contradicts it and the lasers agree with
+    the accelerometer. `lasers` on the ground are compared too.
+    """
+    sensors = SENSORS if lasers else TABLE
+    seen: dict[str, Amplitudes] = {name: getattr(sines, sensor.signal) for name, sensor in sensors.items()}
+    tolerance = parameters.scale_tolerance
+    allowed = 1.0 - tolerance, 1.0 + tolerance
+    reference = _reference(sines.omega, seen, tolerance)
+    for name in seen:
+        if name == reference:
+            continue
+        scale, uncertainty = signed_scale(sines.omega, seen[name], seen[reference])
+        sign = 1.0 if scale > 0.0 else -1.0
+        remedy = _SIGN.format(SENSORS[name].polarity, reference)
+        yield judged(name, f"polarity against {reference}", sign, (1.0, 1.0), "1", remedy, expected=1.0)
+        remedy, expanded = _SCALE.format(SENSORS[name].scale, reference), COVERAGE * uncertainty
+        what = f"scale against {reference}"
+        yield judged(name, what, abs(scale), allowed, "1", remedy, expected=1.0, uncertainty=expanded)
+    if lasers:
+        scale, uncertainty = signed_scale(sines.omega, sines.storey_2, sines.storey_1)
+        yield judged(
+            "lasers",
+            f"scale of {STOREYS[1]} against {STOREYS[0]}",
+            abs(scale),
+            allowed,
+            "1",
+            "the drift is their difference: check the measuring range and the load of the one with the wrong scale",
+            expected=1.0,
+            uncertainty=COVERAGE * uncertainty,
+        )
+
+
+def delay_lines(sines: Sines, parameters: CheckParameters, configuration: BenchConfiguration) -> Iterator[CheckLine]:
+    """One line for each laser, one for their difference, and the setting that compensates the common delay.
+
+    A delay is positive where the laser lags behind the table's displacement.
+    """
+    most = allowed_delay(configuration.known_specimen, parameters.highest_omega, parameters.u1_error)
+    hardware = configuration.hardware.lasers
+    settable = configuration.backend == "hardware" and hardware.connection == "serial"
+    found: list[tuple[float, float]] = []
+    for name, amplitudes in zip(STOREYS, (sines.storey_1, sines.storey_2), strict=True):
+        motion = _delay_between(sines.omega, sines.displacement, amplitudes)
+        found.append((motion.delay, motion.uncertainty))
+        remedy = "set hardware.lasers.delay to the value in the last line" if settable else _OWN_LATENCY
+        yield judged(
+            name,
+            "delay against table_displacement",
+            motion.delay,
+            (-most, most),
+            "s",
+            remedy,
+            expected=0.0,
+            uncertainty=COVERAGE * motion.uncertainty,
+        )
+    (first, u_1), (second, u_2) = found
+    between = COVERAGE * configuration.analysis.laser_timing
+    yield judged(
+        "lasers",
+        f"delay of {STOREYS[1]} against {STOREYS[0]}",
+        second - first,
+        (-between, between),
+        "s",
+        "set both lasers to the same rate, averaging and output; check that neither loses values",
+        expected=0.0,
+        uncertainty=COVERAGE * float(np.hypot(u_1, u_2)),
+    )
+    if settable:
+        value, expanded = hardware.delay - 0.5 * (first + second), 0.5 * COVERAGE * float(np.hypot(u_1, u_2))
+        yield stated("lasers", "correct value of hardware.lasers.delay", value, "s", uncertainty=expanded)
+
+
+def signed_scale(omega: NDArray[np.float64], amplitudes: Amplitudes, reference: Amplitudes) -> tuple[float, float]:
+    """Scale of a sensor relative to another, negative for opposite polarity, and its standard uncertainty.
+
+    The magnitude is extrapolated to zero frequency with a term in omega^2: the load on a compliant clamp moves by
+    (omega / omega_clamp)^2 more than the table.
+    """
+    ratio = amplitudes / reference
+    basis = np.column_stack((np.ones(omega.size), omega**2))
+    magnitude = np.abs(ratio)
+    covariance = np.linalg.inv(basis.T @ basis)
+    solution = covariance @ (basis.T @ magnitude)
+    residual = magnitude - basis @ solution
+    spread = float(residual @ residual) / (omega.size - 2)
+    # at the lowest frequency a delay rotates the ratio by less than a right angle
+    sign = 1.0 if ratio[np.argmin(omega)].real >= 0.0 else -1.0
+    return sign * float(solution[0]), float(np.sqrt(spread * covariance[0, 0]))
+
+
+def allowed_delay(specimen: Specimen, omega: float, error: float) -> float:
+    """Delay [s] of a laser on the ground that changes u1 = laser - x of the bare frame by the relative `error`.
+
+    A small delay d rotates the phasor of the laser by omega d, so the error of u1 is omega d |u1 + x|. The drift is the
+    difference of two lasers: a common delay does not change its amplitude.
+    """
+    u1, _ = steady_response(specimen.bare(), omega, 1.0)
+    return error * abs(u1) / (omega * abs(u1 - 1.0 / omega**2))
+
+
+def _noise(channel: Channel, counts: Counts, limit: float | None) -> CheckLine:
+    noise, least = float(np.std(channel.to_unit(counts))), _STUCK * abs(channel.scale)
+    if limit is None and noise >= least:
+        return stated(channel.name, "noise at rest", noise, channel.unit)
+    if noise < least:
+        remedy = "its reading is constant: check connection and power of the sensor, and the terminal"
+    else:
+        remedy = "let the bench come to rest, then check cable, shield and ground, and the sensor's target"
+    allowed = least, np.inf if limit is None else limit
+    return judged(channel.name, "noise at rest", noise, allowed, channel.unit, remedy)
+
+
+def _reason(channel: Channel, invalid: Counts) -> str:
+    """Cause of invalid samples, by the most frequent count."""
+    if invalid.size == 0:
+        return ""
+    values, numbers = np.unique(invalid, return_counts=True)
+    most = int(values[numbers.argmax()])
+    why = channel.faults.get(most)
+    if why is None:
+        end = "lower" if most < channel.valid[0] else "upper"
+        why = f"beyond its {end} end"
+    if (remedy := _OF_THE_LINE.get(most)) is not None and most in channel.faults:
+        return f"{why}: {remedy}"
+    if channel.name in STOREYS:
+        return f"{why}: check that the laser is on and the storey rests in the middle of its range"
+    return f"{why}: check the sensor's supply, its cable, and the terminal and range of the input"
+
+
+def _residual(basis: NDArray[np.complexfloating], wanted: NDArray[np.complex128]) -> float:
+    """Sum of squared relative residuals of a least-squares fit with real coefficients."""
+    weighed = basis / np.abs(wanted)[:, None]
+    rows = np.concatenate((weighed.real, weighed.imag))
+    aim = np.concatenate(((wanted / np.abs(wanted)).real, (wanted / np.abs(wanted)).imag))
+    solution, *_ = np.linalg.lstsq(rows, aim, rcond=None)
+    return float(np.sum((aim - rows @ solution) ** 2))
+
+
+def _reference(omega: NDArray[np.float64], seen: dict[str, Amplitudes], tolerance: float) -> str:
+    table, other = TABLE_DISPLACEMENT, TABLE_ACCELERATION
+    scale, _ = signed_scale(omega, seen[other], seen[table])
+    lasers = [signed_scale(omega, seen[name], seen[table])[0] for name in STOREYS if name in seen]
+    if abs(scale - 1.0) <= tolerance or not lasers:
+        return table
+    middle = float(np.mean(lasers))
+    return other if abs(middle - scale) < abs(middle - 1.0) else table

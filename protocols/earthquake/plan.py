@@ -1,0 +1,290 @@
+"""Steps of the seismic campaign (section 5 of the paper).
+
+1. The bare frame: identify the table unless it is known, then for every record iterate the drive until the table
+   follows it, and play that drive again to measure.
+2. For each spring: mount it, and play every record with the drive from the bare frame. If the block topples, the record
+   is ended and the block set upright. The springs are the outer loop, since changing them is manual work.
+"""
+
+from collections import Counter
+from collections.abc import Collection, Generator, Mapping, Sequence
+from dataclasses import replace
+from math import tau
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.analysis.signals import DRIFT
+from bench.config.model import BenchConfiguration
+from bench.control.replication import ReplicationParameters
+from bench.control.table_model import TableModel
+from bench.engine.steps import Arm, Done, Fallen, OperatorAction, Outcome, Play, Played, Publish, RampOut, Step, Watch
+from bench.events import Event, PointFinished, Progress, StepStarted, Warned
+from bench.protocol import each_step
+from drivers.rig import OperatorTask, RigError
+from protocols.common.identification.plan import identified
+from protocols.common.replicate import replicate
+from protocols.earthquake.measurement import GainMonitor, Histories, History, observe, tracking
+from protocols.earthquake.points import (
+    BareTest,
+    measured_point,
+    overturned_point,
+    rejection,
+    shortfall,
+    unplayed_point,
+)
+from protocols.earthquake.protocol import EarthquakeParameters, EarthquakePoint
+from protocols.earthquake.records import LeftOut, Shaking
+from protocols.earthquake.table import TableSource
+from sim.errors import InvalidInput
+from sim.specimen import Specimen
+
+NO_BLOCK = "storey 1 has a permanent offset although the block was removed: check lasers and specimen"
+
+FALLEN_REQUEST = "The block has fallen: set it upright again."
+
+OMITTED = "left out, since it would exceed a limit"
+
+SEED = 5
+"""Seed of the Monte Carlo of the first point; each further point has the next."""
+
+
+BETWEEN = 45.0
+"""Typical time between records until the storeys are at rest [s]."""
+
+
+class Pace:
+    """Progress of a campaign, weighted by the length of the `identification` [s] and of the records on the bench,
+    without the combinations that are `left_out`.
+    """
+
+    def __init__(
+        self,
+        parameters: EarthquakeParameters,
+        shakings: Sequence[Shaking],
+        identification: float = 0.0,
+        left_out: Collection[tuple[str, float | None]] = (),
+    ) -> None:
+        self._each = {
+            shaking.name: shaking.target.duration + parameters.decay + parameters.rest + BETWEEN for shaking in shakings
+        }
+        self._bare = {name: 0 if (name, None) in left_out else parameters.passes + 1 for name in self._each}
+        self._identification = identification
+        springs = {name: sum((name, beta) not in left_out for beta in parameters.beta) for name in self._each}
+        self.total = identification + sum(
+            (self._bare[name] + springs[name]) * each for name, each in self._each.items()
+        )
+        """Expected length of the campaign [s]."""
+        self._identified = 0.0
+        self._played = Counter[str]()
+
+    def identified(self, share: float = 1.0) -> None:
+        """Set the completed share of the table's identification."""
+        self._identified = share * self._identification
+
+    def played(self, record: str) -> None:
+        """Count one play of a record: a pass, or a test with a spring."""
+        self._played[record] += 1
+
+    def learned(self, record: str) -> None:
+        """Finish the bare frame's part of a record; remove unused passes from the expected time."""
+        self._played[record] = self._bare[record]
+
+    def progress(self, activity: str) -> Progress:
+        played = sum(count * self._each[record] for record, count in self._played.items())
+        gone = min(self._identified + played, self.total)
+        return Progress(gone / self.total, self.total - gone, activity)
+
+
+class EarthquakePlan:
+    """Steps of a campaign, and the tests of the bare frame required by later steps."""
+
+    def __init__(
+        self,
+        parameters: EarthquakeParameters,
+        configuration: BenchConfiguration,
+        shakings: Sequence[Shaking],
+        table: TableSource,
+        targets: Mapping[tuple[str, float], float | None],
+        left_out: LeftOut,
+        histories: Histories,
+    ) -> None:
+        self._parameters, self._configuration, self._histories = parameters, configuration, histories
+        self._specimen = configuration.known_specimen
+        self._shakings, self._table = shakings, table
+        self._targets, self._left_out = targets, left_out
+        self._pace = Pace(parameters, shakings, table.duration, left_out)
+        self._bare: dict[str, BareTest | str] = {}
+        self._shortfalls: dict[str, str] = {}
+        self._points = 0
+
+    def steps(self) -> Generator[Step, Outcome, None]:
+        """Steps of the whole campaign."""
+        model = yield from table_model(self._table, self._configuration, self._pace)
+        for shaking in self._shakings:
+            if (omitted := self._left_out.get((shaking.name, None))) is not None:
+                self._bare[shaking.name] = f"{OMITTED}: {omitted}"
+                continue
+            self._bare[shaking.name] = yield from self._bare_frame(shaking, model)
+            self._pace.learned(shaking.name)
+            yield Publish(self._pace.progress(f"finished {shaking.name}, bare frame"))
+        for beta in self._parameters.beta:
+            yield from self._spring(self._specimen.coupled(beta))
+
+    def _bare_frame(self, shaking: Shaking, model: TableModel) -> Generator[Step, Outcome, BareTest | str]:
+        """Test of the bare frame, or the reason why it is missing."""
+        p, limits = self._parameters, self._configuration.limits
+
+        def passed() -> Progress:
+            self._pace.played(shaking.name)
+            return self._pace.progress(f"replicating {shaking.name}")
+
+        try:
+            learned = yield from replicate(shaking.target, model, limits, self._learning(), shaking.name, passed)
+        except InvalidInput as beyond:
+            # the other records are still played
+            yield Publish(Warned(f"{shaking.name} is not played: {beyond}"))
+            return f"the table cannot reproduce it: {beyond}"
+        if learned.fell:
+            raise RigError(NO_BLOCK)
+        if (reason := rejection(learned, p)) is not None:
+            yield Publish(Warned(f"{shaking.name} is not played: {reason}"))
+            return reason
+        if lacking := shortfall(learned, p, shaking.target.band[0]):
+            self._shortfalls[shaking.name] = lacking
+            yield Publish(Warned(f"{shaking.name} is played with the best drive so far: {lacking}"))
+        yield Publish(StepStarted(f"{shaking.name}, bare frame"))
+        monitor = GainMonitor(shaking.name, None, shaking.target.sample_rate)
+        outcome = yield from self._play(shaking, learned.drive, monitor)
+        if not isinstance(outcome, Played):
+            raise RigError(NO_BLOCK)
+        rate = shaking.target.sample_rate
+        try:
+            observed = observe(outcome.signals, shaking.target.rest, rate)
+        except InvalidInput as lost:
+            yield Publish(Warned(f"{shaking.name}, bare frame, has no measurable peak: {lost}"))
+            return f"the bare frame has no measurable peak: {lost}"
+        self._histories.bare(shaking, outcome.signals, History.of(self._specimen.bare(), observed.base).drift)
+        return BareTest(
+            learned.drive,
+            learned.passes,
+            learned.status,
+            observed,
+            outcome.signals,
+            tracking(shaking, outcome.signals),
+        )
+
+    def _learning(self) -> ReplicationParameters:
+        p, modes = self._parameters, self._specimen.frame.natural_frequencies
+        return ReplicationParameters(
+            passes=p.passes,
+            tolerance=p.tolerance,
+            spectrum_tolerance=p.spectrum_tolerance,
+            spectrum_periods=tuple(tau / omega for omega in modes),
+        )
+
+    def _spring(self, specimen: Specimen) -> Generator[Step, Outcome, None]:
+        if any((shaking.name, specimen.label) not in self._left_out for shaking in self._shakings):
+            request = f"Set the block upright on its base and mount the spring of beta = {specimen.label:g}."
+            yield OperatorAction(OperatorTask.MOUNT_SPRING, specimen, request)
+        for shaking in self._shakings:
+            bare = self._bare[shaking.name]
+            omitted = self._left_out.get((shaking.name, specimen.label))
+            if omitted is not None:
+                bare = f"{OMITTED}: {omitted}"
+            if isinstance(bare, BareTest):
+                point = self._remarked(shaking, (yield from self._point(shaking, specimen, bare)))
+            else:
+                point = unplayed_point(shaking, specimen.label or 0.0, self._target(shaking, specimen), None, bare)
+            if omitted is None:
+                self._pace.played(shaking.name)
+            yield Publish(self._pace.progress(f"finished {shaking.name}, beta = {specimen.label:g}"))
+            yield Publish(PointFinished(point))
+
+    def _point(self, shaking: Shaking, specimen: Specimen, bare: BareTest) -> Generator[Step, Outcome, EarthquakePoint]:
+        yield Publish(StepStarted(f"{shaking.name}, beta = {specimen.label:g}"))
+        outcome = yield from self._play(shaking, bare.drive, self._running_gain(shaking, specimen, bare))
+        if isinstance(outcome, Fallen):
+            yield OperatorAction(OperatorTask.STAND_BLOCK_UP, specimen, FALLEN_REQUEST)
+        self._points += 1
+        target, p = self._target(shaking, specimen), self._parameters
+        seed = SEED + self._points
+        if isinstance(outcome, Played):
+            rate = shaking.target.sample_rate
+            try:
+                observed = observe(outcome.signals, shaking.target.rest, rate)
+            except InvalidInput as lost:
+                return unplayed_point(shaking, specimen.label or 0.0, target, bare, f"no peak was detected: {lost}")
+            expected = History.of(specimen, observed.base).drift
+            self._histories.coupled(shaking, specimen.label or 0.0, outcome.signals, expected)
+            return measured_point(
+                shaking, specimen, bare, outcome.signals, observed, target, self._configuration, p.draws, seed
+            )
+        signals = bare.signals[:0] if outcome.signals is None else outcome.signals
+        return overturned_point(shaking, specimen, bare, signals, target, self._configuration, p.draws, seed)
+
+    def _play(
+        self, shaking: Shaking, drive: NDArray[np.float64], monitor: GainMonitor
+    ) -> Generator[Step, Outcome, Played | Fallen]:
+        """Play a drive and its decay, and ramp out; a fall during the ramp counts as a fall under the record."""
+        yield Arm(self._parameters.rest)
+        outcome = yield Play(shaking.volts(drive, self._parameters.decay), monitor)
+        ended = yield RampOut(fast=isinstance(outcome, Fallen))
+        if isinstance(outcome, Played):
+            return Fallen(outcome.signals) if isinstance(ended, Fallen) else outcome
+        if isinstance(outcome, Fallen):
+            return outcome
+        raise RigError("a drive was played without a result")
+
+    def _running_gain(self, shaking: Shaking, specimen: Specimen, bare: BareTest) -> GainMonitor:
+        """Monitor of the running gain; its prediction is for the motion of this drive with the bare frame."""
+        base = bare.observed.base
+        expected = (History.of(specimen.bare(), base), History.of(specimen, base))
+        noise = bare.observed.drift.peak.uncertainty
+        return GainMonitor(
+            shaking.name, specimen.label, shaking.target.sample_rate, bare.signals[:, DRIFT], noise, expected
+        )
+
+    def _remarked(self, shaking: Shaking, point: EarthquakePoint) -> EarthquakePoint:
+        """Point with the shortfall of its drive added to the remarks."""
+        said = filter(None, (point.reason, self._shortfalls.get(shaking.name)))
+        return point.model_copy(update={"reason": "; ".join(said)})
+
+    def _target(self, shaking: Shaking, specimen: Specimen) -> float | None:
+        return self._targets[shaking.name, specimen.label or 0.0]
+
+
+def table_model(
+    source: TableSource, configuration: BenchConfiguration, pace: Pace
+) -> Generator[Step, Outcome, TableModel]:
+    """Stored table model, or one identified now; the bare frame is then mounted on the table."""
+    if source.model is not None or source.plan is None:
+        assert source.model is not None
+        bare = configuration.known_specimen.bare()
+        yield OperatorAction(OperatorTask.REMOVE_BLOCK, bare, "Remove the spring and the block from the table.")
+        return source.model
+
+    def carry_out(step: Step) -> Generator[Step, Outcome, Outcome]:
+        # the campaign's progress includes that of the identification
+        if isinstance(step, Publish) and isinstance(step.event, Progress):
+            return Done()
+        return (yield replace(step, watch=_counted(step.watch, pace)) if isinstance(step, Play) else step)
+
+    model = yield from each_step(identified(source.parameters, configuration, source.plan), carry_out)
+    pace.identified()
+    return model
+
+
+def _counted(watch: Watch | None, pace: Pace) -> Watch | None:
+    """Watch of an identification, with progress converted to that of the campaign."""
+    if watch is None:
+        return None
+
+    def progress(signals: NDArray[np.float64]) -> Event | None:
+        event = watch(signals)
+        if not isinstance(event, Progress):
+            return event
+        pace.identified(event.fraction)
+        return pace.progress("identifying the table")
+
+    return progress

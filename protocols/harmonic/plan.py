@@ -1,0 +1,234 @@
+"""Steps of the harmonic campaign (section 4.3 of the paper).
+
+1. The bare frame: calibrate the drive, then at each frequency hold the amplitude, wait for the steady state, measure.
+2. For each spring: mount it, calibrate the drive again at a level that leaves the block at rest, and at each frequency
+   try the planned starts until one is steady. If a start topples the block, it is ended, the block is set upright, and
+   the next one is tried; if no start reaches the point, its last motion is reported.
+"""
+
+from collections.abc import Generator, Mapping, Sequence
+from math import tau
+
+import numpy as np
+
+from bench.analysis.cycles import Cycle
+from bench.analysis.gain import gain, shared_draws, steady_peak
+from bench.config.model import BenchConfiguration
+from bench.control.oscillator import DriveCalibration, Leg
+from bench.control.sine import Sine
+from bench.control.starts import Start
+from bench.engine.steps import Arm, Calibrate, Fallen, OperatorAction, Outcome, Publish, RampOut, Step, Sweep
+from bench.events import Estimate, PointFinished, Progress, StepStarted, Warned
+from drivers.rig import OperatorTask, RigError
+from protocols.common.calibrate import calibrate_drive, harmonic_frequencies
+from protocols.harmonic.measurement import Settled, judge, predicted_fields, settle_and_measure
+from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, PointStatus
+from sim.gain import predict_gain
+from sim.specimen import Specimen
+from sim.steady import resting_level
+
+REST = 2.0
+"""Time at rest before a test, for the zero of the signals [s]."""
+
+BARE_CHANGE = 4.0
+"""Duration of the sweep between frequencies of the bare frame [s]."""
+
+NO_BLOCK = "storey 1 has a permanent offset although the block was removed: check lasers and specimen"
+
+FALLEN_REQUEST = "The block has fallen: set it upright again."
+
+OVERHEAD = 30.0
+"""Time of a test in addition to its cycles: rest, start, ramps [s]."""
+
+CYCLES = 220
+"""Typical number of cycles of a test, including settling."""
+
+
+class Pace:
+    """Progress from the expected length of the remaining tests on the bench."""
+
+    def __init__(self, omegas: tuple[float, ...], tests_per_omega: int) -> None:
+        self._total = tests_per_omega * sum(self._expected(omega) for omega in omegas)
+        self._finished = 0.0
+
+    @staticmethod
+    def _expected(omega: float) -> float:
+        return OVERHEAD + CYCLES * tau / omega
+
+    def finished(self, omega: float) -> None:
+        """Count a finished test at `omega` [rad/s]."""
+        self._finished += self._expected(omega)
+
+    def progress(self, activity: str, omega: float | None = None, cycles: int = 0) -> Progress:
+        """Progress of the campaign, `cycles` into a test at `omega` [rad/s]."""
+        within = 0.0 if omega is None else min(cycles / CYCLES, 0.95) * self._expected(omega)
+        gone = min(self._finished + within, self._total)
+        return Progress(gone / self._total, self._total - gone, activity)
+
+
+class HarmonicPlan:
+    """Steps of a campaign, and the results of the bare frame required by later steps."""
+
+    def __init__(
+        self,
+        parameters: HarmonicParameters,
+        configuration: BenchConfiguration,
+        starts: Mapping[tuple[float, float], Sequence[Start]],
+    ) -> None:
+        self._parameters, self._configuration, self._starts = parameters, configuration, starts
+        self._specimen = configuration.known_specimen
+        self._amplitude = parameters.amplitude_factor * self._specimen.uplift_acceleration
+        self._pace = Pace(parameters.omega, 1 + len(parameters.beta))
+        self._bare: dict[float, Settled] = {}
+        self._points: list[HarmonicPoint] = []
+        self._draws = shared_draws()
+
+    def steps(self) -> Generator[Step, Outcome, Sequence[HarmonicPoint]]:
+        """Execute the whole campaign; returns its points."""
+        calibration = yield from self._bare_frame()
+        for beta in self._parameters.beta:
+            plans = {omega: self._starts[beta, omega] for omega in self._parameters.omega}
+            yield from self._spring(self._specimen.coupled(beta), plans, calibration)
+        return self._points
+
+    def _bare_frame(self) -> Generator[Step, Outcome, DriveCalibration]:
+        yield OperatorAction(
+            OperatorTask.REMOVE_BLOCK, self._specimen.bare(), "Remove the spring and the block from the table."
+        )
+        yield Arm(REST)
+        yield Publish(StepStarted("calibrate the drive, bare frame"))
+        level = self._parameters.calibration_level * self._amplitude
+        above = harmonic_frequencies(max(self._parameters.omega), self._parameters.harmonics)
+        calibration = yield from calibrate_drive((*self._parameters.omega, *above), level, None)
+        if isinstance(calibration, Fallen):
+            raise RigError(NO_BLOCK)
+        yield Calibrate(calibration)
+        duration = self._parameters.ramp_time
+        for omega in self._parameters.omega:
+            yield Publish(StepStarted(f"bare frame at {omega:g} rad/s"))
+            yield Sweep((Leg(duration, self._amplitude, omega),))
+            settled = yield from self._settle(omega, None, calibration)
+            if isinstance(settled, Fallen):
+                raise RigError(NO_BLOCK)
+            if not settled.steadiness.steady:
+                yield Publish(
+                    Warned(f"the bare frame is not steady at {omega:g} rad/s: no gain can be determined there")
+                )
+            self._bare[omega] = settled
+            self._pace.finished(omega)
+            duration = BARE_CHANGE
+        yield RampOut()
+        return calibration
+
+    def _spring(
+        self, specimen: Specimen, plans: Mapping[float, Sequence[Start]], calibration: DriveCalibration
+    ) -> Generator[Step, Outcome, None]:
+        request = f"Set the block upright on its base and mount the spring of beta = {specimen.label:g}."
+        yield OperatorAction(OperatorTask.MOUNT_SPRING, specimen, request)
+        yield Arm(REST)
+        yield Publish(StepStarted(f"calibrate the drive, beta = {specimen.label:g}"))
+        starts = [start for each in plans.values() for start in each]
+        wanted, level = spring_calibration(self._parameters, specimen, starts)
+        measured = yield from calibrate_drive(wanted, level, calibration)
+        yield from self._end_test(specimen, fast=isinstance(measured, Fallen))
+        if isinstance(measured, DriveCalibration):
+            # far above the frame's modes the block only adds mass: use the response of the bare frame
+            calibration = measured.beyond(calibration)
+        for omega in self._parameters.omega:
+            point = yield from self._point(specimen, omega, calibration, plans[omega])
+            self._pace.finished(omega)
+            yield Publish(self._pace.progress(f"finished beta = {specimen.label:g} at {omega:g} rad/s"))
+            self._points.append(point)
+            yield Publish(PointFinished(point))
+
+    def _point(
+        self, specimen: Specimen, omega: float, calibration: DriveCalibration, starts: Sequence[Start]
+    ) -> Generator[Step, Outcome, HarmonicPoint]:
+        """Try the planned starts. Returns the first steady rocking motion, else the first motion without a fall."""
+        found: HarmonicPoint | None = None
+        falls = 0
+        for tried, start in enumerate(starts, 1):
+            where = f"beta = {specimen.label:g} at {omega:g} rad/s, start {tried} of {len(starts)}: {start.name}"
+            yield Publish(StepStarted(f"{where}, chance {start.chance:.0%}"))
+            yield Arm(REST)
+            yield Calibrate(calibration)
+            settled: Settled | Fallen | None = None
+            if not isinstance((yield Sweep(start.legs)), Fallen):
+                settled = yield from self._settle(omega, specimen, calibration)
+            if not isinstance(settled, Settled):
+                falls += 1
+                yield from self._end_test(specimen, fast=True)
+                continue
+            yield from self._end_test(specimen, fast=False)
+            known, sensors = self._configuration.known_on_table, self._configuration.sensors
+            shaker, harmonics = self._configuration.simulated_shaker, self._parameters.harmonics
+            bare = self._bare[omega]
+            point = judge(settled, bare, omega, specimen, known, sensors, tried, shaker, harmonics)
+            point = point.model_copy(update={"start_chance": start.chance})
+            if point.status is PointStatus.STEADY or not point.predicted_stable:
+                return point
+            found = found or point
+        if found is not None:
+            return found.model_copy(update={"starts_tried": len(starts)})
+        return self._overturned(specimen, omega, falls, starts[0].chance)
+
+    def _end_test(self, specimen: Specimen, *, fast: bool) -> Generator[Step, Outcome, None]:
+        """Ramp out, fast if the block has fallen; then request that a fallen block be set upright."""
+        outcome = yield RampOut(fast=fast)
+        if fast or isinstance(outcome, Fallen):
+            yield OperatorAction(OperatorTask.STAND_BLOCK_UP, specimen, FALLEN_REQUEST)
+
+    def _overturned(self, specimen: Specimen, omega: float, falls: int, chance: float) -> HarmonicPoint:
+        bare = self._bare[omega].peak
+        layer = predict_gain(specimen, omega, self._amplitude, bare.amplitude).rocking
+        kind = "stable" if layer and layer.stable else "unstable"
+        return HarmonicPoint(
+            omega_rad_s=omega,
+            beta=specimen.label or 0.0,
+            status=PointStatus.OVERTURNED,
+            **predicted_fields("rocking", layer, self._configuration.known_on_table),
+            bare_drift_peak_m=bare.drift,
+            bare_amplitude_m_s2=bare.amplitude,
+            starts_tried=falls,
+            start_chance=chance,
+            reason=f"the block fell in each of {falls} starts; the predicted orbit is {kind}",
+        )
+
+    def _settle(
+        self, omega: float, specimen: Specimen | None, calibration: DriveCalibration
+    ) -> Generator[Step, Outcome, Settled | Fallen]:
+        """Settle and measure; publishes the running alpha_2 with the predicted one."""
+        evaluated = 0
+        reference = self._bare.get(omega)
+        bare = reference.peak if reference else None
+        predicted = float("nan")
+        if specimen is not None and bare is not None:
+            layer = predict_gain(specimen, omega, self._amplitude, bare.amplitude).rocking
+            predicted = layer.alpha_2 if layer else predicted
+
+        def report(cycles: list[Cycle]) -> Generator[Step, Outcome, None]:
+            nonlocal evaluated
+            evaluated += len(cycles)
+            peak = steady_peak(cycles, omega)
+            alpha_2 = uncertainty = float("nan")
+            if bare is not None and specimen is not None:
+                running = gain(peak, bare, self._configuration.sensors, shared=self._draws)
+                alpha_2, uncertainty = running.alpha_2, running.uncertainty
+            beta = specimen.label if specimen else None
+            yield Publish(Estimate(omega, beta, evaluated, peak.drift, alpha_2, uncertainty, predicted))
+            yield Publish(self._pace.progress(f"settling at {omega:g} rad/s", omega, evaluated))
+
+        sine = Sine(omega, self._amplitude, calibration)
+        return settle_and_measure(sine, self._parameters, self._configuration.analysis, report)
+
+
+def spring_calibration(
+    parameters: HarmonicParameters, specimen: Specimen, starts: Sequence[Start]
+) -> tuple[list[float], float]:
+    """Frequencies [rad/s] and level [m/s2] of the drive calibration with a spring: the block provably rests."""
+    amplitude = parameters.amplitude_factor * specimen.uplift_acceleration
+    omegas = sorted({leg.omega for start in starts for leg in start.legs})
+    grid = np.linspace(omegas[0], omegas[-1], max(round((omegas[-1] - omegas[0]) / 1.5) + 1, 2))
+    wanted = sorted({*(round(float(omega), 2) for omega in grid), *parameters.omega})
+    allowed = 0.6 * min(resting_level(specimen, omega) for omega in wanted)
+    return wanted, min(parameters.calibration_level * amplitude, allowed)

@@ -1,0 +1,258 @@
+"""Report sections on steady sine tests: gains, uncertainty budgets, spectra (Fig. 6), map (Fig. 4), cycles (Fig. 5)."""
+
+import json
+from collections.abc import Mapping, Sequence
+from math import degrees
+from typing import Any, cast
+
+from bench.analysis.signals import SignalMap
+from bench.datafile.tables import arrays
+from bench.document.campaign import Campaign
+from bench.document.document import Column, Listing, Notice, Part, Picture, Section, Table
+from bench.document.gain_map import map_section
+from bench.document.typography import ABSENT, counted, percent, plain, typeset, with_uncertainty, yes_or_no
+from bench.figures.budget_figure import budget_figure
+from bench.figures.map_figure import MapPoint
+from bench.figures.spectra_figure import gain_spectra
+from bench.prediction.bands import expanded_uncertainty
+from protocols.harmonic.report_cycles import Dwells, MeasuredMotion, measured_figure
+from sim.errors import InvalidInput
+from sim.gain import Layer, predict_gain
+
+MOST = 30
+"""Largest number of bars in a figure."""
+
+ROWS = 4
+"""Maximum number of points in a figure of cycles."""
+
+LAYERS = "rocking", "resting"
+
+
+def harmonic_sections(campaign: Campaign) -> list[Section]:
+    """Results, gain spectra, gain map and time histories; empty for a file without points."""
+    if not campaign.harmonic_points:
+        return []
+    measured = [
+        MapPoint(row["omega_rad_s"], row["beta"], row["layer"], row["alpha_2"]) for row in campaign.harmonic_points
+    ]
+    found = [
+        _results_section(campaign),
+        _spectra_section(campaign),
+        map_section(campaign.specimen, campaign.amplitude_factor, measured),
+        _histories_section(campaign),
+    ]
+    return [section for section in found if section is not None]
+
+
+def _results_section(campaign: Campaign) -> Section:
+    """Measured and predicted gain of every point with their uncertainties, and the conditions of its test."""
+    points = campaign.harmonic_points
+    compared = [row["agrees"] for row in points if row["agrees"] is not None]
+    parts: list[Part] = [
+        f"{counted(len(points), 'point was', 'points were')} tested; {len(compared)} of them had a steady motion to "
+        f"compare, and {sum(compared)} of those agree with the prediction. Both gains are for the achieved amplitudes "
+        "of the table and for the branch of the point. They agree when they differ by no more than their combined "
+        "uncertainty (root sum of squares). The uncertainty of a measured gain is expanded (k = 2) and includes "
+        "sensors and scatter; that of a predicted one (k = 2, to first order) follows from the uncertainty of the "
+        "specimen.",
+        _gains(campaign, points),
+        _conditions(points),
+        *_budget_parts(points),
+    ]
+    remarks = [
+        f"β = {row['beta']:g}, Ω = {row['omega_rad_s']:g} rad/s: {typeset(row['reason'])}"
+        for row in points
+        if row["reason"]
+    ]
+    if remarks:
+        parts += ["Remarks on single points:", Listing(remarks)]
+    return Section("results", "Harmonic tests: measured against predicted", parts)
+
+
+def _spectra_section(campaign: Campaign) -> Section | None:
+    """Gain spectra from the stored prediction and the points; None without a stored prediction."""
+    table = campaign.record.tables.get("prediction", {})
+    if not {"omega", "beta", "alpha_2", "stable", "layer"} <= table.keys():
+        return None
+    picture = Picture(
+        gain_spectra(campaign.harmonic_points, arrays(table)),
+        "Gain spectra: measured points with expanded uncertainty (k = 2), and the prediction made before the test.",
+        "Gain of the peak drift (logarithmic) against frequency, one panel per stiffness ratio.",
+    )
+    return Section("spectra", "Gain spectra (as Fig. 6 of the paper)", [picture])
+
+
+def _histories_section(campaign: Campaign) -> Section | None:
+    """Last measured cycles of every point and the predicted motion; None without measured cycles."""
+    points = [row for row in campaign.harmonic_points if row["drift_peak_m"] is not None]
+    if not points:
+        return None
+    return Section("histories", "Time histories (as Fig. 5 of the paper)", _histories(campaign, points))
+
+
+def _histories(campaign: Campaign, points: Sequence[Mapping[str, Any]]) -> list[Part]:
+    configuration = campaign.configuration
+    if configuration is None:
+        return [Notice("Not drawn: this version of the software cannot read the configuration in this file.")]
+    try:
+        dwells = Dwells(
+            campaign, SignalMap(campaign.record.channels, configuration.laser_reference, configuration.calibrated)
+        )
+    except InvalidInput as refused:
+        return [Notice(f"Not drawn: {refused}.")]
+    drawn: list[MeasuredMotion] = []
+    missing: list[str] = []
+    for row in points:
+        motion = dwells.motion(row, _layer(campaign, row))
+        if motion is None:
+            missing.append(f"β = {row['beta']:g}, Ω = {row['omega_rad_s']:g} rad/s")
+        else:
+            drawn.append(motion)
+    parts: list[Part] = [
+        "The last measured cycles from the raw channels, relative to the zero at rest, in phase with the measured "
+        "table acceleration, including the delays of the sensors. u₁ is relative to the table. ϑ is not measured but "
+        "predicted, as are the thin dotted curves, for the achieved amplitude."
+    ]
+    for beta in sorted({motion.beta for motion in drawn}):
+        of_spring = [motion for motion in drawn if motion.beta == beta]
+        parts += [
+            Picture(
+                measured_figure(of_spring[first : first + ROWS]),
+                f"Measured cycles at β = {beta:g}: drift of the coupled and the bare frame (left), u₁ and the "
+                "predicted ϑ (right).",
+                "Curves of drift, first storey displacement and predicted rocking angle over three periods.",
+            )
+            for first in range(0, len(of_spring), ROWS)
+        ]
+    if missing:
+        parts.append(f"The file does not contain the cycles of {'; '.join(missing)}.")
+    return parts
+
+
+def _layer(campaign: Campaign, row: Mapping[str, Any]) -> Layer | None:
+    """Steady motion of the model at the achieved amplitudes."""
+    if row["amplitude_m_s2"] is None or row["layer"] not in LAYERS:
+        return None
+    specimen = campaign.specimen.coupled(row["beta"])
+    return predict_gain(specimen, row["omega_rad_s"], row["amplitude_m_s2"], row["bare_amplitude_m_s2"]).layers.get(
+        row["layer"]
+    )
+
+
+def _gains(campaign: Campaign, points: Sequence[Mapping[str, Any]]) -> Table:
+    columns = [
+        Column("β", "1"),
+        Column("Ω", "rad/s"),
+        Column("status", words=True),
+        Column("layer", words=True),
+        Column("α₂ measured", "1"),
+        Column("α₂ predicted", "1"),
+        Column("difference", "%"),
+        Column("agrees", words=True),
+        Column("orbit", words=True),
+    ]
+    rows: list[list[str]] = []
+    for row in points:
+        measured, predicted = row["alpha_2"], row["alpha_2_predicted"]
+        layer = _layer(campaign, row)
+        open_ = row.get("alpha_2_predicted_uncertainty")
+        if open_ is None and layer is not None:
+            open_ = expanded_uncertainty(layer, campaign.known)
+        stable = row["predicted_stable"]
+        rows.append(
+            [
+                f"{row['beta']:g}",
+                f"{row['omega_rad_s']:g}",
+                row["status"],
+                row["layer"],
+                with_uncertainty(measured, row["alpha_2_uncertainty"]),
+                with_uncertainty(predicted, open_),
+                percent(measured / predicted - 1.0) if measured is not None and predicted else ABSENT,
+                yes_or_no(row["agrees"]),
+                ABSENT if stable is None else "stable" if stable else "unstable",
+            ]
+        )
+    return Table("Gain coefficient α₂, measured and predicted (expanded uncertainties, k = 2)", columns, rows)
+
+
+def _conditions(points: Sequence[Mapping[str, Any]]) -> Table:
+    columns = [
+        Column("β", "1"),
+        Column("Ω", "rad/s"),
+        Column("peak drift, coupled", "mm"),
+        Column("peak drift, bare", "mm"),
+        Column("table, coupled", "m/s²"),
+        Column("table, bare", "m/s²"),
+        Column("amplitude error", "%"),
+        Column("phase error", "°"),
+        Column("table's THD", "%"),
+        Column("cycles"),
+        Column("settled", "s"),
+        Column("starts"),
+    ]
+    rows: list[list[str]] = []
+    for row in points:
+        phase = row.get("phase_error_rad")
+        distortion = row.get("table_harmonics")
+        rows.append(
+            [
+                f"{row['beta']:g}",
+                f"{row['omega_rad_s']:g}",
+                plain(_times(row["drift_peak_m"], 1e3)),
+                plain(_times(row["bare_drift_peak_m"], 1e3)),
+                plain(row["amplitude_m_s2"], 5),
+                plain(row["bare_amplitude_m_s2"], 5),
+                percent(row["amplitude_error"], 3),
+                plain(None if phase is None else degrees(phase), 2),
+                plain(_times(distortion, 100.0), 2),
+                plain(row["cycles_measured"]),
+                plain(row["settle_time_s"], 3),
+                plain(row["starts_tried"]),
+            ]
+        )
+    caption = (
+        "Conditions of the points. The scales of the lasers cancel in α₂, and with them most of the uncertainty of the "
+        "peaks; that of the accelerometer is common to both tests"
+    )
+    return Table(caption, columns, rows)
+
+
+def _budget_parts(points: Sequence[Mapping[str, Any]]) -> list[Part]:
+    """Table and figure of the uncertainty budgets; absent from older files."""
+    known = [(row, found) for row in points if row["alpha_2"] and (found := _budget(row))]
+    if not known:
+        return []
+    totals = {
+        name: sum((found.get(name, 0.0) / row["alpha_2"]) ** 2 for row, found in known)
+        for _, found in known
+        for name in found
+    }
+    names = sorted(totals, key=lambda name: -totals[name])
+    labels = [f"β = {row['beta']:g}, Ω = {row['omega_rad_s']:g} rad/s" for row, _ in known]
+    expanded = [100.0 * row["alpha_2_uncertainty"] / row["alpha_2"] for row, _ in known]
+    columns = [Column("point", words=True), Column("U (k = 2)", "%"), *(Column(name, "%") for name in names)]
+    rows = [
+        [label, f"{size:.2f}", *(_share(found, name, row["alpha_2"]) for name in names)]
+        for label, size, (row, found) in zip(labels, expanded, known, strict=True)
+    ]
+    caption = "Uncertainty budget of α₂: expanded, and standard by contribution, largest first; common errors cancel"
+    picture = Picture(
+        budget_figure(labels[:MOST], [found for _, found in known[:MOST]], expanded[:MOST]),
+        "Contributions to the uncertainty of α₂: each bar is the expanded uncertainty (k = 2), divided in "
+        "proportion to the contributions to the variance.",
+        "Horizontal bars of the expanded uncertainty at every point, divided by contribution.",
+    )
+    return [Table(caption, columns, rows), picture]
+
+
+def _budget(row: Mapping[str, Any]) -> dict[str, float]:
+    text = row.get("uncertainty_parts")
+    return cast(dict[str, float], json.loads(text)) if text else {}
+
+
+def _share(found: Mapping[str, float], name: str, alpha: float) -> str:
+    return f"{100.0 * found[name] / alpha:.3f}" if name in found else ABSENT
+
+
+def _times(value: float | None, factor: float) -> float | None:
+    return None if value is None else factor * value

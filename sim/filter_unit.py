@@ -1,0 +1,93 @@
+"""The low-pass cards between sensors and converter."""
+
+from functools import lru_cache
+from math import pi, sin, tan
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.parameters import Parameters, quantity
+
+Array = NDArray[np.float64]
+
+
+@lru_cache
+def butterworth(order: int, share: float) -> tuple[Array, Array]:
+    """Second-order sections b0, b1, b2, 1, a1, a2 of the low-pass with cutoff `share` of the sample rate, shape (m, 6),
+    poles near the unit circle last; and their state, shape (m, 2), once they have settled at 1.
+
+    Bilinear transform of the analogue poles, in the order of operations of `scipy.signal.butter`, whose import alone
+    takes longer than a simulated minute.
+    """
+    warped = 4.0 * np.tan(np.pi * (share / 0.5) / 2.0)
+    angles = 1j * np.pi * np.arange(1 - order, order, 2, dtype=np.float64) / (2 * order)
+    analogue: NDArray[np.complex128] = warped * -np.exp(angles)
+    poles: NDArray[np.complex128] = (4.0 + analogue) / (4.0 - analogue)
+    half = order // 2
+    # both of a conjugate pair have the same rounding errors
+    pairs = 0.5 * (poles[:half] + poles[::-1][:half].conj())
+    kept = [*pairs, *poles.real[half : order - half]]
+    kept.sort(key=lambda pole: -abs(1.0 - abs(pole)))
+    sections = np.array([_section(complex(pole)) for pole in kept])
+    sections[0, :3] *= warped**order * (1.0 / np.prod(4.0 - analogue)).real
+    return sections, _settled(sections)
+
+
+def _section(pole: complex) -> tuple[float, ...]:
+    """A pair of conjugate poles or a real one, with zeros at half the sample rate."""
+    if pole.imag == 0.0:
+        return 1.0, 1.0, 0.0, 1.0, -pole.real, 0.0
+    return 1.0, 2.0, 1.0, 1.0, -(pole + pole.conjugate()).real, (pole * pole.conjugate()).real
+
+
+def _settled(sections: Array) -> Array:
+    """State of each section under a constant input of 1 to the first."""
+    found, level = np.empty((len(sections), 2)), 1.0
+    for state, (b0, b1, b2, _, a1, a2) in zip(found, sections, strict=True):
+        changes = np.array([[1.0 + a1, -1.0], [a2, 1.0]])
+        state[:] = level * np.linalg.solve(changes, np.array([b1 - a1 * b0, b2 - a2 * b0]))
+        level *= (b0 + b1 + b2) / (1.0 + a1 + a2)
+    return found
+
+
+class FilterUnit(Parameters):
+    """The analogue low-pass before the converter: the same Butterworth card in every channel.
+
+    Simulated by the bilinear transform at the sample rate with the cutoff kept in place.
+    """
+
+    order: int = quantity(4, "1", "order of the Butterworth low-pass", ge=1, le=10)
+    cutoff: float = quantity(100.0, "Hz", "frequency at which the gain is -3 dB", gt=0)
+
+    def delay(self, sample_rate: float) -> float:
+        """Delay of slow signals [s], as simulated at `sample_rate` [1/s]: 1 / (omega_c sin(pi / 2n)).
+
+        The group delay of a Butterworth low-pass at zero frequency, from its poles; omega_c as warped by the bilinear
+        transform.
+        """
+        bent = 2.0 * sample_rate * tan(pi * self.cutoff / sample_rate)
+        return 1.0 / (bent * sin(pi / (2 * self.order)))
+
+    def stream(self, sample_rate: float) -> "FilterStream":
+        """Start filtering channels sampled at `sample_rate` [1/s]."""
+        return FilterStream(*butterworth(self.order, self.cutoff / sample_rate))
+
+
+class FilterStream:
+    """The filter cards in operation; at the first sample they have settled."""
+
+    def __init__(self, sections: Array, settled: Array) -> None:
+        from sim.kernel.filter import cascade
+
+        self._cascade = cascade
+        self._sections = np.ascontiguousarray(sections)
+        self._settled = settled
+        self._state: Array | None = None
+
+    def read(self, volts: Array) -> Array:
+        """Filtered voltages, shape (n_channels, n) as given."""
+        filtered = np.array(volts, dtype=np.float64, order="C")
+        if self._state is None:
+            self._state = self._settled[:, None, :] * filtered[None, :, :1]
+        self._cascade(self._sections, self._state, filtered)
+        return filtered

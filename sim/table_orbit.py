@@ -1,0 +1,166 @@
+"""Steady rocking on a table moved by the reaction of the specimen: its orbit and Floquet multipliers.
+
+The motion of the table is part of the state, so a disturbance of the block moves the table, which changes the stability
+of the orbit: the same orbit may be stable on a light table and unstable on fixed ground. The drive is periodic and
+unchanging, as under a slow amplitude control within a few cycles; its harmonics are such that the acceleration of the
+table is a sine.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import tau
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.arrangement import plant_of
+from sim.excitation import SineProgram, Sweep
+from sim.rocking import simulate
+from sim.shaker import Shaker
+from sim.specimen import Specimen
+from sim.steady import NoOrbit, Orbit, slowest_of
+
+Array = NDArray[np.float64]
+
+TICKS, SUBSTEPS = 600, 2
+"""Intervals of a constant drive per period, and Runge-Kutta steps in each; the error of the multipliers is 4e-5."""
+
+STEP = 1e-5
+"""Step of the differences, relative to the size of each state."""
+
+CLOSED, QUICK = 1e-9, 0.2
+"""Relative mismatch over a period at which an orbit counts as closed, and its reduction by a step of Newton's method
+with known derivatives.
+"""
+
+PURE = 1e-4
+"""Largest deviation of a harmonic of the table's acceleration from the requested sine, relative to its amplitude."""
+
+NEWTON, CORRECTIONS = 20, 12
+"""Maximum number of Newton steps, and of corrections of the drive."""
+
+
+@dataclass(frozen=True, eq=False)
+class TableOrbit:
+    """Steady rocking on the table. `start`, shape (8,), is the state [x, v, u1, u2, v1, v2, theta, omega] at the start
+    of the period, `drive`, shape (H,), the complex harmonics of the amplifier's command [V or A], and `multipliers`,
+    complex, shape (8,), the Floquet multipliers of table and specimen together.
+    """
+
+    omega: float
+    start: Array
+    drive: NDArray[np.complex128]
+    multipliers: NDArray[np.complex128]
+    drift: float
+
+    @cached_property
+    def slowest(self) -> complex:
+        """The multiplier of greatest modulus; of a conjugate pair the one in the upper half plane."""
+        return slowest_of(self.multipliers)
+
+    @property
+    def stable(self) -> bool:
+        """Whether small disturbances of specimen and table decay."""
+        return abs(self.slowest) < 1.0
+
+
+def table_orbit(fixed: Orbit, shaker: Shaker, harmonics: int = 5) -> TableOrbit:
+    """The orbit on the table of `shaker` that belongs to the rocking orbit `fixed` on fixed ground.
+
+    The harmonics 1 to `harmonics` of the drive give the table's acceleration the fundamental of `fixed` and no others.
+    Raises NoOrbit when Newton's method does not find it, or the block comes to rest or falls.
+    """
+    period = _Period(fixed.specimen, shaker, fixed.omega)
+    phase, start = _widest(fixed)
+    orders: Array = np.arange(1.0, harmonics + 1.0)
+    wanted = np.zeros(harmonics, dtype=np.complex128)
+    # a sine of the phase, as coefficients of exp(i k omega t)
+    wanted[0] = -1j * fixed.amplitude * np.exp(1j * phase)
+    frequencies: Array = orders * fixed.omega
+    response = shaker.gain / shaker.frequency_response(frequencies, fixed.specimen.mass)
+    drive = wanted * response
+    for _ in range(CORRECTIONS):
+        start = period.closed(start, drive)
+        _, samples = period.run(start, drive)
+        found = 2.0 * np.fft.rfft(samples[:, -1])[1 : harmonics + 1] / TICKS
+        # the samples are means over a tick
+        found *= np.exp(1j * np.pi * orders / TICKS)
+        error = wanted - found
+        if float(np.abs(error).max()) <= PURE * fixed.amplitude:
+            jacobian = period.jacobian(start, drive)
+            drift = float(np.abs(samples[:, 3] - samples[:, 2]).max())
+            return TableOrbit(fixed.omega, start, drive, np.linalg.eigvals(jacobian).astype(np.complex128), drift)
+        drive = drive + error * response
+    raise NoOrbit(f"no drive makes the table's motion a sine at omega = {fixed.omega:g} rad/s with the block rocking")
+
+
+def _widest(fixed: Orbit) -> tuple[float, Array]:
+    """Phase of the base's sine [rad] and state at the largest angle of the block, away from impacts."""
+    times = np.arange(256) * (fixed.period / 256)
+    program = SineProgram([Sweep.dwell(1.5 * fixed.period, fixed.amplitude, fixed.omega)], phase=fixed.phase)
+    motion = simulate(fixed.specimen, program, state=fixed.start, sample_times=times, peaks_from=None)
+    if motion.samples is None or len(motion.samples) < times.size:
+        raise NoOrbit(f"the orbit at omega = {fixed.omega:g} rad/s is too unstable to be followed over one period")
+    at = int(np.argmax(np.abs(motion.samples[:, 4])))
+    phase = (fixed.phase + fixed.omega * times[at]) % tau
+    velocity = -fixed.amplitude / fixed.omega * np.cos(phase)
+    displacement = -fixed.amplitude / fixed.omega**2 * np.sin(phase)
+    return phase, np.concatenate(([displacement, velocity], motion.samples[at]))
+
+
+class _Period:
+    """One period of table and specimen under a periodic drive."""
+
+    def __init__(self, specimen: Specimen, shaker: Shaker, omega: float) -> None:
+        from sim.kernel import table
+
+        self._stream = table.stream
+        self._plant = plant_of(specimen, shaker, catch_angle=np.pi / 2)
+        self._omega, self._tick = omega, tau / omega / TICKS
+        self._step: Array | None = None
+
+    def run(self, start: Array, drive: NDArray[np.complex128]) -> tuple[Array, Array]:
+        """State after one period, and the samples, shape (TICKS, 9), with the mean acceleration after each of them."""
+        from sim.kernel.plant import ROCK_A, ROCK_B
+
+        # each command is held for a tick: its phase is that of the middle of the tick
+        phase = (np.arange(TICKS) + 0.5) * (tau / TICKS)
+        orders = np.arange(1, drive.size + 1)
+        requests = np.ascontiguousarray((np.exp(1j * np.outer(phase, orders)) @ drive).real)
+        y, carried, samples = start.copy(), np.array([requests[-1], 0.0]), np.empty((TICKS, 9))
+        mode = ROCK_A if y[6] > 0.0 else ROCK_B
+        after = self._stream(self._plant, self._tick, SUBSTEPS, requests, np.zeros(TICKS), mode, y, carried, samples)
+        if after != mode:
+            raise NoOrbit(f"the block does not rock with the period of the drive at omega = {self._omega:g} rad/s")
+        samples[:-1, -1] = samples[1:, -1]
+        samples[-1, -1] = carried[1]
+        return y, samples
+
+    def closed(self, start: Array, drive: NDArray[np.complex128]) -> Array:
+        """Start of the closed orbit under this drive, by Newton's method; the derivatives are kept while each
+        step reduces the mismatch by `QUICK`.
+        """
+        y, before = start, np.inf
+        for _ in range(NEWTON):
+            mismatch = self.run(y, drive)[0] - y
+            size = float(np.abs(mismatch / self._scales(y)).max())
+            if size <= CLOSED:
+                return y
+            if self._step is None or size > QUICK * before:
+                self._step = np.asarray(np.linalg.inv(np.eye(y.size) - self.jacobian(y, drive)), dtype=np.float64)
+            y, before = y + self._step @ mismatch, size
+        raise NoOrbit(f"no steady rocking on the table was found at omega = {self._omega:g} rad/s")
+
+    def jacobian(self, start: Array, drive: NDArray[np.complex128]) -> Array:
+        """Derivatives of the state after a period by that before it, by central differences."""
+        columns = list[Array]()
+        for step in np.diag(STEP * self._scales(start)):
+            ahead, behind = self.run(start + step, drive)[0], self.run(start - step, drive)[0]
+            columns.append((ahead - behind) / (2.0 * step.max()))
+        return np.stack(columns, axis=1)
+
+    def _scales(self, y: Array) -> Array:
+        """Size of each state: a displacement and an angle of the widest state, times omega for a rate."""
+        lengths, angle = float(np.abs(y[[0, 2, 3]]).max()), abs(float(y[6]))
+        rates = np.array([1.0, self._omega, 1.0, 1.0, self._omega, self._omega, 1.0, self._omega])
+        return rates * np.where(np.arange(8) < 6, lengths, angle)

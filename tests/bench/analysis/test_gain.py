@@ -1,0 +1,237 @@
+"""alpha_2 and its uncertainty from cycles."""
+
+import json
+from dataclasses import replace
+from datetime import UTC, datetime
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bench.analysis.cycles import Cycle, fit_cycle
+from bench.analysis.gain import DRAWS, SEED, SensorAccuracy, SteadyPeak, gain, modulated_peak, shared_draws, steady_peak
+from bench.analysis.laser_calibration import LaserCalibration, LaserCurve
+from bench.analysis.sensor_accuracy import LINEARITY, SCALES, Draws, PeakReadings, SensorUncertainty
+from bench.analysis.signals import ACCELERATION, DRIFT, LASER_2
+from tests.made_cycles import pure_cycle
+
+EXACT = SensorAccuracy(laser_mismatch=0.0, laser_resolution=0.0, laser_timing=0.0, laser_linearity=0.0, table_scale=0.0)
+
+
+def _sensors(accuracy: SensorAccuracy) -> SensorUncertainty:
+    return SensorUncertainty(accuracy, (0.2, 0.2))
+
+
+def _cycles(drifts: np.ndarray) -> list[Cycle]:
+    made = []
+    for k, drift in enumerate(drifts):
+        amplitudes = np.zeros(7, dtype=complex)
+        amplitudes[ACCELERATION], amplitudes[DRIFT] = 1.2j, drift
+        made.append(pure_cycle(k, amplitudes))
+    return made
+
+
+def _peak(drift: float, scatter: float = 0.0, seen: float = 0.0, swing: float = 0.02) -> SteadyPeak:
+    at = PeakReadings(drift, 1.0, (seen, seen + drift), (0.0, 0.0), np.zeros((2, 1)), (swing, swing), 6.0, False)
+    return SteadyPeak(drift, scatter, 0.0, 0.001, 1.2, 0.0, at, 24)
+
+
+def test_the_gain_is_the_ratio_of_the_drifts() -> None:
+    found = gain(_peak(0.008), _peak(0.04), _sensors(EXACT))
+    assert found.alpha_2 == pytest.approx(0.2)
+    assert found.uncertainty == 0.0
+
+
+def test_what_both_tests_share_cancels_and_what_they_do_not_adds_up_in_squares() -> None:
+    """To first order the relative error of alpha_2 by the lasers is (s_2 - s_1) (L1c / Dc - L1b / Db)."""
+    accuracy = EXACT.model_copy(update={"laser_mismatch": 0.001})
+    coupled, bare = _peak(0.010, 1e-5, 0.008), _peak(0.050, 1e-4, -0.020)
+    by_scale = 0.001 * (0.008 / 0.010 + 0.020 / 0.050)
+    by_scatter = np.hypot(1e-5 / 0.010, 1e-4 / 0.050)
+    found = gain(coupled, bare, _sensors(accuracy))
+    assert found.budget.parts[SCALES] == pytest.approx(0.2 * by_scale, rel=0.03)
+    assert found.budget.parts["scatter of the cycles"] == pytest.approx(0.2 * by_scatter)
+    assert found.uncertainty == pytest.approx(2.0 * 0.2 * np.hypot(by_scale, by_scatter), rel=0.03)
+    # the storey sees the same multiple of its drift in both tests
+    alike = gain(_peak(0.010, seen=-0.008), _peak(0.050, seen=-0.040), _sensors(accuracy))
+    assert alike.uncertainty == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_linearity_error_counts_by_what_differs_between_the_tests() -> None:
+    """Against the curve itself, of every phase and number of waves, put through both peaks."""
+    height, span = 0.00016, 0.2
+    coupled, bare = (0.003, 0.010), (0.020, 0.050)
+    ratios = []
+    for waves in np.linspace(0.5, 2.0, 41):
+        turn = 2.0 * np.pi * waves / span
+        for phases in np.stack(np.meshgrid(*2 * [np.arange(24) * 2.0 * np.pi / 24]), axis=-1).reshape(-1, 2):
+
+            def off(first: float, drift: float, turn: float = turn, phases: np.ndarray = phases) -> float:
+                at = np.array([first, first + drift]) * turn
+                errors = height * (np.sin(at + phases) - np.sin(phases))
+                return float(errors[1] - errors[0]) / drift
+
+            ratios.append(off(*coupled) - off(*bare))
+    exact = EXACT.model_copy(update={"laser_linearity": 0.0008})
+    found = gain(_peak(coupled[1], seen=coupled[0]), _peak(bare[1], seen=bare[0]), _sensors(exact))
+    # one number of waves for both lasers here, one for each there: their curves are independent by the phase anyway
+    assert found.budget.parts[LINEARITY] == pytest.approx(0.2 * np.std(ratios), rel=0.06)
+
+
+def test_the_table_counts_as_far_as_the_gain_moves_with_its_amplitude() -> None:
+    accuracy = EXACT.model_copy(update={"table_scale": 0.005})
+    found = gain(_peak(0.010), _peak(0.050), _sensors(accuracy), amplitude_slope=-1.6)
+    assert found.budget.dominating == "amplitude of the table"
+    assert found.uncertainty == pytest.approx(2.0 * 0.2 * 1.6 * 0.005)
+
+
+def test_the_budget_is_sorted_and_readable() -> None:
+    found = gain(_peak(0.010, 1e-5, 0.008), _peak(0.050, 1e-4, -0.020), _sensors(SensorAccuracy()), 0.5)
+    read = json.loads(found.budget.as_json)
+    assert list(read.values()) == sorted(read.values(), reverse=True)
+    assert next(iter(read)) == found.budget.dominating
+    assert 2.0 * np.hypot.reduce(list(read.values())) == pytest.approx(found.uncertainty, rel=0.01)
+
+
+@pytest.mark.parametrize("ratio", [100, 400])
+def test_the_peak_of_the_mean_cycle_has_no_bias_of_the_largest_sample(ratio: int) -> None:
+    """Noise of A / `ratio` and a zero that is off by as much: the largest sample of 24 cycles is far too large."""
+    random, phase = np.random.default_rng(ratio), np.arange(629) * 0.01 * 1.0001
+    pure = np.sin(phase) + 0.05 * np.sin(3.0 * phase + 0.4)
+    fine = np.linspace(0.0, 2.0 * np.pi, 200_001)
+    true = float(np.abs(np.sin(fine) + 0.05 * np.sin(3.0 * fine + 0.4)).max())
+    found, largest = [], []
+    for _ in range(60):
+        noisy = np.zeros((24, phase.size, 7))
+        noisy[:, :, DRIFT] = pure + (random.standard_normal((24, phase.size)) + random.choice([-1.0, 1.0])) / ratio
+        cycles = [cycle for k, each in enumerate(noisy) if (cycle := fit_cycle(k, phase, each)) is not None]
+        found.append(steady_peak(cycles, 1.0).drift / true - 1.0)
+        largest.append(np.abs(noisy[:, :, DRIFT]).max() / true - 1.0)
+    assert abs(np.mean(found)) < 5e-4
+    assert np.mean(largest) > 3.0 / ratio
+
+
+def test_the_scatter_of_independent_cycles_is_the_standard_error() -> None:
+    draw = np.random.default_rng(1)
+    errors = [steady_peak(_cycles(1.0 + 0.01 * draw.standard_normal(50)), 1.0).scatter for _ in range(100)]
+    assert np.mean(errors) == pytest.approx(0.01 / np.sqrt(50), rel=0.25)
+
+
+def test_correlated_cycles_count_less() -> None:
+    draw = np.random.default_rng(2)
+    covered = 0
+    for _ in range(300):
+        series = np.empty(60)
+        series[0] = draw.standard_normal()
+        for k in range(1, 60):
+            series[k] = 0.7 * series[k - 1] + np.sqrt(1.0 - 0.49) * draw.standard_normal()
+        peak = steady_peak(_cycles(10.0 + series), 1.0)
+        covered += abs(peak.drift - 10.0) <= 2.0 * peak.scatter
+    assert covered / 300 > 0.85  # two standard errors of independent samples would cover about 60 %
+
+
+def test_a_modulated_motion_counts_with_its_largest_peak() -> None:
+    drifts = 1.0 + 0.3 * np.sin(np.arange(40))
+    assert modulated_peak(_cycles(drifts), 1.0).drift == drifts.max()
+
+
+def test_a_transient_that_may_be_left_counts_as_a_rectangular_distribution() -> None:
+    peak = steady_peak(_cycles(np.full(24, 0.01)), 1.0, residual=0.0024)
+    assert peak.transient == pytest.approx(0.01 * 0.0024 / np.sqrt(3.0))
+
+
+@pytest.mark.parametrize(("amplitude", "step"), [(4e-4, 5e-5), (1e-3, 5e-5), (1e-2, 5e-5)])
+def test_the_steps_of_a_laser_move_a_fitted_peak_about_as_far_as_stated(amplitude: float, step: float) -> None:
+    """Against sines of many sizes and offsets, rounded and fitted: no code of the bench makes the errors."""
+    random, phase = np.random.default_rng(7), np.arange(2000) * (2.0 * np.pi / 2000)
+    errors = []
+    for offset, more in random.uniform(0.0, 1.0, (200, 2)):
+        values = np.zeros((2000, 7))
+        size = amplitude + more * step
+        true = size * np.sin(phase)
+        values[:, LASER_2] = np.round(true / step + offset) * step - offset * step
+        values[:, DRIFT] = values[:, LASER_2]
+        cycle = fit_cycle(0, phase, values)
+        assert cycle is not None
+        peak = steady_peak([cycle], 1.0)
+        errors.append(peak.drift - size)
+    accuracy = EXACT.model_copy(update={"laser_resolution": step})
+    # laser 1 stands still, so that its rounding is no error of this peak
+    seen = replace(peak.readings, swings=(1e9, peak.readings.swings[1]))
+    stated = gain(replace(peak, readings=seen), _peak(1.0, swing=1e9), _sensors(accuracy)).uncertainty / 2.0
+    assert 0.3 * stated < np.hypot(np.std(errors), np.mean(errors)) < 1.5 * stated
+
+
+def _calibrated() -> LaserCalibration:
+    curve = LaserCurve(
+        sensor="",
+        lowest=-0.05,
+        highest=0.03,
+        rest=0.004,
+        error=(0.0, 1e-5),
+        uncertainty=3e-6,
+        scale=1.0,
+        delay=0.0,
+        delay_uncertainty=0.0,
+    )
+    return LaserCalibration(
+        date=datetime(2020, 1, 1, tzinfo=UTC),
+        valid_days=1000.0,
+        laser_1=curve,
+        laser_2=curve,
+        table_displacement=1.0,
+        table_acceleration=1.0,
+        table_uncertainty=1e-3,
+        differential_uncertainty=1e-4,
+        common_linearity=1e-5,
+        differential_scale=1.0,
+    )
+
+
+_READING = st.floats(-0.1, 0.1)
+
+
+@st.composite
+def _steady(draw: st.DrawFn) -> SteadyPeak:
+    drift, sign = draw(st.floats(1e-4, 0.1)), draw(st.sampled_from((1.0, -1.0)))
+    at_rest, speeds = draw(st.booleans()), draw(st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0)))
+    swings = draw(st.tuples(st.floats(0.0, 0.2), st.floats(0.0, 0.2)))
+    zero = np.zeros((2, 1)) if at_rest else np.array(draw(st.lists(_READING, min_size=64, max_size=64))).reshape(2, 32)
+    lasers = draw(st.tuples(_READING, _READING))
+    return SteadyPeak(
+        drift, 1e-5, 1e-5, 0.001, 1.2, 0.0, PeakReadings(drift, sign, lasers, speeds, zero, swings, 6.0, at_rest), 24
+    )
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    bare=_steady(),
+    coupled=_steady(),
+    calibration=st.sampled_from((None, _calibrated())),
+    resolution=st.sampled_from((0.0, 5e-5)),
+)
+def test_a_running_gain_with_shared_draws_has_the_uncertainty_of_the_result(
+    bare: SteadyPeak, coupled: SteadyPeak, calibration: LaserCalibration | None, resolution: float
+) -> None:
+    sensors = SensorUncertainty(SensorAccuracy(laser_resolution=resolution), (0.2, 0.2), calibration)
+    expected = gain(coupled, bare, sensors)
+    for found in (gain(coupled, bare, sensors, shared=SHARED) for _ in range(2)):
+        assert found.alpha_2 == expected.alpha_2
+        assert found.uncertainty == pytest.approx(expected.uncertainty, rel=1e-9)
+        assert found.budget.parts == pytest.approx(expected.budget.parts, rel=1e-6, abs=1e-9 * expected.uncertainty)
+
+
+SHARED = shared_draws()
+
+
+def test_shared_draws_are_those_of_a_new_generator_and_are_made_once() -> None:
+    shared, new = shared_draws(), Draws(np.random.default_rng(SEED), DRAWS)
+    first = [shared.uniform(-0.5, 0.5), shared.normal(2), shared.normal()]
+    for found, expected in zip(first, (new.uniform(-0.5, 0.5), new.normal(2), new.normal()), strict=True):
+        np.testing.assert_array_equal(found, expected)
+    again = shared.again()
+    repeated = [again.uniform(-0.5, 0.5), again.normal(2), again.normal()]
+    assert [id(each) for each in repeated] == [id(each) for each in first]
+    other, new = shared.again().normal(), Draws(np.random.default_rng(SEED), DRAWS)
+    np.testing.assert_array_equal(other, new.normal())

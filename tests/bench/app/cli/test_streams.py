@@ -1,0 +1,97 @@
+"""A run outlasts the terminal that shows it."""
+
+import errno
+import json
+import os
+import subprocess
+import sys
+from io import StringIO
+from pathlib import Path
+
+import pytest
+
+from bench.app.cli.main import main
+from bench.app.cli.streams import lasting
+
+RUN = ["run", "free-vibration", "--repeats", "1"]
+FULL = Path("/dev/full")
+
+
+class Broken(StringIO):
+    """A terminal that is gone after some texts."""
+
+    def __init__(self, number: int, after: int) -> None:
+        super().__init__()
+        self._number, self._left = number, after
+
+    def write(self, text: str) -> int:
+        self._left -= 1
+        if self._left < 0:
+            raise OSError(self._number, os.strerror(self._number))
+        return super().write(text)
+
+
+@pytest.mark.parametrize("number", [errno.EPIPE, errno.ENOSPC, errno.EIO])
+@pytest.mark.parametrize("after", [0, 3, 8])
+def test_a_run_goes_on_without_its_display(
+    number: int, after: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "stderr", Broken(number, after))
+    assert main([*RUN, "--out", str(tmp_path / "run"), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["status"] == "completed"
+
+
+@pytest.mark.parametrize("how", ["closed pipe", "full disk"])
+def test_a_command_whose_standard_error_is_gone_ends_well(how: str, tmp_path: Path) -> None:
+    if how == "full disk" and not FULL.exists():
+        pytest.skip("no device that is always full")
+    reader, writer = os.pipe()
+    os.close(reader)
+    target = writer if how == "closed pipe" else os.open(FULL, os.O_WRONLY)
+    try:
+        done = subprocess.run(
+            [sys.executable, "-m", "bench", *RUN, "--out", str(tmp_path / "run"), "--json"],
+            stdout=subprocess.PIPE,
+            stderr=target,
+            timeout=120,
+        )
+    finally:
+        for handle in {writer, target}:
+            os.close(handle)
+    assert done.returncode == 0
+    assert json.loads(done.stdout)["status"] == "completed"
+
+
+def test_a_result_that_cannot_be_printed_is_one_line(tmp_path: Path) -> None:
+    if not FULL.exists():
+        pytest.skip("no device that is always full")
+    with FULL.open("w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "bench", "config", "init", str(tmp_path / "bench.toml"), "--help"],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            timeout=60,
+        )
+    assert done.returncode == 1
+    assert "No space left on device" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_console_without_the_characters_shows_substitutes() -> None:
+    for command in (["predict", "steady", "--help"], ["file", "info", "--help"], ["run", "harmonic", "--help"]):
+        shown = subprocess.run(
+            [sys.executable, "-m", "bench", *command],
+            env={**os.environ, "PYTHONIOENCODING": "cp1252", "PYTHONUTF8": "0"},
+            capture_output=True,
+            timeout=60,
+        )
+        assert shown.returncode == 0, shown.stderr
+        assert b"UnicodeEncodeError" not in shown.stderr
+
+
+def test_what_outlasts_its_reader_is_wrapped_once() -> None:
+    stream = lasting(StringIO())
+    assert lasting(stream) is stream
+    print("text", file=stream)
+    assert stream.getvalue() == "text\n"  # type: ignore[attr-defined]

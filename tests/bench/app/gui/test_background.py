@@ -1,0 +1,25 @@
+"""Work beside the window: its answers and its errors come in the window's thread."""
+
+import traceback
+
+from PySide6.QtCore import QObject
+from pytestqt.qtbot import QtBot
+
+from bench.app.gui.background import Reader
+
+
+def test_an_error_of_the_program_is_raised_in_the_thread_of_the_window(qtbot: QtBot) -> None:
+    owner = QObject()
+    reader, found = Reader(owner), list[object]()
+    reader.found.connect(found.append)
+
+    def wrong() -> object:
+        raise ZeroDivisionError("a mistake of ours")
+
+    with qtbot.captureExceptions() as raised:
+        reader.call(wrong)
+        qtbot.waitUntil(lambda: bool(found and raised))
+    assert [kind for kind, _, _ in raised] == [ZeroDivisionError]
+    assert "_tell" in [frame.name for frame in traceback.extract_tb(raised[0][2])], "not in the pool's thread"
+    reader.call(lambda: 7)
+    qtbot.waitUntil(lambda: found[-1] == 7)

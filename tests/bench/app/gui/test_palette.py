@@ -1,0 +1,44 @@
+"""Contrast of every text with what is behind it, after WCAG 2.2, 1.4.3: 4.5 for text of this size, 3 for lines."""
+
+import pytest
+from PySide6.QtGui import QColor, QPalette
+
+from bench.app.gui.palette import DARK, LIGHT, Theme, qt_palette
+
+
+def _luminance(colour: QColor) -> float:
+    """Relative luminance (WCAG 2.2, definition)."""
+    parts = [value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4 for value in colour.getRgbF()[:3]]
+    return 0.2126 * parts[0] + 0.7152 * parts[1] + 0.0722 * parts[2]
+
+
+def _contrast(one: QColor, other: QColor) -> float:
+    low, high = sorted((_luminance(one), _luminance(other)))
+    return (high + 0.05) / (low + 0.05)
+
+
+@pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
+def test_everything_can_be_read_on_its_ground(theme: Theme) -> None:
+    for ground in (theme.ground, theme.raised):
+        for name in ("text", "faint", "calm", "good", "wait", "alarm"):
+            assert _contrast(QColor(str(getattr(theme, name))), QColor(ground)) >= 4.5, name
+        for line in theme.lines:
+            assert _contrast(QColor(line), QColor(ground)) >= 3.0
+    palette, role = qt_palette(theme), QPalette.ColorRole
+    for text, ground in (
+        (role.WindowText, role.Window),
+        (role.Text, role.Base),
+        (role.Text, role.AlternateBase),
+        (role.ButtonText, role.Button),
+        (role.ToolTipText, role.ToolTipBase),
+        (role.HighlightedText, role.Highlight),
+        (role.PlaceholderText, role.Base),
+    ):
+        assert _contrast(palette.color(text), palette.color(ground)) >= 4.5, text
+    assert _contrast(QColor("#b30000"), QColor("white")) >= 4.5, "STOP"
+
+
+def test_the_formula_is_the_published_one() -> None:
+    assert _contrast(QColor("black"), QColor("white")) == pytest.approx(21.0)
+    # the lightest grey that passes on white: WebAIM's table
+    assert _contrast(QColor("#767676"), QColor("white")) == pytest.approx(4.54, abs=0.01)

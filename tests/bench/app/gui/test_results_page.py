@@ -1,0 +1,259 @@
+"""Files side by side: what is drawn and said is what the files hold, and nothing is overwritten."""
+
+import re
+from math import isnan, nan
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PySide6.QtCore import Qt, QUrl
+from PySide6.QtGui import QDesktopServices, QImage
+from pytestqt.qtbot import QtBot
+from scipy.io import loadmat
+
+from bench.app.gui import texts
+from bench.app.gui.controller import Controller
+from bench.app.gui.gains import compare
+from bench.app.gui.open_files import read_stretch
+from bench.app.gui.outputs import free
+from bench.app.gui.palette import LIGHT
+from bench.app.gui.results_page import ResultsPage
+from bench.app.ipc.messages import Ended
+from bench.config.model import BenchConfiguration
+from bench.datafile.recorder import Recorder
+from bench.datafile.tables import Column
+from bench.events import Acquired, PointFinished
+from drivers.rig import Block, Channel
+from protocols.harmonic.protocol import HarmonicPoint, PointStatus
+
+RATE, N = 1000.0, 4000
+LONG = 60_000
+CHANNELS = (
+    Channel("table_acceleration", "acceleration", "m/s2", 1e-3, 0.0, (-32_000, 32_000), "made"),
+    Channel("laser_1", "displacement", "m", 1e-6, 0.0, (-32_000, 32_000), "made"),
+)
+
+
+def _point(omega: float, alpha_2: float | None, spread: float = 0.004) -> HarmonicPoint:
+    status = PointStatus.OVERTURNED if alpha_2 is None else PointStatus.STEADY
+    return HarmonicPoint(
+        omega_rad_s=omega, beta=0.4, status=status, layer="rocking", alpha_2=alpha_2, alpha_2_uncertainty=spread
+    )
+
+
+def _counts(seed: int) -> np.ndarray:
+    return np.random.default_rng(seed).integers(-30_000, 30_000, (N, 2)).astype(np.int16)
+
+
+def _made(folder: Path, *points: HarmonicPoint) -> Path:
+    folder.mkdir()
+    omega = np.array([15.0, 16.0, 17.0])
+    prediction = {
+        "omega": Column(omega, "rad/s", ""),
+        "beta": Column(np.full(3, 0.4), "1", ""),
+        "alpha_2": Column(np.array([0.3, 0.2, 0.4]), "1", ""),
+        "alpha_2_low": Column(np.array([0.28, 0.19, 0.38]), "1", ""),
+        "alpha_2_high": Column(np.array([0.32, 0.22, 0.43]), "1", ""),
+        "layer": Column(np.array(["rocking"] * 3), "", ""),
+    }
+    path = folder / "campaign.h5"
+    metadata = {"configuration": BenchConfiguration().model_dump_json(), "protocol": "harmonic"}
+    recorder = Recorder(
+        path, channels=CHANNELS, sample_rate=RATE, point_type=HarmonicPoint, metadata=metadata,
+        tables={"prediction": prediction},
+    )  # fmt: skip
+    for run in (1, 2):
+        for first in range(0, N, 500):
+            block = Block(first, _counts(run)[first : first + 500])
+            recorder(Acquired(run, block, np.full(500, 0.1 * run), time=first / RATE))
+    for point in points:
+        recorder(PointFinished(point, time=2.0))
+    recorder.close("completed", "the plan was carried out")
+    return path
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    folder = tmp_path_factory.mktemp("results")
+    return (
+        _made(folder / "monday", _point(16.0, 0.200), _point(17.0, None)),
+        _made(folder / "tuesday", _point(16.0, 0.212, 0.003), _point(15.0, 0.31)),
+    )
+
+
+@pytest.fixture
+def page(qtbot: QtBot) -> ResultsPage:
+    controller = Controller()
+    shown = ResultsPage(controller, LIGHT)
+    qtbot.addWidget(shown)
+    shown.resize(1200, 700)
+    shown.show()
+    shown.destroyed.connect(controller.close)
+    return shown
+
+
+def test_differences_are_set_against_both_uncertainties() -> None:
+    first = [_point(16.0, 0.200).model_dump(), _point(17.0, None).model_dump()]
+    second = [_point(16.0, 0.212, 0.003).model_dump(), _point(15.0, 0.31).model_dump()]
+    one, fallen, alone = compare(first, second)
+    assert one.value == pytest.approx(0.012)
+    assert one.uncertainty == pytest.approx(0.005)  # 3-4-5
+    assert one.score == pytest.approx(2.4)
+    assert (fallen.reference, fallen.other, isnan(fallen.value), isnan(fallen.score)) == (None, None, True, True)
+    assert (alone.reference, alone.other, isnan(alone.uncertainty)) == (None, 0.31, True)
+    records = [{"record": "Kobe", "beta": b, "alpha_2": a, "alpha_2_uncertainty": nan} for b, a in ((0.4, 0.8),)]
+    assert compare(records, records)[0].point == "Kobe, β = 0.4"
+
+
+def test_every_point_has_its_verdict_in_six_columns(page: ResultsPage, tmp_path: Path) -> None:
+    told = {"alpha_2_predicted": 0.199, "alpha_2_predicted_uncertainty": 0.002, "agrees": True}
+    parts = '{"laser_scale": 0.001, "clock": 0.0005}'
+    good = _point(16.0, 0.2).model_copy(update={**told, "uncertainty_parts": parts})
+    off = _point(17.0, 0.3).model_copy(update={**told, "agrees": False, "status": PointStatus.MODULATED})
+    page.show_file(_made(tmp_path / "wednesday", good, off, _point(18.0, None)))
+
+    def cells(row: int) -> list[str]:
+        items = [page.table.item(row, column) for column in range(page.table.columnCount())]
+        return [item.text() for item in items if item is not None]
+
+    assert page.table.columnCount() == 6
+    first = cells(0)
+    assert first[:4] == ["ω = 16 rad/s, β = 0.4", "α₂", "0.2000 ± 0.0040", "0.1990 ± 0.0020"]
+    assert first[4].startswith("+0.001")
+    assert "+0.5 %" in first[4]
+    assert first[5] == "✓ agrees"
+    assert cells(1)[5] == "modulated, ▲ DISAGREES"
+    assert cells(2)[5] == "overturned"
+    page.everything.setChecked(True)
+    headings = [page.table.horizontalHeaderItem(column).text() for column in range(page.table.columnCount())]
+    shown = [*headings, *(text for row in range(3) for text in cells(row))]
+    assert not [text for text in shown if re.search(r"[a-z0-9]_[a-z0-9]|[{}]|m/s2|\+-", text)]
+    assert "ω [rad/s]" in headings
+    assert any("laser scale 0.001; clock 0.0005" in text for text in shown)
+
+
+def test_a_file_has_the_figures_of_its_folder(page: ResultsPage, tmp_path: Path) -> None:
+    path = _made(tmp_path / "thursday", _point(16.0, 0.2))
+    image = QImage(200, 100, QImage.Format.Format_RGB32)
+    image.fill(Qt.GlobalColor.red)
+    image.save(str(path.with_name("gain_spectra.png")))
+    page.show_file(path)
+    page.parts.setCurrentWidget(page.figures)
+    assert [page.figures.choice.itemText(row) for row in range(page.figures.choice.count())] == ["gain spectra"]
+    shown = page.figures.picture.pixmap()
+    assert shown.width() == pytest.approx(2 * shown.height(), abs=2)
+    page.files.remove_chosen()
+    assert page.figures.picture.text() == texts.NO_FIGURE
+
+
+def test_two_files_are_drawn_together_and_compared(page: ResultsPage, files: tuple[Path, Path]) -> None:
+    for path in files:
+        page.show_file(path)
+    assert page.gains.measured == [(16.0, 0.2), (16.0, 0.212), (15.0, 0.31)]
+    assert page.gains.bands == 1
+    assert [file.name for file in page.files.ticked] == ["monday", "tuesday"]
+    assert page.table.rowCount() == 2
+    cells = [page.differences.item(0, column).text() for column in range(8)]
+    assert cells == ["tuesday", "ω = 16 rad/s, β = 0.4", "0.2000", "0.2120", "0.01200", "0.005000", "2.400", "▲ BEYOND"]
+    assert page.differences.rowCount() == 3
+    page.files.remove_chosen()
+    assert page.gains.measured == [(16.0, 0.2)]
+    assert page.differences.rowCount() == 0
+    assert "monday" in page.message.text()
+
+
+def test_a_run_that_ends_takes_nobodys_comparison_away(
+    page: ResultsPage, files: tuple[Path, Path], tmp_path: Path
+) -> None:
+    page.show_file(files[0])
+    last = _made(tmp_path / "wednesday", _point(16.0, 0.22))
+    page.show_end(Ended("completed", "the plan was carried out", {}, "", files[1].parent))
+    assert [file.name for file in page.files.ticked] == ["tuesday"], "one file is no comparison"
+    page.files.item(0).setCheckState(Qt.CheckState.Checked)
+    chosen, before = page.files.chosen, page.gains.measured
+    page.show_end(Ended("aborted", "abort requested", {}, "", last.parent))
+    assert [file.name for file in page.files.ticked] == ["monday", "tuesday"]
+    assert (page.files.chosen, page.gains.measured, page.files.count()) == (chosen, before, 3)
+    assert "abort requested" in page.message.text()
+    page.files.item(2).setCheckState(Qt.CheckState.Checked)
+    assert page.gains.measured[-1] == (16.0, 0.22)
+
+
+def test_a_path_may_be_typed_and_a_wrong_one_changes_nothing(page: ResultsPage, files: tuple[Path, Path]) -> None:
+    page.path.setText(f'"{files[0]}"')
+    page.path.returnPressed.emit()
+    assert page.files.count() == 1
+    page.path.setText(str(files[0].with_name("none.h5")))
+    page.path.returnPressed.emit()
+    assert "there is no such file" in page.message.text()
+    assert page.files.count() == 1
+
+
+@pytest.mark.parametrize(
+    ("begin", "end", "parts"), [(0.0, 4.0, 7), (1.0, 1.2, 50), (-1.0, 9.0, 4000), (0.5, 0.52, 400)]
+)
+def test_a_stretch_has_the_extremes_of_its_samples(
+    files: tuple[Path, Path], begin: float, end: float, parts: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Against the counts as they were made."""
+    monkeypatch.setattr("bench.app.gui.open_files.CHUNK", 300)
+    found = read_stretch(files[0], 2, "laser_1", begin, end, parts)
+    first, last = max(round(begin * RATE), 0), min(round(end * RATE) + 1, N)
+    expected = 1e-6 * _counts(2)[first:last, 1]
+    assert (found.values.min(), found.values.max()) == pytest.approx((expected.min(), expected.max()), rel=1e-6)
+    assert found.time[0] == pytest.approx(first / RATE)
+    assert found.time.size <= 2 * parts + 4
+    assert found.unit == "m"
+    if (last - first) < 2 * parts:
+        np.testing.assert_allclose(found.values, expected, rtol=1e-6)
+
+
+def test_samples_are_read_beside_the_window(page: ResultsPage, files: tuple[Path, Path], qtbot: QtBot) -> None:
+    page.show_file(files[0])
+    view = page.histories
+    # a laser's counts are micrometres, shown in millimetres
+    view.run.setCurrentIndex(1)
+    view.channel.setCurrentText("drive")
+    qtbot.waitUntil(lambda: view.shown is not None and view.shown.unit == "V", timeout=LONG)
+    np.testing.assert_allclose(view.curve.getData()[1], 0.2, rtol=1e-6)
+    view.channel.setCurrentText("laser 1")
+    view._item.setXRange(1.0, 1.1, padding=0.0)
+    qtbot.waitUntil(lambda: view.shown is not None and (view.shown.begin, view.shown.unit) == (1.0, "m"), timeout=LONG)
+    np.testing.assert_allclose(view.curve.getData()[1], 1e-3 * _counts(2)[1000:1101, 1], rtol=1e-6)
+
+
+def test_export_and_report_are_those_of_the_command_line(
+    page: ResultsPage, files: tuple[Path, Path], qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = files[0].parent
+    (folder / "campaign-mat").mkdir()
+    page.show_file(files[0])
+    outputs = page.outputs
+    outputs.export.click()
+    assert not outputs.export.isEnabled()
+    qtbot.waitUntil(outputs.open_made.isVisible, timeout=LONG)
+    assert outputs.message.text() == texts.MADE.format(path=folder / "campaign-mat-2")
+    made = next((folder / "campaign-mat-2").glob("*run*1*.mat"))
+    np.testing.assert_allclose(np.ravel(loadmat(made)["laser_1"]), 1e-6 * _counts(1)[:, 1], rtol=1e-9)
+    opened: list[QUrl] = []
+    monkeypatch.setattr(QDesktopServices, "openUrl", opened.append)
+    outputs.open_made.click()
+    assert Path(opened[0].toLocalFile()) == folder / "campaign-mat-2"
+    assert not list((folder / "campaign-mat").iterdir())
+
+
+def test_what_cannot_be_made_says_why(page: ResultsPage, files: tuple[Path, Path], qtbot: QtBot) -> None:
+    page.show_file(files[0])
+    page.outputs.use(files[0].with_name("none.h5"))
+    page.outputs.report.click()
+    qtbot.waitUntil(page.outputs.report.isEnabled, timeout=LONG)
+    assert "there is no such file" in page.outputs.message.text()
+    assert not page.outputs.open_made.isVisible()
+
+
+def test_a_free_name_is_taken(tmp_path: Path) -> None:
+    wanted = tmp_path / "campaign.report.html"
+    assert free(wanted) == wanted
+    wanted.touch()
+    (tmp_path / "campaign.report-2.html").touch()
+    assert free(wanted) == tmp_path / "campaign.report-3.html"

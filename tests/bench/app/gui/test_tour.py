@@ -1,0 +1,88 @@
+"""The first minute: a step is ticked off when it was done, and begun again when it went wrong."""
+
+from pathlib import Path
+
+import pytest
+from pytestqt.qtbot import QtBot
+
+from bench.app.gui.controller import Controller
+from bench.app.gui.palette import LIGHT
+from bench.app.gui.panels import DONE, LATER, NEXT, Tour
+from bench.app.gui.trouble import Trouble
+from bench.app.gui.window import Window
+from bench.app.ipc.messages import Ended, PlanChecked, Question, Refused
+from bench.config.model import BenchConfiguration
+from bench.events import PointFinished, Warned
+from sim.parameters import Parameters
+from tests.bench.app.gui.conftest import PROTOCOLS, SHAKING
+from tests.bench.app.ipc.experiment import bench, order
+
+FINE = PlanChecked((), None, (), 60.0, 1e6, 1e9, "hash", {})
+TIGHT = PlanChecked((), "drift: too near", (), 60.0, 1e6, 1e9, "hash", {})
+
+
+def _marks(tour: Tour) -> str:
+    return "".join(label.text()[0] for label in tour.steps)
+
+
+@pytest.fixture
+def controller(qtbot: QtBot) -> Controller:
+    made = Controller()
+    qtbot.addWidget(tour := Tour(made))
+    tour.show()
+    made.setProperty("tour", tour)
+    return made
+
+
+def test_steps_follow_what_was_done(controller: Controller) -> None:
+    tour = controller.property("tour")
+    assert _marks(tour) == NEXT + 3 * LATER
+    controller.plan_checked.emit(TIGHT, None)
+    assert _marks(tour) == NEXT + 3 * LATER
+    controller.plan_checked.emit(FINE, None)
+    assert _marks(tour) == DONE + NEXT + 2 * LATER
+    controller.began.emit(order(Path("never")))
+    controller.event_received.emit(Warned("of something", time=1.0))
+    assert _marks(tour) == 2 * DONE + NEXT + LATER
+    assert tour.steps[2].property("level") == "wait"
+    controller.plan_checked.emit(TIGHT, None)
+    controller.event_received.emit(PointFinished(Parameters(), time=2.0))
+    assert _marks(tour) == 3 * DONE + NEXT
+    controller.ended.emit(Ended("completed", "the plan was carried out", {}, "", Path("never")))
+    assert _marks(tour) == 4 * DONE
+
+
+@pytest.mark.parametrize(
+    "ended", [Ended("aborted", "abort requested", {}, "", Path("never")), Refused("no room", failed=True)]
+)
+def test_a_run_without_a_point_is_begun_again(controller: Controller, ended: Ended | Refused) -> None:
+    controller.plan_checked.emit(FINE, None)
+    controller.began.emit(order(Path("never")))
+    controller.ended.emit(ended)
+    assert _marks(controller.property("tour")) == NEXT + 3 * LATER
+
+
+@pytest.mark.usefixtures("without_plots", "spoken")
+def test_the_tour_gives_way_to_what_matters_and_to_a_real_bench(qtbot: QtBot) -> None:
+    controller = Controller()
+    window = Window(controller, bench(), (SHAKING, *PROTOCOLS), LIGHT, tour=True)
+    qtbot.addWidget(window)
+    window.show()
+    assert window.welcome.isVisible()
+    controller.asked.emit(Question(1, "Mount the spring."))
+    assert (window.prompt.isVisible(), window.welcome.isVisible()) == (True, False)
+    window.trouble.show_trouble(Trouble("one", "two", "three"))
+    controller.asked.emit(None)
+    assert not window.welcome.isVisible()
+    window.trouble.hide()
+    assert window.welcome.isVisible()
+    window.setup.opened.emit(BenchConfiguration(backend="hardware"))
+    assert not window.welcome.isVisible(), "there the table is real"
+    window.setup.opened.emit(bench())
+    assert window.welcome.isVisible()
+    window.welcome.leave()
+    controller.asked.emit(None)
+    window.trouble.show_trouble(Trouble("one", "two", "three"))
+    window.trouble.hide()
+    assert not window.welcome.isVisible()
+    window.close()

@@ -1,0 +1,79 @@
+"""The virtual bench as the tests of the table's control use it: identify it, play a drive, make a record."""
+
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.control.identification import band_lines, drive_amplitudes, identify_table, multisine, steady_periods
+from bench.control.preparation import prepare
+from bench.control.table_model import TableModel
+from bench.control.target import Target
+from sim.excitation import SampledRecord
+from sim.shaker import Shaker
+from sim.specimen import Specimen
+from sim.virtual_bench import VirtualBench, VirtualBenchParameters
+
+Array = NDArray[np.float64]
+
+RATE = 2000.0
+IDENTIFIED = datetime(2026, 5, 4, 12, 0, tzinfo=UTC)
+
+
+@dataclass(frozen=True)
+class Played:
+    """What the bench measured, and the true table acceleration; shape (n,)."""
+
+    acceleration: Array
+    displacement: Array
+    truth: Array
+
+
+def play(bench: VirtualBench, volts: Array) -> Played:
+    """Play a drive on a bench at rest."""
+    bench.mount(bench.arrangement)
+    bench.run(np.zeros(400))
+    counts = bench.run(volts)
+    displacement, acceleration = (bench.channels[i].to_unit(counts[:, i]) for i in (0, 1))
+    return Played(acceleration, displacement, bench.truth.a.copy())
+
+
+def bench_with(specimen: Specimen, seed: int = 1, parameters: VirtualBenchParameters | None = None) -> VirtualBench:
+    return VirtualBench(parameters or VirtualBenchParameters(), specimen, seed)
+
+
+def identify(
+    bench: VirtualBench, level: float = 0.6, period: float = 8.0, realisations: int = 3, periods: int = 3
+) -> TableModel:
+    """Identify the table with whatever stands on it, the first period left out, peaks of `level` [m/s2]."""
+    samples = round(period * RATE)
+    lines = band_lines(samples, RATE, (0.4, 80.0))
+    prior = np.abs(Shaker().frequency_response(2.0 * np.pi * lines * RATE / samples))
+    amplitudes = drive_amplitudes(lines * RATE / samples, prior, "displacement", 1.0)
+    random = np.random.default_rng(5)
+    drives: list[Array] = []
+    accelerations: list[Array] = []
+    for _ in range(realisations):
+        signal = multisine(lines, amplitudes, samples, RATE, random, prior).scaled_to(level, prior)
+        drive = signal.drive(periods + 1)
+        drives.append(steady_periods(drive, samples, 1))
+        accelerations.append(steady_periods(play(bench, drive).acceleration, samples, 1))
+    return identify_table(
+        np.array(drives), np.array(accelerations), lines, RATE, date=IDENTIFIED, specimen="as mounted"
+    )
+
+
+def target_of(record: Array, dt: float, band: tuple[float, float]) -> Target:
+    """The part of a record that a table can make, at RATE, neither trimmed nor scaled."""
+    return prepare(SampledRecord(record, dt), band=band, peak=None, trim=None).target(RATE)
+
+
+def earthquake(seed: int, duration: float = 20.0, dt: float = 0.01) -> tuple[Array, float]:
+    """A record of filtered noise with an envelope and strong low frequencies, greatest value 1 m/s2; and its step."""
+    n = round(duration / dt)
+    t, f = dt * np.arange(n), np.fft.rfftfreq(n, dt)
+    shape = np.exp(-((f / 6.0) ** 2)) * (1.0 + 8.0 / (1.0 + (f / 0.4) ** 4))
+    values = np.fft.irfft(np.fft.rfft(np.random.default_rng(seed).standard_normal(n)) * shape, n)
+    values *= (t / 3.0) ** 2 * np.exp(2.0 * (1.0 - t / 3.0))
+    return values / np.abs(values).max(), dt

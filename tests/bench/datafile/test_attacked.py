@@ -1,0 +1,171 @@
+"""What other programs do to the data file during a run ends the run with the reason; nobody hangs."""
+
+import errno
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from bench.datafile.access import locking
+from bench.datafile.hdf5_reading import DataFileError
+from bench.datafile.inspection import overview, verify
+from bench.datafile.reader import open_datafile
+from bench.datafile.recorder import Recorder
+from bench.datafile.recovery import recover
+from sim.errors import RockbenchError
+from tests.bench.datafile.living import begin, hand_over
+
+SOON = 5.0
+"""Longest time for an answer about a damaged file [s]."""
+
+
+def _truncate(to: float) -> Callable[[Path], None]:
+    return lambda path: os.truncate(path, int(to * path.stat().st_size) if to < 1.0 else int(to))
+
+
+def _replace(path: Path) -> None:
+    other = path.with_name("other.h5")
+    other.write_bytes(b"something else")
+    other.replace(path)
+
+
+ATTACKS: dict[str, tuple[Callable[[Path], object], str]] = {
+    "truncated to nothing": (_truncate(0.0), "truncated it"),
+    "truncated to its head": (_truncate(4096.0), "truncated it"),
+    "truncated to half": (_truncate(0.5), "truncated it"),
+    "renamed": (lambda path: path.rename(path.with_name("moved.h5")), "renamed it to moved.h5"),
+    "deleted": (Path.unlink, "deleted it"),
+    "replaced": (_replace, "replaced it"),
+}
+
+
+def _recording(path: Path, blocks: int = 20) -> Recorder:
+    recorder = begin(path)
+    for k in range(blocks):
+        hand_over(recorder, k)
+    recorder.sync()
+    return recorder
+
+
+@pytest.mark.parametrize("attack", ATTACKS)
+def test_an_attack_on_the_file_of_a_run_is_its_next_error(attack: str, tmp_path: Path) -> None:
+    act, says = ATTACKS[attack]
+    path = tmp_path / "run.h5"
+    recorder = _recording(path)
+    act(path)
+    hand_over(recorder, 20)
+    with pytest.raises(DataFileError, match=says):
+        recorder.sync()
+    recorder.close("failed")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="finds the file of a handle in /proc")
+def test_a_share_that_is_lost_is_the_next_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every look at the file fails, also when it is let go."""
+    recorder = _recording(tmp_path / "run.h5")
+    stat = os.fstat
+
+    def stale(handle: int) -> os.stat_result:
+        if os.readlink(f"/proc/self/fd/{handle}").endswith("run.h5"):
+            raise OSError(errno.ESTALE, "Stale file handle")
+        return stat(handle)
+
+    monkeypatch.setattr(os, "fstat", stale)
+    hand_over(recorder, 20)
+    with pytest.raises(DataFileError, match="Stale file handle"):
+        recorder.sync()
+    recorder.close("failed")
+
+
+@pytest.mark.parametrize("attack", ATTACKS)
+def test_an_attack_just_before_the_end_is_the_error_of_closing(attack: str, tmp_path: Path) -> None:
+    act, says = ATTACKS[attack]
+    path = tmp_path / "run.h5"
+    recorder = _recording(path)
+    act(path)
+    with pytest.raises(DataFileError, match=says):
+        recorder.close("completed")
+
+
+def test_a_deleted_file_is_written_again_and_can_be_recovered(tmp_path: Path) -> None:
+    path = tmp_path / "run.h5"
+    recorder = _recording(path)
+    path.unlink()
+    with pytest.raises(DataFileError):
+        recorder.close("completed")
+    recover(path, tmp_path / "mended.h5")
+    with open_datafile(tmp_path / "mended.h5") as record:
+        assert record.rows == 20 * 200
+
+
+_AMID = """
+import os, sys, time
+from pathlib import Path
+from tests.bench.datafile.living import begin, hand_over
+path = Path(sys.argv[1])
+recorder = begin(path)
+samples = recorder._writer._parts.samples
+write, count = samples.write, []
+def cut(partial):
+    count.append(1)
+    if len(count) == 4:
+        os.truncate(path, int(sys.argv[2]))
+    write(partial=partial)
+samples.write = cut
+for k in range(40):
+    hand_over(recorder, k)
+    time.sleep(0.05)
+try:
+    recorder.close("completed")
+except Exception as error:
+    print(error)
+"""
+
+
+@pytest.mark.parametrize("size", [0, 4096, 50_000])
+def test_a_file_that_is_truncated_while_it_is_written_does_not_stop_the_process(size: int, tmp_path: Path) -> None:
+    """HDF5 holds the interpreter while it searches for what is cut off, and the engine with it."""
+    done = subprocess.run(
+        [sys.executable, "-c", _AMID, str(tmp_path / "run.h5"), str(size)], timeout=60, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def test_readers_of_a_truncated_file_refuse_it_soon(tmp_path: Path) -> None:
+    path, cut = tmp_path / "run.h5", tmp_path / "cut.h5"
+    recorder = _recording(path)
+    whole = path.read_bytes()
+    for share in (0.0, 0.001, 0.01, 0.05, 0.2, 0.5, 0.8, 0.95, 0.999):
+        cut.write_bytes(whole[: int(share * len(whole))])
+        begun = time.monotonic()
+        for read in (overview, open_datafile):
+            with pytest.raises(RockbenchError):
+                read(cut)
+        with suppress(RockbenchError):
+            assert verify(cut).problems
+        assert time.monotonic() - begun < SOON
+    recorder.close("completed")
+
+
+def test_a_reader_that_follows_a_file_notices_that_it_is_truncated(tmp_path: Path) -> None:
+    path = tmp_path / "run.h5"
+    recorder = _recording(path)
+    with open_datafile(path) as record:
+        record.refresh()
+        os.truncate(path, 4096)
+        begun = time.monotonic()
+        with pytest.raises(DataFileError, match="truncated"):
+            record.refresh()
+        assert time.monotonic() - begun < SOON
+    with pytest.raises(DataFileError):
+        recorder.close("completed")
+
+
+def test_nobody_locks_a_file_where_locks_are_mandatory() -> None:
+    assert locking("win32") is False
+    assert locking("linux") == "best-effort"

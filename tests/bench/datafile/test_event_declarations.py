@@ -1,0 +1,107 @@
+"""One declaration of an event: its columns in the file, its reading, export, comparison in replay, and its lines."""
+
+from dataclasses import replace
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bench import events
+from bench.app.cli.terminal import PlainLines
+from bench.app.export.format import content_of
+from bench.app.run_display import RunDisplay, notice_of
+from bench.datafile.declared import COUNTED, EVENT_TABLES
+from bench.datafile.reader import open_datafile
+from bench.engine.interface import EventStream
+from bench.events import Event, LiveValue, SensorsAligned, StepStarted, TableIdentified, Warned
+from drivers.clock import VirtualClock
+from drivers.rig import Alignment
+from tests.bench.datafile.example import begin, block, record
+from tests.command_line import rendered
+
+PERIOD = LiveValue("period", 0.6412, "s", 0.0031, 0.6389, time=3.0)
+ALIGNED = SensorsAligned(2, (Alignment("laser_1", 0.1, 1.00003, 2e-6, 0.0035, 4000, 1),) * 2, time=4.0)
+LINES = 5
+TABLE = TableIdentified("first", *(np.arange(LINES) + k / 7.0 for k in range(7)), time=5.0)
+
+
+def test_every_column_of_every_event_has_a_meaning_and_numbers_a_unit() -> None:
+    assert len(EVENT_TABLES) >= 7
+    for kind, table in EVENT_TABLES.items():
+        assert (kind.__doc__ or "").strip(), kind
+        for field in table.fields:
+            assert field.description, (kind, field.name)
+            assert (field.unit != "") == (field.kind != "text"), (kind, field.name)
+
+
+def test_what_files_of_before_counted_keeps_its_place() -> None:
+    """`complete` is read by position: the order of the first seventeen is in every file that was ever written."""
+    counted = (
+        *("samples", "blocks", "events", "estimates", "points", "alignments", "running_gains", "passes"),
+        *("table_response", "fits", "fit_columns", "fit_parameters", "fit_values", "twin", "identified"),
+        *("identified_correlations", "live_values"),
+    )
+    assert COUNTED[: len(counted)] == counted
+
+
+def test_a_live_value_is_recorded_read_and_exported_by_its_declaration(tmp_path: Path) -> None:
+    path = tmp_path / "campaign.h5"
+    unknown = replace(PERIOD, value=float("nan"), time=2.0)
+    record(begin(path), block(0, 10), unknown, PERIOD, ALIGNED, TABLE)
+    with open_datafile(path) as kept:
+        first, second = kept.rows_of(LiveValue)
+        assert np.isnan(first["value"])
+        assert second == {name: getattr(PERIOD, name) for name in second}
+        assert kept.alignments == {2: ALIGNED.alignments}
+        np.testing.assert_array_equal(kept.columns_of(TableIdentified)["noise"], TABLE.noise)
+        # journalled: what is not published many times a second
+        assert [each.kind for each in kept.events] == ["SensorsAligned", "TableIdentified"]
+        tables = content_of(kept, path, raw=False).tables
+        assert {"live_values", "alignments", "table_response", "events"} <= tables.keys()
+        exported = {column.name: column for column in tables["live_values"]}
+        assert (exported["value"].values[1], exported["label"].values[0]) == (PERIOD.value, "period")
+        units = {column.name: column.unit for column in tables["table_response"]}
+        assert (units["frequency"], units["noise"]) == ("Hz", "m/s2/Hz^0.5")
+
+
+def test_the_line_of_an_event_is_that_of_journal_terminal_and_window(tmp_path: Path) -> None:
+    path = tmp_path / "campaign.h5"
+    shown = [
+        event
+        for event in (StepStarted("go", time=1.0), Warned("look", time=2.0), replace(TABLE, time=3.0))
+        if event.notice
+    ]
+    record(begin(path), block(0, 10), *shown)
+    out = StringIO()
+    with PlainLines(out) as lines:
+        for event in shown:
+            lines(event)
+    notices = [notice_of(event) for event in shown]
+    with open_datafile(path) as kept:
+        for entry, notice, line in zip(kept.events, notices, out.getvalue().splitlines(), strict=True):
+            assert notice is not None
+            assert entry.text == notice.text
+            assert line.endswith(f"{notice.kind:<8} {entry.text}")
+    assert [notice.grave for notice in notices if notice] == [False, True, False]
+
+
+def test_the_terminal_shows_a_live_value_with_its_unit_and_prediction() -> None:
+    scene = RunDisplay()
+    scene.update(PERIOD)
+    scene.update(replace(PERIOD, label="restitution", value=0.93, unit="1", predicted=float("nan"), time=3.5))
+    drawn = "\n".join(rendered(scene))
+    assert "period  (0.6412 ± 0.0031) s, predicted 0.6389 s, difference +0.4 %" in drawn
+    assert "restitution  0.9300 ± 0.0031" in drawn
+    scene.update(events.StateChanged(events.State.STOPPING, events.State.IDLE, "over", time=4.0))
+    assert scene.live == {}
+
+
+@pytest.mark.parametrize("own", [False, True])
+def test_the_stream_stamps_what_has_no_time(own: bool) -> None:
+    clock, published = VirtualClock(), list[Event]()
+    clock.wait_until(10.0)
+    stream = EventStream(clock, [published.append])
+    clock.wait_until(12.5)
+    stream.publish(StepStarted("go", time=1.0) if own else StepStarted("go"))
+    assert [event.time for event in published] == [1.0 if own else 2.5]

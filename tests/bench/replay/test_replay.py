@@ -1,0 +1,441 @@
+"""A recorded campaign replays as it was, however it ended; what does not is told where it parts."""
+
+import json
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from bench.analysis.signals import ACCELERATION
+from bench.app.cli.main import main
+from bench.config.model import BenchConfiguration
+from bench.config.sections import Acquisition, Simulation
+from bench.control.oscillator import DriveCalibration, Leg
+from bench.datafile.reader import open_datafile
+from bench.engine.interface import Requests
+from bench.engine.steps import Arm, Calibrate, Dwell, Measured, OperatorAction, Plan, Publish, RampOut, Sweep
+from bench.events import Acquired, Estimate, Event, PointFinished, Warned
+from bench.guard.limits import Limits
+from bench.provenance import software
+from bench.replay import session
+from bench.replay.compare import DRIVE, JOURNAL, POINTS
+from bench.replay.session import PacedClock, Replayed, replay, stored_configuration
+from bench.testing.loopback import LoopbackRig
+from drivers.clock import VirtualClock
+from drivers.errors import DeviceTimeout
+from drivers.rig import Alignment, Block, OperatorTask
+from sim.errors import CauseCode
+from sim.parameters import Parameters, quantity
+from sim.specimen import Specimen
+from sim.virtual_bench import VirtualBenchParameters
+from tests.recorded import recorded
+
+BENCH = BenchConfiguration(
+    acquisition=Acquisition(lead=0.1),
+    simulation=Simulation(bench=VirtualBenchParameters(sample_rate=1000.0)),
+    limits=Limits(velocity=50.0),
+)
+OMEGA = 20.0
+BARE = Specimen().bare()
+
+
+class Found(Parameters):
+    peak: float = quantity(..., "m/s2", "peak of the table")
+    doubt: float | None = quantity(None, "m/s2", "nothing is known of it")
+    good: bool | None = quantity(True, "1", "whether it is good")
+    reason: str = quantity("", "", "in words")
+
+
+class Two:
+    """Two tests, each after a person's work; the second goes on from what the first has measured."""
+
+    def check(self, configuration: BenchConfiguration) -> None:
+        pass
+
+    def plan(self, configuration: BenchConfiguration) -> Plan:  # noqa: ARG002
+        amplitude = 1.0
+        for work in ("Take the block off.", "Put it back."):
+            yield OperatorAction(OperatorTask.REMOVE_BLOCK, BARE, work)
+            yield Arm(0.5)
+            yield Calibrate(DriveCalibration.flat(1.0))
+            yield Sweep((Leg(1.0, amplitude, OMEGA),))
+            outcome = yield Dwell(4)
+            assert isinstance(outcome, Measured)
+            peak = float(np.mean([cycle.peak[ACCELERATION] for cycle in outcome.cycles]))
+            yield Publish(Estimate(OMEGA, None, 4, peak, math.nan, math.nan, 1.0))
+            yield Publish(PointFinished(Found(peak=peak, reason="ä" * 400)))
+            yield RampOut()
+            amplitude = 1.0 + peak / 3.0
+
+
+@dataclass
+class Person:
+    """Declines, or asks for the end of the run, when the second question comes."""
+
+    requests: Requests
+    declines: bool = False
+    stops: bool = False
+    asked: int = 0
+    name: str = "somebody (at the bench)"
+
+    def confirm(self, request: str) -> bool:  # noqa: ARG002
+        self.asked += 1
+        if self.asked == 2 and self.stops:
+            self.requests.stop()
+        return not (self.asked == 2 and self.declines)
+
+
+@dataclass
+class Mishap:
+    """What happens when block 17 has been read."""
+
+    rig: LoopbackRig
+    requests: Requests
+    do: Callable[["Mishap"], None]
+    blocks: int = field(default=0)
+
+    def __call__(self, event: Event) -> None:
+        self.blocks += isinstance(event, Acquired)
+        if isinstance(event, Acquired) and self.blocks == 17:
+            self.do(self)
+
+    def fail(self) -> None:
+        def read(n: int) -> Block:
+            raise DeviceTimeout(f"no {n} samples came")
+
+        self.rig.read = read  # type: ignore[method-assign]
+
+    def open(self) -> None:
+        self.rig.safety = {"emergency stop": False, "door": True, "fence": False}
+
+    def late(self) -> None:
+        """The next block comes 3 s late, and those after it at their intervals: blocks at one time have no order."""
+        self.rig.clock.wait_until(self.rig.clock.now() + 3.0)
+        self.rig._started += 3.0
+
+
+def loopback() -> LoopbackRig:
+    """Its lasers see enough not to look stuck; one has a clock of its own."""
+    rig = LoopbackRig()
+    rig.alignments = (Alignment("laser_1", 0.1, 1.00003, 2e-6, 0.0035, 4000, 1),)
+    rig.response |= {"laser_1": lambda volts: 0.01 * volts, "laser_2": lambda volts: 0.02 * volts}
+    return rig
+
+
+def made(path: Path, do: Callable[[Mishap], None] | None = None, **person: bool) -> Path:
+    rig, requests = loopback(), Requests()
+    recorded(
+        path,
+        Two().plan(BENCH),
+        rig,
+        BENCH,
+        Found,
+        requests=requests,
+        operator=Person(requests, **person),
+        subscribers=[] if do is None else [Mishap(rig, requests, do)],
+        first=[Warned("the stroke is nearly used up", time=0.0)],
+    )
+    return path
+
+
+def played(path: Path) -> Replayed:
+    before = path.read_bytes()
+    with open_datafile(path) as record:
+        configuration = stored_configuration(record)
+        assert configuration == BENCH
+        replayed = replay(record, Two().plan(configuration), configuration, clock=VirtualClock(), subscribers=[])
+    assert path.read_bytes() == before
+    return replayed
+
+
+@pytest.mark.parametrize(
+    ("do", "person", "status"),
+    [
+        (None, {}, "completed"),
+        (lambda m: m.requests.stop(), {}, "stopped"),
+        (lambda m: m.requests.abort(), {}, "aborted"),
+        (lambda m: m.requests.halt(), {}, "halted"),
+        (None, {"declines": True}, "aborted"),
+        (None, {"stops": True}, "stopped"),
+        (Mishap.open, {}, "halted"),
+    ],
+    ids=["completed", "stop", "abort", "halt", "declined", "stopped in a question", "emergency stop"],
+)
+def test_every_ending_comes_again(
+    tmp_path: Path, do: Callable[[Mishap], None] | None, person: dict[str, bool], status: str
+) -> None:
+    replayed = played(made(tmp_path / "run.h5", do, **person))
+    assert replayed.found.differences == []
+    assert replayed.identical
+    assert (replayed.status, replayed.ended) == (status, None)
+    assert replayed.played == replayed.rows > 1500
+    assert replayed.found.compared[POINTS] == len(replayed.points) == {"completed": 2}.get(status, bool(person))
+    assert replayed.found.compared["estimates"] == len(replayed.points)
+
+
+def test_a_limit_that_was_exceeded_is_exceeded_again(tmp_path: Path) -> None:
+    limits = BENCH.limits.model_copy(update={"displacement": 0.005})
+    tight = BENCH.model_copy(update={"limits": limits})
+    ending = recorded(tmp_path / "run.h5", Two().plan(tight), loopback(), tight, Found)
+    with open_datafile(tmp_path / "run.h5") as record:
+        replayed = replay(record, Two().plan(tight), stored_configuration(record), clock=VirtualClock(), subscribers=[])
+    assert replayed.identical
+    assert (replayed.status, replayed.reason) == (ending.status, ending.reason)
+    assert "displacement" in ending.reason
+
+
+def test_blocks_that_came_late_are_in_no_sample_an_abort_stands_for_them(tmp_path: Path) -> None:
+    replayed = played(made(tmp_path / "run.h5", Mishap.late))
+    assert replayed.found.differences == []
+    (reason,) = replayed.in_place
+    assert "delay of a block of samples 3 s exceeds" in reason
+    assert (replayed.status, replayed.reason) == ("aborted", reason)
+    assert replayed.played == replayed.rows
+
+
+def test_the_clock_of_the_computer_is_no_part_of_the_replay(tmp_path: Path) -> None:
+    path = made(tmp_path / "run.h5")
+    with h5py.File(path, "r+") as file:
+        times = file["entry/instrument/blocks/time"]
+        # published after some work, as on a wall clock; the first block longest
+        times[1:] += 0.02 * np.random.default_rng(1).random(len(times) - 1)
+        times[0] += 0.09
+    assert played(path).identical
+
+
+def test_an_error_of_the_rig_is_where_the_recording_breaks_off(tmp_path: Path) -> None:
+    replayed = played(made(tmp_path / "run.h5", Mishap.fail))
+    assert replayed.identical
+    assert replayed.ended is not None
+    assert "sample 1700" in replayed.ended
+    assert "no 100 samples came" in replayed.ended
+
+
+def test_a_killed_program_leaves_what_replays_up_to_there(tmp_path: Path) -> None:
+    path = made(tmp_path / "run.h5")
+    with h5py.File(path, "r+") as file:
+        entry = file["entry"]
+        rows, time = 1637, 1.6
+        entry["complete"][0] = rows
+        entry["complete"][2] = int((entry["events/time"][:] < time).sum())
+        entry["complete"][3:5] = 0
+        entry["status"][()] = b"running"
+    replayed = played(path)
+    assert replayed.found.differences == []
+    assert replayed.ended is not None
+    assert "killed" in replayed.ended
+    assert (replayed.played, replayed.rows) == (1600, rows)
+
+
+def _changed(path: Path, dataset: str, row: int, value: object) -> None:
+    with h5py.File(path, "r+") as file:
+        file["entry"][dataset][row] = value
+
+
+@pytest.mark.parametrize(
+    ("dataset", "row", "value", "part", "said"),
+    [
+        ("points/peak", 1, 1.01, POINTS, "row 2 of points: peak was 1.01"),
+        ("points/good", 0, 0, POINTS, "row 1 of points: good was False"),
+        ("points/doubt", 0, 0.1, POINTS, "row 1 of points: doubt was 0.1 and is None"),
+        ("estimates/predicted", 0, 1.1, "estimates", "row 1 of estimates: predicted was 1.1"),
+        ("instrument/drive/voltage", 1204, 3.0, DRIVE, "sample 1204 of run 1 on: recorded 3 V"),
+        ("events/text", 3, "nobody knows", JOURNAL, "journal entry 4 was"),
+        ("summary", (), "all was well", "ending", "all was well"),
+    ],
+)
+def test_what_is_not_as_recorded_is_told(
+    tmp_path: Path, dataset: str, row: int, value: object, part: str, said: str
+) -> None:
+    path = made(tmp_path / "run.h5")
+    _changed(path, dataset, row, value)
+    replayed = played(path)
+    assert not replayed.agrees
+    assert [each.part for each in replayed.found.differences] == [part]
+    assert said in str(replayed.parted(part))
+
+
+def _reworded(path: Path) -> None:
+    """As an edition with other sentences would have written the file."""
+    with h5py.File(path, "r+") as file:
+        file.attrs["wording"] = 1
+        entry = file["entry"]
+        for texts in (entry["events/text"], entry["state_changes/reason"]):
+            texts[:] = [b"in other words: " + bytes(text) for text in texts[:]]
+        entry["summary"][()] = b"in other words"
+
+
+@pytest.mark.parametrize(
+    ("do", "person"),
+    [
+        (None, {}),
+        (lambda m: m.requests.stop("the window was closed", CauseCode.CLIENT_LOST), {}),
+        (lambda m: m.requests.halt(), {}),
+        (None, {"declines": True}),
+        (None, {"stops": True}),
+        (Mishap.open, {}),
+        (Mishap.late, {}),
+        (Mishap.fail, {}),
+    ],
+    ids=["completed", "client lost", "halt", "declined", "stopped in a question", "emergency stop", "late", "error"],
+)
+@pytest.mark.parametrize("reworded", [False, True])
+def test_a_file_replays_by_its_columns_whatever_the_wording(
+    tmp_path: Path, do: Callable[[Mishap], None] | None, person: dict[str, bool], reworded: bool
+) -> None:
+    path = made(tmp_path / "run.h5", do, **person)
+    if reworded:
+        _reworded(path)
+    replayed = played(path)
+    assert replayed.found.differences == []
+    assert replayed.same_wording is not reworded
+    assert replayed.found.compared[JOURNAL] > 7
+    assert replayed.found.compared["state changes"] > 3
+
+
+@pytest.mark.parametrize(
+    ("dataset", "row", "value", "said"),
+    [
+        ("events/kind", 3, "StepStarted", "journal entry 4 was StepStarted"),
+        ("events/time", 6, 0.0, "after 0 blocks and is"),
+        ("state_changes/after", 2, "stopping", "after was 'stopping' and is 'armed'"),
+        ("state_changes/code", 3, "limit", "code was 'limit' and is ''"),
+        ("operator_actions/work", 0, "lock table", "work was 'lock table' and is"),
+        ("exceeded_limits/value", 0, 0.123, "value was 0.123 and is 0.0"),
+        ("exceeded_limits/unit", 0, "m/s", "unit was 'm/s' and is 'm'"),
+        ("points/peak", 0, 1.01, "peak was 1.01 and is"),
+    ],
+)
+def test_a_changed_kind_or_number_is_found_in_a_file_of_another_wording(
+    tmp_path: Path, dataset: str, row: int, value: object, said: str
+) -> None:
+    path, plan = tmp_path / "run.h5", Two().plan
+    limits = BENCH.limits.model_copy(update={"displacement": 0.005} if "limits" in dataset else {})
+    bench = BENCH.model_copy(update={"limits": limits})
+    recorded(path, plan(bench), loopback(), bench, Found)
+    _reworded(path)
+    _changed(path, dataset, row, value)
+    with open_datafile(path) as record:
+        replayed = replay(record, plan(bench), bench, clock=VirtualClock(), subscribers=[])
+    assert any(said in each.text for each in replayed.found.differences), replayed.found.differences
+    assert not replayed.agrees
+
+
+def test_the_command_says_that_another_wording_was_not_compared(
+    checked: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "older.h5"
+    path.write_bytes(checked.read_bytes())
+    _reworded(path)
+    assert main(["replay", str(path)]) == 0
+    assert "older version; its sentences were not compared" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("was", "now", "said"),
+    [
+        ("abc", "abc", ()),
+        ("abc", "abd", ("git was abc and is abd",)),
+        ("abc", "abc+", ("git was abc and is abc+",)),
+        # files that were changed since the hash may be any
+        ("abc+", "abc+", ("git is abc+ in both, which does not prove that the sources are identical",)),
+        (None, "abc", ("git was unknown and is abc",)),
+    ],
+)
+def test_other_software_is_told_by_its_git_hash_where_the_versions_are_the_same(
+    was: str | None, now: str, said: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(session, "revision", lambda: now)
+    assert session._changed(software() | ({} if was is None else {"git": was})) == said
+
+
+def test_rounding_is_told_from_difference(tmp_path: Path) -> None:
+    path = made(tmp_path / "run.h5")
+    with h5py.File(path, "r") as file:
+        peak, volts = file["entry/points/peak"][0], file["entry/instrument/drive/voltage"][1204]
+    _changed(path, "points/peak", 0, np.nextafter(peak, 2.0))
+    _changed(path, "instrument/drive/voltage", 1204, np.nextafter(volts, np.float32(2.0)))
+    replayed = played(path)
+    assert replayed.agrees
+    assert not replayed.identical
+    assert {each.part for each in replayed.found.differences} == {POINTS, DRIVE}
+
+
+def test_another_measurement_leads_to_another_drive_and_that_is_where_it_parts(tmp_path: Path) -> None:
+    path = made(tmp_path / "run.h5")
+    with h5py.File(path, "r+") as file:
+        blocks = file["entry/instrument/blocks"]
+        begin = int(blocks["row"][:][blocks["run"][:] == 2][0])
+        counts = file["entry/instrument/table_acceleration/counts"]
+        # the amplitude of the second test follows from the first one's measurement
+        counts[1600:begin] = (counts[1600:begin] * 0.9).astype(np.int16)
+    replayed = played(path)
+    assert "run 2" in str(replayed.parted(DRIVE))
+    assert replayed.parted(POINTS) is not None
+
+
+def test_the_pace_is_kept_and_nothing_is_ever_late() -> None:
+    clock = PacedClock(20.0)
+    begun = time.perf_counter()
+    for step in range(1, 11):
+        clock.wait_until(0.2 * step)
+        if step == 5:
+            time.sleep(0.1)
+    # ten steps of 10 ms and a slow computation, which covers the first step after it
+    assert 0.18 <= time.perf_counter() - begun < 1.0
+    assert clock.now() == pytest.approx(2.0)
+    begun = time.perf_counter()
+    clock.wait_until(3600.0)
+    assert 0.04 <= time.perf_counter() - begun < 1.0
+    clock.wait_until(10.0)
+    assert clock.now() == 3600.0
+
+
+SHORT = ("--omega", "12", "18", "27", "40", "--cycles", "4", "--yes")
+
+
+@pytest.fixture(scope="module")
+def checked(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A loop check, as the command line leaves it."""
+    folder = tmp_path_factory.mktemp("check")
+    assert main(["check", *SHORT, "--out", str(folder / "run")]) == 0
+    return folder / "run" / "campaign.h5"
+
+
+def test_the_command_replays_a_run_of_the_command_line(checked: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["replay", str(checked), "--speed", "500"]) == 0
+    shown = capsys.readouterr()
+    assert "Identical to the file in every bit" in shown.out
+    assert "passed" in shown.out
+    assert "Remove the clamps" in shown.err
+
+
+def test_a_difference_is_an_exit_code_and_a_line(
+    checked: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "changed.h5"
+    path.write_bytes(checked.read_bytes())
+    _changed(path, "points/verdict", 0, "failed")
+    assert main(["replay", str(path), "--json"]) == 1
+    shown = capsys.readouterr()
+    content = json.loads(shown.out)
+    assert not content["identical"]
+    assert not any(each.startswith("git was") for each in content["software_changed"])
+    assert content["samples"]["played"] == content["samples"]["recorded"]
+    assert "verdict was 'failed' and is 'passed'" in shown.err.splitlines()[-1]
+
+
+def test_what_cannot_be_played_is_refused_in_a_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["replay", str(tmp_path / "none.h5")]) == 2
+    assert "there is no such file" in capsys.readouterr().err
+    path = made(tmp_path / "run.h5")
+    assert main(["replay", str(path)]) == 2
+    assert "protocol of the data file" in capsys.readouterr().err
+    for speed in ("0", "fast", "-1", "nan"):
+        assert main(["replay", str(path), f"--speed={speed}"]) == 2
+        assert "--speed" in capsys.readouterr().err

@@ -1,0 +1,144 @@
+"""One point of the campaign from the command line to the files, on the virtual bench."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from bench.app.cli.main import main
+from sim.gain import predict_gain
+from sim.specimen import Specimen
+
+OMEGA, BETA = 16.0, 0.4
+
+
+def _run(folder: Path, *flags: str) -> tuple[int, Path]:
+    code = main(["run", "harmonic", "--omega", "16", "--beta", "0.4", "--yes", "--json", "--out", str(folder), *flags])
+    return code, folder
+
+
+def _summary(folder: Path) -> dict[str, Any]:
+    return json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    code, folder = _run(tmp_path_factory.mktemp("seed3") / "run", "--seed", "3")
+    assert code == 0
+    return folder
+
+
+def test_measured_and_predicted_agree(done: Path) -> None:
+    summary = _summary(done)
+    (point,) = summary["points"]
+    assert (summary["protocol"], summary["status"]) == ("harmonic", "completed")
+    assert (point["omega_rad_s"], point["beta"], point["status"]) == (OMEGA, BETA, "steady")
+    # the specimen is as assumed, so the uncertainty of the measurement alone must hold the difference
+    assert abs(point["alpha_2"] - point["alpha_2_predicted"]) <= point["alpha_2_uncertainty"]
+    assert point["agrees"] is True
+    assert point["starts_tried"] >= 1
+    assert point["cycles_measured"] == 24
+    assert abs(point["amplitude_m_s2"] / (1.01 * 9.81 / 8.0) - 1.0) < 0.003
+
+
+def test_the_prediction_is_that_of_the_achieved_amplitudes(done: Path) -> None:
+    (point,) = _summary(done)["points"]
+    expected = predict_gain(
+        Specimen().coupled(BETA), OMEGA, point["amplitude_m_s2"], bare_amplitude=point["bare_amplitude_m_s2"]
+    )
+    assert expected.rocking is not None
+    assert point["alpha_2_predicted"] == pytest.approx(expected.rocking.alpha_2, rel=1e-9)
+
+
+def test_every_number_in_the_file_has_a_unit(done: Path) -> None:
+    without: list[str] = []
+
+    def visit(name: str, item: object) -> None:
+        if isinstance(item, h5py.Dataset) and item.dtype.kind in "iuf" and "units" not in item.attrs:
+            without.append(name)
+
+    with h5py.File(done / "campaign.h5", "r") as file:
+        file.visititems(visit)
+    assert without == []
+
+
+def test_the_file_holds_what_a_reader_needs(done: Path) -> None:
+    with h5py.File(done / "campaign.h5", "r") as file:
+        entry = file["entry"]
+        rows = entry["instrument/drive/voltage"].shape[0]
+        for name in ("table_displacement", "table_acceleration", "laser_1", "laser_2"):
+            assert entry[f"instrument/{name}/counts"].shape == (rows,)
+            assert entry[f"instrument/{name}/counts"].dtype == np.int16
+        metadata = {key: value[()].decode() for key, value in entry["metadata"].items()}
+        assert json.loads(metadata["parameters"])["omega"] == [OMEGA]
+        assert json.loads(metadata["configuration"])["simulation"]["seed"] == 3
+        assert metadata["rocking-bench"] == "0.1.0"
+        assert {"numpy", "numba", "python", "specimen", "devices"} <= metadata.keys()
+        kinds = {kind.decode() for kind in entry["events/kind"][:]}
+        assert {"StateChanged", "StepStarted", "OperatorAsked", "OperatorAnswered", "PointFinished"} <= kinds
+        (alpha_2,) = entry["points/alpha_2"][:]
+        (point,) = _summary(done)["points"]
+        assert alpha_2 == point["alpha_2"]
+        assert entry["prediction/alpha_2"].shape[0] > 30
+        assert entry["status"][()].decode() == "completed"
+
+
+def test_alpha_2_can_be_recomputed_from_the_raw_channels(done: Path) -> None:
+    """With nothing but h5py and a sine fit over whole cycles of both dwells: no code of the bench."""
+    with h5py.File(done / "campaign.h5", "r") as file:
+        instrument = file["entry/instrument"]
+
+        def channel(name: str) -> np.ndarray:
+            counts = instrument[f"{name}/counts"]
+            return counts[:] * counts.attrs["scale"] + counts.attrs["offset"]
+
+        drift = channel("laser_2") - channel("laser_1")
+        blocks = instrument["blocks"]
+        runs, starts = blocks["run"][:], blocks["row"][:]
+        times, names = file["entry/events/time"][:], [kind.decode() for kind in file["entry/events/kind"][:]]
+        ends = [time for time, kind in zip(times, names, strict=True) if kind == "StateChanged"]
+        assert len(ends) > 8
+        peaks = {}
+        for run in (runs[0], runs[-1]):  # the bare frame's run, and the start that came to be measured
+            rows = starts[runs == run]
+            piece = drift[rows[0] : rows[-1]]
+            cycle = 2.0 * np.pi / OMEGA * 2000.0
+            last = piece.size - round(5.5 * 2000.0)  # the ramp out takes 4 s
+            window = np.abs(piece[last - round(20 * cycle) : last] - piece[:2000].mean())
+            peaks[run] = np.mean([part.max() for part in np.array_split(window, 20)])
+    (point,) = _summary(done)["points"]
+    assert peaks[runs[-1]] / peaks[runs[0]] == pytest.approx(point["alpha_2"], rel=0.02)
+
+
+def test_the_figure_is_there_and_nothing_is_overwritten(done: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    before = {path.name: path.read_bytes()[:64] for path in done.iterdir()}
+    assert set(before) == {"campaign.events.jsonl", "campaign.h5", "gain_spectra.png", "summary.json"}
+    assert before["gain_spectra.png"].startswith(b"\x89PNG")
+    code, _ = _run(done)
+    captured = capsys.readouterr()
+    assert code == 2
+    assert captured.err.count("\n") == 1
+    assert "campaign.h5" in captured.err
+    assert {path.name: path.read_bytes()[:64] for path in done.iterdir()} == before
+
+
+def test_the_same_seed_gives_the_same_numbers_and_another_seed_others(done: Path, tmp_path: Path) -> None:
+    _run(tmp_path / "again", "--seed", "3")
+    _run(tmp_path / "other", "--seed", "4")
+    assert _summary(tmp_path / "again")["points"] == _summary(done)["points"]
+    other, first = (_summary(folder)["points"][0] for folder in (tmp_path / "other", done))
+    assert other["alpha_2"] != first["alpha_2"]
+    assert other["alpha_2"] == pytest.approx(first["alpha_2"], rel=0.02)
+
+
+def test_a_specimen_that_is_not_as_assumed_is_flagged(tmp_path: Path) -> None:
+    configuration = tmp_path / "differs.toml"
+    sure = "[uncertainty]\nstiffness = 0.005\ndamping = 0.02\nrestitution = 0.001\nspring = 0.005\n"
+    configuration.write_text(f"{sure}[simulation.specimen.frame]\nk2 = 60.0\n", encoding="utf-8")
+    _, folder = _run(tmp_path / "run", "--config", str(configuration))
+    (point,) = _summary(folder)["points"]
+    assert point["agrees"] is False
+    assert "differs from the prediction" in point["reason"]

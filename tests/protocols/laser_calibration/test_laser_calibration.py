@@ -1,0 +1,260 @@
+"""The laser calibration: against errors that are known exactly, applied to signals, kept, aged, refused."""
+
+import json
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bench.analysis.laser_calibration import LaserCalibration, LaserCurve
+from bench.analysis.sensor_accuracy import LINEARITY, SCALES, Draws, PeakReadings, SensorAccuracy, SensorUncertainty
+from bench.analysis.signals import ACCELERATION, DRIFT, LASER_1, LASER_2, U1, SignalMap
+from bench.app.catalogue import load_protocol
+from bench.app.cli.main import main
+from bench.config.model import BenchConfiguration
+from bench.config.result_files import read_calibration, write_calibration
+from bench.config.toml import as_toml, read_configuration
+from bench.datafile.reader import open_datafile
+from drivers.rig import Channel
+from protocols.laser_calibration.fit import Pass, calibration, fit_curve
+from protocols.laser_calibration.protocol import LaserCalibrationParameters
+from sim.errors import InvalidInput
+
+PROTOCOL = load_protocol("laser-calibration")
+RANGE = 0.2
+PHASES = np.arange(256) * 2.0 * np.pi / 256
+RESTS = (0.003, -0.002)
+SCALES_TRUE, DELAYS, YIELDS, TURNS = (1.0006, 0.9995), (6e-4, 4e-4), (2e-5, 6e-5), (0.7, 2.9)
+DISPLACEMENT_SHOWS = 1.004
+
+
+def error(laser: int, place: np.ndarray) -> np.ndarray:
+    """What a laser says too much at a place [m] in its range, as the data sheet allows it to."""
+    bent = 0.0008 * RANGE * np.sin(2.0 * np.pi * 1.5 * place / RANGE + TURNS[laser])
+    return (SCALES_TRUE[laser] - 1.0) * place + bent
+
+
+def made_pass(omega: float, amplitude: float, random: np.random.Generator, noise: float) -> Pass:
+    """One slow sine with a third harmonic of the table, seen by two lasers."""
+    x = amplitude * (np.sin(PHASES) + 0.01 * np.sin(3.0 * PHASES + 0.5))
+    v = omega * amplitude * (np.cos(PHASES) + 0.03 * np.cos(3.0 * PHASES + 0.5))
+    lasers = []
+    for k in range(2):
+        place = RESTS[k] + x * (1.0 + YIELDS[k] * omega**2)
+        shown = place + error(k, place) - DELAYS[k] * v
+        zero = RESTS[k] + float(error(k, np.array(RESTS[k])))
+        lasers.append(shown - zero + noise * random.standard_normal(x.size))
+    return Pass(
+        omega, DISPLACEMENT_SHOWS * x, DISPLACEMENT_SHOWS * v, (lasers[0], lasers[1]), DISPLACEMENT_SHOWS / 1.001
+    )
+
+
+def found(noise: float = 0.0) -> LaserCalibration:
+    random = np.random.default_rng(3)
+    passes = [made_pass(4.0 if k < 4 else 8.0, 0.05 * (1.0 - 0.01 * k), random, noise) for k in range(8)]
+    rests = [RESTS[k] + float(error(k, np.array(RESTS[k]))) for k in range(2)]
+    return calibration(
+        passes,
+        (fit_curve(passes, 0, rests[0]), fit_curve(passes, 1, rests[1])),
+        (rests[0], rests[1]),
+        ("laser A", "laser B"),
+        SensorAccuracy(),
+        (RANGE, RANGE),
+        reference_linearity=5e-4,
+        valid_days=30.0,
+        date=datetime(2026, 5, 4, 12, tzinfo=UTC),
+    )
+
+
+def left(one: LaserCalibration, laser: int, places: np.ndarray) -> np.ndarray:
+    """What the corrected laser still says too much, counted from its rest [m]."""
+    corrected = one.lasers[laser].corrected(places + error(laser, places))
+    at_rest = one.lasers[laser].corrected(np.array([RESTS[laser]]) + error(laser, np.array([RESTS[laser]])))
+    return corrected - at_rest - (places - RESTS[laser])
+
+
+@pytest.mark.parametrize("noise", [0.0, 3e-6])
+def test_known_errors_are_found_with_their_delay_and_without_what_the_clamps_yield(noise: float) -> None:
+    one = found(noise)
+    places = np.linspace(-0.045, 0.045, 91)
+    # the mean of both lasers is the standard: what both have in common stays
+    smallest = made_pass(8.0, 0.05 * 0.93, np.random.default_rng(1), 0.0).displacement / DISPLACEMENT_SHOWS
+    ends = np.array([smallest.min(), smallest.max()])
+    spans = [1.0 + float(np.diff(error(k, ends + RESTS[k]))[0] / np.diff(ends)[0]) for k in range(2)]
+    common = 0.5 * sum(spans) - 1.0
+    both = [left(one, k, places + RESTS[k]) for k in range(2)]
+    for k in range(2):
+        assert np.abs(both[k] - common * places).max() < 1.5e-6 + noise
+        assert one.lasers[k].delay == pytest.approx(DELAYS[k], abs=2e-6 + noise)
+    assert np.abs(both[1] - both[0]).max() < 1.5e-6 + noise
+    # four ends of curves that are off by as much as above
+    assert one.differential_scale == pytest.approx(spans[1] / spans[0], abs=4.0 * (1.5e-6 + noise) / 0.093)
+    assert one.table_displacement * DISPLACEMENT_SHOWS == pytest.approx(1.0 + common, abs=3e-5)
+    assert one.table_acceleration == pytest.approx(one.table_displacement * DISPLACEMENT_SHOWS / 1.001, rel=1e-9)
+    # what is stated of the scale that the mean of the lasers keeps: see the module on where it comes from
+    assert 0.001 < one.table_uncertainty < 0.002
+    assert abs(common) < 2.0 * one.table_uncertainty
+
+
+def test_what_is_stated_of_the_curve_is_what_is_left() -> None:
+    """Noise that comes anew with each pass; the scatter between passes must foretell the error of what is found."""
+    one = found(2e-5)
+    places = np.linspace(-0.046, 0.046, 185)
+    for k in range(2):
+        curve = left(one, k, places + RESTS[k])
+        curve -= np.polynomial.Polynomial.fit(places, curve, 1)(places)
+        assert 0.3 * one.lasers[k].uncertainty < curve.std() < 2.0 * one.lasers[k].uncertainty
+
+
+CHANNELS = tuple(
+    Channel(name, kind, unit, 1e-6 if unit == "m" else 1e-3, 0.0, (-(2**31), 2**31 - 1), device)
+    for name, kind, unit, device in (
+        ("table_displacement", "displacement", "m", "lvdt"),
+        ("table_acceleration", "acceleration", "m/s2", "servo"),
+        ("laser_1", "displacement", "m", "laser A"),
+        ("laser_2", "displacement", "m", "laser B"),
+    )
+)
+
+
+def test_signals_are_without_the_errors_and_channels_keep_them() -> None:
+    """A locked frame under a slow motion has no drift and no u1, whatever the lasers say."""
+    one = found()
+    x = np.linspace(-0.045, 0.045, 301)
+    seen = [RESTS[k] + x for k in range(2)]
+    shown = np.column_stack(
+        (DISPLACEMENT_SHOWS * x, 1.001 * x, seen[0] + error(0, seen[0]), seen[1] + error(1, seen[1]))
+    )
+    before = shown.copy()
+    raw, right = SignalMap(CHANNELS, "ground"), SignalMap(CHANNELS, "ground", one)
+    for signals in (raw, right):
+        signals.tare(shown[150:151])
+    np.testing.assert_array_equal(shown, before)
+    assert np.abs(raw.of(shown)[:, DRIFT]).max() > 1e-4
+    assert np.abs(right.of(shown)[:, DRIFT]).max() < 3e-6
+    assert np.abs(right.of(shown)[:, U1]).max() < 3e-6
+    assert right.of(shown)[:, ACCELERATION] == pytest.approx(one.table_acceleration * 1.001 * x, rel=1e-12, abs=1e-15)
+    shown[7, 3] = np.nan
+    assert np.isnan(right.of(shown)[7, [LASER_2, DRIFT]]).all()
+    assert np.isfinite(right.of(shown)[7, LASER_1])
+
+
+def test_what_is_left_open_is_less_with_a_calibration_and_no_less_beyond_what_it_covered() -> None:
+    def spread(lasers: tuple[float, float], one: LaserCalibration | None) -> dict[str, float]:
+        coupled = PeakReadings(0.01, 1.0, lasers, (0.0, 0.0), np.zeros((2, 1)), (0.02, 0.02), 1.0, True)
+        bare = PeakReadings(0.02, 1.0, (0.002, 0.022), (0.0, 0.0), np.zeros((2, 1)), (0.02, 0.02), 1.0, True)
+        doubt = SensorUncertainty(SensorAccuracy(), (RANGE, RANGE), one)
+        errors = doubt.drift_errors((bare, coupled), Draws(np.random.default_rng(1), 4000))
+        return {name: float(np.std(each[1] / 0.01 - each[0] / 0.02)) for name, each in errors.items()}
+
+    one = found(3e-6)
+    within, sheets = spread((0.03, 0.04), one), spread((0.03, 0.04), None)
+    assert within[LINEARITY] < 0.4 * sheets[LINEARITY]
+    assert within[SCALES] < 0.2 * sheets[SCALES]
+    assert spread((0.08, 0.09), one)[LINEARITY] > 3.0 * within[LINEARITY]
+
+
+def test_a_file_is_read_as_it_was_written_and_is_part_of_the_configuration(tmp_path: Path) -> None:
+    one = found()
+    write_calibration(tmp_path / "lasers.json", one)
+    assert read_calibration(tmp_path / "lasers.json") == one
+    bench = tmp_path / "bench.toml"
+    bench.write_text('laser_calibration = "lasers.json"\n', encoding="utf-8")
+    configuration = read_configuration(bench)
+    assert (configuration.calibrated, configuration.laser_calibration) == (one, None)
+    assert configuration.sensors.table_scale == one.table_uncertainty
+    again = tmp_path / "again.toml"
+    again.write_text(as_toml(configuration), encoding="utf-8")
+    assert read_configuration(again) == configuration
+    with pytest.raises(InvalidInput, match="never overwritten"):
+        write_calibration(tmp_path / "lasers.json", one)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"format": "other"}, "it is not a laser calibration"),
+        ({"format_version": 9}, "use a newer program"),
+        ({"valid_days": -1.0}, "lasers.json: valid_days"),
+        ({"date": "yesterday"}, "lasers.json: date"),
+        ({"strange": 1}, "there is no such key"),
+    ],
+)
+def test_a_file_that_cannot_be_used_is_refused_by_its_key(
+    change: dict[str, object], words: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "lasers.json"
+    write_calibration(path, found())
+    path.write_text(json.dumps(json.loads(path.read_text(encoding="utf-8")) | change), encoding="utf-8")
+    with pytest.raises(InvalidInput, match=words):
+        read_calibration(path)
+
+
+def test_age_and_other_lasers_are_told() -> None:
+    one = found()
+    assert one.expired(one.date + timedelta(days=29)) is None
+    said = one.expired(one.date + timedelta(days=31))
+    assert said is not None
+    assert "2026-06-03" in said
+    assert "laser-calibration" in said
+    assert one.strange({"laser_1": "laser A", "laser_2": "laser B", "shaker": "x"}) == ()
+    (other,) = one.strange({"laser_1": "laser A", "laser_2": "laser C"})
+    assert "laser C" in other
+    with pytest.raises(ValueError, match="below highest"):
+        LaserCurve.model_validate(one.laser_1.model_dump() | {"lowest": 1.0})
+
+
+@pytest.mark.parametrize(
+    ("configuration", "parameters", "item"),
+    [
+        ("[simulation.bench]\nlaser_1.reference = 'table'\nlaser_2.reference = 'table'\n", {}, "lasers.reference"),
+        ("", {"amplitude": 0.059}, "amplitude"),
+        ("", {"omega": 14.0}, "omega"),
+    ],
+)
+def test_what_cannot_be_calibrated_is_refused(
+    configuration: str, parameters: dict[str, float], item: str, tmp_path: Path
+) -> None:
+    bench = tmp_path / "bench.toml"
+    bench.write_text(configuration, encoding="utf-8")
+    with pytest.raises(InvalidInput) as refused:
+        PROTOCOL.prepare(LaserCalibrationParameters(**parameters), read_configuration(bench), None)
+    assert refused.value.item == item
+
+
+def test_an_older_calibration_is_not_calibrated_again() -> None:
+    with pytest.raises(InvalidInput, match="remove it from the configuration"):
+        PROTOCOL.prepare(LaserCalibrationParameters(), BenchConfiguration(calibrated=found()), None)
+
+
+def test_a_calibration_on_the_simulated_bench_agrees_with_its_lasers_and_serves_other_runs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The waves of the virtual lasers are drawn from the bench's seed; here they are read back from its streams."""
+    from numpy.random import SeedSequence
+
+    out = tmp_path / "out"
+    assert main(["run", "laser-calibration", "--seed", "5", "--out", str(out), "--cycles", "4", "--passes", "6"]) == 0
+    one = read_calibration(out / "laser_calibration.json")
+    spans = []
+    x = np.array([-0.045, 0.045])
+    for number, source in enumerate(SeedSequence(5).spawn(7)[3:5]):
+        draws = np.random.default_rng(source)
+        draws.uniform()
+        shown = x + 0.0008 * RANGE * np.sin(2.0 * np.pi * 1.5 * x / RANGE + draws.uniform(0.0, 2.0 * np.pi))
+        spans.append(float(np.diff(one.lasers[number].corrected(shown))[0]) / 0.09)
+    # three standard uncertainties of a difference, of which both curves and the differential scale are parts
+    assert abs(spans[1] - spans[0]) < 3.0 * one.differential_uncertainty
+    assert abs(0.5 * sum(spans) - 1.0) < 3.0 * one.table_uncertainty
+    with open_datafile(out / "campaign.h5") as record:
+        assert [row["sensor"] for row in record.points][:2] == ["laser_1", "laser_2"]
+    capsys.readouterr()
+
+    old = one.model_copy(update={"date": datetime(2020, 1, 1, tzinfo=UTC)})
+    write_calibration(tmp_path / "old.json", old)
+    bench = tmp_path / "bench.toml"
+    bench.write_text('laser_calibration = "old.json"\n', encoding="utf-8")
+    assert main(["run", "identify", "--config", str(bench), "--dry-run", "--json"]) == 0
+    (said,) = json.loads(capsys.readouterr().out)["warnings"]
+    assert "the laser calibration of 2020-01-01 expired on 2020-12-31" in said
