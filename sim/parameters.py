@@ -47,18 +47,22 @@ def quantity(
     *,
     usual: tuple[float, float] | None = None,
     example: Any = None,
+    formerly: str | None = None,
     **limits: Any,
 ) -> Any:
     """Declare a field of `Parameters` with its SI `unit` ("1" for a pure number) and its `limits` (gt, ge, lt, le).
 
     A magnitude outside `usual`, (lowest, highest) in that unit, causes a notice; see `usual_of`. A field that
-    is absent by default has an `example` of valid input.
+    is absent by default has an `example` of valid input. `formerly` is its name in earlier versions: readers of files
+    accept it, with a notice.
     """
     extra: dict[str, Any] = {"unit": unit}
     if usual is not None:
         extra["usual"] = list(usual)
     if example is not None:
         extra["example"] = example
+    if formerly is not None:
+        extra["formerly"] = formerly
     return Field(default, description=description, json_schema_extra=extra, **limits)
 
 
@@ -98,6 +102,11 @@ def usual_of(field: FieldInfo) -> tuple[float, float] | None:
 def example_of(field: FieldInfo) -> Any:
     """Example of valid input for a field that is absent by default; None for other fields."""
     return _extra(field).get("example")
+
+
+def former_name_of(field: FieldInfo) -> str | None:
+    """The name of a field in earlier versions; None if it has not changed."""
+    return _extra(field).get("formerly")
 
 
 def _extra(field: FieldInfo) -> dict[str, Any]:

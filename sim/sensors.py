@@ -33,7 +33,9 @@ class Laser(Parameters):
     linearity: float = quantity(
         0.0008, "1", "amplitude of the smooth linearity error over the measuring range", ge=0, lt=0.1
     )
-    linearity_waves: float = quantity(1.5, "1", "periods of the linearity error within the measuring range", ge=0)
+    linearity_periods: float = quantity(
+        1.5, "1", "periods of the linearity error within the measuring range", ge=0, formerly="linearity_waves"
+    )
     scale_error: float = quantity(0.0, "1", "relative error of the sensitivity", gt=-0.5, lt=0.5)
     load: float = quantity(500.0, "ohm", "load resistor that converts the current to a voltage", gt=0)
     error_current: float = quantity(0.0030, "A", "current without a valid measurement", ge=0)
@@ -73,7 +75,7 @@ class LaserStream:
                 laser.measuring_range,
                 1.0 + laser.scale_error,
                 laser.linearity,
-                laser.linearity_waves,
+                laser.linearity_periods,
                 wave_phase,
                 2.0**laser.output_bits,
                 laser.load,

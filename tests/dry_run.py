@@ -26,7 +26,7 @@ SHORT = (
 def hurried(configuration: BenchConfiguration) -> BenchConfiguration:
     """The same bench with less patience: shorter ramps, less listening to the lasers."""
     hardware = configuration.hardware
-    lasers = hardware.lasers.model_copy(update={"listening": 2.0})
+    lasers = hardware.lasers.model_copy(update={"observation_time": 2.0})
     changed = {
         "ramps": configuration.ramps.model_copy(update={"stop": 1.0}),
         "hardware": hardware.model_copy(update={"lasers": lasers}),

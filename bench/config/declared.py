@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 from annotated_types import Ge, Gt, Le, Lt, MaxLen, MinLen
 from pydantic.fields import FieldInfo
 
-from sim.parameters import Parameters, example_of, unit_of, usual_of
+from sim.parameters import Parameters, example_of, former_name_of, unit_of, usual_of
 
 _BOUNDS: dict[type, tuple[str, str]] = {
     Gt: ("gt", "above"),
@@ -48,6 +48,8 @@ class Declared:
     """Lowest and highest magnitude without a notice, see `sim.parameters.usual_of`."""
     example: Any
     """Example of valid input for a parameter absent by default, see `sim.parameters.example_of`."""
+    formerly: str | None
+    """Name in earlier versions."""
 
     @property
     def group(self) -> type[Parameters] | None:
@@ -167,4 +169,5 @@ def _declared(name: str, field: FieldInfo) -> Declared:
         lengths=tuple(item for item in metadata if isinstance(item, MinLen | MaxLen)),
         usual=usual_of(field) if kind in (int, float) else None,
         example=example_of(field),
+        formerly=former_name_of(field),
     )

@@ -202,7 +202,7 @@ class BenchConfiguration(Parameters):
     def serves_itself(self) -> bool:
         """Whether tasks between two tests need no operator: the bench is simulated or emulated."""
         if self.backend == "hardware":
-            return self.hardware.hands is not None
+            return self.hardware.emulator_address is not None
         return not load_backend(self.backend).operator
 
     @field_validator("backend")

@@ -20,7 +20,7 @@ from bench.config.declared import Declared, at, declared, summary
 from bench.config.model import BenchConfiguration
 from bench.config.result_files import read_calibration, read_specimen
 from bench.config.review import review
-from bench.config.validation import dotted, problems, validated
+from bench.config.validation import dotted, former_names, problems, validated
 from sim.errors import InvalidInput
 from sim.identified import Identified
 from sim.parameters import Parameters
@@ -75,6 +75,13 @@ def read_configuration(path: str | PathLike[str]) -> BenchConfiguration:
     for refusal in _refusals(configuration, Path(path)):
         raise refusal
     return configuration
+
+
+def former_keys(path: str | PathLike[str]) -> tuple[str, ...]:
+    """A notice for each key of a configuration file that has its name of an earlier version."""
+    file = Path(path)
+    found = former_names(BenchConfiguration, read_table(file, "configuration file"))
+    return tuple(f"{_within(file)(old)} is now called {new}; rename it" for old, new in found)
 
 
 def problems_of(path: Path) -> list[InvalidInput]:

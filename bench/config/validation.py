@@ -1,6 +1,6 @@
 """Validation of external values, with a one-line message for each refusal."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from json import dumps
 from math import inf
@@ -53,6 +53,34 @@ def problems(
     return []
 
 
+def former_names(model: type[Parameters], data: Mapping[str, Any], parent: Path = ()) -> Iterator[tuple[Path, str]]:
+    """The keys of `data` with their name of an earlier version, which `validated` accepts, and their present names."""
+    for entry in declared(model):
+        if entry.formerly in data and entry.name not in data:
+            yield (*parent, str(entry.formerly)), dotted((*parent, entry.name))
+        value = data.get(entry.name, data.get(str(entry.formerly)))
+        if entry.element is not None and isinstance(value, dict):
+            yield from former_names(entry.element, cast(dict[str, Any], value), (*parent, entry.name))
+
+
+def with_present_names(model: type[Parameters], data: Mapping[str, Any]) -> dict[str, Any]:
+    """The data of a file with the present names of its keys. A key with both names keeps both, to be refused."""
+    found = dict(data)
+    for entry in declared(model):
+        old = entry.formerly
+        if old is not None and old in found and entry.name not in found:
+            found[entry.name] = found.pop(old)
+        value = found.get(entry.name)
+        if entry.element is not None and isinstance(value, dict):
+            found[entry.name] = with_present_names(entry.element, cast(dict[str, Any], value))
+        elif entry.element is not None and isinstance(value, list):
+            found[entry.name] = [
+                with_present_names(entry.element, cast(dict[str, Any], each)) if isinstance(each, dict) else each
+                for each in cast(list[Any], value)
+            ]
+    return found
+
+
 def read_typed(entry: Declared, typed: Any) -> Any:
     """Plain data from typed text or the tokens of a list, with numbers for numeric fields.
 
@@ -81,7 +109,8 @@ def read_fields(model: type[Parameters], typed: Mapping[str, Any]) -> dict[str, 
 
 def _parsed(model: type[P], data: Mapping[str, Any]) -> P:
     # strict JSON validation: accepts a list for a tuple and a word for a choice, but not "12" or true for a number
-    return model.model_validate_json(dumps(_in_si(model, data), default=str), strict=True)
+    present = _in_si(model, with_present_names(model, data))
+    return model.model_validate_json(dumps(present, default=str), strict=True)
 
 
 def _in_si(model: type[Parameters], data: Mapping[str, Any]) -> dict[str, Any]:

@@ -1,5 +1,6 @@
 """Data file as the recording for a replay: samples, times of blocks, safety inputs, requests and answers."""
 
+import json
 from collections import deque
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ from pydantic import ValidationError
 
 from bench.config.model import BenchConfiguration
 from bench.config.sections import Twin
+from bench.config.validation import dotted, former_names, with_present_names
 from bench.datafile.declared import ENTRY_TABLES
 from bench.datafile.opening import WORDING, columns_from
 from bench.datafile.reader import DataFile
@@ -141,12 +143,20 @@ def _stretches(blocks: dict[str, NDArray[Any]], ends: NDArray[np.int64], chosen:
     return [_Stretch(int(first[a]), int(end[b] - row[a]), int(row[a])) for a, b in zip(begins, finishes, strict=True)]
 
 
+def former_keys(record: DataFile) -> str:
+    """A notice of the keys in the recorded configuration that have their names of an earlier version; empty if none."""
+    stored = json.loads(record.metadata.get("configuration", "{}"))
+    found = [f"{dotted(old)} (now {new})" for old, new in former_names(BenchConfiguration, stored)]
+    return f"the file has former names of keys: {', '.join(found)}" if found else ""
+
+
 def _configuration(record: DataFile) -> BenchConfiguration:
     stored = record.metadata.get("configuration")
     if stored is None:
         raise InvalidInput("record", record.title, "it has no bench configuration and cannot be replayed")
     try:
-        configuration = BenchConfiguration.model_validate_json(stored)
+        content = with_present_names(BenchConfiguration, json.loads(stored))
+        configuration = BenchConfiguration.model_validate_json(json.dumps(content))
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         if first["loc"] == ("backend",):

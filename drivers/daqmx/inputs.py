@@ -80,7 +80,7 @@ class Inputs:
         devices: Sequence[Connected],
     ) -> None:
         # the device's own error is more specific than a time-out, so it is raised first
-        self._allowance = daq.patience / 4.0
+        self._allowance = daq.timeout_margin / 4.0
         mark = uuid4().hex
         self._names = [f"rockbench_{mark}_{k}" for k in range(len(inputs))]
         with translated("creating the input task"):

@@ -66,7 +66,7 @@ class Output:
                 f" {self._buffer}; start first"
             )
         rest = np.ascontiguousarray(volts, np.float64)
-        deadline = time.monotonic() + volts.size / self.rate + self._daq.patience
+        deadline = time.monotonic() + volts.size / self.rate + self._daq.timeout_margin
         while rest.size:
             rest = rest[self._append(rest, deadline - time.monotonic()) :]
         self._prefilled += volts.size

@@ -112,7 +112,9 @@ class Daq(Parameters):
     amplifier_ready: AmplifierReady | None = quantity(None, "", "amplifier ready; absent: not wired")
     heartbeat: Heartbeat | None = quantity(None, "", "heartbeat; absent: no heartbeat relay")
     buffer: float = quantity(10.0, "s", "length of the input buffer: longest delay of a read", ge=1.0, le=60.0)
-    patience: float = quantity(2.0, "s", "time allowed for a call beyond its own duration", ge=0.1, le=60)
+    timeout_margin: float = quantity(
+        2.0, "s", "time allowed for a call beyond its own duration", ge=0.1, le=60, formerly="patience"
+    )
 
     @property
     def safety_inputs(self) -> dict[str, SafetyInput]:

@@ -145,7 +145,7 @@ def ask(address: str, command: str, /, *, patience: float = _PATIENCE, **argumen
     except OSError as error:
         raise ConnectionLost(
             f"{command} is refused: no connection to the emulated laboratory at {address} ({error});"
-            " check that it is running and that hardware.hands is its address"
+            " check that it is running and that hardware.emulator_address is its address"
         ) from None
     return _result(address, command, line)
 
@@ -154,7 +154,7 @@ def place_of(address: str) -> tuple[str, int]:
     """Host and port of an address, `host:port`. Raises InvalidInput."""
     host, _, port = address.rpartition(":")
     if not host or not port.isdecimal() or not 0 < int(port) < 65536:
-        raise InvalidInput("hands", address, "it must be host:port, such as localhost:31700")
+        raise InvalidInput("emulator_address", address, "it must be host:port, such as localhost:31700")
     return host.strip("[]"), int(port)
 
 

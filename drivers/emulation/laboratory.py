@@ -75,7 +75,12 @@ class Laboratory:
             opened.callback(self._control.close)
             ports = [laser.port for laser in self.lasers] or [None, None]
             self.hardware = hardware_of(
-                parameters, site, connection, server=self.daq.address, hands=self._control.address, ports=ports
+                parameters,
+                site,
+                connection,
+                server=self.daq.address,
+                emulator_address=self._control.address,
+                ports=ports,
             )
             self._opened = opened.pop_all()
 

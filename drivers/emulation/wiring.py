@@ -115,7 +115,7 @@ def hardware_of(
     connection: Connection,
     *,
     server: str,
-    hands: str,
+    emulator_address: str,
     ports: Sequence[str | None],
 ) -> Hardware:
     """The configuration of a client, with the calibrations of the virtual bench; `ports` are those of the lasers."""
@@ -129,7 +129,7 @@ def hardware_of(
     return Hardware(
         sample_rate=p.sample_rate,
         half_stroke=p.shaker.half_stroke,
-        hands=hands,
+        emulator_address=emulator_address,
         daq=Daq(
             server=server,
             output=site.output,

@@ -77,8 +77,13 @@ class Lasers(Parameters):
         le=0.1,
         usual=(1e-4, 0.05),
     )
-    listening: float = quantity(
-        10.0, "s", "observation time of the lasers before the first run, to identify their clocks", ge=1, le=120
+    observation_time: float = quantity(
+        10.0,
+        "s",
+        "observation time of the lasers before the first run, to identify their clocks",
+        ge=1,
+        le=120,
+        formerly="listening",
     )
     load: float = quantity(500.0, "ohm", "load resistor of an analogue current output", gt=0)
 
@@ -136,8 +141,11 @@ class Hardware(Parameters):
     force_constant: float | None = quantity(
         None, "N/A", "force constant of the coil, to estimate its current", gt=0, usual=(5.0, 200.0), example=50.0
     )
-    hands: str | None = quantity(
-        None, "", "host:port of the control channel of an emulated laboratory; absent on a real bench"
+    emulator_address: str | None = quantity(
+        None,
+        "",
+        "host:port of the control channel of an emulated laboratory; absent on a real bench",
+        formerly="hands",
     )
     daq: Daq = Daq()
     table_displacement: TableDisplacement = TableDisplacement()

@@ -49,7 +49,7 @@ class HardwareRig(RigBase):
             self._deskew = Deskew(delays, self._daq.sample_rate, [channel.valid for channel in analogue])
             # a block is complete when its most delayed input is
             super().__init__(self._daq.drive_range, lead + self._deskew.latency, WallClock())
-            self._laboratory = hardware.hands
+            self._laboratory = hardware.emulator_address
             if self._laboratory is not None:
                 place_of(self._laboratory)
             for name, given in hardware.analogue_lasers:

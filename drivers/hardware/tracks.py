@@ -83,13 +83,13 @@ class ClockedSensor(Protocol):
 class Track:
     """One instrument: its open sensor, its channel, and the placement of its values.
 
-    `listening` is the observation time of its clock before the first run [s].
+    `observation_time` is the observation time of its clock before the first run [s].
     """
 
     sensor: ClockedSensor
     channel: Channel
     placing: SensorTrack
-    listening: float
+    observation_time: float
 
 
 class Tracks:
@@ -106,7 +106,7 @@ class Tracks:
             for track in self._tracks:
                 track.sensor.start()
             self._opened = opened.pop_all()
-        self._known_from = now() + max((track.listening for track in self._tracks), default=0.0)
+        self._known_from = now() + max((track.observation_time for track in self._tracks), default=0.0)
         self._sample_rate = 0.0
         self._clock: SampleClock | None = None
         self.channels: tuple[Channel, ...] = tuple(track.channel for track in self._tracks)
@@ -200,5 +200,5 @@ def _open(name: str, given: LaserInput, lasers: Lasers) -> Track:
         sensor=sensor,
         channel=serial_laser(name, reach, given.polarity, sensor.description, MEANINGS),
         placing=SensorTrack(name, lasers.rate, lasers.delay, marked, MID_RANGE, MARKS, step),
-        listening=lasers.listening,
+        observation_time=lasers.observation_time,
     )

@@ -70,7 +70,7 @@ def measure(seconds: float, runs: int) -> bool:
                     rig.read(BLOCK)
                     if number % max(blocks // 6, 1):
                         continue
-                    truth, until = ask(str(hardware.hands), "truth"), number * BLOCK / rig.sample_rate
+                    truth, until = ask(str(hardware.emulator_address), "truth"), number * BLOCK / rig.sample_rate
                     clock = truth["sample_rate"] / hardware.sample_rate
                     row: list[str] = []
                     for one, laser in zip(rig.alignments, truth["lasers"], strict=True):

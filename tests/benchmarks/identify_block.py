@@ -46,7 +46,7 @@ def repeat(seed: int, *, as_drawn: bool) -> list[tuple[float, float]]:
     """Error and stated standard uncertainty of what `NAMES` names, for one bench."""
     random = np.random.default_rng((2027, seed))
     factor = float(random.uniform(0.98, 1.0))
-    drawn = {"linearity_waves": random.uniform(*WAVES), "clock_error": random.uniform(-CLOCK, CLOCK)}
+    drawn = {"linearity_periods": random.uniform(*WAVES), "clock_error": random.uniform(-CLOCK, CLOCK)}
     laser = Laser(scale_error=float(random.uniform(-0.002, 0.002)), **(drawn if as_drawn else {}))
     asked, nominal = FreeRockingParameters(), Specimen()
     true = Specimen(block=Block(restitution_factor=factor)).coupled(0.0)

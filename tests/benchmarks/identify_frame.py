@@ -93,7 +93,7 @@ def _drawn(random: np.random.Generator) -> tuple[Frame, float]:
 def _laser(random: np.random.Generator) -> Laser:
     return Laser(
         scale_error=random.uniform(-0.002, 0.002),
-        linearity_waves=random.choice(WAVES),
+        linearity_periods=random.choice(WAVES),
         clock_error=random.choice(CLOCKS) * random.choice([-1.0, 1.0]),
     )
 

@@ -35,7 +35,7 @@ SERIAL = pytest.mark.skipif(sys.platform == "win32", reason="emulated serial las
 def laboratory(connection: Connection, device: Device = "usb", listening: float = 1.0) -> Laboratory:
     """A laboratory whose clients listen to the lasers for a short time."""
     emulated = Laboratory(VirtualBenchParameters(), Specimen(), seed=1, connection=connection, device=device)
-    lasers = emulated.hardware.lasers.model_copy(update={"listening": listening})
+    lasers = emulated.hardware.lasers.model_copy(update={"observation_time": listening})
     emulated.hardware = emulated.hardware.model_copy(update={"lasers": lasers})
     return emulated
 
@@ -174,7 +174,7 @@ class TestSerialFaults:
             one, two = names.index("laser_1"), names.index("laser_2")
             (mark,) = (count for count, why in rig.channels[two].faults.items() if why == "no reflection detected")
             play(started(rig), np.zeros(400), 200)
-            ask(str(serial.hardware.hands), "laser", storey=2, fault="target", arguments=["none"])
+            ask(str(serial.hardware.emulator_address), "laser", storey=2, fault="target", arguments=["none"])
             deadline = time.monotonic() + 20.0
             while True:
                 (block,) = play(rig, np.zeros(200), 200)
@@ -297,7 +297,7 @@ class TestADeadClient:
         ("part", "change"),
         [
             (None, {"sample_rate": 1999.0}),
-            (None, {"hands": "nowhere"}),
+            (None, {"emulator_address": "nowhere"}),
             ("daq", {"output": "Dev1/ao9"}),
             ("laser_1", {"range": 5.0}),
         ],

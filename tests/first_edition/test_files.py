@@ -64,6 +64,7 @@ def test_it_is_opened_and_verified(file: Path, rockbench: Rockbench) -> None:
 def test_it_is_replayed_bit_for_bit(file: Path, rockbench: Rockbench, same_arithmetic: bool) -> None:
     done = rockbench("replay", file, "--json")
     found = json.loads(done.out)
+    assert "hardware.lasers.listening (now hardware.lasers.observation_time)" in done.err
     with h5py.File(file) as content:
         samples = len(content["entry/instrument/drive/voltage"])
         points = len(next(iter(content["entry/points"].values())))

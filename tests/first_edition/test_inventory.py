@@ -16,6 +16,12 @@ BEFORE: dict[str, Any] = json.loads((DATA / "inventory.json").read_text(encoding
 RENAMED: dict[str, str] = {
     # headings and captions of reports were reworded; every section, table and figure remains
     **json.loads((DATA / "captions.json").read_text(encoding="utf-8")),
+    # standard terms; files with the former names are read, with a notice
+    "configuration: hardware.hands": "hardware.emulator_address",
+    "configuration: hardware.daq.patience": "hardware.daq.timeout_margin",
+    "configuration: hardware.lasers.listening": "hardware.lasers.observation_time",
+    "configuration: simulation.bench.laser_1.linearity_waves": "simulation.bench.laser_1.linearity_periods",
+    "configuration: simulation.bench.laser_2.linearity_waves": "simulation.bench.laser_2.linearity_periods",
 }
 """What was renamed since, as "part: name" (such as "commands: run harmonic" or "options: run harmonic --omega") to its
 name of today, each with the reason beside it.

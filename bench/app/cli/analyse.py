@@ -86,6 +86,7 @@ def analyse(
     from bench.app.cli.terminal import progress_on
     from bench.datafile.reader import open_datafile
     from bench.replay.analysis import Analysis, NotComparable, write_analysis
+    from bench.replay.recording import former_keys
 
     if out is not None and out.exists():
         raise InvalidInput("--out", str(out), "the file exists and is never overwritten; name another")
@@ -94,7 +95,8 @@ def analyse(
         if list_:
             print(listed(choice))
             return 0
-        for notice in unusual_of(choice):
+        former = former_keys(record)
+        for notice in (*([former] if former else ()), *unusual_of(choice)):
             print_warning(notice)
         try:
             load_model(progress)

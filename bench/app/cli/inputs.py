@@ -55,9 +55,11 @@ def configuration_from(file: Path | None, seed: str | None, specimen: Path | Non
     """
     from bench.config.model import BenchConfiguration
     from bench.config.sections import Simulation
-    from bench.config.toml import read_configuration, with_identified
+    from bench.config.toml import former_keys, read_configuration, with_identified
 
     configuration = read_configuration(file) if file is not None else BenchConfiguration()
+    for notice in former_keys(file) if file is not None else ():
+        print_warning(notice)
     if specimen is not None:
         from bench.config.result_files import read_specimen
         from bench.config.review import review

@@ -61,14 +61,14 @@ def check(file: Annotated[Path, Parameter(help="File to check.", metavar="FILE",
     Valid but unusual values get a warning. The exit code is 0 when the file is valid and 2 when it is not.
     """
     from bench.config.review import review
-    from bench.config.toml import problems_of, read_configuration
+    from bench.config.toml import former_keys, problems_of, read_configuration
 
     problems = problems_of(file)
     for problem in problems:
         print_error(problem)
     if problems:
         return 2
-    for notice in review(read_configuration(file)).notices:
+    for notice in (*former_keys(file), *review(read_configuration(file)).notices):
         print_warning(notice)
     print(f"{file} is good")
     return 0

@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from bench.app.cli.interrupt import report_interrupt
 from bench.app.cli.options import CampaignFile, Handed, Json
-from bench.app.cli.output import print_error, print_result
+from bench.app.cli.output import print_error, print_result, print_warning
 from bench.app.formatting import one_line
 from bench.progress import silent
 from sim.errors import InvalidInput
@@ -49,6 +49,7 @@ def replay(
     from bench.app.preflight import load_bench
     from bench.app.session import result_of
     from bench.datafile.reader import open_datafile
+    from bench.replay.recording import former_keys
     from bench.replay.session import replay as play
     from bench.replay.session import stored_configuration
 
@@ -56,6 +57,8 @@ def replay(
     with open_datafile(file) as record:
         protocol = protocol_of(record)
         configuration, parameters = stored_configuration(record), parameters_of(record, protocol)
+        if notice := former_keys(record):
+            print_warning(notice)
         try:
             load_bench(configuration, progress)
             progress("replaying the file")

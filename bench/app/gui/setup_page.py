@@ -36,7 +36,7 @@ from bench.app.gui.widgets import (
 from bench.config.declared import Declared, declared, summary
 from bench.config.model import BenchConfiguration
 from bench.config.result_files import read_specimen
-from bench.config.toml import read_configuration, with_identified
+from bench.config.toml import former_keys, read_configuration, with_identified
 from sim.errors import RockbenchError
 from sim.parameters import Parameters
 
@@ -253,6 +253,8 @@ class SetupPage(QWidget):
         lines = [f"{texts.CONFIGURATION}: {self.path or texts.VIRTUAL}"]
         if self._specimen is not None:
             lines.append(texts.IDENTIFIED.format(path=self._specimen))
+        if self.path is not None:
+            lines += former_keys(self.path)
         self._say("\n".join(lines), "calm")
         self.tree.use(self.configuration)
         self.devices.use(self.configuration, self.path)

@@ -75,7 +75,7 @@ class Optics:
         laser = self._laser
         seen = displacement + laser.noise * self._random.standard_normal(displacement.size)
         place = seen / laser.measuring_range
-        waves = np.sin(2.0 * np.pi * laser.linearity_waves * place + self._phase)
+        waves = np.sin(2.0 * np.pi * laser.linearity_periods * place + self._phase)
         return 0.5 + (1.0 + laser.scale_error) * place + laser.linearity * waves
 
 

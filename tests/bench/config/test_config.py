@@ -273,3 +273,46 @@ def test_blocks_suit_the_devices(tmp_path: Path, text: str, named: str) -> None:
     file.write_text(f'backend = "hardware"\n{text}')
     with pytest.raises(InvalidInput, match=named):
         read_configuration(file)
+
+
+FORMER = """
+backend = "hardware"
+[hardware]
+hands = "localhost:31700"
+[hardware.daq]
+patience = "1500 ms"
+[hardware.lasers]
+listening = 2.0
+[simulation.bench.laser_1]
+linearity_waves = 1.0
+"""
+
+
+def test_keys_with_their_former_names_are_accepted_with_a_notice_that_names_the_present_one(
+    file: Callable[[str], Path], capsys: pytest.CaptureFixture[str]
+):
+    path = file(FORMER)
+    read = read_configuration(path)
+    assert read.hardware.emulator_address == "localhost:31700"
+    assert read.hardware.daq.timeout_margin == 1.5
+    assert read.hardware.lasers.observation_time == 2.0
+    assert read.simulation.bench.laser_1.linearity_periods == 1.0
+    assert main(["config", "check", str(path)]) == 0
+    said = capsys.readouterr().err
+    for old, new in (
+        ("hardware.hands", "hardware.emulator_address"),
+        ("hardware.daq.patience", "hardware.daq.timeout_margin"),
+        ("hardware.lasers.listening", "hardware.lasers.observation_time"),
+        ("simulation.bench.laser_1.linearity_waves", "simulation.bench.laser_1.linearity_periods"),
+    ):
+        assert f"bench.toml: {old} is now called {new}" in said
+
+
+def test_a_key_with_both_names_is_refused(file: Callable[[str], Path]):
+    text = refusal(file('[hardware]\nhands = "a:1"\nemulator_address = "b:1"\n'))
+    assert "hardware.hands" in text
+    assert "there is no such key" in text
+
+
+def test_a_refused_value_of_a_former_name_is_named_as_it_is_called_now(file: Callable[[str], Path]):
+    assert "hardware.daq.timeout_margin = 0" in refusal(file("[hardware.daq]\npatience = 0.0\n"))

@@ -228,7 +228,7 @@ def test_a_server_that_goes_away_is_noticed_in_time(
 ) -> None:
     wire = Wire(server.address)
     try:
-        session = driving(open_session(server=wire.address, patience=0.6))
+        session = driving(open_session(server=wire.address, timeout_margin=0.6))
         begin = time.monotonic()
         fault(server, wire)
         with pytest.raises((ConnectionLost, DeviceTimeout)):
@@ -247,7 +247,7 @@ def test_a_server_that_goes_away_is_noticed_in_time(
 def test_a_server_that_was_late_once_is_not_trusted_again(
     server: DaqServer, open_session: OpenSession, plant: Loopback
 ) -> None:
-    session = driving(open_session(patience=1.0))
+    session = driving(open_session(timeout_margin=1.0))
     server.stall(2.5)
     with pytest.raises(DeviceTimeout) as caught:
         session.read(BLOCK)

@@ -38,7 +38,7 @@ def session() -> Iterator[DaqSession]:
         output=os.environ["ROCKBENCH_NI_OUTPUT"],
         enable_line=given("ROCKBENCH_NI_LINE"),
         watchdog=float(watchdog) if watchdog else None,
-        patience=5.0,
+        timeout_margin=5.0,
     )
     inputs = [AnalogInput(terminal=name.strip()) for name in os.environ["ROCKBENCH_NI_INPUTS"].split(",")]
     with DaqSession(daq, inputs, RATE, LEAD) as session:

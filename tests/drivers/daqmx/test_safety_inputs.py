@@ -78,7 +78,7 @@ def test_a_line_that_the_device_does_not_report_is_open(open_session: OpenSessio
 
 
 def test_a_server_that_stalls_ends_it_too(open_session: OpenSession, server: DaqServer, plant: Loopback) -> None:
-    session = driving(open_session(emergency_stop={}, patience=0.1))
+    session = driving(open_session(emergency_stop={}, timeout_margin=0.1))
     server.stall(0.8)
     with pytest.raises(RigError, match="DEADLINE_EXCEEDED"):
         session.safety_inputs()

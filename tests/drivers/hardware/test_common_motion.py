@@ -32,7 +32,7 @@ def compared(connection: Connection, **changes: dict[str, Any]) -> tuple[CommonM
     parameters = VirtualBenchParameters()
     with Laboratory(parameters, Specimen(), seed=1, connection=connection) as laboratory:
         hardware = laboratory.hardware
-        groups = {"lasers": {"listening": 2.0, **changes.pop("lasers", {})}, **changes}
+        groups = {"lasers": {"observation_time": 2.0, **changes.pop("lasers", {})}, **changes}
         made = {name: getattr(hardware, name).model_copy(update=new) for name, new in groups.items()}
         with HardwareRig(Hardware.model_validate(dict(hardware) | made), lead=LEAD) as rig:
             rig.perform(OperatorTask.LOCK_FRAME)

@@ -81,7 +81,7 @@ def test_a_program_that_hangs_is_switched_off_by_the_relay_of_its_heartbeat(labo
     with HardwareRig(laboratory.hardware.model_copy(update={"daq": daq}), lead=LEAD) as rig:
         play(started(rig, 3000), np.zeros(400), 200)
         eventually(lambda: not laboratory.bench.enabled)
-        contacts = ask(str(laboratory.hardware.hands), "truth")["contacts"]
+        contacts = ask(str(laboratory.hardware.emulator_address), "truth")["contacts"]
         # the device keeps its line high; only the pulses are missing
         assert contacts["enable relay"]
         assert not contacts["heartbeat relay"]

@@ -43,7 +43,7 @@ def emulated() -> Iterator[tuple[EmulatedLaser, EmulatedLaser]]:
 def lasers(emulated: tuple[EmulatedLaser, EmulatedLaser]) -> Iterator[Tracks]:
     first, second = (one.port for one in emulated)
     hardware = Hardware(
-        lasers=Lasers(rate=4000.0, listening=1.5, delay=5e-3),
+        lasers=Lasers(rate=4000.0, observation_time=1.5, delay=5e-3),
         laser_1=Laser1(port=first, baud=921_600),
         laser_2=Laser2(port=second, baud=921_600),
     )
@@ -143,7 +143,7 @@ class Inclinometer:
 def test_a_second_kind_of_sensor_is_one_more_track(emulated: tuple[EmulatedLaser, EmulatedLaser]) -> None:
     first, second = (one.port for one in emulated)
     hardware = Hardware(
-        lasers=Lasers(rate=4000.0, listening=1.5),
+        lasers=Lasers(rate=4000.0, observation_time=1.5),
         laser_1=Laser1(port=first, baud=921_600),
         laser_2=Laser2(port=second, baud=921_600),
     )

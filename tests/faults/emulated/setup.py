@@ -58,8 +58,8 @@ def shortened(laboratory: Laboratory, *, watchdog: bool = True, heartbeat: bool 
     keepers = {"watchdog": KEEPER if watchdog else None, "heartbeat": beating}
     return hardware.model_copy(
         update={
-            "daq": daq.model_copy(update={**keepers, "patience": PATIENCE}),
-            "lasers": lasers.model_copy(update={"listening": LISTENING, "rate": 1000.0}),
+            "daq": daq.model_copy(update={**keepers, "timeout_margin": PATIENCE}),
+            "lasers": lasers.model_copy(update={"observation_time": LISTENING, "rate": 1000.0}),
         }
     )
 

@@ -56,7 +56,7 @@ def _driven(truth: dict[str, Any]) -> bool:
 )
 def test_the_chain_opens_by_itself(state: str, laboratory: BenchConfiguration, tmp_path: Path) -> None:
     hardware = laboratory.hardware
-    hands, timeout = hardware.hands, hardware.daq.watchdog
+    hands, timeout = hardware.emulator_address, hardware.daq.watchdog
     assert hands is not None
     assert timeout is not None
 

@@ -62,7 +62,7 @@ def check(laboratory: Laboratory, tmp_path: Path) -> Check:
 
 
 def does(laboratory: Laboratory, fault: str, arguments: list[object]) -> None:
-    ask(str(laboratory.hardware.hands), "safety", fault=fault, arguments=arguments)
+    ask(str(laboratory.hardware.emulator_address), "safety", fault=fault, arguments=arguments)
 
 
 @pytest.mark.parametrize(
@@ -96,7 +96,7 @@ def test_an_input_that_opens_halts_the_bench_and_the_file_says_which(
     finally:
         over.set()
         thread.join()
-        truth = ask(str(laboratory.hardware.hands), "truth")
+        truth = ask(str(laboratory.hardware.emulator_address), "truth")
         for mended, which in MENDED:
             does(laboratory, mended, list(which))
     assert (result.status, result.reason) == ("halted", says)
