@@ -1,7 +1,8 @@
 """Unfinished results: temporary files and folders that a process must remove, however it ends.
 
-The creator removes each one, or renames it when complete. The list here serves the one ending that runs no `finally`:
-an interrupted process whose main thread does not respond, see `bench.app.cli.interrupt`.
+The creator removes each one, or gives it its name when complete. The list here serves the one ending that runs no
+`finally`: an interrupted process whose main thread does not respond, see `bench.app.cli.interrupt`. A second list has
+the complete results, which an interrupt after their completion names.
 """
 
 import os
@@ -20,19 +21,20 @@ HELD, PAUSE = 1.0, 0.05
 
 _paths: set[Path] = set()
 _reserved: set[Path] = set()
+_names: dict[Path, Path] = {}
+"""Final name of every result that is or was about to be renamed, by its temporary name."""
 
 
 @contextmanager
 def unfinished(path: Path) -> Generator[Path]:
     """Context manager to create a file or folder at `path`: removes it at exit unless it was renamed or is `whole`."""
+    _names.pop(path, None)
     _paths.add(path)
     try:
         yield path
     finally:
-        if path in _paths:
-            with suppress(OSError):
-                _remove(path)
-            _paths.discard(path)
+        _discard(path)
+        _paths.discard(path)
 
 
 @contextmanager
@@ -61,6 +63,23 @@ def replace(source: Path, target: Path) -> None:
             return
 
 
+def finish(temporary: Path, target: Path) -> None:
+    """Give the complete result `temporary` its name. Raises OSError."""
+    # noted before the rename: an interrupt may come between any two instructions, and the files decide
+    _names[temporary] = target
+    replace(temporary, target)
+
+
+def completed() -> list[Path]:
+    """Results that have been completed since `forget_completed`: they are kept, also after an interrupt."""
+    return [path for temporary, path in tuple(_names.items()) if path == temporary or _is_renamed(temporary, path)]
+
+
+def forget_completed() -> None:
+    """Start a new list of completed results."""
+    _names.clear()
+
+
 def write_new(path: Path, write: Callable[[Path], None], *, overwrite: bool = False) -> None:
     """Writes a file under a temporary name in the folder of `path` and renames it when it is complete.
 
@@ -75,14 +94,14 @@ def write_new(path: Path, write: Callable[[Path], None], *, overwrite: bool = Fa
     try:
         with unfinished(path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")) as temporary:
             write(temporary)
-            replace(temporary, path)
+            finish(temporary, path)
     except OSError as error:
         raise RockbenchError(f"{path} could not be written ({error.strerror or error}): check the disk") from error
 
 
 def whole(path: Path) -> None:
-    """Mark the file at `path` as complete: it is kept."""
-    _paths.discard(path)
+    """Mark the file at `path`, which has its final name, as complete: it is kept."""
+    _names[path] = path
 
 
 def reserve(folder: Path) -> None:
@@ -93,13 +112,26 @@ def reserve(folder: Path) -> None:
 def remove_unfinished() -> None:
     """Remove all unfinished files and folders; called from any thread just before the process exits."""
     for path in tuple(_paths):
-        with suppress(OSError):
-            _remove(path)
+        _discard(path)
     for folder in tuple(_reserved):
         with suppress(OSError):
             # a folder that is not empty is kept
             folder.rmdir()
             folder.parent.rmdir()
+
+
+def _is_renamed(temporary: Path, path: Path) -> bool:
+    return not temporary.exists() and path.exists()
+
+
+def _discard(path: Path) -> None:
+    """Remove an unfinished result; one that is complete has another name, or is `whole`."""
+    if _names.get(path) == path or not path.exists():
+        return
+    # an older file with the final name is not the result
+    _names.pop(path, None)
+    with suppress(OSError):
+        _remove(path)
 
 
 def _remove(path: Path) -> None:

@@ -23,6 +23,7 @@ from math import inf
 from pathlib import Path
 
 from tests.lateness import Lateness
+from tests.whole import partial
 
 ANSWERED = 0.5
 """Longest time to the answer [s]."""
@@ -232,14 +233,7 @@ def _judge(found: Reaction, lines: list[tuple[float, str]], group: int, work: Pa
         faults.append(f"ended after {found.end:.2f} s")
     left = [str(path) for path in temporary.rglob("*")]
     if not (done or found.driving):
-        # the lock of a queue stays, and is let go of; the window keeps its queue in a folder of its own
-        kept = {
-            "queue.json",
-            "queue.json.lock",
-            "queue.json.owner",
-            *(("runs",) if found.command.name == "gui" else ()),
-        }
-        left += [str(path) for path in work.rglob("*") if path.name not in kept]
+        faults.extend(misjudged(found.command, told, work))
     else:
         left += [str(path) for pattern in (".*", "*.part", "*.new") for path in work.rglob(pattern)]
     if left:
@@ -249,6 +243,23 @@ def _judge(found: Reaction, lines: list[tuple[float, str]], group: int, work: Pa
     except ProcessLookupError:
         return
     faults.append("a child is left")
+
+
+def misjudged(command: Command, told: list[str], work: Path) -> list[str]:
+    """What is wrong with the files of an interrupted command: each is whole and has the name that was asked for."""
+    # the lock of a queue stays, and is let go of; the window keeps its queue in a folder of its own
+    kept = {"queue.json", "queue.json.lock", "queue.json.owner", *(("runs",) if command.name == "gui" else ())}
+    found = sorted(path for path in work.iterdir() if path.name not in kept)
+    # a run's folder is no result before its rig was opened
+    asked = set[str]() if command.drives else {word.replace("NEW", "new") for word in command.line.split()}
+    faults = [f"left behind: {path}" for path in found if path.name not in asked]
+    results = [path for path in found if path.name in asked]
+    faults += [f"not whole: {why}" for path in results if (why := partial(path))]
+    if any("is complete" in text for text in told) and not results:
+        faults.append(f"called complete, but nothing is there: {told}")
+    if results and any("no partial" in text or "nothing was written" in text for text in told):
+        faults.append(f"{results} are there, but the command states: {told}")
+    return faults
 
 
 def moments(count: int, seed: int, only: Sequence[str] = (), latest: float = inf) -> list[Moment]:

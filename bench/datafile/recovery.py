@@ -3,7 +3,6 @@
 The original is only read. The copy has the intact data in the present layout, with checksums.
 """
 
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
@@ -26,7 +25,7 @@ from bench.datafile.reader import DataFile, open_datafile
 from bench.datafile.samples import Timeline, chunk_of, create_plot, read_channels
 from bench.datafile.writer import FileSync, journal_path, read_journal
 from bench.progress import Progress, counting, silent
-from bench.unfinished import unfinished
+from bench.unfinished import finish, unfinished
 from sim.errors import InvalidInput
 
 Row = Mapping[str, Any]
@@ -163,7 +162,7 @@ def recover(path: Path, target: Path, progress: Progress = silent) -> Recovery:
         try:
             with unfinished(temporary):
                 result = _rebuild(record, path, temporary, target, progress)
-                os.rename(temporary, target)
+                finish(temporary, target)
         except UNREADABLE as error:
             raise DataFileError(f"{path} could not be recovered into {target} ({reason(error)})") from error
     return result

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from bench.app.catalogue import format_names
-from bench.app.cli.interrupt import report_interrupt
+from bench.app.cli.interrupt import interrupted_text, report_interrupt
 from bench.app.cli.options import CampaignFile, Handed, Json, switch
 from bench.app.cli.output import print_error, print_result, print_warning
 from bench.progress import counting, silent
@@ -151,7 +151,7 @@ def export(
         print_error(f"{out} could not be written ({error.strerror or error}): check the disk")
         return 1
     except KeyboardInterrupt:
-        report_interrupt("the export was interrupted; no partial files remain")
+        report_interrupt(interrupted_text("the export was interrupted", "no partial files remain"))
         return 130
     if integrity.failing:
         print_warning(f"{file}: {integrity}")

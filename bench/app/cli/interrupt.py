@@ -16,7 +16,7 @@ from types import FrameType
 from typing import TYPE_CHECKING, NoReturn
 
 from bench.app.cli.output import print_error, report_error
-from bench.unfinished import remove_unfinished
+from bench.unfinished import completed, remove_unfinished
 
 if TYPE_CHECKING:
     from bench.engine.interface import Requests
@@ -58,7 +58,7 @@ class Leaving(Interrupts):
 
     def __call__(self, number: int, frame: FrameType | None) -> None:  # noqa: ARG002 - the signature is Python's
         """End the process at once."""
-        report_interrupt("interrupted")
+        report_interrupt()
         leave(128 + number)
 
 
@@ -172,7 +172,7 @@ class Watch:
         threading.Event().wait(ANSWER)
         if self.claim():
             # the blocked thread may hold the lock of the terminal's output
-            saying = threading.Thread(target=report_error, args=("interrupted", "interrupted"), daemon=True)
+            saying = threading.Thread(target=report_error, args=(interrupted_text(), "interrupted"), daemon=True)
             saying.start()
             saying.join(ANSWER)
         threading.Event().wait(ORDERLY - ANSWER)
@@ -203,10 +203,19 @@ def handle_signals(interrupts: Interrupts) -> None:
             signal.signal(number, interrupts)
 
 
-def report_interrupt(text: str, *, in_result: bool = False) -> None:
-    """Report the interrupt once, as one line on standard error; with --json also as an object, unless the command's
-    result states it (`in_result`).
+def interrupted_text(text: str = "interrupted", otherwise: str = "") -> str:
+    """Message for an interrupt: `text` and the files that are complete, or `otherwise` if there are none."""
+    kept = ", ".join(map(str, completed()))
+    if not kept:
+        return f"{text}; {otherwise}" if otherwise else text
+    return f"{text} after its result was written: {kept} is complete"
+
+
+def report_interrupt(text: str | None = None, *, in_result: bool = False) -> None:
+    """Report the interrupt once, as one line on standard error, `interrupted_text` unless `text` is given; with --json
+    also as an object, unless the command's result states it (`in_result`).
     """
+    text = text or interrupted_text()
     if _watch is None or _watch.claim():
         if in_result:
             print_error(text)

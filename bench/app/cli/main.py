@@ -11,6 +11,7 @@ from cyclopts import App, CycloptsError, UnusedCliTokensError
 from bench.app.cli.interrupt import report_interrupt
 from bench.app.cli.output import reply_in_json, report_error
 from bench.progress import Progress, silent
+from bench.unfinished import forget_completed
 from sim.errors import RockbenchError
 
 SUMMARY = "Runs a shake-table bench for a frame coupled to a rocking block; compares measured and predicted gain."
@@ -246,6 +247,7 @@ def main(argv: Sequence[str] | None = None, progress: Progress = silent) -> int:
     An error is one line on standard error, and with --json an object on standard output (docs/errors.md).
     """
     arguments = sys.argv[1:] if argv is None else list(argv)
+    forget_completed()
     app = rockbench_app(arguments)
     # also for a command line that cannot be parsed
     reply_in_json(sys.stdout if "--json" in arguments else None)
@@ -268,7 +270,7 @@ def main(argv: Sequence[str] | None = None, progress: Progress = silent) -> int:
         report_error("the computer is out of memory: close other programs")
         return 1
     except KeyboardInterrupt as interrupt:
-        report_interrupt(str(interrupt) or "interrupted")
+        report_interrupt(str(interrupt) or None)
         return 130
     except Exception as error:
         # damaged contents may cause any exception

@@ -29,13 +29,13 @@ def run() -> None:
         handle_signals(interrupts)
         code = _carry_out()
     except KeyboardInterrupt:
-        report_interrupt("interrupted")
+        report_interrupt()
         code = 130
     except BaseException:
         if interrupts.first is None:
             raise
         # an interrupt that a library converted to its own error
-        report_interrupt("interrupted")
+        report_interrupt()
         code = 130
     if interrupts.exit_code is not None or code == 130:
         # a normal exit would wait for threads that are still computing

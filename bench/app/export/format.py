@@ -16,7 +16,7 @@ from bench.datafile.reader import DataFile
 from bench.datafile.series import RecordedRun
 from bench.plugins import load_plugin, plugin_code
 from bench.progress import Progress, counting, silent
-from bench.unfinished import unfinished
+from bench.unfinished import finish, unfinished
 from drivers.rig import Channel
 from sim.errors import InvalidInput
 from sim.extras import require
@@ -217,5 +217,5 @@ def export(
         if integrity.failing:
             lines = (f"{path.name} is damaged or was changed since it was written:", *integrity.failing.values())
             (temporary / DAMAGED).write_text("\n".join(lines) + "\n", encoding="utf-8")
-        temporary.rename(out)
+        finish(temporary, out)
     return sorted(out.iterdir()), integrity

@@ -1,0 +1,104 @@
+"""An interrupt just before and after a result gets its name: nothing is left, or a whole file is kept and named."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from bench.app.cli.main import main
+from tests.interrupts import COMMANDS, misjudged
+from tests.whole import partial
+
+PREDICT = ["predict", "modes", "--out"]
+
+
+def interrupted_at_rename(monkeypatch: pytest.MonkeyPatch, *, after: bool) -> None:
+    """Make every rename of a file raise KeyboardInterrupt, before or after it was carried out."""
+    rename: Callable[[Path, Path], None] = os.replace
+
+    def replace(source: Path, target: Path) -> None:
+        if after:
+            rename(source, target)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(os, "replace", replace)
+
+
+def test_a_complete_result_is_kept_and_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "new.h5"
+    interrupted_at_rename(monkeypatch, after=True)
+    assert main([*PREDICT, str(out)]) == 130
+    assert f"interrupted after its result was written: {out} is complete" in capsys.readouterr().err
+    assert [*tmp_path.iterdir()] == [out]
+    assert partial(out) is None
+
+
+def test_an_incomplete_result_is_removed_and_not_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    interrupted_at_rename(monkeypatch, after=False)
+    assert main([*PREDICT, str(tmp_path / "new.h5")]) == 130
+    assert capsys.readouterr().err.splitlines()[-1] == "rockbench: error: interrupted"
+    assert not [*tmp_path.iterdir()]
+
+
+def test_an_older_file_of_the_name_is_not_the_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from bench.unfinished import completed, forget_completed, write_new
+
+    out = tmp_path / "report.html"
+    out.write_text("older")
+    interrupted_at_rename(monkeypatch, after=False)
+    forget_completed()
+    with pytest.raises(KeyboardInterrupt):
+        write_new(out, lambda path: path.write_text("new") and None, overwrite=True)
+    assert (completed(), out.read_text(), [*tmp_path.iterdir()]) == ([], "older", [out])
+
+
+HANGING = """
+import ctypes, os, signal, sys, threading
+from bench.app.cli.process import run
+
+rename = os.replace
+
+def replace(source, target):
+    rename(source, target)
+    # the signal arrives while native code runs: the main thread does not handle it
+    threading.Timer(0.1, lambda: signal.pthread_kill(threading.get_ident(), signal.SIGINT)).start()
+    ctypes.CDLL(None).sleep(20)
+
+os.replace = replace
+sys.argv = ["rockbench", *sys.argv[1:]]
+run()
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="sends a signal to one of its own threads")
+def test_the_thread_that_ends_the_process_keeps_and_names_it(tmp_path: Path) -> None:
+    out = tmp_path / "new.h5"
+    process = [sys.executable, "-c", HANGING, *PREDICT, str(out)]
+    done = subprocess.run(process, capture_output=True, text=True, timeout=60.0)
+    assert (done.returncode, [*tmp_path.iterdir()], partial(out)) == (130, [out], None)
+    assert done.stderr.count(f"{out} is complete") == 1
+
+
+def test_the_judge_finds_what_is_partial_foreign_or_misreported(tmp_path: Path) -> None:
+    command = next(each for each in COMMANDS if each.name == "predict map")
+    out = tmp_path / "new.h5"
+    assert main([*PREDICT, str(out)]) == 0
+    assert misjudged(command, [f"interrupted after its result was written: {out} is complete"], tmp_path) == []
+    assert misjudged(command, ["interrupted; nothing was written"], tmp_path) != []
+    whole = out.read_bytes()
+    out.write_bytes(whole[: len(whole) // 2])
+    assert misjudged(command, ["interrupted"], tmp_path)[0].startswith("not whole: new.h5")
+    out.rename(tmp_path / ".new.123.h5")
+    assert misjudged(command, ["interrupted"], tmp_path)[0].startswith("left behind")
+    (tmp_path / ".new.123.h5").unlink()
+    assert misjudged(command, [f"{out} is complete"], tmp_path)[0].startswith("called complete")
+    page = next(each for each in COMMANDS if each.name == "report")
+    (tmp_path / "new.html").write_text("<!doctype html><p>cut")
+    assert misjudged(page, ["interrupted"], tmp_path) == ["not whole: new.html: it is cut"]
