@@ -16,6 +16,10 @@ os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 # sums of matrix products have the same last digits on every number of processors; read when numpy is imported
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+# programs that tests start read compiled modules: without them, each compiles several hundred (a second and more)
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
+
 # a result that a test computes with replaced parts must not reach another one
 os.environ.setdefault("ROCKBENCH_RESULT_CACHE", "off")
 
@@ -44,7 +48,10 @@ SPREAD = "tests/faults/test_matrix.py"
 """The longest file of all; its tests share nothing, so they fill every process at the end."""
 
 
-KERNELS = ("sim.kernel.members", "sim.kernel.table, sim.kernel.laser, sim.kernel.filter")
+KERNELS = (
+    "sim.kernel.members",
+    "sim.kernel.table, sim.kernel.laser, sim.kernel.filter, sim.kernel.rocking, sim.kernel.equations",
+)
 """Modules that compile all of the kernel when they are imported, divided between two processors."""
 
 

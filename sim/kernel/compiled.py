@@ -10,22 +10,16 @@ The wrapper for calls from C is omitted, since it is unused and slow to compile.
 # pyright: reportPrivateImportUsage=false, reportAttributeAccessIssue=false
 # numba publishes no types; `cast` below gives the decorated function its own type back.
 
-import os
 import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-# the loops here are short recurrences: vectorising them and the highest level of optimisation take a fifth of the
-# compile time without benefit. numba reads these once, on import; the user's own settings have priority
-for name, value in (("NUMBA_OPT", "2"), ("NUMBA_LOOP_VECTORIZE", "0"), ("NUMBA_SLP_VECTORIZE", "0")):
-    os.environ.setdefault(name, value)
+import llvmlite.binding
+import numba
+import numpy as np
 
-import llvmlite.binding  # noqa: E402
-import numba  # noqa: E402
-import numpy as np  # noqa: E402
-
-from sim.kernel.cache import KERNEL, KernelCache  # noqa: E402
+from sim.kernel.cache import KERNEL, KernelCache
 
 F = TypeVar("F", bound=Callable[..., Any])
 

@@ -111,6 +111,15 @@ def where_the_user_says(installation: Installation) -> Path:
     return place
 
 
+def test_whatever_imports_numba_first_finds_the_kernels_settings(installation: Installation) -> None:
+    """Else `table`, which imports numba before the decorator, would compile all of the kernel a second time."""
+    code = (
+        "import os, sys\nsys.modules['numba'] = None\ntry:\n    import sim.kernel.table\n"
+        "except ImportError:\n    print(os.environ.get('NUMBA_OPT'), os.environ.get('NUMBA_LOOP_VECTORIZE'))"
+    )
+    assert installation.run(code) == ("2 0", "")
+
+
 def test_a_package_that_calls_the_kernel_is_compiled_again_after_an_edit_there_and_in_itself(
     installation: Installation,
 ) -> None:
