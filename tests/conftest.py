@@ -22,6 +22,8 @@ sys.dont_write_bytecode = False
 
 # a result that a test computes with replaced parts must not reach another one
 os.environ.setdefault("ROCKBENCH_RESULT_CACHE", "off")
+# a window of a test must not attach to the session of another one
+os.environ.setdefault("ROCKBENCH_SESSIONS", "off")
 
 pytest.register_assert_rewrite("bench.testing.conformance")
 

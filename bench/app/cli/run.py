@@ -14,7 +14,7 @@ from bench.app.cli.options import Handed, RunOptions, with_flags
 from bench.app.cli.output import Code, print_error, print_result, report_error
 from bench.progress import Progress, silent
 from bench.results import SUMMARY
-from sim.errors import InvalidInput, RockbenchError
+from sim.errors import InvalidInput, RockbenchError, cause_of
 
 if TYPE_CHECKING:
     from bench.app.session import SessionResult
@@ -185,20 +185,37 @@ def carry_out(
         try:
             progress.prepare("loading the program")
             with requests.without_rig():
+                from bench.app.ipc.announcement import announced
+                from bench.app.ipc.messages import FromSession, Refused, Run
+                from bench.app.ipc.server import FAREWELL, Publisher, SessionServer, ended_message
                 from bench.app.session import run_session
 
                 prepared = prepare(progress.prepare)
-            ended = run_session(
-                protocol,
-                prepared,
-                out=out,
-                operator=operator,
-                subscribers=[progress],
-                requests=requests,
-                realtime=realtime,
-                about=about,
-                progress=progress.prepare,
-            )
+            # windows can attach to the run, and stop it
+            run = Run(protocol.name, prepared.parameters, prepared.configuration, out, realtime=realtime, about=about)
+            server = SessionServer(None, requests, lambda _why: None, lambda: person is not None and person.asking)
+            teller = Publisher(server)
+            last: FromSession = Refused("the run was interrupted", failed=True)
+            try:
+                with announced(server, run, "terminal"):
+                    ended = run_session(
+                        protocol,
+                        prepared,
+                        out=out,
+                        operator=operator,
+                        subscribers=[progress, teller],
+                        requests=requests,
+                        realtime=realtime,
+                        about=about,
+                        opened=lambda rig: teller.opened(rig, prepared),
+                        progress=progress.prepare,
+                    )
+                last = ended_message(ended, out)
+            except Exception as error:
+                last = Refused(str(error), cause_of(error), failed=not isinstance(error, InvalidInput))
+                raise
+            finally:
+                server.close(last, FAREWELL)
         except InvalidInput:
             raise
         except KeyboardInterrupt:

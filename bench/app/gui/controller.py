@@ -12,11 +12,13 @@ from PySide6.QtCore import QObject, Qt, QTimer, Signal
 
 from bench.app.gui import texts
 from bench.app.gui.status import DRIVEN, Status, bench_status
-from bench.app.ipc.client import SessionClient
+from bench.app.ipc.client import AttachedClient, ClientConnection, SessionClient
 from bench.app.ipc.messages import (
     BEAT,
     SILENCE,
+    Attached,
     Beat,
+    Control,
     Ended,
     FromSession,
     Opened,
@@ -30,6 +32,7 @@ from bench.app.ipc.messages import (
     SafetyInputs,
     Traces,
 )
+from bench.app.ipc.sessions import RunningSession
 from bench.app.run_display import Notice, RunDisplay
 from bench.events import State, StateChanged
 from drivers.clock import now
@@ -69,7 +72,7 @@ class Controller(QObject):
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._link: SessionClient | None = None
+        self._link: ClientConnection | None = None
         self._plan_checks: dict[object, SessionClient] = {}
         self._waiting = deque[FromSession]()
         self._running = False
@@ -81,6 +84,14 @@ class Controller(QObject):
         self._inputs_heard: float | None = None
         self.driven = False
         """Whether the rig was armed in the current or last run."""
+        self.run: Run | None = None
+        """The current or last run; None before the first, and until an attached session has introduced itself."""
+        self.attached: RunningSession | None = None
+        """The session of another window, or of a terminal, whose current or last run is shown."""
+        self.controls = True
+        """Whether this window drives the run: it answers questions and may ramp out. STOP acts in any case."""
+        self.elsewhere: RunningSession | None = None
+        """A session under way on this machine to which this window is not attached."""
         self.held = ""
         """Why only the queue may start a run; empty otherwise."""
         self.lost = (0, 0)
@@ -99,6 +110,27 @@ class Controller(QObject):
     def running(self) -> bool:
         """Whether a run is in progress, or was when the connection was lost."""
         return self._running
+
+    @property
+    def why_busy(self) -> str:
+        """Why no run can begin beside those under way; empty if one can. Simulated benches run beside each other."""
+        if self._running:
+            return texts.START_BUSY
+        return texts.START_ELSEWHERE if self.elsewhere is not None and self.elsewhere.real else ""
+
+    @property
+    def owner(self) -> str:
+        """Whose run is shown, and what this window may do; empty without a run."""
+        if not self._running:
+            return ""
+        if self.attached is not None:
+            owner = texts.OWNERS.get(self.attached.owner, self.attached.owner)
+            right = texts.ATTACHED_CONTROLS if self.controls else texts.ATTACHED_READ_ONLY.format(owner=owner)
+            return f"{texts.ATTACHED_RUN.format(owner=owner.capitalize(), run=self.attached.title)} {right}"
+        run = self.run
+        by = run.about.get("operator", "") if run is not None else ""
+        told = "" if run is None else f"{run.protocol}{f' by {by}' if by else ''}, {run.out}"
+        return texts.OWN_RUN.format(run=told)
 
     @property
     def inputs_age(self) -> float | None:
@@ -125,8 +157,12 @@ class Controller(QObject):
         link, scene = self._link if self._running else None, self.scene
         if self._failure:
             return Status(texts.FAILED_WORD, self._failure, "alarm", "cross")
+        if link is None and self.elsewhere is not None:
+            return Status(texts.RUN_ELSEWHERE, texts.ELSEWHERE.format(run=self.elsewhere.title), "wait", "ring")
         if link is None:
             return bench_status("over" if self._started else "none", scene.state, scene.reason, 0.0)
+        if link.status == "starting" and self.attached is not None:
+            return Status(texts.ATTACHING, texts.ATTACHING_WHY.format(run=self.attached.title), "wait", "ring")
         if link.status == "linked" and scene.state in DRIVEN and self._quiet > self._longest_quiet:
             # the process runs but its engine does not respond: the last known state may be outdated
             return bench_status("no link", scene.state, scene.reason, self._quiet)
@@ -150,14 +186,40 @@ class Controller(QObject):
         """Start a run. Has no effect while one is under way or STOP is latched."""
         if self._running or self.latched:
             return
+        self._use(SessionClient(run, self._call), None)
+        self._introduce(run, 0.0)
+
+    def attach(self, session: RunningSession) -> None:
+        """Show the run of a session that another window or a terminal has started; this window can stop it."""
+        if not self._running:
+            self.latched = False
+            self._use(AttachedClient(session, self._call), session)
+            self.changed.emit()
+
+    def detach(self) -> None:
+        """Leave a session that this window has attached to; its run is not affected."""
+        link = self._link
+        if link is not None and self.attached is not None:
+            self._link, self._running, self._started, self._question = None, False, 0.0, None
+            self.scene, self.attached, self.latched = RunDisplay(), None, False
+            link.leave()
+            self.asked.emit(None)
+            self.changed.emit()
+
+    def _use(self, link: ClientConnection, attached: RunningSession | None) -> None:
         self.scene, self.inputs, self.lost, self._failure = RunDisplay(), {}, (0, 0), ""
         self._inputs_heard, self.driven = None, False
         self._waiting.clear()
+        self._quiet, self._longest_quiet = 0.0, inf
+        self.run, self.attached, self.controls, self.elsewhere = None, attached, attached is None, None
+        self._link, self._running = link, True
+        self._started, self._stopped_at = now(), None
+
+    def _introduce(self, run: Run, elapsed: float) -> None:
         # a simulated bench that is not in real time lags with its model
         paced = run.realtime or run.configuration.real_time_only
-        self._quiet, self._longest_quiet = 0.0, SILENCE + run.configuration.acquisition.block_duration if paced else inf
-        self._link, self._running = SessionClient(run, self._call), True
-        self._started, self._stopped_at = now(), None
+        self._longest_quiet = SILENCE + run.configuration.acquisition.block_duration if paced else inf
+        self.run, self._started = run, now() - elapsed
         self.began.emit(run)
         self.changed.emit()
 
@@ -180,12 +242,12 @@ class Controller(QObject):
 
     def ramp_out(self) -> None:
         """End the run gently."""
-        if self._link is not None:
+        if self._link is not None and self.controls:
             self._link.ask("stop")
 
     def answer(self, *, agreed: bool) -> None:
         """Answer the open question."""
-        if self._link is not None and self._question is not None:
+        if self._link is not None and self._question is not None and self.controls:
             self._link.answer(self._question.number, agreed=agreed)
             self._question = None
             self.asked.emit(None)
@@ -224,13 +286,15 @@ class Controller(QObject):
         if self._link is None:
             return
         messages = self._link.take()
-        # the number of columns must be known before traces are drawn
+        # the number of columns must be known before traces are drawn, and the run of an attached session before its rig
         for message in messages:
-            if isinstance(message, Opened):
+            if isinstance(message, Attached):
+                self._take(message)
+            elif isinstance(message, Opened):
                 self.opened.emit(message)
         if traces := [message for message in messages if isinstance(message, Traces)]:
             self.traced.emit(traces)
-        self._waiting.extend(message for message in messages if not isinstance(message, Traces))
+        self._waiting.extend(message for message in messages if not isinstance(message, Traces | Attached))
         if self._waiting:
             self._handle_waiting()
 
@@ -268,11 +332,17 @@ class Controller(QObject):
                 self.lost, self._quiet = (message.lost_events, message.lost_traces), message.quiet
             case Preparing():
                 self.scene.prepare(message.phase, message.done, message.total)
+            case Attached():
+                self._introduce(message.run, message.elapsed)
+            case Control():
+                self.controls = message.granted
+                self.asked.emit(self._question if message.granted else None)
             case Opened():
                 self.scene.expect(message.duration)
             case Question():
                 self._question = message
-                self.asked.emit(message)
+                if self.controls:
+                    self.asked.emit(message)
             case SafetyInputs():
                 self.inputs, self._inputs_heard = message.good, now()
             case Ended():

@@ -1,5 +1,6 @@
 """The header, always visible: state of the bench, safety inputs, times, step, and STOP."""
 
+from collections.abc import Callable
 from textwrap import shorten
 from typing import cast
 
@@ -148,14 +149,14 @@ def _corners(shape: Shape, box: QRectF) -> QPolygonF:
 class Header(QWidget):
     """Updated by the signals of the controller."""
 
-    def __init__(self, controller: Controller, theme: Theme) -> None:
+    def __init__(self, controller: Controller, theme: Theme, toggle: Callable[[], None] = lambda: None) -> None:
         super().__init__()
         self._controller = controller
         self.lamp = Lamp(theme)
         self.word, self.reason = _label("word"), _label("faint")
         self.word.setAccessibleName(texts.NAMES["state"])
         self.reason.setWordWrap(True)
-        self.inputs, self.step = _label(""), _label("")
+        self.inputs, self.step, self.owner = _label(""), _label(""), _label("")
         self.elapsed, self.remaining = _label("value"), _label("value")
         self.inputs.setToolTip(texts.INPUTS_TIP.format(stale=STALE))
         self.progress = QProgressBar(maximum=1000, textVisible=False)
@@ -167,6 +168,10 @@ class Header(QWidget):
         self.clear.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         give_key(self.clear, "Ctrl+Shift+K")
         self.clear.clicked.connect(controller.clear_stop)
+        self.attach = QPushButton()
+        self.attach.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        give_key(self.attach, "Ctrl+Shift+A")
+        self.attach.clicked.connect(toggle)
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setObjectName("header")
         words = QVBoxLayout()
@@ -182,13 +187,14 @@ class Header(QWidget):
         self.details = QWidget()
         details = QGridLayout(self.details)
         details.setContentsMargins(0, 0, 0, 0)
-        for row, (name, value) in enumerate(((texts.STEP, self.step), (texts.INPUTS, self.inputs))):
+        rows = ((texts.OWNER, self.owner), (texts.STEP, self.step), (texts.INPUTS, self.inputs))
+        for row, (name, value) in enumerate(rows):
             details.addWidget(_label("faint", name), row, 0)
             details.addWidget(value, row, 1)
-            value.setWordWrap(True)
+            value.setWordWrap(value is not self.owner)
             # a long text is elided and does not widen the label
             value.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
-        details.addWidget(self.progress, 2, 0, 1, 2)
+        details.addWidget(self.progress, len(rows), 0, 1, 2)
         details.setColumnStretch(1, 1)
         for part in (self.word, self.reason):
             # a long text is truncated, with the full text in the tooltip, so that it does not widen the header
@@ -200,6 +206,7 @@ class Header(QWidget):
         row.addLayout(words, 3)
         row.addWidget(self.times)
         row.addWidget(self.details, 4)
+        row.addWidget(self.attach)
         row.addWidget(self.clear)
         row.addWidget(self.stop)
         self.setFixedHeight(HEIGHT)
@@ -226,6 +233,9 @@ class Header(QWidget):
         set_level(self.word, shown.level)
         key_acts = application().applicationState() == Qt.ApplicationState.ApplicationActive
         said = ([texts.STOPPED + "."] if controller.latched else []) + [typeset(shown.reason)]
+        if controller.attached is not None and controller.running:
+            # whose run it is has priority over the rest of the reason
+            said.insert(0, controller.owner)
         if not key_acts:
             said.insert(0, texts.KEY_NEEDS_FOCUS)
         self.reason.setText(" ".join(said))
@@ -244,10 +254,20 @@ class Header(QWidget):
         self.clear.setEnabled(not controller.running)
         self.clear.setToolTip(texts.CLEAR_BUSY if controller.running else texts.CLEAR_TIP)
         self._show_inputs()
+        self._show_owner()
 
     def use_theme(self, theme: Theme) -> None:
         """Use the colours of another theme."""
         self.lamp.use_theme(theme)
+
+    def _show_owner(self) -> None:
+        controller = self._controller
+        self.owner.setText(controller.owner or "–")
+        self.owner.setToolTip(controller.owner)
+        attached = controller.attached is not None and controller.running
+        self.attach.setVisible(attached or (controller.elsewhere is not None and not controller.running))
+        self.attach.setText(texts.DETACH if attached else texts.ATTACH)
+        self.attach.setToolTip(texts.DETACH_TIP if attached else texts.ATTACH_TIP)
 
     def _show_inputs(self) -> None:
         """Show the safety inputs; values older than `STALE` are shown as unknown."""

@@ -92,8 +92,8 @@ class ProtocolPage(QWidget):
     @property
     def why_not(self) -> str:
         """Why a run cannot be started now; empty if it can."""
-        if self._controller.running:
-            return texts.START_BUSY
+        if busy := self._controller.why_busy:
+            return busy
         if self._controller.latched:
             return texts.LATCHED
         return self._controller.held or self.why_not_planned

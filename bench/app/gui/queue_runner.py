@@ -66,8 +66,8 @@ class QueueRunner(QObject):
         """Why the queue cannot be started now; empty when it can."""
         if self._controller.latched:
             return texts.LATCHED
-        if self._controller.running and self.queue.running is None:
-            return texts.START_BUSY
+        if self.queue.running is None and (busy := self._controller.why_busy):
+            return busy
         return "" if self.queue.next is not None else texts.QUEUE_EMPTY
 
     @property

@@ -157,6 +157,8 @@ class RunPage(QWidget):
 
     def _open(self, opened: Opened) -> None:
         self.traces.use_further(opened.further)
+        if self._controller.attached is not None:
+            self.gains.predict(opened.prediction)
 
     def _trace(self, traces: list[Traces]) -> None:
         self.traces.add(traces)
@@ -276,7 +278,7 @@ class RunPage(QWidget):
         self.lost.setVisible(bool(said))
         set_level(self.lost, "wait")
         self._show_twin()
-        self.ramp_out.setEnabled(self._controller.running)
+        self.ramp_out.setEnabled(self._controller.running and self._controller.controls)
 
     def _show_twin(self) -> None:
         # an estimate may arrive after the end of the run

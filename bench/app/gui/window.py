@@ -23,6 +23,7 @@ from PySide6.QtWidgets import (
 )
 
 from bench.app.gui import texts
+from bench.app.gui.attach import SessionWatch
 from bench.app.gui.controller import Controller
 from bench.app.gui.header import Header, StopFilter
 from bench.app.gui.palette import Theme, desktop_theme, dress
@@ -107,7 +108,9 @@ class Window(QMainWindow):
         self.resize(*FIRST)
         self._leaving = False
         self._goes_on = False
-        self.header, self.prompt, self.trouble = Header(controller, theme), Prompt(controller), TroublePanel(controller)
+        self.sessions = SessionWatch(controller, self)
+        self.header = Header(controller, theme, self.sessions.toggle)
+        self.prompt, self.trouble = Prompt(controller), TroublePanel(controller)
         self.runner = self._runner(configuration, queue)
         self.setup = SetupPage(controller, configuration, path, theme)
         self.protocol = ProtocolPage(controller, configuration, entries, tour)
@@ -161,8 +164,9 @@ class Window(QMainWindow):
         return super().eventFilter(watched, event)
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        """Ask before closing during a run; otherwise store the layout and disconnect from the session."""
-        if self._controller.running and not self._leaving:
+        """Ask before closing during a run that this window drives; otherwise store the layout and disconnect."""
+        drives = self._controller.running and self._controller.attached is None
+        if drives and not self._leaving:
             self.leave_panel.ask(goes_on=self._goes_on)
             event.ignore()
             return
@@ -202,6 +206,8 @@ class Window(QMainWindow):
 
     def _began(self, run: Run) -> None:
         self._goes_on = run.keep_going
+        if self._controller.attached is not None:
+            self.welcome.leave()
         if self.pages.currentWidget() is self.protocol and not self.runner.going:
             self.pages.setCurrentWidget(self.run)
 

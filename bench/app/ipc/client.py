@@ -9,7 +9,9 @@ import threading
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
+from multiprocessing import AuthenticationError
 from multiprocessing.connection import Client, Connection, Listener
+from pathlib import Path
 from queue import SimpleQueue
 from typing import Literal
 
@@ -28,6 +30,7 @@ from bench.app.ipc.messages import (
     Run,
     Traces,
 )
+from bench.app.ipc.sessions import RunningSession
 from bench.results import SUMMARY
 from drivers.clock import now
 
@@ -41,41 +44,20 @@ _GIVES_WAY = 0x4000 if sys.platform == "win32" else 0
 """BELOW_NORMAL_PRIORITY_CLASS (Windows), for plan checks; elsewhere the process lowers its own priority."""
 
 
-class SessionClient:
-    """A session process and the connection to it. All methods return at once, and may be called by any thread. The
-    client's main loop must call `alive` at least every `bench.app.ipc.messages.BEAT` seconds; otherwise the session
-    considers the client frozen. `heard` is called in a thread of the connection when messages have arrived.
+class ClientConnection:
+    """A client's connection to a session. All methods return at once, and may be called by any thread.
+
+    The client's main loop must call `alive` at least every `bench.app.ipc.messages.BEAT` seconds; otherwise the session
+    considers the client frozen. `heard` is called in a thread of the connection when messages have arrived. `out` is
+    the folder of a run, whose files tell how it ended if its last message was lost; None without one.
     """
 
-    def __init__(self, assignment: PlanCheck, heard: Callable[[], None] = lambda: None) -> None:
-        self._tell = heard
+    def __init__(self, out: Path | None, heard: Callable[[], None]) -> None:
+        self._out, self._tell = out, heard
         self._received: deque[FromSession] = deque(maxlen=KEPT)
         self._outgoing = SimpleQueue[FromClient | None]()
         self._heard = now()
         self._begun = self._over = False
-        self._errors = tempfile.TemporaryFile()  # noqa: SIM115 - closed with the process
-        self._checks_plan = not isinstance(assignment, Run)
-        # an existing summary belongs to another run
-        summary = assignment.out / SUMMARY
-        self._out = None if self._checks_plan or summary.exists() else assignment.out
-        key = secrets.token_bytes(32)
-        self._listener = Listener(authkey=key)
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "bench.app.ipc.process"],
-            stdin=subprocess.PIPE,
-            stdout=self._errors,
-            stderr=self._errors,
-            text=True,
-            creationflags=_OWN_GROUP | (_GIVES_WAY if self._checks_plan else 0),
-            start_new_session=sys.platform != "win32",
-        )
-        assert self.process.stdin is not None
-        with suppress(OSError), self.process.stdin as stdin:
-            stdin.write(json.dumps({"address": self._listener.address, "key": key.hex()}) + "\n")
-        self._address = self._listener.address
-        self._talking = threading.Thread(target=self._talk, args=(assignment,), name="link", daemon=True)
-        self._talking.start()
-        threading.Thread(target=self._wait, args=(key,), name="session's process", daemon=True).start()
 
     def alive(self) -> None:
         """Report that the client's main loop is running."""
@@ -101,39 +83,37 @@ class SessionClient:
 
     @property
     def status(self) -> Literal["starting", "linked", "no link", "over"]:
-        """State of the connection: "no link" when the process has died or is silent before its final message."""
+        """State of the connection: "no link" when the session has died or is silent before its final message."""
         if self._over:
             return "over"
-        if self.process.poll() is not None:
+        if not self._lives:
             return "no link"
         if not self._begun:
             return "starting"
         return "linked" if self.silence <= SILENCE else "no link"
 
-    def leave(self) -> None:
-        """Disconnect: a run ramps out, unless it is to continue without a client. A plan check is cancelled."""
-        self._outgoing.put(Leave())
-        if self._checks_plan:
-            self.process.kill()
+    @property
+    def _lives(self) -> bool:
+        """Whether the session can still send messages."""
+        raise NotImplementedError
 
-    def _talk(self, assignment: PlanCheck) -> None:
-        """Body of the receiving thread, which starts and ends the sending one."""
-        with suppress(OSError, EOFError):
-            with self._listener:
-                connection = self._listener.accept()
-            with connection:
-                connection.send(assignment)
-                sender = threading.Thread(target=self._send, args=(connection,), name="link, sending", daemon=True)
-                sender.start()
-                try:
-                    while True:
-                        message = connection.recv()
-                        self._heard, self._begun = now(), True
-                        self._keep(message)
-                        self._tell()
-                finally:
-                    self._outgoing.put(None)
-                    sender.join(SILENCE)
+    def leave(self) -> None:
+        """Disconnect."""
+        self._outgoing.put(Leave())
+
+    def _converse(self, connection: Connection) -> None:
+        """Receive messages until the connection ends; a thread sends meanwhile."""
+        sender = threading.Thread(target=self._send, args=(connection,), name="link, sending", daemon=True)
+        sender.start()
+        try:
+            while True:
+                message = connection.recv()
+                self._heard, self._begun = now(), True
+                self._keep(message)
+                self._tell()
+        finally:
+            self._outgoing.put(None)
+            sender.join(SILENCE)
 
     def _keep(self, message: FromSession) -> None:
         # traces are discarded first when the client does not read
@@ -147,24 +127,13 @@ class SessionClient:
             while (message := self._outgoing.get()) is not None:
                 connection.send(message)
 
-    def _wait(self, key: bytes) -> None:
-        """Report a process that ends without a final message, and wake the receiving thread if it never connected."""
-        code = self.process.wait()
-        with suppress(OSError, EOFError):
-            Client(self._address, authkey=key).close()
-        # its last messages may not have been received yet
-        self._talking.join(SILENCE)
-        if not self._over and code == 0 and (ended := self._by_the_files()) is not None:
-            self._keep(ended)
-            self._tell()
-        if not self._over:
-            self._errors.seek(0)
-            last_words = self._errors.read().decode(errors="replace").strip()
-            told = f": {last_words.splitlines()[-1]}" if last_words else ""
-            text = f"the session process ended without a message (exit code {code}){told}"
-            self._received.append(Refused(text, failed=True, details=last_words))
-            self._tell()
-        self._errors.close()
+    def _end_unheard(self, text: str, details: str, *, by_files: bool = True) -> None:
+        """Report a session that ended without a final message: by its files if it wrote them, else with `text`."""
+        if self._over:
+            return
+        ended = self._by_the_files() if by_files else None
+        self._keep(ended or Refused(text, failed=True, details=details))
+        self._tell()
 
     def _by_the_files(self) -> Ended | None:
         """The end of a run from its summary file, if there is one, when the final message was lost."""
@@ -175,3 +144,86 @@ class SessionClient:
             passed = content.get("passed", True) is not False
             return Ended(content["status"], content["reason"], content, "", self._out, passed)
         return None
+
+
+class SessionClient(ClientConnection):
+    """A session process and the connection to it: the owner of a run, or a plan check."""
+
+    def __init__(self, assignment: PlanCheck, heard: Callable[[], None] = lambda: None) -> None:
+        self._checks_plan = not isinstance(assignment, Run)
+        # an existing summary belongs to another run
+        summary = assignment.out / SUMMARY
+        super().__init__(None if self._checks_plan or summary.exists() else assignment.out, heard)
+        self._errors = tempfile.TemporaryFile()  # noqa: SIM115 - closed with the process
+        key = secrets.token_bytes(32)
+        self._listener = Listener(authkey=key)
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "bench.app.ipc.process"],
+            stdin=subprocess.PIPE,
+            stdout=self._errors,
+            stderr=self._errors,
+            text=True,
+            creationflags=_OWN_GROUP | (_GIVES_WAY if self._checks_plan else 0),
+            start_new_session=sys.platform != "win32",
+        )
+        assert self.process.stdin is not None
+        with suppress(OSError), self.process.stdin as stdin:
+            stdin.write(json.dumps({"address": self._listener.address, "key": key.hex()}) + "\n")
+        self._address = self._listener.address
+        self._talking = threading.Thread(target=self._talk, args=(assignment,), name="link", daemon=True)
+        self._talking.start()
+        threading.Thread(target=self._wait, args=(key,), name="session's process", daemon=True).start()
+
+    def leave(self) -> None:
+        """Disconnect: a run ramps out, unless it is to continue without a client. A plan check is cancelled."""
+        super().leave()
+        if self._checks_plan:
+            self.process.kill()
+
+    @property
+    def _lives(self) -> bool:
+        return self.process.poll() is None
+
+    def _talk(self, assignment: PlanCheck) -> None:
+        """Body of the receiving thread, which starts and ends the sending one."""
+        with suppress(OSError, EOFError):
+            with self._listener:
+                connection = self._listener.accept()
+            with connection:
+                connection.send(assignment)
+                self._converse(connection)
+
+    def _wait(self, key: bytes) -> None:
+        """Report a process that ends without a final message, and wake the receiving thread if it never connected."""
+        code = self.process.wait()
+        with suppress(OSError, EOFError):
+            Client(self._address, authkey=key).close()
+        # its last messages may not have been received yet
+        self._talking.join(SILENCE)
+        self._errors.seek(0)
+        last_words = self._errors.read().decode(errors="replace").strip()
+        told = f": {last_words.splitlines()[-1]}" if last_words else ""
+        text = f"the session process ended without a message (exit code {code}){told}"
+        self._end_unheard(text, last_words, by_files=code == 0)
+        self._errors.close()
+
+
+class AttachedClient(ClientConnection):
+    """A further client of a session that another client, or a terminal, has started."""
+
+    def __init__(self, session: RunningSession, heard: Callable[[], None] = lambda: None) -> None:
+        super().__init__(Path(session.out), heard)
+        self._talking = threading.Thread(target=self._talk, args=(session,), name="link", daemon=True)
+        self._talking.start()
+
+    @property
+    def _lives(self) -> bool:
+        return self._talking.is_alive()
+
+    def _talk(self, session: RunningSession) -> None:
+        with (
+            suppress(OSError, EOFError, AuthenticationError),
+            Client(session.address, authkey=bytes.fromhex(session.key)) as connection,
+        ):
+            self._converse(connection)
+        self._end_unheard("the session ended without a message", "")

@@ -1,6 +1,4 @@
-"""Messages between the session process and its client, pickled over a connection that only the client's child can
-open.
-"""
+"""Messages between a session and its clients, pickled over connections that only this user's processes can open."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -11,7 +9,7 @@ from numpy.typing import NDArray
 
 from bench.analysis.signals import ACCELERATION, DISPLACEMENT, DRIFT, SIGNALS, U1, Further
 from bench.config.model import BenchConfiguration
-from bench.datafile.tables import Table
+from bench.datafile.tables import Column, Table
 from bench.events import Acquired, Event, State
 from bench.preflight.margins import Margin
 from drivers.clock import now
@@ -91,10 +89,31 @@ class PlanChecked:
 
 
 @dataclass(frozen=True)
+class Attached:
+    """First message to a client that attaches to a session: its `run`, the operator's name (may be empty), the `owner`,
+    "window" or "terminal", and the time since the run was started [s].
+    """
+
+    run: Run
+    operator: str
+    owner: str
+    elapsed: float
+
+
+@dataclass(frozen=True)
+class Control:
+    """Whether an attached client may answer questions and ramp out, because the owner's window is lost. Any client may
+    stop the run.
+    """
+
+    granted: bool
+
+
+@dataclass(frozen=True)
 class Opened:
     """The rig is open: the names of its channels, its sample rate [1/s], and the description of its devices. `further`
     are the signals that follow those of `bench.app.ipc.messages.TRACES` in every block of traces. `duration` is the
-    expected length of the run [s], None if not predicted.
+    expected length of the run [s], None if not predicted; `prediction` and `margins` are those of the plan.
     """
 
     channels: tuple[str, ...]
@@ -102,6 +121,8 @@ class Opened:
     devices: Mapping[str, str]
     further: tuple[Further, ...] = ()
     duration: float | None = None
+    prediction: Table = field(default_factory=dict[str, Column])
+    margins: tuple[Margin, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -199,7 +220,20 @@ class Refused:
     details: str = ""
 
 
-FromSession = PlanChecked | Preparing | Opened | Published | Question | SafetyInputs | Traces | Beat | Ended | Refused
+FromSession = (
+    Attached
+    | Control
+    | PlanChecked
+    | Preparing
+    | Opened
+    | Published
+    | Question
+    | SafetyInputs
+    | Traces
+    | Beat
+    | Ended
+    | Refused
+)
 FromClient = Ask | Answer | Alive | Leave
 
 

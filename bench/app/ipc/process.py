@@ -12,16 +12,14 @@ from multiprocessing.connection import Client, Connection
 from types import FrameType
 
 from bench.app.catalogue import load_protocol
-from bench.app.ipc.messages import Ended, FromSession, PlanCheck, PlanChecked, Refused, Run
-from bench.app.ipc.server import Publisher, RemoteOperator, SessionServer
+from bench.app.ipc.announcement import announced
+from bench.app.ipc.messages import FromSession, PlanCheck, PlanChecked, Refused, Run
+from bench.app.ipc.server import FAREWELL, Publisher, RemoteOperator, SessionServer, ended_message
 from bench.app.preflight import compile_run, prepare
 from bench.app.session import run_session
 from bench.config.model import BenchConfiguration
 from bench.engine.interface import Requests, Unattended
 from sim.errors import CauseCode, InvalidInput, RockbenchError, cause_of
-
-FAREWELL = 2.0
-"""Longest wait at the end for a client that does not read its messages [s]."""
 
 
 def main() -> None:
@@ -43,7 +41,11 @@ def serve(connection: Connection) -> None:
 
     host = SessionServer(connection, requests, lost)
     try:
-        last = _run(assignment, host, requests) if isinstance(assignment, Run) else _check_plan(assignment)
+        if isinstance(assignment, Run):
+            with announced(host, assignment, "window"):
+                last = _run(assignment, host, requests)
+        else:
+            last = _check_plan(assignment)
     except KeyboardInterrupt:
         last = Refused(f"ended before anything moved: {requests.reason}", requests.cause)
     except InvalidInput as error:
@@ -89,13 +91,13 @@ def _run(asked: Run, host: SessionServer, requests: Requests) -> FromSession:
         out=asked.out,
         operator=RemoteOperator(host, requests) if asked.person else Unattended(_policy(configuration)),
         subscribers=[teller],
-        opened=lambda rig: teller.opened(rig, prepared.forecast.duration),
+        opened=lambda rig: teller.opened(rig, prepared),
         progress=teller.prepare,
         requests=requests,
         realtime=asked.realtime,
         about=asked.about,
     )
-    return Ended(ended.status, ended.reason, ended.summary, ended.table, asked.out, ended.passed, ended.cause)
+    return ended_message(ended, asked.out)
 
 
 def _policy(configuration: BenchConfiguration) -> str:

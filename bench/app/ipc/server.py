@@ -3,19 +3,24 @@
 import signal
 import threading
 from _thread import interrupt_main
-from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from multiprocessing.connection import Connection
+from pathlib import Path
 from queue import Empty, SimpleQueue
+from typing import Any
 
 from bench.analysis.signals import further_of
+from bench.app.ipc.broadcast import Broadcast, SendQueue
 from bench.app.ipc.messages import (
     BEAT,
     PATIENCE,
     Answer,
     Ask,
+    Attached,
     Beat,
+    Control,
     Ended,
     FromSession,
     Leave,
@@ -27,57 +32,17 @@ from bench.app.ipc.messages import (
     Reduction,
     Refused,
     SafetyInputs,
-    Traces,
 )
+from bench.app.session import SessionResult
 from bench.engine.interface import Requests
-from bench.events import Acquired, Event, State, StateChanged, TwinEstimate, Warned
+from bench.events import Acquired, Event, State, StateChanged, Warned
+from bench.preflight.margins import bounds, margins
+from bench.protocol import Prepared
 from drivers.clock import now
 from drivers.rig import Rig, RigError
 
-EVENTS, TRACES = 5000, 64
-"""Capacity for messages and for blocks of traces of 0.1 s each."""
-
-
-class SendQueue:
-    """Queue between the engine's thread, which never waits, and the sender's. When full, it discards the oldest traces
-    and twin estimates, and the newest of other events, and counts the losses. The data file is complete nevertheless.
-    """
-
-    def __init__(self, events: int = EVENTS, traces: int = TRACES) -> None:
-        self._events, self._traces = deque[FromSession](), deque[Traces]()
-        self._twin = deque[FromSession](maxlen=traces)
-        self._most_events, self._most_traces = events, traces
-        self._changed = threading.Condition()
-        self.lost_events = 0
-        self.lost_traces = 0
-
-    def put(self, message: FromSession, *, always: bool = False) -> None:
-        """Append a message; with `always` even if the queue is full."""
-        with self._changed:
-            if isinstance(message, Traces):
-                self._traces.append(message)
-                if len(self._traces) > self._most_traces:
-                    self._traces.popleft()
-                    self.lost_traces += 1
-            elif isinstance(message, Published) and isinstance(message.event, TwinEstimate):
-                self._twin.append(message)
-            elif always or len(self._events) < self._most_events:
-                self._events.append(message)
-            else:
-                self.lost_events += 1
-            self._changed.notify()
-
-    def take(self, timeout: float) -> list[FromSession]:
-        """All messages, events first; empty if none arrives within `timeout` seconds."""
-        with self._changed:
-            if not (self._events or self._twin or self._traces):
-                self._changed.wait(timeout)
-            taken = [*self._events, *self._twin, *self._traces]
-            self._events.clear()
-            self._twin.clear()
-            self._traces.clear()
-        return taken
-
+FAREWELL = 2.0
+"""Longest wait at the end for a client that does not read its messages [s]."""
 
 PERIOD = 0.5
 """Shortest interval between readings [s]; the guard reads the inputs in every block independently."""
@@ -86,7 +51,7 @@ PERIOD = 0.5
 class SafetyWatch:
     """Reads the rig's safety inputs for the display; to be called in the engine's thread only."""
 
-    def __init__(self, outbox: SendQueue) -> None:
+    def __init__(self, outbox: Broadcast) -> None:
         self._outbox = outbox
         self._rig: Rig | None = None
         self._looked = -PERIOD
@@ -120,21 +85,44 @@ _LOOK = 0.1
 
 
 class SessionServer:
-    """Serves the client by a sending and a receiving thread; the engine waits for neither. `lost(why)` is called in the
-    receiving thread when the client has disconnected or is silent, and again after each reconnection.
+    """Serves the clients of a session, each by a sending and a receiving thread; the engine waits for none of them.
+
+    The `owner` is the client that started the session, None for a session that a terminal drives. `lost(why)` is called
+    in a receiving thread when the owner has disconnected or is silent, and again after each reconnection. Clients that
+    `attach` may stop the run, and answer questions while the owner is lost. `pending` is called in a receiving thread:
+    whether the main thread polls no requests at present, so that it must be interrupted.
     """
 
-    def __init__(self, connection: Connection, requests: Requests, lost: Callable[[str], None]) -> None:
-        self._connection, self._requests, self._lost = connection, requests, lost
-        self.outbox = SendQueue()
+    def __init__(
+        self,
+        owner: Connection | None,
+        requests: Requests,
+        lost: Callable[[str], None],
+        pending: Callable[[], bool] = lambda: False,
+    ) -> None:
+        self._requests, self._lost, self._pending = requests, lost, pending
+        self.outbox = Broadcast()
         self.inputs = SafetyWatch(self.outbox)
         self.answers = SimpleQueue[Answer]()
         self.connected = True
-        self._sent = threading.Event()
+        """Whether the owner is present."""
+        self._attached: list[SendQueue] = []
+        self._sending: list[threading.Event] = []
         self._state, self._reason, self._time = State.IDLE, "", 0.0
         self._noted = now()
-        for work in (self._send, self._hear):
-            threading.Thread(target=work, name=work.__name__.strip("_"), daemon=True).start()
+        if owner is not None:
+            self._serve(owner, self.outbox.join(), lambda: self._hear(owner))
+
+    @property
+    def attended(self) -> bool:
+        """Whether a client may answer questions."""
+        return self.connected or bool(self._attached)
+
+    def attach(self, connection: Connection, introduction: Attached) -> None:
+        """Serve another client."""
+        queue = self.outbox.join(introduction, Control(not self.connected))
+        self._attached.append(queue)
+        self._serve(connection, queue, lambda: self._hear_attached(connection, queue))
 
     def note(self, event: Event) -> None:
         """Store the state for the next beat, which reports it even if events are lost."""
@@ -144,48 +132,75 @@ class SessionServer:
             self._state, self._reason = event.after, event.reason
 
     def close(self, last: FromSession, timeout: float) -> None:
-        """Send the queue and then `last`; gives up after `timeout` seconds."""
+        """Send the queues and then `last`; gives up after `timeout` seconds."""
         self.outbox.put(last, always=True)
-        self._sent.wait(timeout)
+        end = now() + timeout
+        for sent in tuple(self._sending):
+            sent.wait(max(end - now(), 0.0))
 
-    def _send(self) -> None:
+    def _serve(self, connection: Connection, queue: SendQueue, hear: Callable[[], None]) -> None:
+        sent = threading.Event()
+        self._sending.append(sent)
+        for name, work in (("send", lambda: self._send(connection, queue, sent)), ("hear", hear)):
+            threading.Thread(target=work, name=name, daemon=True).start()
+
+    def _send(self, connection: Connection, queue: SendQueue, sent: threading.Event) -> None:
         over, beaten = False, 0.0
         # the receiving thread detects a lost client too, and reports it
         with suppress(OSError):
             while not over:
-                for message in self.outbox.take(BEAT / 2):
-                    self._connection.send(message)
+                for message in queue.take(BEAT / 2):
+                    connection.send(message)
                     over = over or isinstance(message, PlanChecked | Ended | Refused)
                 if now() - beaten >= BEAT and not over:
                     beaten = now()
-                    self._connection.send(self._beat())
-        self._sent.set()
+                    connection.send(self._beat(queue))
+        self.outbox.leave(queue)
+        sent.set()
 
-    def _beat(self) -> FromSession:
-        outbox = self.outbox
+    def _beat(self, queue: SendQueue) -> FromSession:
         quiet = now() - self._noted
-        return Beat(self._state, self._reason, self._time, outbox.lost_events, outbox.lost_traces, quiet)
+        return Beat(self._state, self._reason, self._time, queue.lost_events, queue.lost_traces, quiet)
 
-    def _hear(self) -> None:
+    def _hear(self, owner: Connection) -> None:
         try:
             while True:
-                if self._connection.poll(PATIENCE):
-                    self.connected = True
-                    self._heed(self._connection.recv())
+                if owner.poll(PATIENCE):
+                    message = owner.recv()
+                    self._find(present=True)
+                    self._heed(message)
                 else:
                     self._lose(f"the client has been silent for {PATIENCE:g} s")
         except (EOFError, OSError):
             self._lose("the client has disconnected")
 
+    def _hear_attached(self, connection: Connection, queue: SendQueue) -> None:
+        with suppress(EOFError, OSError):
+            while not isinstance(message := connection.recv(), Leave):
+                # the run is the owner's while the owner is present; STOP is everybody's
+                if not self.connected or message in (Ask("abort"), Ask("halt")):
+                    self._heed(message)
+        self._attached.remove(queue)
+        self.outbox.leave(queue)
+        with suppress(OSError):
+            connection.close()
+
     def _lose(self, why: str) -> None:
-        self.connected = False
+        self._find(present=False)
         self._lost(why)
+
+    def _find(self, *, present: bool) -> None:
+        """Give the control of the run to the attached clients, or back to the owner."""
+        if present != self.connected:
+            self.connected = present
+            for queue in tuple(self._attached):
+                queue.put(Control(not present), always=True)
 
     def _heed(self, message: object) -> None:
         match message:
             case Ask("halt" | "abort" | "stop" as end):
                 {"halt": self._requests.halt, "abort": self._requests.abort, "stop": self._requests.stop}[end]()
-                if self._requests.rig_closed:
+                if self._requests.rig_closed or self._pending():
                     # planning does not poll requests: the handler of this signal interrupts it
                     interrupt_main(signal.SIGTERM)
             case Answer():
@@ -209,14 +224,17 @@ class RemoteOperator:
         """Wait for the answer to a question; a request to end or a lost client counts as no."""
         self._number += 1
         self._host.outbox.put(Question(self._number, request), always=True)
-        while self._requests.strongest is None and self._host.connected:
-            with suppress(Empty):
-                answer = self._host.answers.get(timeout=_LOOK)
-                if answer.number == self._number:
-                    return answer.agreed
-            # the engine's thread waits while a person works at the bench
-            self._host.inputs.look()
-        return False
+        try:
+            while self._requests.strongest is None and self._host.attended:
+                with suppress(Empty):
+                    answer = self._host.answers.get(timeout=_LOOK)
+                    if answer.number == self._number:
+                        return answer.agreed
+                # the engine's thread waits while a person works at the bench
+                self._host.inputs.look()
+            return False
+        finally:
+            self._host.outbox.answered()
 
 
 class Publisher:
@@ -233,18 +251,22 @@ class Publisher:
             self._phase, self._prepared = phase, now()
             self._host.outbox.put(Preparing(phase, done, total))
 
-    def opened(self, rig: Rig, duration: float | None) -> None:
-        """Start to send traces; the plan expects the run to take `duration` [s]."""
+    def opened(self, rig: Rig, prepared: Prepared[Any] | None = None) -> None:
+        """Start to send traces of the run that was `prepared`; None if its plan is not known."""
         self._reduction = Reduction(rig.sample_rate)
         names = tuple(channel.name for channel in rig.channels)
-        opened = Opened(names, rig.sample_rate, rig.description, further_of(rig.channels), duration)
+        opened = Opened(names, rig.sample_rate, rig.description, further_of(rig.channels))
+        if prepared is not None:
+            forecast = prepared.forecast
+            found = margins(forecast.demands, bounds(prepared.configuration))
+            opened = replace(opened, duration=forecast.duration, prediction=prepared.prediction, margins=found)
         self._host.outbox.put(opened, always=True)
         self._host.inputs.watch(rig)
 
     def __call__(self, event: Event) -> None:
         self._host.note(event)
         if isinstance(event, Acquired):
-            if self._reduction is not None:
+            if self._reduction is not None and self._host.outbox.heard:
                 self._trace(self._reduction, event)
             self._host.inputs.look_driven(event.time)
         else:
@@ -259,3 +281,8 @@ class Publisher:
             # an error of the display must not end a measurement
             self._reduction = None
             self._host.outbox.put(Published(Warned(f"traces are no longer shown: {error}", time=event.time)))
+
+
+def ended_message(result: SessionResult, out: Path) -> Ended:
+    """The last message of a run whose results are in the folder `out`."""
+    return Ended(result.status, result.reason, result.summary, result.table, out, result.passed, result.cause)

@@ -1,4 +1,4 @@
-"""A client that starts a run and looks after it: `python -m tests.bench.app.ipc.lone_client FOLDER [go on]`.
+"""A client that starts a run and looks after it: `python -m tests.bench.app.ipc.lone_client FOLDER [go on [CYCLES]]`.
 
 It prints the process of the session and every state of the bench; a test then kills or freezes it.
 """
@@ -12,9 +12,9 @@ from bench.events import StateChanged
 from tests.bench.app.ipc.experiment import begun
 
 
-def main(out: Path, *, keep_going: bool) -> None:
+def main(out: Path, *, keep_going: bool, cycles: int) -> None:
     """Start the run, and stay until it is over."""
-    link = begun(out, keep_going=keep_going, cycles=12 if keep_going else 400)
+    link = begun(out, keep_going=keep_going, cycles=cycles)
     print(link.process.pid, flush=True)
     while link.status not in ("over", "no link"):
         link.alive()
@@ -25,4 +25,5 @@ def main(out: Path, *, keep_going: bool) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), keep_going=len(sys.argv) > 2)
+    folder, *options = sys.argv[1:]
+    main(Path(folder), keep_going=bool(options), cycles=int(options[1]) if len(options) > 1 else 12 if options else 400)

@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 import pytest
 
+from bench.app.ipc.broadcast import SendQueue
 from bench.app.ipc.client import SessionClient
 from bench.app.ipc.messages import (
     Ask,
@@ -29,7 +30,7 @@ from bench.app.ipc.messages import (
     Traces,
     extremes,
 )
-from bench.app.ipc.server import SendQueue, SessionServer
+from bench.app.ipc.server import SessionServer
 from bench.app.session import run_session
 from bench.config.model import BenchConfiguration
 from bench.datafile.reader import open_datafile
@@ -221,11 +222,12 @@ def test_a_halt_is_heard_from_a_client_that_reads_nothing() -> None:
     here, there = Pipe()
     requests = Requests()
     host = SessionServer(there, requests, print)
+    unread = host.outbox.join()
     start = time.monotonic()
     for number in range(50_000):
         host.outbox.put(Published(StepStarted("x" * 100, time=float(number))))
     assert time.monotonic() - start < 5.0
-    assert host.outbox.lost_events > 0
+    assert unread.lost_events > 0
     here.send(Ask("halt"))
     end = time.monotonic() + 1.0
     while requests.strongest is None and time.monotonic() < end:
@@ -274,7 +276,7 @@ def test_a_link_that_is_over_leaves_no_thread_and_no_handle(tmp_path: Path) -> N
 
 def test_a_run_whose_last_word_was_lost_is_told_by_its_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As for a client that stood still at the end of a run that goes on without it."""
-    keep, lost = SessionClient._keep, list[FromSession]()
+    keep, lost = SessionClient._keep, list[FromSession]()  # pyright: ignore[reportPrivateUsage]
 
     def forgetful(self: SessionClient, message: FromSession) -> None:
         if isinstance(message, Ended) and not lost:

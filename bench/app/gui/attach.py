@@ -1,0 +1,45 @@
+"""Runs of other windows and of terminals on this machine: they are watched for, and attached to."""
+
+from PySide6.QtCore import QObject, QTimer
+
+from bench.app.gui.controller import Controller
+from bench.app.ipc.sessions import running_sessions
+
+PERIOD = 1000
+"""Interval between two looks for sessions [ms]."""
+
+
+class SessionWatch(QObject):
+    """Looks for sessions while the window has no run; at the first look it attaches to one that is under way."""
+
+    def __init__(self, controller: Controller, parent: QObject) -> None:
+        super().__init__(parent)
+        self._controller = controller
+        self._timer = QTimer(self, interval=PERIOD)
+        self._timer.timeout.connect(self.look)
+        self._timer.start()
+        # the window must exist before it shows a run
+        QTimer.singleShot(0, self, self._attach_at_once)
+
+    def look(self) -> None:
+        """Update the session that is under way elsewhere."""
+        controller = self._controller
+        if controller.running:
+            return
+        found = next(iter(running_sessions()), None)
+        if found != controller.elsewhere:
+            controller.elsewhere = found
+            controller.changed.emit()
+
+    def toggle(self) -> None:
+        """Attach to the session elsewhere, or detach from the present one."""
+        if self._controller.attached is not None and self._controller.running:
+            self._controller.detach()
+            self.look()
+        elif self._controller.elsewhere is not None:
+            self._controller.attach(self._controller.elsewhere)
+
+    def _attach_at_once(self) -> None:
+        self.look()
+        if self._controller.elsewhere is not None and not self._controller.running:
+            self.toggle()

@@ -1,0 +1,122 @@
+"""Queues between the engine's thread and the clients of a session: one for each client, who may join at any time."""
+
+import threading
+from collections import deque
+from collections.abc import Hashable
+
+from bench.app.ipc.messages import FromSession, Opened, Preparing, Published, Question, SafetyInputs, Traces
+from bench.events import Estimate, Event, LiveValue, PointFinished, RunningGain, StepStarted, TwinEstimate
+
+EVENTS, TRACES = 5000, 64
+"""Capacity for messages and for blocks of traces of 0.1 s each."""
+
+
+class SendQueue:
+    """Queue between the engine's thread, which never waits, and the sender's. When full, it discards the oldest traces
+    and twin estimates, and the newest of other events, and counts the losses. The data file is complete nevertheless.
+    """
+
+    def __init__(self, events: int = EVENTS, traces: int = TRACES) -> None:
+        self._events, self._traces = deque[FromSession](), deque[Traces]()
+        self._twin = deque[FromSession](maxlen=traces)
+        self._most_events, self._most_traces = events, traces
+        self._changed = threading.Condition()
+        self.lost_events = 0
+        self.lost_traces = 0
+
+    def put(self, message: FromSession, *, always: bool = False) -> None:
+        """Append a message; with `always` even if the queue is full."""
+        with self._changed:
+            if isinstance(message, Traces):
+                self._traces.append(message)
+                if len(self._traces) > self._most_traces:
+                    self._traces.popleft()
+                    self.lost_traces += 1
+            elif isinstance(message, Published) and isinstance(message.event, TwinEstimate):
+                self._twin.append(message)
+            elif always or len(self._events) < self._most_events:
+                self._events.append(message)
+            else:
+                self.lost_events += 1
+            self._changed.notify()
+
+    def take(self, timeout: float) -> list[FromSession]:
+        """All messages, events first; empty if none arrives within `timeout` seconds."""
+        with self._changed:
+            if not (self._events or self._twin or self._traces):
+                self._changed.wait(timeout)
+            taken = [*self._events, *self._twin, *self._traces]
+            self._events.clear()
+            self._twin.clear()
+            self._traces.clear()
+        return taken
+
+
+RUNNING = (Estimate, RunningGain)
+"""Events on the current point or step, which its end supersedes."""
+
+
+class Broadcast:
+    """The messages of a session for all of its clients. A client that joins late first receives those that describe the
+    run so far: the rig, the events of the journal, up to `EVENTS` of them, and the last of each kind of running value.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._queues: list[SendQueue] = []
+        self._opened: Opened | None = None
+        self._journal = deque[FromSession](maxlen=EVENTS)
+        self._last: dict[Hashable, FromSession] = {}
+
+    @property
+    def heard(self) -> bool:
+        """Whether there is a client."""
+        return bool(self._queues)
+
+    def put(self, message: FromSession, *, always: bool = False) -> None:
+        """Append a message to the queue of every client; with `always` even to a full one."""
+        with self._lock:
+            self._store(message)
+            for queue in self._queues:
+                queue.put(message, always=always)
+
+    def join(self, *first: FromSession) -> SendQueue:
+        """Queue of a new client, which begins with the messages `first` and the run so far."""
+        queue = SendQueue()
+        with self._lock:
+            opened = () if self._opened is None else (self._opened,)
+            for message in (*first, *opened, *self._journal, *self._last.values()):
+                queue.put(message, always=True)
+            self._queues.append(queue)
+        return queue
+
+    def leave(self, queue: SendQueue) -> None:
+        """Drop the queue of a client that has left."""
+        with self._lock:
+            self._queues = [each for each in self._queues if each is not queue]
+
+    def answered(self) -> None:
+        """The open question is answered: clients that join later do not receive it."""
+        with self._lock:
+            self._last.pop(Question, None)
+
+    def _store(self, message: FromSession) -> None:
+        match message:
+            case Opened():
+                self._opened = message
+                self._last.pop(Preparing, None)
+            case Published(event) if type(event).journalled:
+                self._journal.append(message)
+                if isinstance(event, StepStarted | PointFinished):
+                    for kind in RUNNING:
+                        self._last.pop(kind, None)
+            case Published(event) if not isinstance(event, TwinEstimate):
+                self._last[_key(event)] = message
+            case Preparing() | SafetyInputs() | Question():
+                self._last[type(message)] = message
+            case _:
+                pass
+
+
+def _key(event: Event) -> Hashable:
+    return (LiveValue, event.label) if isinstance(event, LiveValue) else type(event)

@@ -1,0 +1,91 @@
+"""Sessions under way on this machine: each announces itself in a folder of this user, for windows that attach to it.
+
+An announcement is a file that only this user can read, with the address and key of the session. It is locked for as
+long as the session lives: one without a lock is that of a process that ended abruptly, and is removed.
+"""
+
+import json
+import os
+import stat
+import sys
+import tempfile
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from filelock import FileLock, Timeout
+
+FOLDER = "ROCKBENCH_SESSIONS"
+"""Environment variable with the folder of the announcements; "off" for none."""
+
+
+@dataclass(frozen=True)
+class RunningSession:
+    """A session to which a client can attach: process, address and key of its listener, and its run. `real` is a bench
+    with hardware; `began` is in seconds since 1970.
+    """
+
+    process: int
+    address: str
+    key: str
+    protocol: str
+    operator: str
+    owner: str
+    out: str
+    real: bool
+    began: float
+
+    @property
+    def title(self) -> str:
+        """The run in a few words: protocol, operator, and folder."""
+        by = f" by {self.operator}" if self.operator else ""
+        return f"{self.protocol}{by}, {self.out}"
+
+
+def sessions_folder() -> Path | None:
+    """Folder of the announcements, created if missing; None if switched off, or if others could write to it."""
+    given = os.environ.get(FOLDER)
+    if given == "off":
+        return None
+    user = os.getuid() if sys.platform != "win32" else os.environ.get("USERNAME", "")
+    folder = Path(given or Path(tempfile.gettempdir(), f"rockbench-{user}"))
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        found = folder.lstat()
+    except OSError:
+        return None
+    # on Windows, the folder for temporary files is the user's own
+    private = sys.platform == "win32" or (found.st_uid == os.getuid() and not found.st_mode & 0o077)
+    return folder if stat.S_ISDIR(found.st_mode) and private else None
+
+
+def running_sessions() -> list[RunningSession]:
+    """Sessions under way, the newest first, those of real benches before all others."""
+    folder, found = sessions_folder(), list[RunningSession]()
+    for path in () if folder is None else folder.glob("*.json"):
+        lock = lock_of(path)
+        try:
+            lock.acquire()
+        except Timeout:
+            with suppress(OSError, ValueError, TypeError):
+                found.append(RunningSession(**json.loads(path.read_text(encoding="utf-8"))))
+        except OSError:
+            continue
+        else:
+            remove(path, lock)
+    return sorted(found, key=lambda each: (each.real, each.began), reverse=True)
+
+
+def lock_of(path: Path) -> FileLock:
+    """Lock of an announcement, on a file of its own: on Windows a locked file cannot be read."""
+    return FileLock(path.with_suffix(".lock"), blocking=False, thread_local=False, fallback_to_soft=False)
+
+
+def remove(path: Path, lock: FileLock) -> None:
+    """Remove an announcement and its lock."""
+    with suppress(OSError):
+        path.unlink(missing_ok=True)
+    if lock.is_locked:
+        lock.release()
+    with suppress(OSError):
+        path.with_suffix(".lock").unlink(missing_ok=True)

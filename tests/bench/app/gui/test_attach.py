@@ -1,0 +1,109 @@
+"""A window beside a run of another window or of a terminal: it shows whose it is, and can stop it."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Generator
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QApplication
+from pytestqt.qtbot import QtBot
+
+from bench.app.gui.controller import Controller
+from bench.app.gui.palette import LIGHT, dress
+from bench.app.gui.window import Window
+from bench.app.ipc.sessions import running_sessions
+from bench.datafile.reader import open_datafile
+from tests.bench.app.ipc.experiment import SHAKING, bench
+
+ROOT = Path(__file__).parents[4]
+LONG = 60_000
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="kills a process the POSIX way")
+
+
+@pytest.fixture
+def session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Generator[subprocess.Popen[str]]:
+    """A window's process that is killed while its run, which goes on without it, drives the table."""
+    monkeypatch.setenv("ROCKBENCH_SESSIONS", str(tmp_path / "sessions"))
+    command = [sys.executable, "-m", "tests.bench.app.ipc.lone_client", str(tmp_path / "run"), "go on", "400"]
+    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as client:
+        assert client.stdout is not None
+        while client.stdout.readline().strip() != "running":
+            assert client.poll() is None
+        yield client
+        client.kill()
+
+
+def opened(qtbot: QtBot, qapp: QApplication) -> Window:
+    dress(qapp, LIGHT)
+    window = Window(Controller(), bench(), (SHAKING,), LIGHT)
+    qtbot.addWidget(window)
+    window.show()
+    return window
+
+
+def test_a_window_after_a_killed_one_has_state_log_and_stop(
+    session: subprocess.Popen[str], qtbot: QtBot, qapp: QApplication, tmp_path: Path
+) -> None:
+    session.send_signal(signal.SIGKILL)
+    session.wait()
+    window = opened(qtbot, qapp)
+    began = time.monotonic()
+    controller = window.header._controller  # pyright: ignore[reportPrivateUsage]
+    qtbot.waitUntil(lambda: window.header.word.text() == "RUNNING", timeout=LONG)
+    qtbot.waitUntil(lambda: "shaking" in window.run.log.toPlainText(), timeout=LONG)
+    qtbot.waitUntil(lambda: len(window.run.traces.ring) > 0, timeout=LONG)
+    print(f"attached after {time.monotonic() - began:.2f} s")
+    assert str(tmp_path / "run") in window.header.reason.text()
+    assert "another window's run" in window.header.reason.text().lower()
+    assert not window.protocol.start.isEnabled()
+    assert window.protocol.why_not == "a run is under way"
+    qtbot.waitUntil(lambda: controller.controls, timeout=LONG)
+    qtbot.mousePress(window.header.stop, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(lambda: not controller.running, timeout=LONG)
+    window.close()
+    with open_datafile(tmp_path / "run" / "campaign.h5") as record:
+        assert (record.status, record.summary) == ("aborted", "abort requested")
+    assert running_sessions() == []
+
+
+@pytest.mark.usefixtures("session")
+def test_a_second_window_only_watches_and_stops(qtbot: QtBot, qapp: QApplication, tmp_path: Path) -> None:
+    window = opened(qtbot, qapp)
+    controller = window.header._controller  # pyright: ignore[reportPrivateUsage]
+    qtbot.waitUntil(lambda: window.header.word.text() == "RUNNING", timeout=LONG)
+    assert not controller.controls
+    assert not window.run.ramp_out.isEnabled()
+    controller.ramp_out()
+    # the run goes on while the window leaves, offers it, and attaches again
+    window.header.attach.click()
+    assert window.header.word.text() == "RUN ELSEWHERE"
+    assert not controller.running
+    window.header.attach.click()
+    qtbot.waitUntil(lambda: window.header.word.text() == "RUNNING", timeout=LONG)
+    controller.press_stop()
+    qtbot.waitUntil(lambda: not controller.running, timeout=LONG)
+    window.close()
+    with open_datafile(tmp_path / "run" / "campaign.h5") as record:
+        assert record.status == "aborted"
+
+
+def test_the_announcement_of_a_killed_session_is_removed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROCKBENCH_SESSIONS", str(tmp_path))
+    (tmp_path / "1-abcd.json").write_text("{}")
+    assert running_sessions() == []
+    assert list(tmp_path.glob("*.json")) == []
+
+
+def test_a_folder_that_others_can_enter_is_not_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROCKBENCH_SESSIONS", str(tmp_path / "open"))
+    (tmp_path / "open").mkdir(mode=0o777)
+    (tmp_path / "open").chmod(0o777)
+    (tmp_path / "open" / "1-abcd.json").write_text("{}")
+    assert running_sessions() == []
+    assert (tmp_path / "open" / "1-abcd.json").exists()
