@@ -43,11 +43,13 @@ NEWTON, CORRECTIONS = 20, 12
 @dataclass(frozen=True, eq=False)
 class TableOrbit:
     """Steady rocking on the table. `start`, shape (8,), is the state [x, v, u1, u2, v1, v2, theta, omega] at the start
-    of the period, `drive`, shape (H,), the complex harmonics of the amplifier's command [V or A], and `multipliers`,
-    complex, shape (8,), the Floquet multipliers of table and specimen together.
+    of the period, where the base's sine has the `phase` [rad]; `drive`, shape (H,), are the complex harmonics of the
+    amplifier's command [V or A], and `multipliers`, complex, shape (8,), the Floquet multipliers of table and specimen
+    together.
     """
 
     omega: float
+    phase: float
     start: Array
     drive: NDArray[np.complex128]
     multipliers: NDArray[np.complex128]
@@ -70,7 +72,7 @@ def table_orbit(fixed: Orbit, shaker: Shaker, harmonics: int = 5) -> TableOrbit:
     The harmonics 1 to `harmonics` of the drive give the table's acceleration the fundamental of `fixed` and no others.
     Raises NoOrbit when Newton's method does not find it, or the block comes to rest or falls.
     """
-    period = _Period(fixed.specimen, shaker, fixed.omega)
+    period = TablePeriod(fixed.specimen, shaker, fixed.omega)
     phase, start = _widest(fixed)
     orders: Array = np.arange(1.0, harmonics + 1.0)
     wanted = np.zeros(harmonics, dtype=np.complex128)
@@ -83,13 +85,14 @@ def table_orbit(fixed: Orbit, shaker: Shaker, harmonics: int = 5) -> TableOrbit:
         start = period.closed(start, drive)
         _, samples = period.run(start, drive)
         found = 2.0 * np.fft.rfft(samples[:, -1])[1 : harmonics + 1] / TICKS
-        # the samples are means over a tick
-        found *= np.exp(1j * np.pi * orders / TICKS)
+        # the samples are means over a tick: their phase is that of its middle
+        found *= np.exp(-1j * np.pi * orders / TICKS)
         error = wanted - found
         if float(np.abs(error).max()) <= PURE * fixed.amplitude:
             jacobian = period.jacobian(start, drive)
             drift = float(np.abs(samples[:, 3] - samples[:, 2]).max())
-            return TableOrbit(fixed.omega, start, drive, np.linalg.eigvals(jacobian).astype(np.complex128), drift)
+            multipliers = np.linalg.eigvals(jacobian).astype(np.complex128)
+            return TableOrbit(fixed.omega, phase, start, drive, multipliers, drift)
         drive = drive + error * response
     raise NoOrbit(f"no drive makes the table's motion a sine at omega = {fixed.omega:g} rad/s with the block rocking")
 
@@ -108,7 +111,7 @@ def _widest(fixed: Orbit) -> tuple[float, Array]:
     return phase, np.concatenate(([displacement, velocity], motion.samples[at]))
 
 
-class _Period:
+class TablePeriod:
     """One period of table and specimen under a periodic drive."""
 
     def __init__(self, specimen: Specimen, shaker: Shaker, omega: float) -> None:
@@ -119,14 +122,20 @@ class _Period:
         self._omega, self._tick = omega, tau / omega / TICKS
         self._step: Array | None = None
 
-    def run(self, start: Array, drive: NDArray[np.complex128]) -> tuple[Array, Array]:
-        """State after one period, and the samples, shape (TICKS, 9), with the mean acceleration after each of them."""
+    def run(self, start: Array, drive: NDArray[np.complex128], change: Array | None = None) -> tuple[Array, Array]:
+        """State after one period, and the samples, shape (TICKS, 9), with the mean acceleration after each of them.
+
+        `change`, shape (TICKS,), is added to the commands of the period. Raises NoOrbit if the block does not rock on
+        the corner of the start at its end.
+        """
         from sim.kernel.plant import ROCK_A, ROCK_B
 
         # each command is held for a tick: its phase is that of the middle of the tick
         phase = (np.arange(TICKS) + 0.5) * (tau / TICKS)
         orders = np.arange(1, drive.size + 1)
         requests = np.ascontiguousarray((np.exp(1j * np.outer(phase, orders)) @ drive).real)
+        if change is not None:
+            requests += change
         y, carried, samples = start.copy(), np.array([requests[-1], 0.0]), np.empty((TICKS, 9))
         mode = ROCK_A if y[6] > 0.0 else ROCK_B
         after = self._stream(self._plant, self._tick, SUBSTEPS, requests, np.zeros(TICKS), mode, y, carried, samples)
@@ -143,7 +152,7 @@ class _Period:
         y, before = start, np.inf
         for _ in range(NEWTON):
             mismatch = self.run(y, drive)[0] - y
-            size = float(np.abs(mismatch / self._scales(y)).max())
+            size = float(np.abs(mismatch / self.scales(y)).max())
             if size <= CLOSED:
                 return y
             if self._step is None or size > QUICK * before:
@@ -154,12 +163,12 @@ class _Period:
     def jacobian(self, start: Array, drive: NDArray[np.complex128]) -> Array:
         """Derivatives of the state after a period by that before it, by central differences."""
         columns = list[Array]()
-        for step in np.diag(STEP * self._scales(start)):
+        for step in np.diag(STEP * self.scales(start)):
             ahead, behind = self.run(start + step, drive)[0], self.run(start - step, drive)[0]
             columns.append((ahead - behind) / (2.0 * step.max()))
         return np.stack(columns, axis=1)
 
-    def _scales(self, y: Array) -> Array:
+    def scales(self, y: Array) -> Array:
         """Size of each state: a displacement and an angle of the widest state, times omega for a rate."""
         lengths, angle = float(np.abs(y[[0, 2, 3]]).max()), abs(float(y[6]))
         rates = np.array([1.0, self._omega, 1.0, 1.0, self._omega, self._omega, 1.0, self._omega])

@@ -207,6 +207,15 @@ class CycleAnalyser:
         """Cycles so far, including those without a fit."""
         return self._count
 
+    @property
+    def first(self) -> int:
+        """Index of the first sample of the first cycle."""
+        return self._first
+
+    def start_of(self, cycle: int) -> int:
+        """Index of the first sample of a cycle."""
+        return self._first + ceil(cycle * tau / self._step)
+
     def push(self, values: NDArray[np.float64]) -> list[Cycle]:
         """Process the next samples, shape (n, m); returns the cycles that they complete."""
         self._pending.append(values)
@@ -228,4 +237,4 @@ class CycleAnalyser:
         return cycles
 
     def _end(self) -> int:
-        return self._first + ceil((self._count + 1) * tau / self._step)
+        return self.start_of(self._count + 1)

@@ -84,9 +84,20 @@ class ShareRamp:
     def __init__(self) -> None:
         self._from = self._to = _pure()
         self._length, self._done = 1, 1
+        self._waiting: deque[tuple[int, tuple[complex, ...], int]] = deque()
+        self._played = 0
 
-    def to(self, shares: tuple[complex, ...], samples: int) -> None:
-        """Reach `shares` after `samples` more samples; other harmonics go to zero."""
+    def to(self, shares: tuple[complex, ...], samples: int, wait: int = 0) -> None:
+        """Reach `shares` within `samples` samples, from `wait` samples on; other harmonics go to zero.
+
+        A change that is due later than this one is cancelled.
+        """
+        due = self._played + wait
+        while self._waiting and self._waiting[-1][0] >= due:
+            self._waiting.pop()
+        if wait > 0:
+            self._waiting.append((due, shares, samples))
+            return
         target = np.zeros(HARMONICS, dtype=np.complex128)
         target[: len(shares)] = shares
         self._from, self._to = self._at(np.array([self._done]))[0], target
@@ -94,11 +105,28 @@ class ShareRamp:
 
     def to_pure(self, samples: int) -> None:
         """Reach a pure sine after `samples` more samples."""
-        if not np.array_equal(self._to, _pure()):
+        if self._waiting or not np.array_equal(self._to, _pure()):
             self.to((1.0,), samples)
 
     def next(self, n: int) -> NDArray[np.complex128]:
         """Shares at the next `n` samples, shape (n, HARMONICS), or (1, HARMONICS) while constant."""
+        if not self._waiting or self._waiting[0][0] >= self._played + n:
+            return self._follow(n)
+        pieces = list[NDArray[np.complex128]]()
+        while n > 0:
+            here = min(n, self._waiting[0][0] - self._played) if self._waiting else n
+            if here > 0:
+                pieces.append(np.broadcast_to(self._follow(here), (here, HARMONICS)))
+                n -= here
+            if self._waiting and self._waiting[0][0] == self._played:
+                _, shares, samples = self._waiting.popleft()
+                waiting, self._waiting = self._waiting, deque()
+                self.to(shares, samples)
+                self._waiting = waiting
+        return np.concatenate(pieces)
+
+    def _follow(self, n: int) -> NDArray[np.complex128]:
+        self._played += n
         if self._done >= self._length:
             return self._to[None, :]
         found = self._at(self._done + np.arange(1, n + 1))
@@ -151,9 +179,16 @@ class Oscillator:
         self._shares.to_pure(self._cycle)
         self._sweeps.append(sweep)
 
-    def trim(self, shares: tuple[complex, ...]) -> None:
-        """Change to `shares` of fundamental, second harmonic and so on, over one cycle of the present frequency."""
-        self._shares.to(shares, self._cycle)
+    def trim(self, shares: tuple[complex, ...], blend: float = 1.0, wait: int = 0) -> None:
+        """Change to `shares` of fundamental, second harmonic and so on, over `blend` cycles of the present frequency,
+        from `wait` samples on.
+        """
+        self._shares.to(shares, round(blend * self._cycle), wait)
+
+    @property
+    def phase(self) -> float:
+        """Phase of a held sine at the last sample [rad]."""
+        return self._phase
 
     @property
     def remaining(self) -> int:

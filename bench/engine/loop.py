@@ -1,5 +1,6 @@
 """Acquisition loop and the steps that run in it."""
 
+from math import ceil, tau
 from typing import Never
 
 import numpy as np
@@ -205,22 +206,36 @@ class SineDrive:
         """Hold the sine and measure its cycles."""
         output = self._loop.output
         output.source.require_silence("a dwell")
-        if self._cycles is None:
-            self._cycles = CycleAnalyser(output.source.oscillator.omega, self._rate, output.read)
+        if self._cycles is None or step.phase is not None:
+            first = output.read if step.phase is None else self._sample_at(step.phase)
+            self._cycles = CycleAnalyser(output.source.oscillator.omega, self._rate, first)
         done: list[Cycle] = []
         end = self._cycles.completed + step.cycles
         while self._cycles.completed < end:
+            first = output.read
             signals, fell = self._loop.signals()
             if fell:
                 return Fallen()
             values = np.empty((len(signals), len(SIGNALS) + 1), order="F")
             values[:, :-1], values[:, -1] = signals, output.drive
-            done += self._cycles.push(values)
+            done += self._cycles.push(values[max(self._cycles.first - first, 0) :])
         return Measured(tuple(done))
 
     def set_harmonics(self, step: SetHarmonics) -> None:
         """Change the harmonics of the sine."""
-        self._loop.output.source.oscillator.trim(step.shares)
+        output, wait = self._loop.output, 0
+        if step.cycle is not None and self._cycles is not None:
+            wait = max(self._cycles.start_of(step.cycle) - output.begins, 0)
+        output.source.oscillator.trim(step.shares, step.blend, wait)
+
+    def _sample_at(self, phase: float) -> int:
+        """Index of the first sample to be read at which the held sine has `phase` [rad]."""
+        output = self._loop.output
+        oscillator = output.source.oscillator
+        # the oscillator is at the last of the samples queued in the rig
+        queued = output.begins - 1 - output.read
+        step = oscillator.omega / self._rate
+        return output.read + ceil((phase - oscillator.phase + step * queued) % tau / step)
 
 
 Array = NDArray[np.float64]

@@ -70,18 +70,28 @@ class Sweep:
 
 @dataclass(frozen=True)
 class Dwell:
-    """Hold amplitude and frequency for `cycles` full cycles. Returns `Measured`, or `Fallen`."""
+    """Hold amplitude and frequency for `cycles` full cycles. Returns `Measured`, or `Fallen`.
+
+    The count of cycles continues that of the previous dwell, unless `phase` [rad] is given: then it restarts, and each
+    cycle begins at this phase of the oscillator.
+    """
 
     cycles: int
+    phase: float | None = None
 
 
 @dataclass(frozen=True)
 class SetHarmonics:
-    """Blend to `shares` over one cycle: complex shares of the set amplitude for the fundamental, second harmonic
-    and so on, as in `bench.control.oscillator`. A `Sweep` resets them.
+    """Blend to `shares`: complex shares of the set amplitude for the fundamental, second harmonic and so on, as in
+    `bench.control.oscillator`. A `Sweep` resets them.
+
+    The change lasts `blend` cycles. It begins with `cycle` of the present count, or at once if that is None or has
+    begun.
     """
 
     shares: tuple[complex, ...]
+    cycle: int | None = None
+    blend: float = 1.0
 
 
 Watch = Callable[[NDArray[np.float64]], Event | None]

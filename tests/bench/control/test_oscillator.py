@@ -161,3 +161,32 @@ def test_a_held_sine_looks_its_response_up_once() -> None:
     for _ in range(50):
         oscillator.next(200)
     assert len(looked_up) == 1
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.lists(st.integers(1, 900), min_size=1, max_size=8))
+def test_a_change_begins_at_its_sample_in_blocks_of_any_size(sizes: list[int]) -> None:
+    def changed() -> Oscillator:
+        oscillator = _oscillator()
+        oscillator.next(6000)
+        oscillator.trim((1.2,), blend=0.5, wait=700)
+        return oscillator
+
+    oscillator, held = changed(), _oscillator()
+    held.next(6000)
+    pieces = np.concatenate([oscillator.next(size) for size in (*sizes, 2000)])
+    np.testing.assert_allclose(pieces, changed().next(pieces.size), rtol=0, atol=1e-12)
+    unchanged = held.next(pieces.size)
+    np.testing.assert_allclose(pieces[:700], unchanged[:700], rtol=0, atol=1e-12)
+    half = round(np.pi / 16.0 * RATE)
+    np.testing.assert_allclose(pieces[700 + half + 1 :], 1.2 * unchanged[700 + half + 1 :], rtol=0, atol=1e-12)
+
+
+def test_a_later_command_replaces_changes_that_have_not_begun() -> None:
+    oscillator, plain = _oscillator(), _oscillator()
+    oscillator.next(6000)
+    plain.next(6000)
+    oscillator.trim((1.1,), wait=300)
+    oscillator.trim((1.4,), wait=900)
+    oscillator.trim((1.0,), wait=0)
+    np.testing.assert_array_equal(oscillator.next(2000), plain.next(2000))

@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Callable, Generator
+from math import tau
 
 import numpy as np
 import pytest
@@ -89,6 +90,31 @@ def test_dwells_follow_each_other_without_a_gap() -> None:
     indices = [cycle.index for outcome in outcomes if isinstance(outcome, Measured) for cycle in outcome.cycles]
     assert indices == list(range(len(indices)))
     assert np.abs(outcomes[-2].cycles[-1].fundamental[0]) == pytest.approx(1.1, rel=1e-3)  # type: ignore[union-attr]
+
+
+def test_cycles_begin_at_the_phase_asked_for_and_a_change_with_its_cycle() -> None:
+    bench, outcomes = Bench(), list[Outcome]()
+    phase = 2.0
+    changes = (SetHarmonics((1.2,), cycle=4, blend=0.1), Dwell(8))
+    bench.run(_plan(*RUN[:5], Dwell(2, phase), *changes, RampOut(), outcomes=outcomes))
+    first, second = (each for each in outcomes[-4:] if isinstance(each, Measured))
+    assert [cycle.index for cycle in (*first.cycles, *second.cycles)] == list(range(10))
+    sizes = [abs(cycle.fundamental[6]) for cycle in (*first.cycles, *second.cycles)]
+    assert sizes[:4] == pytest.approx([sizes[0]] * 4, rel=1e-9)
+    assert sizes[5:] == pytest.approx([1.2 * sizes[0]] * 5, rel=1e-9)
+    # the change lasts a tenth of cycle 4
+    assert 1.1 < sizes[4] / sizes[0] < 1.2
+    drive = np.concatenate([event.drive for event in bench.events if isinstance(event, Acquired)])
+    step = OMEGA / bench.rig.sample_rate
+    end = drive.size // 2
+    held = slice(end - 300, end)
+    basis = np.exp(1j * step * np.arange(drive.size))
+    sine, cosine = np.linalg.lstsq(np.stack((basis.imag[held], basis.real[held]), axis=1), drive[held], rcond=None)[0]
+    expected = sine * basis.imag + cosine * basis.real
+    departed = held.start + int(np.argmax(np.abs(drive - expected)[held.start :] > 1e-9))
+    reached = (step * (departed - 1) + np.arctan2(cosine, sine) - phase) % tau
+    # the first changed sample follows the one at which the cycle begins, and differs little from the sine
+    assert min(reached, tau - reached) < 3.0 * step
 
 
 def test_blocks_are_contiguous_within_a_run_and_counted_anew_in_the_next() -> None:

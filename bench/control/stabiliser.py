@@ -1,0 +1,187 @@
+"""Stabiliser of an unstable periodic motion: corrections of the drive's fundamental, once per cycle.
+
+The state of the cycle map (`sim.cycle_map`) is estimated by a Kalman filter and fed back by a linear-quadratic
+regulator. The filter does not know the orbit: the Fourier coefficients y* of the periodic motion are a random walk that
+it estimates as well, with steps large compared with the noise. So it reacts to differences between cycles only: any
+motion that repeats is taken for the orbit and receives no control, whatever the error of the model.
+
+A correction computed from cycle n takes effect at the beginning of cycle n + 2; cycle n + 1 is under way by then.
+"""
+
+from collections import deque
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.analysis.cycles import Cycle
+from bench.analysis.signals import DRIFT, U1
+from sim.cycle_map import CycleMap, coefficients
+
+Array = NDArray[np.float64]
+
+DELAY = 2
+"""Number of cycles from a measured cycle to the one in which its correction begins."""
+
+BLEND = 0.5
+"""Part of a cycle in which a correction blends in. A whole cycle weakens it by a third, as successive corrections have
+nearly opposite signs.
+"""
+
+COST = 100.0
+"""Cost of control, squared shares, against squared deviations of y relative to y*: cheap control saturates on every
+deviation and captures less often, dear control takes longer.
+"""
+
+READING, DISTURBANCE, WANDER = 3e-6, 1e-3, 1e-2
+"""Standard deviations assumed by the filter: of a measured coefficient [m], of the disturbance of a state in a cycle
+relative to its size, and of the change of y* in a cycle relative to its size.
+"""
+
+
+def observed(cycle: Cycle, turn: complex) -> Array:
+    """The vector y of a measured cycle; `turn` is that of `bench.control.sine.Sine.turn`."""
+    by = turn ** np.arange(1, cycle.harmonics(U1).size + 1)
+    return coefficients(cycle.harmonics(U1) / by, cycle.harmonics(DRIFT) / by)
+
+
+class Stabiliser:
+    """Determines the control of each cycle, a complex share of magnitude `authority` at most."""
+
+    def __init__(self, cycle_map: CycleMap, authority: float) -> None:
+        self._map, self._authority = cycle_map, authority
+        self._regulator = _regulator(cycle_map)
+        self._filter = _filter(cycle_map)
+        n, m = cycle_map.transition.shape[0], cycle_map.orbit.size
+        self._state, self._orbit = np.zeros(n), np.zeros(m)
+        self._begun = False
+        # controls of the cycle before the one that is measured next, of that one, and of the following one
+        self._before, self._now, self._next = np.zeros(2), np.zeros(2), np.zeros(2)
+
+    @property
+    def deviation(self) -> float:
+        """Estimated deviation of y from the orbit's, relative to its size, at the beginning of the next cycle."""
+        return float(np.linalg.norm(self._map.outputs @ self._state) / np.linalg.norm(self._map.orbit))
+
+    def next(self, y: Array | None) -> complex:
+        """Control of the cycle after next, from the coefficients of the cycle just measured; None if it was lost."""
+        a, (b1, b0), c, (d1, d0) = (
+            self._map.transition,
+            self._map.inputs,
+            self._map.outputs,
+            self._map.feedthrough,
+        )
+        if y is not None and not self._begun:
+            self._orbit, self._begun = y - d1 @ self._before - d0 @ self._now, True
+        moved = a @ self._state + b1 @ self._before + b0 @ self._now
+        if y is not None:
+            surprise = y - (self._orbit + c @ self._state + d1 @ self._before + d0 @ self._now)
+            correction = self._filter @ surprise
+            moved += correction[: moved.size]
+            self._orbit = self._orbit + correction[moved.size :]
+        self._state = moved
+        ahead = a @ moved + b1 @ self._now + b0 @ self._next
+        control = -self._regulator @ np.concatenate((ahead, self._next))
+        control *= min(1.0, self._authority / max(float(np.hypot(*control)), 1e-12))
+        self._before, self._now, self._next = self._now, self._next, control
+        return complex(control[0], control[1])
+
+
+def _regulator(found: CycleMap) -> Array:
+    """Feedback of deviation and last control, shape (2, n + 2), that minimises deviation and control."""
+    from scipy.linalg import solve_discrete_are
+
+    (b1, b0), n = found.inputs, found.transition.shape[0]
+    a = np.zeros((n + 2, n + 2))
+    a[:n, :n], a[:n, n:] = found.transition, b1
+    b = np.concatenate((b0, np.eye(2)))
+    weight = 1e-9 * np.eye(n + 2)
+    weight[:n, :n] += found.outputs.T @ found.outputs / float(found.orbit @ found.orbit)
+    cost = COST * np.eye(2)
+    value = np.asarray(solve_discrete_are(a, b, weight, cost), dtype=np.float64)
+    return np.asarray(np.linalg.solve(cost + b.T @ value @ b, b.T @ value @ a), dtype=np.float64)
+
+
+def _filter(found: CycleMap) -> Array:
+    """Steady gain of the Kalman predictor of deviation and y*, shape (n + m, m)."""
+    from scipy.linalg import block_diag, solve_discrete_are
+
+    n, m = found.transition.shape[0], found.orbit.size
+    a = np.asarray(block_diag(found.transition, np.eye(m)), dtype=np.float64)
+    c = np.hstack((found.outputs, np.eye(m)))
+    wander = WANDER * float(np.linalg.norm(found.orbit))
+    disturbance = np.diag(np.concatenate((np.full(n, DISTURBANCE**2), np.full(m, wander**2))))
+    reading = READING**2 * np.eye(m)
+    covariance = np.asarray(solve_discrete_are(a.T, c.T, disturbance, reading), dtype=np.float64)
+    return a @ covariance @ c.T @ np.linalg.inv(c @ covariance @ c.T + reading)
+
+
+QUIET, CAPTURED = 0.01, 24
+"""Largest control of a captured motion, as a share, and number of successive cycles with no more."""
+
+LOST, ROUGH = 6, 0.5
+"""Number of cycles in which a captured motion is lost: each has at least this part of the authority as control."""
+
+MISSING = 3
+"""Number of successive cycles without a measurement after which the hold ends."""
+
+ANSWER = 0.15
+"""Largest difference of the table's fundamental from that expected of the drive, as a share: that of a phase off by 9
+degrees, or of a gain off by 15 %.
+"""
+
+GROWTH = 1.1
+"""Largest peak of a cycle, relative to the largest of the free motion or of the limit's warning level."""
+
+
+@dataclass
+class HoldMonitor:
+    """Test for capture, and reasons to release the hold.
+
+    `patience` is the number of cycles within which the motion must be captured, `largest` [m] the largest peak drift
+    allowed, and `answer` the table's fundamental per share of the drive before the hold.
+    """
+
+    authority: float
+    patience: int
+    largest: float
+    answer: complex
+    captured_after: int | None = None
+    cycles: int = 0
+    _missing: int = 0
+    _controls: deque[float] = field(default_factory=lambda: deque[float](maxlen=CAPTURED))
+
+    def missed(self) -> str | None:
+        """Count a cycle without a measurement. Returns the reason to release, if there is one."""
+        self.cycles += 1
+        self._missing += 1
+        if self._missing >= MISSING:
+            return f"{MISSING} successive cycles could not be measured: a sensor has lost its target"
+        return self._late()
+
+    def push(self, control: complex, drift: float, played: complex, achieved: complex) -> str | None:
+        """Count a cycle with its `control`, peak `drift` [m], and shares of drive and table. Returns as `missed`."""
+        self.cycles += 1
+        self._missing = 0
+        self._controls.append(abs(control))
+        if drift > self.largest:
+            return f"the drift reached {1e3 * drift:.3g} mm, {1e3 * self.largest:.3g} mm are allowed"
+        expected = self.answer * played
+        if abs(achieved - expected) > ANSWER:
+            ratio = achieved / expected
+            return (
+                f"the table's response changed by a factor of {abs(ratio):.2f} and "
+                f"{abs(np.degrees(np.angle(ratio))):.0f} degrees"
+            )
+        controls = list(self._controls)
+        if self.captured_after is None:
+            if len(controls) == CAPTURED and max(controls) <= QUIET:
+                self.captured_after = self.cycles - CAPTURED
+        elif min(controls[-LOST:]) > ROUGH * self.authority:
+            return "the deviation grew again after the capture"
+        return self._late()
+
+    def _late(self) -> str | None:
+        if self.captured_after is None and self.cycles >= self.patience:
+            return f"the motion was not captured within {self.patience} cycles"
+        return None

@@ -1,0 +1,114 @@
+"""Linear map from cycle to cycle near a steady rocking motion, with the fundamental of the drive as its input.
+
+Cycle n lasts from one section to the next. It begins with the deviation x_n of the state from the orbit, shape (8,). In
+its first part the control blends from c_(n-1) to c_n, each a complex share of the table's acceleration, as a vector of
+real and imaginary part. With y_n, the Fourier coefficients of u1 and drift over the cycle,
+
+    x_(n+1) = M x_n + B1 c_(n-1) + B0 c_n
+    y_n     = y* + C x_n + D1 c_(n-1) + D0 c_n.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.shaker import Shaker
+from sim.steady import Orbit
+from sim.table_orbit import TICKS, TablePeriod, table_orbit
+
+Array = NDArray[np.float64]
+
+OBSERVED = 3
+"""Number of harmonics of u1 and of the drift in y."""
+
+STEP = 1e-4
+"""Step of the differences: states relative to their size, control as a share."""
+
+RIGID = Shaker(moving_mass=1e8, friction=0.0, voltage_limit=1e12, current_limit=1e12)
+"""A table that the block does not move."""
+
+TABLE = 2
+"""Number of states of the table, the first ones. A rigid table has none: its free motion would hardly decay."""
+
+
+@dataclass(frozen=True, eq=False)
+class CycleMap:
+    """The map at `omega` [rad/s]; cycles begin at `phase` [rad] of the base's sine.
+
+    States are relative to their size on the orbit. Shapes: `transition` M (n, n), `inputs` B1, B0 (n, 2), `outputs`
+    C (12, n), `feedthrough` D1, D0 (12, 2), `orbit` y* (12,) [m]; n is 8, or 6 on a rigid table. `blend` is the part
+    of a cycle in which the control changes. The coefficients are ordered as by `coefficients`.
+    """
+
+    omega: float
+    phase: float
+    blend: float
+    transition: Array
+    inputs: tuple[Array, Array]
+    outputs: Array
+    feedthrough: tuple[Array, Array]
+    orbit: Array
+
+    @property
+    def slowest(self) -> complex:
+        """Multiplier of greatest modulus; of a conjugate pair the one in the upper half plane."""
+        multipliers = np.linalg.eigvals(self.transition)
+        found = complex(multipliers[int(np.argmax(np.abs(multipliers)))])
+        return complex(found.real, abs(found.imag))
+
+
+def coefficients(u1: NDArray[np.complex128], drift: NDArray[np.complex128]) -> Array:
+    """The vector y, shape (12,), from complex harmonics, shape (OBSERVED,) at least, of u1 and drift [m].
+
+    A signal is the imaginary part of the sum of z_k exp(i k phi), with phi the phase of the base's sine.
+    """
+    both = np.concatenate((u1[:OBSERVED], drift[:OBSERVED]))
+    return np.concatenate((both.real, both.imag))
+
+
+def cycle_map(fixed: Orbit, shaker: Shaker | None, harmonics: int, blend: float = 0.5) -> CycleMap:
+    """The map near the orbit `fixed` on the table of `shaker`, which is controlled up to `harmonics`.
+
+    None is a rigid table. The control changes along a smoothstep in the first part `blend` of a cycle. Raises NoOrbit
+    as `sim.table_orbit.table_orbit` does.
+    """
+    table = RIGID if shaker is None else shaker
+    orbit = table_orbit(fixed, table, harmonics)
+    period = TablePeriod(fixed.specimen, table, fixed.omega)
+    middle = (np.arange(TICKS) + 0.5) / TICKS
+    done = np.minimum(middle / blend, 1.0)
+    done *= done * (3.0 - 2.0 * done)
+    volts = table.gain * fixed.amplitude / complex(table.frequency_response(fixed.omega, fixed.specimen.mass))
+    # a share c gives the table the acceleration Im(A c exp(i phi))
+    carrier = -1j * volts * np.exp(1j * (orbit.phase + 2.0 * np.pi * middle))
+    orders = np.arange(1, OBSERVED + 1)
+    angles = np.arange(TICKS) * (2.0 * np.pi / TICKS)
+    fourier = 2j / TICKS * np.exp(-1j * np.outer(orders, orbit.phase + angles))
+    sizes = period.scales(orbit.start)
+
+    def response(state: Array, before: complex, now: complex) -> Array:
+        """State after the cycle in units of its size, and coefficients."""
+        change = ((before + (now - before) * done) * carrier).real
+        after, samples = period.run(orbit.start + state * sizes, orbit.drive, change)
+        u1, drift = samples[:, 2], samples[:, 3] - samples[:, 2]
+        return np.concatenate((after / sizes, coefficients(fourier @ u1, fourier @ drift)))
+
+    def slope(state: Array, before: complex, now: complex) -> Array:
+        return (response(state, before, now) - response(-state, -before, -now)) / (2.0 * STEP)
+
+    rest, n = np.zeros(sizes.size), sizes.size
+    states = np.stack([slope(STEP * unit, 0.0, 0.0) for unit in np.eye(n)], axis=1)
+    before = np.stack([slope(rest, STEP * unit, 0.0) for unit in (1.0, 1j)], axis=1)
+    now = np.stack([slope(rest, 0.0, STEP * unit) for unit in (1.0, 1j)], axis=1)
+    first = TABLE if shaker is None else 0
+    return CycleMap(
+        omega=fixed.omega,
+        phase=orbit.phase,
+        blend=blend,
+        transition=states[first:n, first:],
+        inputs=(before[first:n], now[first:n]),
+        outputs=states[n:, first:],
+        feedthrough=(before[n:], now[n:]),
+        orbit=response(rest, 0.0, 0.0)[n:],
+    )
