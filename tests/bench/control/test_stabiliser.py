@@ -34,7 +34,7 @@ def test_a_specimen_off_by_four_per_cent_is_captured_from_its_free_motion_and_he
     plant = RockingTable(drawn(point[1], seed), point[0], found.phase)
     for _ in range(120):
         plant.cycle(0.0, 0.0)
-    held = plant.hold(Stabiliser(found, AUTHORITY), 160, NOISE)
+    held = plant.hold(Stabiliser(found, AUTHORITY), 220, NOISE)
     assert not held.fell
     assert held.deviations[-40:].max() < 0.005
     assert np.sqrt(np.mean(held.controls[-40:] ** 2)) < 2e-4
