@@ -19,7 +19,7 @@ def read_bounded(path: Path) -> bytes:
 
 
 def require_shallow(data: object) -> None:
-    """Raise ValueError for data from TOML or JSON nested deeper than DEEPEST."""
+    """Raise ValueError if data from TOML or JSON are nested deeper than DEEPEST."""
     level: list[Any] = [data]
     for _ in range(DEEPEST):
         level = [

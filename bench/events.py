@@ -46,7 +46,7 @@ class Event:
     journalled: ClassVar[bool] = True
     """Whether the event is in the journal; frequent events are not."""
     notice: ClassVar[str] = ""
-    """Its label in the log of terminal and window; empty for events that are not logged."""
+    """Label in the log of terminal and window; empty for events that are not logged."""
     grave: ClassVar[bool] = False
     """Whether the event needs the operator's attention."""
 
@@ -54,7 +54,7 @@ class Event:
 
     @property
     def line(self) -> str:
-        """One line for the journal."""
+        """Line for the journal."""
         names = (each.name for each in fields(self) if each.name != "time")
         return ", ".join(f"{name} = {getattr(self, name)}" for name in names)
 
@@ -68,8 +68,8 @@ def event(
 ) -> Callable[[type[E]], type[E]]:
     """Class decorator that declares a frozen event; see the class variables of `Event`.
 
-    The columns of its `table` are the fields declared by `column`. A field of shape (n,), or a tuple of dataclasses
-    with their own columns, gives n rows for one event; such rows have no time column.
+    The columns of its `table` are the fields declared by `column`. A field of shape (n,), or a tuple of n dataclasses
+    with their own columns, gives n rows per event; such rows have no time column.
     """
 
     def declare(kind: type[E]) -> type[E]:
@@ -84,10 +84,10 @@ class StateChanged(Event):
     """Transition of the bench from one state to another, with its reason and `code` and `subject` of the cause."""
 
     before: State = column("", "state before the transition")
-    after: State = column("", "state after it")
+    after: State = column("", "state after the transition")
     reason: str = column("", "reason, as in the journal")
     code: str = column("", "code of the cause of an ending; empty for an ordinary transition", default="")
-    subject: str = column("", "subject of the cause: kind of request, quantity of a limit, open inputs", default="")
+    subject: str = column("", "subject of the cause: kind of request, limited quantity or open inputs", default="")
 
     @property
     def line(self) -> str:
@@ -96,7 +96,7 @@ class StateChanged(Event):
 
 @event(journalled=False)
 class Acquired(Event):
-    """Block of samples as read, and the drive [V], shape (n,), played during its acquisition.
+    """A block of samples as read, and the drive [V], shape (n,), played during its acquisition.
 
     `run` counts the armings of the rig; the block's `first` sample index is relative to the start of the run.
     `signals`, shape (n, n_signals), are in SI units, tared for the run, in the order of `bench.analysis.signals`.
@@ -110,11 +110,13 @@ class Acquired(Event):
 
 @event(table="operator_actions")
 class SpecimenMounted(Event):
-    """The operator has completed `work`, with its `amount` if it has one; `specimen` is now on the table."""
+    """The operator has completed `work`, with its `amount` if any; `specimen` is now on the table."""
 
     specimen: Specimen
     work: OperatorTask = column("", "action of the operator")
-    amount: float | None = column("of the action", "amount of the action; absent if it has none", default=None)
+    amount: float | None = column(
+        "of the action", "amount involved in the action; absent if there is none", default=None
+    )
 
     @property
     def line(self) -> str:
@@ -137,7 +139,7 @@ class SensorsAligned(Event):
 
 @event(notice="step")
 class StepStarted(Event):
-    """A step of the plan began; `text` describes it."""
+    """A step of the plan, described by `text`, has begun."""
 
     text: str
 
@@ -148,7 +150,7 @@ class StepStarted(Event):
 
 @event(journalled=False)
 class Progress(Event):
-    """Completed share of the campaign, 0 to 1, present step, and estimated remaining bench time [s]."""
+    """Completed fraction of the campaign, 0 to 1, present step, and estimated remaining bench time [s]."""
 
     fraction: float
     remaining: float
@@ -170,7 +172,7 @@ class LiveValue(Event):
 class Estimate(Event):
     """Running gain coefficient of the point under test; NaN while unknown.
 
-    `predicted` is for the branch of steady motion intended by the start of the point.
+    `predicted` is for the branch of steady motion that the point's start-up aims at.
     """
 
     omega: float = column("rad/s", "circular frequency of the base motion")
@@ -184,7 +186,7 @@ class Estimate(Event):
 
 @event(table="running_gains", journalled=False)
 class RunningGain(Event):
-    """Gain under a record up to `seconds` into it: ratio of the peak drifts so far, measured and predicted.
+    """Gain under a record during its first `seconds`: ratio of the peak drifts so far, measured and predicted.
 
     Peaks are the largest magnitudes of the drift since the start of the record, for coupled and bare frame alike. NaN
     while unknown; `beta` is None for the bare frame.
@@ -205,7 +207,7 @@ TWIN_TRACE = ("seconds", "u1", "u2", "theta", "drift_low", "drift_high")
 @event(table="twin", journalled=False, eq=False)
 class TwinEstimate(Event):
     """State of the live model and of the specimen at the last sample for which both are known, `seconds` into `run`.
-    `time` is when its block had been read.
+    `time` is the instant at which its block had been read.
 
     `_low` and `_high` are the ends of the model's band, `_measured` the values of the lasers. `alpha_2` is available
     once the protocol has published a gain. `residual` is the root mean square of measured minus modelled drift over the
@@ -218,8 +220,8 @@ class TwinEstimate(Event):
     time: float = column("s", "bench time at which the block had been read", default=nan, kw_only=True)
     run: int = column("1", "number of armings of the rig")
     seconds: float = column("s", "time in the run to which the values apply")
-    members: int = column("1", "models in the ensemble of the band, besides the nominal one")
-    standing: float = column("1", "share of these models whose block stands")
+    members: int = column("1", "number of models in the ensemble of the band, excluding the nominal one")
+    standing: float = column("1", "share of these models whose block is standing")
     u1: float = column("m", "u1 of the model")
     u1_low: float = column("m", "u1, lower end of the model's band")
     u1_high: float = column("m", "u1, upper end of the model's band")
@@ -248,20 +250,20 @@ class TwinEstimate(Event):
 
 @event(table="passes", notice="pass")
 class PassFinished(Event):
-    """A pass of a replication has ended: pass `number` of the iteration that makes the table follow `motion`.
+    """Pass `number` of a replication, the iteration that makes the table follow `motion`, has ended.
 
     `error`, `repeatable`, `peak_error` and `spectrum_error` are relative, see `bench.control.passes.Pass`; `text`
     summarises the pass.
     """
 
     time: float = column("s", "bench time at the end of the pass", default=nan, kw_only=True)
-    motion: str = column("", "commanded motion of the table")
+    motion: str = column("", "motion commanded to the table")
     number: int = column("1", "number of the pass, from 1 for each replication")
     error: float = column("1", "measured rms error relative to the rms of the target")
-    repeatable: float = column("1", "error without its non-repeatable part")
+    repeatable: float = column("1", "error excluding its non-repeatable part")
     peak_error: float = column("1", "largest error relative to the peak of the target")
     spectrum_error: float = column("1", "largest relative deviation of the response spectrum")
-    accepted: bool = column("1", "whether the error was the smallest so far; otherwise the previous drive is restored")
+    accepted: bool = column("1", "whether the error is the smallest so far; otherwise the previous drive is restored")
     text: str
 
     @property
@@ -281,7 +283,7 @@ class TableIdentified(Event):
     imaginary: Array = column("m/s2/V", "table acceleration per drive, imaginary part")
     uncertainty: Array = column("m/s2/V", "standard uncertainty of the response, from noise and distortion")
     distortion: Array = column("m/s2/V", "standard deviation of one realisation due to nonlinear distortion alone")
-    coherence: Array = column("1", "share of the acceleration's power that is coherent with the drive")
+    coherence: Array = column("1", "fraction of the acceleration's power that is coherent with the drive")
     noise: Array = column("m/s2/Hz^0.5", "spectral density of the noise in the acceleration")
 
     @property
@@ -291,7 +293,7 @@ class TableIdentified(Event):
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """Values along the axis of a fit, shape (n,), their unit in SI symbols ("1" for a number), and description."""
+    """Values along the axis of a fit, shape (n,), with unit in SI symbols ("1" for a pure number) and description."""
 
     values: Array
     unit: str
@@ -300,7 +302,7 @@ class Series:
 
 @dataclass(frozen=True)
 class FittedParameter:
-    """Fitted value of a parameter of a model; the standard uncertainty has the same unit, NaN if unknown."""
+    """Fitted value of a model parameter; the standard uncertainty has the same unit and is NaN if unknown."""
 
     value: float
     uncertainty: float
@@ -309,7 +311,7 @@ class FittedParameter:
 
 @event(notice="fit", eq=False)
 class FitFinished(Event):
-    """A model was fitted to a stretch of a recording; `name` is short and unique within a session, `text` one line.
+    """A model was fitted to a section of a recording; `name` is short and unique within a session, `text` one line.
 
     `columns` by name, all of equal length: first the axis (such as time), then measured values and, for comparison,
     fitted values, residuals and so on. Raises ValueError unless all names are valid in a data file. Stored by
@@ -324,7 +326,9 @@ class FitFinished(Event):
     def __post_init__(self) -> None:
         shapes = {series.values.shape for series in self.columns.values()}
         if len(shapes) != 1 or len(*shapes) != 1:
-            raise ValueError(f"columns of the fit {self.name} have shapes {shapes}; they must be equal, (n,)")
+            raise ValueError(
+                f"columns of the fit {self.name} have shapes {shapes}; they must all have the same shape (n,)"
+            )
         for name in (self.name, *self.columns):
             if not name.strip(".") or "/" in name:
                 raise ValueError(f"{name!r} in the fit {self.name} is not a valid name in a data file")
@@ -336,7 +340,7 @@ class FitFinished(Event):
 
 @event()
 class SpecimenIdentified(Event):
-    """Present knowledge of the specimen: findings of this and earlier runs; stored by `bench.datafile.declared`."""
+    """The specimen as identified so far: findings of this and earlier runs; stored by `bench.datafile.declared`."""
 
     identified: Identified
 
@@ -350,7 +354,7 @@ class SpecimenIdentified(Event):
 
 @event(notice="point")
 class PointFinished(Event):
-    """A point of the campaign is finished: its result is an instance of `point_type`, a row of `points`."""
+    """A point of the campaign is finished; its result, an instance of `point_type`, is a row of `points`."""
 
     point: Parameters
 
@@ -376,7 +380,7 @@ class LimitExceeded(Event):
     limit: float = column("of the row", "largest value allowed")
     unit: str = column("", "SI unit of the row")
     timing: bool = column(
-        "1", "whether the limit concerns the arrival of blocks, which is not in the samples", default=False
+        "1", "whether the limit concerns the arrival times of blocks, which the samples do not contain", default=False
     )
 
     @property
@@ -386,7 +390,7 @@ class LimitExceeded(Event):
 
 @event(table="operator_requests", notice="asked")
 class OperatorAsked(Event):
-    """The plan waits for the operator: requested action with its reason, and its kind, if known."""
+    """The plan waits for the operator: the requested action with its reason, and its kind, if known."""
 
     request: str
     work: OperatorTask | None = column("", "kind of the requested action; empty if unknown", default=None)

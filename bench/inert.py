@@ -3,19 +3,19 @@
 import re
 
 _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
-"""Control characters other than tab and line feed, changes of the writing direction, and halves of characters."""
+"""Control characters other than tab and line feed, marks that change the writing direction, and unpaired surrogates."""
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 """Characters with which a spreadsheet begins a formula."""
 
 
 def shown(text: str) -> str:
-    """The text for a terminal: control characters, which could move the cursor or run a command, as escapes."""
+    """The text for a terminal, with control characters, which could move the cursor or run a command, as escapes."""
     return _CONTROL.sub(lambda found: f"\\x{ord(found[0]):02x}", text)
 
 
 def csv_cell(text: str) -> str:
-    """The text for a cell of a table: an apostrophe before what a spreadsheet would compute, unless it is a number.
-    Carriage returns, which would end the row, are line feeds.
+    """The text for a table cell. Prefixes an apostrophe to anything but a number that a spreadsheet would compute, and
+    replaces carriage returns, which would end the row, by line feeds.
     """
     formula, text = text.startswith(_FORMULA), text.replace("\r\n", "\n").replace("\r", "\n")
     if not formula:

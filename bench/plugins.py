@@ -22,24 +22,24 @@ R = TypeVar("R")
 
 
 class PluginFailed(RockbenchError):
-    """The code of a plug-in raised an exception that is no error of this program; `name` is the plug-in."""
+    """The code of the plug-in `name` raised an exception other than this program's errors."""
 
     error_code = "plug_in"
 
     def __init__(self, name: str, what: str) -> None:
-        super().__init__(f"{name} failed: {what}; mend or remove it")
+        super().__init__(f"{name} failed: {what}; repair or remove it")
         self.name = name
 
     @property
     def cause(self) -> Cause:
-        """The code, and the name of the plug-in."""
+        """The error code, with the name of the plug-in as subject."""
         return Cause(self.error_code, self.name)
 
 
 @contextmanager
 def plugin_code(name: str, *, files: bool = False) -> Generator[None]:
-    """Within, an exception of the code of the plug-in `name` becomes PluginFailed, with the line that raised it; where
-    it writes `files`, an error of the operating system stays one.
+    """Context manager that converts exceptions in the code of the plug-in `name` to PluginFailed, with the line that
+    raised them; while the plug-in writes `files`, errors of the operating system are passed on.
     """
     try:
         yield
@@ -55,7 +55,7 @@ def plugin_code(name: str, *, files: bool = False) -> Generator[None]:
 
 
 def plugin_generator(name: str, code: Generator[Y, S, R]) -> Generator[Y, S, R]:
-    """A generator of the plug-in `name`, with its exceptions as those of `plugin_code`."""
+    """The plug-in's generator with its exceptions converted as by `plugin_code`."""
     with plugin_code(name):
         return (yield from code)
 
@@ -68,7 +68,7 @@ def plugin_names(group: str) -> tuple[str, ...]:
 def load_plugin(group: str, name: str, item: str, kind: type[T]) -> T:
     """Load the plug-in `name` of a group, an instance of `kind`.
 
-    Raises InvalidInput if it is not installed or fails to load; `item` is the option or key to name in the message.
+    Raises InvalidInput if it is not installed or fails to load; the message names the option or key `item`.
     """
     entries = _entries(group)
     if name not in entries:
@@ -97,5 +97,5 @@ def _entries(group: str) -> dict[str, EntryPoint]:
 
 @lru_cache(maxsize=8)
 def _on_path(group: str, _path: tuple[str, ...]) -> EntryPoints:
-    """Entry points of all packages on the path; reads their metadata once."""
+    """Entry points of all packages on the path; their metadata are read once."""
     return entry_points(group=group)

@@ -8,7 +8,7 @@ class Progress(Protocol):
     """Callable that long computations call in the thread of their caller."""
 
     def __call__(self, phase: str, done: int = 0, total: int = 0, /) -> None:
-        """Report `phase`, the present stage, of which `done` of `total` parts are complete, if countable."""
+        """Report the present stage, `phase`, with `done` of its `total` parts complete if they can be counted."""
         ...
 
 
@@ -17,6 +17,6 @@ def silent(phase: str, done: int = 0, total: int = 0, /) -> None:
 
 
 def counting(progress: Progress, phase: str) -> Callable[[int, int], None]:
-    """Report `phase` now, and return a callable that reports how many of its parts are done: `(done, total)`."""
+    """Report `phase` now; returns a callable `(done, total)` that reports its completed parts."""
     progress(phase)
     return lambda done, total: progress(phase, done, total)

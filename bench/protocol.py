@@ -57,9 +57,10 @@ Plan: TypeAlias = Generator["Step", "Outcome", Result]
 def each_step(
     plan: 'Generator["Step", "Outcome", T]', carry_out: 'Callable[["Step"], Generator["Step", "Outcome", "Outcome"]]'
 ) -> 'Generator["Step", "Outcome", T]':
-    """`plan` with each step replaced by the steps of `carry_out(step)`, which returns the outcome of the step.
+    """`plan` with each step replaced by the steps of `carry_out(step)`, which returns the step's outcome.
 
-    As with `yield from`, an exception thrown in is raised at the step of `plan`, which may handle it.
+    As with `yield from`, an exception thrown into the generator is raised at the current step of `plan`, which may
+    handle it.
     """
     try:
         step = next(plan)
@@ -81,8 +82,8 @@ def each_step(
 class Prepared(ABC, Generic[P]):
     """Protocol prepared for a bench: checked, and ready to be forecast and run.
 
-    The constructor computes once whatever forecast, prediction and plan share. `stored` are the tables of the data file
-    that is replayed or analysed again; they replace the input files that a new run reads. None for a new run.
+    The constructor computes once whatever forecast, prediction and plan share. `stored` holds the tables of the data
+    file that is replayed or analysed again, which replace the input files that a new run reads; None for a new run.
 
     The constructor of a subclass raises InvalidInput for parameters beyond the capabilities of the bench.
     """
@@ -94,7 +95,7 @@ class Prepared(ABC, Generic[P]):
 
     @cached_property
     def forecast(self) -> "Forecast":
-        """Stages, demands and duration; empty for a protocol without predictions, which then has no margins.
+        """Stages, demands and duration; empty for a protocol without predictions, for which no margins are shown.
 
         Raises InvalidInput if no plan is possible.
         """
@@ -117,7 +118,7 @@ class Prepared(ABC, Generic[P]):
         """Steps of the run from the beginning; the generator returns the result."""
 
     def collected(self, steps: 'Generator["Step", "Outcome", object]') -> Plan:
-        """Yield `steps`, and return the result of the points that they publish."""
+        """Yield `steps`; returns the result from the points that they publish."""
         from bench.engine.steps import Publish
         from bench.events import PointFinished
 
@@ -133,7 +134,7 @@ class Prepared(ABC, Generic[P]):
 
     @abstractmethod
     def result(self, points: Sequence[Parameters]) -> Result:
-        """Result of an interrupted run from the points that it has published."""
+        """Result of an interrupted run from the points already published."""
 
 
 class Follower(Interface):
@@ -162,7 +163,8 @@ class Follower(Interface):
 class Reanalysis(Generic[P]):
     """Re-analysis of recorded results with other `settings`.
 
-    `follower` is called with settings, recorded parameters, configuration for the analysis, and the open file.
+    `follower` is called with the settings, the recorded parameters, the configuration for the analysis and the open
+    file.
     """
 
     settings: type[Parameters]
@@ -171,18 +173,18 @@ class Reanalysis(Generic[P]):
 
 @dataclass(frozen=True)
 class Protocol(Generic[P]):
-    """Experiment. Flags, form, file metadata and documentation are generated from `parameters`, tables from `point`.
+    """An experiment. Flags, form, file metadata and documentation are generated from `parameters`, tables from `point`.
 
     `prepare` takes the parameters, the bench configuration, and the tables of a data file that is replayed or analysed
-    again, else None. It raises InvalidInput for parameters beyond the capabilities of the bench. A list of protocols
-    imports the object itself: wrap a `prepare` with heavy imports in `deferred`.
+    again, else None. It raises InvalidInput for parameters beyond the capabilities of the bench. Listing the protocols
+    imports this object: wrap a `prepare` with heavy imports in `deferred`.
 
-    `example` are arguments shown in its help. `figures` and `files` name all files that a run may write besides data
-    file and summary, the main figure first. `positional` is the parameter that the command line accepts without a flag.
-    `log_line` formats a point as one log line: the run is then displayed as a log, not as a plot. Without a
-    `reanalysis`, an analysis runs the plan with other parameters on the recorded samples. `report` returns the
-    protocol's own sections of a report on its data file; if they include no table, the report lists all fields of the
-    points.
+    `example` holds arguments shown in the help. `figures` and `files` name all files that a run may write in addition
+    to data file and summary, with the main figure first. `positional` is the parameter that the command line accepts
+    without a flag. `log_line` formats a point as one log line: the run is then displayed as a log, not as a plot.
+    Without a `reanalysis`, an analysis runs the plan with other parameters on the recorded samples. `report` returns
+    the protocol's own sections of a report on its data file; if they include no table, the report lists all fields of
+    the points.
     """
 
     name: str
@@ -201,7 +203,7 @@ class Protocol(Generic[P]):
 
 
 def deferred(reference: str) -> Callable[..., Any]:
-    """Function or class `module:name`, as in an entry point, imported at the first call."""
+    """Function or class `module:name`, written as in an entry point and imported at the first call."""
     module, name = reference.split(":")
 
     def call(*args: Any, **kwargs: Any) -> Any:

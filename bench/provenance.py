@@ -1,4 +1,4 @@
-"""Versions of the software that produced a result."""
+"""Version of the software that produced a result."""
 
 import json
 import platform
@@ -14,7 +14,9 @@ def software() -> dict[str, str]:
 
 
 def revision() -> str:
-    """Git hash of this program, with "+" after uncommitted changes; "unknown" outside a repository or package."""
+    """Git hash of this program, followed by "+" if there are uncommitted changes; "unknown" outside a repository or
+    package.
+    """
     here = Path(__file__).parent
     try:
         found = subprocess.run(
@@ -25,7 +27,7 @@ def revision() -> str:
             timeout=10.0,
             check=True,
         )
-        # ignore the repository of another project in which this program was installed
+        # ignore the repository of another project inside which this program is installed
         subprocess.run(["git", "ls-files", "--error-unmatch", __file__], cwd=here, capture_output=True, check=True)
         return found.stdout.strip()
     except (OSError, subprocess.SubprocessError):

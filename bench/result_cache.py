@@ -83,7 +83,7 @@ def _prune(folder: Path) -> None:
 
 @lru_cache(maxsize=1)
 def _stamp() -> list[object]:
-    """Everything apart from the inputs that affects a result."""
+    """Everything that affects a result apart from its inputs."""
     from sim.kernel.compiled import processor
 
     root, digest = Path(__file__).parents[1], sha256()

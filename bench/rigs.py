@@ -12,7 +12,7 @@ from sim.errors import RockbenchError
 from sim.extras import require
 
 _PURPOSES = {"serial": "a laser on a serial port"}
-"""Parts of a backend that need an extra of their own."""
+"""Parts of a backend that need an additional extra."""
 
 
 def require_drivers(configuration: BenchConfiguration) -> None:

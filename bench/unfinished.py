@@ -1,8 +1,8 @@
 """Unfinished results: temporary files and folders that a process must remove, however it ends.
 
-The creator removes each one, or gives it its name when complete. The list here serves the one ending that runs no
-`finally`: an interrupted process whose main thread does not respond, see `bench.app.cli.interrupt`. A second list has
-the complete results, which an interrupt after their completion names.
+The code that creates one removes it, or renames it when complete. The list here is needed only where no `finally` runs:
+when an interrupted process ends because its main thread does not respond, see `bench.app.cli.interrupt`. A second list
+has the complete results, which the message of a later interrupt names.
 """
 
 import os
@@ -17,7 +17,7 @@ from uuid import uuid4
 from sim.errors import InvalidInput, RockbenchError
 
 HELD, PAUSE = 1.0, 0.05
-"""Time for which another program may hold a file that is renamed, and the pause between attempts [s]."""
+"""Time for which another program may hold a file that is to be renamed, and the pause between attempts [s]."""
 
 _paths: set[Path] = set()
 _reserved: set[Path] = set()
@@ -39,17 +39,19 @@ def unfinished(path: Path) -> Generator[Path]:
 
 @contextmanager
 def temporary_folder() -> Generator[Path]:
-    """Context manager for an empty folder for files of this process; removes both at the end."""
+    """Context manager that creates an empty folder for files of this process, and removes folder and files at the
+    end.
+    """
     with unfinished(Path(gettempdir(), f"rockbench-{uuid4().hex}")) as folder:
         folder.mkdir(mode=0o700)
         yield folder
 
 
 def replace(source: Path, target: Path) -> None:
-    """Rename a complete file to its name, replacing one that has it.
+    """Rename a complete file to its final name, replacing any existing file.
 
-    On Windows a scanner or an indexer may hold either for a moment: it is tried again for `HELD` seconds. Raises
-    OSError.
+    On Windows a scanner or an indexer may briefly hold either file, so the renaming is retried for `HELD` seconds.
+    Raises OSError.
     """
     end = time.monotonic() + HELD
     while True:
@@ -87,9 +89,9 @@ def write_new(path: Path, write: Callable[[Path], None], *, overwrite: bool = Fa
     when the disk fails.
     """
     if path.exists() and not overwrite:
-        raise InvalidInput("file", str(path), "it exists and is never overwritten; name another")
+        raise InvalidInput("file", str(path), "the file exists and is never overwritten; choose another name")
     if not path.parent.is_dir():
-        raise InvalidInput("file", str(path), "its folder does not exist; create it first")
+        raise InvalidInput("file", str(path), "the folder does not exist; create it first")
     # the temporary name keeps the suffix, from which a writer may choose the format
     try:
         with unfinished(path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")) as temporary:
@@ -105,7 +107,9 @@ def whole(path: Path) -> None:
 
 
 def reserve(folder: Path) -> None:
-    """Register `folder`, created for results: an ending that runs no `finally` removes it if it is still empty."""
+    """Register `folder`, created for results: if the process ends without running `finally`, it is removed if still
+    empty.
+    """
     _reserved.add(folder)
 
 

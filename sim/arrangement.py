@@ -21,11 +21,10 @@ Array = NDArray[np.float64]
 class Arrangement:
     """A specimen with its clamps and manual restraints.
 
-    table_locked : the table is clamped to the ground at mid stroke.
-    block_clamped : the block is clamped to the table: it moves with the table, and the spring is fixed to it.
-    watched : height [m] at which laser 2 measures the block's face; None: it measures storey 2.
-    tilt : rotation [rad] at which the block is held by hand; 0 when it is free. pull : displacement [m] at which storey
-    2 is held by hand; 0 when it is free.
+    table_locked : the table is clamped to the ground at mid stroke. block_clamped : the block is clamped to the table:
+    it moves with the table, and the spring is fixed to it. watched : height [m] at which laser 2 measures the block's
+    face; None if it measures storey 2. tilt : rotation [rad] at which the block is held by hand; 0 when it is free.
+    pull : displacement [m] at which storey 2 is held by hand; 0 when it is free.
     """
 
     specimen: Specimen
@@ -41,7 +40,7 @@ class Arrangement:
         return self.tilt != 0.0 or self.pull != 0.0
 
     def let_go(self) -> "Arrangement":
-        """The same arrangement after release of the parts held by hand."""
+        """The same arrangement after the parts held by hand have been released."""
         return replace(self, tilt=0.0, pull=0.0)
 
     def storeys(self) -> tuple[float, float]:

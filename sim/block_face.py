@@ -41,16 +41,19 @@ def heights(theta: ArrayLike, block: Block) -> tuple[Array, Array]:
 
 
 def displacement_rate(theta: ArrayLike, height: float, block: Block) -> Array:
-    """Derivative of `displacement` [m/rad]: times the angular velocity it is the velocity measured by the laser."""
+    """Derivative of `displacement` [m/rad]; multiplied by the angular velocity, it gives the velocity measured by the
+    laser.
+    """
     angle = np.asarray(theta, dtype=np.float64)
     return (height + 2.0 * block.b * np.minimum(np.sin(angle), 0.0)) / np.cos(angle) ** 2
 
 
 def rotation(displacement: ArrayLike, height: float, block: Block) -> Array:
-    """Rotation [rad] of the block whose lit point is displaced by `displacement` [m], any shape; inverse of the above.
+    """Rotation [rad] of the block whose lit point is displaced by `displacement` [m], any shape; the inverse of
+    `displacement`.
 
-    About A atan(D / z). About B, with X = D + 2b, X cos + z sin = 2b for |theta|: two angles of a right triangle of
-    legs X and z with 2b along its hypotenuse, subtracted. NaN where no rotation gives that displacement.
+    About A, theta = atan(D / z). About B, with X = D + 2b, |theta| solves X cos + z sin = 2b: it is the difference of
+    two angles in the right triangle with legs X and z. NaN where no rotation gives that displacement.
     """
     seen = np.asarray(displacement, dtype=np.float64)
     width = 2.0 * block.b

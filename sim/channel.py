@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 TABLE_DISPLACEMENT, TABLE_ACCELERATION = "table_displacement", "table_acceleration"
 TABLE_FORCE, COIL_CURRENT = "table_force", "coil_current"
 STOREYS = ("laser_1", "laser_2")
-"""Names of the channels by measured motion, independent of the instrument: table and coil, first and second storey."""
+"""Names of the channels by the motion they measure, whatever the instrument: table and coil, first and second storey.
+"""
 
 Counts = NDArray[np.int16 | np.int32]
 """Integer types of a converter's counts: 16 bits for most converters, 32 bits for 24-bit ones."""
@@ -24,11 +25,11 @@ class Channel:
 
     `value = offset + scale counts + higher[0] counts^2 + ...` in `unit`.
 
-    `quantity` is the measured quantity: "displacement", "acceleration" or "voltage".
-    `valid` is the inclusive range of counts of valid measurements: outside it the converter is saturated or the
-    sensor signals an error, and the sample becomes NaN. `faults` gives the meaning of individual counts outside it.
-    `delay` has been taken out of its samples, with the standard uncertainty `delay_uncertainty`, both in seconds.
-    `higher` are the small higher-order terms of a converter whose own calibration is a polynomial.
+    `quantity` is the measured quantity: "displacement", "acceleration" or "voltage". `valid` is the inclusive range of
+    counts of valid measurements: outside it the converter is saturated or the sensor signals an error, and the sample
+    becomes NaN. `faults` gives the meaning of individual counts outside it. `delay` [s], with standard uncertainty
+    `delay_uncertainty` [s], has already been removed from its samples. `higher` are the small higher-order terms of a
+    converter whose own calibration is a polynomial.
     """
 
     name: str
@@ -57,7 +58,7 @@ class Channel:
 
     @property
     def storage(self) -> type[np.int16] | type[np.int32]:
-        """The narrower integer that holds every valid count."""
+        """The narrowest integer type that holds every valid count."""
         return np.int16 if self.valid[0] >= -(2**15) and self.valid[1] < 2**15 else np.int32
 
     def _converted(self, counts: NDArray[np.float64]) -> NDArray[np.float64]:

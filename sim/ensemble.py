@@ -21,10 +21,10 @@ from sim.sweep import Done, processors, sweep
 Floats = NDArray[np.float64]
 
 RUN_TOLERANCE = 1e-8
-"""Tolerance of the runs under a record: far below the statistical error of an ensemble."""
+"""Integration tolerance of the runs under a record, far below the statistical error of an ensemble."""
 
 _Member = tuple[Orbit, Specimen]
-"""Specimen and the known orbit from which the search for its own orbit starts."""
+"""A specimen, and the known orbit from which the search for the specimen's orbit starts."""
 
 CHUNK = 500
 """Members integrated together: enough to share the overhead of a step, few enough to finish within a second."""
@@ -36,11 +36,11 @@ def steady_gains(
     bare_amplitude: float | None = None,
     done: Done | None = None,
 ) -> Floats:
-    """alpha_1 and alpha_2 of m specimens on the branch of each of n orbits, shape (n, m, 2), on all processors.
+    """alpha_1 and alpha_2 of m specimens on the branches of n orbits, shape (n, m, 2), computed on all processors.
 
     `members[i]` are the specimens at `orbits[i]`, under its frequency and amplitude; `bare_amplitude` [m/s2] is that of
     the test without block, if different. NaN where a member has no such motion: its block does not rest, or
-    continuation does not reach its orbit. `done` reports the completed parts of the work.
+    continuation does not reach its orbit. `done` is called as parts of the work are completed.
     """
     every = [(orbit, specimen) for orbit, own in zip(orbits, members, strict=True) for specimen in own]
     parts = max(processors(), len(every) // CHUNK)
@@ -54,7 +54,7 @@ def steady_gains(
 
 
 def record_gains(members: Sequence[Specimen], record: SampledRecord) -> Floats:
-    """alpha_1 and alpha_2 of n specimens under `record`, from rest, shape (n, 2), on all processors.
+    """alpha_1 and alpha_2 of n specimens under `record`, from rest, shape (n, 2), computed on all processors.
 
     NaN where the block overturns or the run fails.
     """

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 
 class CauseCode(StrEnum):
-    """Causes of a run's end that have no exception type."""
+    """Reasons for the end of a run that have no exception type."""
 
     UNKNOWN = "unknown"
     REQUEST = "request"
@@ -25,12 +25,12 @@ class CauseCode(StrEnum):
 
 
 class Interruption(Exception):
-    """Ends a run early; raised in any code, and no error of that code."""
+    """Ends a run early. Any code may raise it; it does not indicate an error in that code."""
 
 
 @dataclass(frozen=True)
 class Cause:
-    """Cause of an ending or a refusal: the `error_code` of an error, or a `CauseCode`; advice depends on it alone.
+    """Cause of the end or refusal of a run: the `error_code` of an error, or a `CauseCode`; advice depends on it alone.
 
     `subject` is the item concerned: the quantity of a limit, the names of safety inputs, the name of a value, the kind
     of a request ("stop", "abort" or "halt").
@@ -44,7 +44,7 @@ UNKNOWN = Cause()
 
 
 class RockbenchError(Exception):
-    """Error with a one-line message: what happened, what was refused, and the remedy.
+    """Error with a one-line message that states the problem, the rejected input and the remedy.
 
     `error_code` identifies the type to programs (docs/errors.md); a type without its own inherits that of its parent.
     """
@@ -53,7 +53,7 @@ class RockbenchError(Exception):
 
     @property
     def cause(self) -> Cause:
-        """Error code and subject of the error."""
+        """The error's code and subject."""
         return Cause(self.error_code)
 
 

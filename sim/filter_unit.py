@@ -41,7 +41,7 @@ def _section(pole: complex) -> tuple[float, ...]:
 
 
 def _settled(sections: Array) -> Array:
-    """State of each section under a constant input of 1 to the first."""
+    """Steady state of each section when the input of the first is a constant 1."""
     found, level = np.empty((len(sections), 2)), 1.0
     for state, (b0, b1, b2, _, a1, a2) in zip(found, sections, strict=True):
         changes = np.array([[1.0 + a1, -1.0], [a2, 1.0]])
@@ -74,7 +74,7 @@ class FilterUnit(Parameters):
 
 
 class FilterStream:
-    """The filter cards in operation; at the first sample they have settled."""
+    """Running filter cards, already settled at the first sample."""
 
     def __init__(self, sections: Array, settled: Array) -> None:
         from sim.kernel.filter import cascade

@@ -97,7 +97,7 @@ class FreeRocking:
 
     @cached_property
     def quarters(self) -> Array:
-        """Time from the ground to each turning point, equal to that back [s], shape as `energies`."""
+        """Time from the ground to each turning point [s], equal to the time back, shape as `energies`."""
         from scipy import special
 
         phi, half = self.alpha - self.amplitudes, 0.5 * self.amplitudes
@@ -141,5 +141,5 @@ class FreeRocking:
 
     @property
     def rest_time(self) -> float:
-        """Instant [s] at which the block comes to rest; of the infinitely many impacts the smallest are neglected."""
+        """Instant [s] at which the block comes to rest; the smallest of the infinitely many impacts are neglected."""
         return float(self.impacts[-1])

@@ -19,7 +19,7 @@ SPRING = "k_c:"
 UNITS = {name: unit_of(Frame.model_fields[name]) for name in ("m1", "m2", "k1", "k2", "xi1", "xi2")} | {
     name: unit_of(Block.model_fields[name]) for name in ("restitution_factor",)
 }
-"""Quantities of frame and block that can be identified, with their SI units."""
+"""Identifiable quantities of frame and block, with their SI units."""
 
 _HIGHEST = {"xi1": 1.0, "xi2": 1.0, "restitution_factor": 2.0}
 _MAY_VANISH = ("xi1", "xi2")
@@ -57,7 +57,7 @@ def unit(name: str) -> str:
 
 
 def possible(name: str, value: float) -> bool:
-    """Whether this value of the quantity is physically possible; that of a fit may not be."""
+    """Whether this value of the quantity is physically possible; a fitted value may not be."""
     above = value >= 0.0 if name in _MAY_VANISH else value > 0.0
     return above and value < _HIGHEST.get(name, np.inf)
 
@@ -133,29 +133,33 @@ class Identified(Parameters):
         labels = sorted((label, name) for name in names if (label := spring_label(name)) is not None)
         for (label, _), (next_label, name) in pairwise(labels):
             if isclose(label, next_label):
-                raise InvalidInput("findings", name, f"label not distinguishable from that of {spring_name(label)}")
+                raise InvalidInput(
+                    "findings", name, f"label too close to that of {spring_name(label)} to be distinguished"
+                )
         pairs: set[frozenset[str]] = set()
         for one in self.correlations:
             for name in (one.first, one.second):
                 if name not in names:
-                    raise InvalidInput("correlations", name, f"there is no such finding; there are {', '.join(names)}")
+                    raise InvalidInput("correlations", name, f"no such finding; the findings are {', '.join(names)}")
             if one.first == one.second or one.pair in pairs:
                 pair = f"{one.first}, {one.second}"
-                raise InvalidInput("correlations", pair, "two different findings, each pair once")
+                raise InvalidInput(
+                    "correlations", pair, "it must name two different findings, and each pair may occur once"
+                )
             pairs.add(one.pair)
         if self.correlations and float(np.linalg.eigvalsh(self.correlation(names)).min()) < -_ROUNDING:
             refused = [one.coefficient for one in self.correlations]
-            allowed = "these correlations contradict each other: their matrix has a negative eigenvalue"
+            allowed = "these correlations contradict each other: the correlation matrix has a negative eigenvalue"
             raise InvalidInput("correlations", refused, allowed)
         return self
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The names of the findings, in their order."""
+        """The names of the findings, in order."""
         return tuple(finding.name for finding in self.findings)
 
     def finding(self, name: str) -> Finding | None:
-        """Finding of a quantity; None if it has not been measured."""
+        """Finding for a quantity; None if it has not been measured."""
         return next((finding for finding in self.findings if finding.name == name), None)
 
     def covariance(self, names: Sequence[str]) -> NDArray[np.float64]:
@@ -205,7 +209,7 @@ class Identified(Parameters):
         return matrix
 
     def extended(self, findings: Iterable[Finding], correlations: Iterable[Correlation] = ()) -> "Identified":
-        """These findings and newer ones, which replace those of the same name together with their correlations."""
+        """These findings merged with newer ones, which replace any of the same name and their correlations."""
         findings, correlations = tuple(findings), tuple(correlations)
         kept, pairs = self.without(*(finding.name for finding in findings)), {one.pair for one in correlations}
         still = tuple(one for one in kept.correlations if one.pair not in pairs)

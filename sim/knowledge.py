@@ -51,7 +51,7 @@ _WIDTH = {
 """Half width of each quantity. Masses have none: they are weighed, or identified by a fit."""
 
 _OF_MASSES = "stiffness"
-"""Half width to which the masses are assigned in lists of contributions: frame and masses are one fit."""
+"""Half width with which lists of contributions group the masses: frame and masses come from one fit."""
 
 
 class SpecimenKnowledge(SpecimenUncertainty):
@@ -142,7 +142,7 @@ class SpecimenKnowledge(SpecimenUncertainty):
         return {name: finding for name, finding in found.items() if finding is not None}
 
     def _spread(self, measured: Mapping[str, Finding]) -> tuple[Floats, list[float]]:
-        """Correlation matrix of findings, shape (n, n), and their relative standard uncertainties."""
+        """Correlation matrix, shape (n, n), and relative standard uncertainties of the findings."""
         findings = list(measured.values())
         matrix = self.identified.correlation([finding.name for finding in findings])
         return matrix, [finding.standard_uncertainty / finding.value for finding in findings]

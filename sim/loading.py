@@ -14,7 +14,7 @@ BENCH = {**MODEL, "laser": 3, "filter": 2, "plant": 8, "table": 15}
 def load_model(
     report: Callable[[str, int, int], None] = lambda _phase, _done, _all: None, modules: Mapping[str, int] = MODEL
 ) -> None:
-    """Import the `modules`. `report` is called with a description, the number of parts done and the total."""
+    """Import the `modules`. `report` is called with a description, the number of modules loaded and the total."""
     if all(f"sim.kernel.{name}" in sys.modules for name in modules):
         return
     report("loading the model", 0, 0)

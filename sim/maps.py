@@ -1,7 +1,7 @@
 """Maps of the gain coefficients over frequency and stiffness: both steady motions, their existence and stability.
 
-Continuation over frequency gives a row of constant stiffness; from there every column is continued over stiffness, all
-columns of a strip together, each predicted from the previous rows. No transient has to be integrated.
+Continuation over frequency gives a row at constant stiffness. From there the columns of a strip are continued over
+stiffness together, each predicted from the previous rows. No transient has to be integrated.
 """
 
 from collections.abc import Sequence
@@ -22,7 +22,7 @@ from sim.sweep import Done, processors, sweep
 Floats = NDArray[np.float64]
 
 STRIPS = 2
-"""Strips of columns per processor: enough to balance the load, few enough to keep each strip wide."""
+"""Number of strips of columns per processor: enough to balance the load, few enough to keep each strip wide."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +39,7 @@ class LayerMap:
 
     @property
     def exists(self) -> NDArray[np.bool_]:
-        """Mask of the cells with such a motion, shape (n, m)."""
+        """Mask of the cells where the motion exists, shape (n, m)."""
         return np.isfinite(self.peaks[:, :, 0])
 
     @property
@@ -97,7 +97,7 @@ def gain_map(
     rows, row_of = np.unique(np.asarray(betas, dtype=np.float64), return_inverse=True)
     columns, column_of = np.unique(np.asarray(omegas, dtype=np.float64), return_inverse=True)
     if not (rows.size and columns.size):
-        raise InvalidInput("grid", (rows.size, columns.size), "it needs at least one stiffness and one frequency")
+        raise InvalidInput("grid", (rows.size, columns.size), "the map needs at least one stiffness and one frequency")
     for omega in columns:
         check_steady(specimen.coupled(float(rows[0])), float(omega), amplitude)
     coupled = [specimen.coupled(float(beta)) for beta in rows]

@@ -33,10 +33,12 @@ LEFT = 1e-3
 """An undecided motion is continued until a disturbance of the stable orbit would have decayed to this fraction."""
 
 FEWEST_ROUNDS, MOST_ROUNDS = 10, 100
-"""Minimum and maximum number of rounds of WINDOW periods for this; the minimum applies without a stable orbit."""
+"""Minimum and maximum number of rounds of WINDOW periods for this continuation; without a stable orbit the minimum
+applies.
+"""
 
 StartProgram = Callable[[float, float], SineProgram]
-"""Function that returns the drive of a start-up for its final frequency [rad/s] and amplitude [m/s2]."""
+"""Function of a final frequency [rad/s] and amplitude [m/s2] that returns the base excitation of a start-up."""
 
 
 class Outcome(StrEnum):
@@ -53,7 +55,7 @@ class Outcome(StrEnum):
 class Reached:
     """Outcome of a start-up.
 
-    `time` [s] from its beginning: of the overturning, or when the outcome was decided.
+    `time` [s] since its beginning at which the block overturned or the outcome was decided.
 
     `side`: the corner of the overturning. `peaks` over the last 20 periods of the drive; None when toppled or failed.
     """
@@ -65,7 +67,7 @@ class Reached:
 
 
 class Steady(NamedTuple):
-    """Peaks of the stable steady motions at a point, None if there is none, and multiplier of the rocking motion."""
+    """Peaks of the stable steady motions at a point, or None, and the multiplier of the rocking motion."""
 
     rocking: Peaks | None
     resting: Peaks | None
@@ -76,8 +78,8 @@ class Steady(NamedTuple):
 class OutcomeMap:
     """Outcomes over the grid of a gain map, n stiffnesses by m frequencies, each array of shape (n, m).
 
-    `outcome`: texts of `Outcome`. `time` [s] and `side` ("A", "B" or empty) as in `Reached`. `drift` [m]: greatest
-    |u2 - u1| over the last 20 periods, NaN when toppled or failed.
+    `outcome`: values of `Outcome`. `time` [s] and `side` ("A", "B" or empty) as in `Reached`. `drift` [m]: greatest |u2
+    - u1| over the last 20 periods, NaN when toppled or failed.
     """
 
     outcome: NDArray[np.str_]
@@ -105,7 +107,7 @@ def reached(
     """Outcome of `start`, from rest, which ends with a sine of `omega` [rad/s] and `amplitude` [m/s2].
 
     The program must end with a dwell of at least WINDOW periods at these values. A motion that is then unlike either
-    steady motion is continued. `steady`: the steady motions, if they are known already.
+    steady motion is continued. `steady`: the steady motions, if already known.
 
     Raises InvalidInput for a bare frame, meaningless numbers, or a program with a different end.
     """

@@ -1,7 +1,8 @@
-"""Declarations of parameters and recorded values: unit, limits and meaning, each in one place.
+"""Declarations of parameters and recorded values, with unit, limits and meaning in one place.
 
 Validation, configuration file, command-line flags, documentation table and the data file's metadata follow from the
-declaration of a parameter; the data file's column with reader, export and replay from that of a recorded value.
+declaration of a parameter; the data file's column, and its handling by reader, export and replay, follow from the
+declaration of a recorded value.
 """
 
 from collections.abc import Iterator
@@ -25,7 +26,7 @@ _ANGULAR = ("rad/s", "Hz", "rad", "N/m")
 
 
 class Parameters(BaseModel):
-    """A frozen group of validated parameters in SI units; unknown names and non-finite numbers are refused."""
+    """A frozen group of validated parameters in SI units; rejects unknown names and non-finite numbers."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
@@ -67,7 +68,7 @@ def quantity(
 
 
 def column(unit: str, description: str, **options: Any) -> Any:
-    """Declare a recorded field of a dataclass with its SI `unit` ("1" for a pure number, "" for a text).
+    """Declare a recorded field of a dataclass with its SI `unit` ("1" for a pure number, "" for a string).
 
     `options` are those of `dataclasses.field`.
     """
@@ -75,15 +76,15 @@ def column(unit: str, description: str, **options: Any) -> Any:
 
 
 def unit_of(field: FieldInfo) -> str:
-    """The SI unit that `quantity` stored on a field; empty for texts, switches and nested groups."""
+    """The SI unit that `quantity` stored on a field; empty for strings, switches and nested groups."""
     return str(_extra(field).get("unit", ""))
 
 
 def usual_of(field: FieldInfo) -> tuple[float, float] | None:
     """Range of magnitudes of a field that cause no notice; None if every value is plausible.
 
-    If not declared, for a quantity with a dimension: values within a factor of `NEAR` of its default, a smaller one
-    where 2 pi or degrees are a likely mistake.
+    A quantity with a dimension and no declared range has one within a factor of `NEAR` of its default, or a smaller
+    factor where 2 pi or degrees are a likely mistake.
     """
     extra = _extra(field)
     if "usual" in extra:
@@ -115,7 +116,7 @@ def _extra(field: FieldInfo) -> dict[str, Any]:
 
 
 def each_once(values: tuple[float, ...]) -> tuple[float, ...]:
-    """The values of a list of points; ValueError when one occurs twice. For use as a validator."""
+    """Validator of a list of points: returns its values, or raises ValueError if one occurs twice."""
     if len(set(values)) < len(values):
         raise ValueError("each value may occur once")
     return values

@@ -46,7 +46,7 @@ NEAR = 0.3
 
 MOST_ITERATIONS = 10
 SMALLEST_ADVANCE = 1e-3
-"""Largest number of Newton iterations, and limits of the steps of `follow` as fractions of the path."""
+"""Maximum number of Newton iterations, and limits on the steps of `follow` as fractions of the path."""
 
 MOST_KNOWN = 5
 """Number of points used by an extrapolation: more would amplify the rounding errors of the Jacobians."""
@@ -92,7 +92,7 @@ def parameters(specimen: Specimen, omega: float | Floats, amplitude: float) -> F
 
 
 def scales(q: Floats) -> Floats:
-    """Typical sizes of the unknowns, shape (n, 6): the angle b / h_b, the block's diagonal, the drive's frequency."""
+    """Scales of the unknowns, shape (n, 6): from the angle b / h_b, the block's diagonal and the drive's frequency."""
     length, angle = np.hypot(q[:, 9], q[:, 10]), q[:, 9] / q[:, 10]
     velocity = np.maximum(q[:, 16] * angle, q[:, 17] / q[:, 16])
     sizes = np.empty((len(q), 6))
@@ -183,8 +183,8 @@ def newton(q: Floats, x: Floats, known: Floats | None = None, accuracy: Accuracy
 def follow(origin: Floats, x: Floats, target: Floats) -> Solution | None:
     """The fixed point at `target`, shape (18,), by continuation from `x`, near the one at `origin`.
 
-    The path is a straight line. Steps grow while Newton converges and are halved when it does not; None when they
-    become too short.
+    The path is a straight line. Steps grow while Newton converges and are halved when it does not; returns None when
+    they become too short.
     """
     solution = newton(origin[None], x[None]).one(0)
     if solution is None:

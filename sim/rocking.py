@@ -1,6 +1,6 @@
 """Motion of the specimen under a base acceleration: rest, rocking, impacts, overturning.
 
-A front end to `sim.kernel.rocking` with named types, checks and threads.
+Front end to `sim.kernel.rocking` with named types, checks and threads.
 """
 
 from collections.abc import Sequence
@@ -157,7 +157,7 @@ def simulate_many(
     several = [len(item) for item in (specimens, excitations, states, peaks_from) if isinstance(item, Sequence)]
     runs = several[0] if several else 1
     if any(length != runs for length in several):
-        raise InvalidInput("simulate_many", several, "its sequences must have the same length")
+        raise InvalidInput("simulate_many", several, "the sequences must have the same length")
 
     models = list(specimens) if isinstance(specimens, Sequence) else [specimens]
     drives = [Drive(item) for item in (excitations if isinstance(excitations, Sequence) else [excitations])]
@@ -175,7 +175,7 @@ def simulate_many(
         )
         for i in range(runs)
     ]
-    # run members of equal order in parallel, in parts that occupy every processor and finish within a second
+    # run members of equal order together, in batches that occupy every processor and finish within a second
     alike: dict[int, list[int]] = {}
     for i, run in enumerate(prepared):
         alike.setdefault(run.order, []).append(i)
@@ -190,9 +190,9 @@ def simulate_many(
 def series_order(tolerance: float, segment: float) -> int:
     """Order of the Taylor series that reaches `tolerance` at minimum cost, for segments of a typical length [s].
 
-    Long segments: 1.6 orders per digit, measured. A record's samples end most steps, so a lower order that just spans
-    one interval is cheaper; the motion's radius of convergence is about 0.27 s. The step control meets the tolerance
-    with any order.
+    Long segments take 1.6 orders per digit (measured). A record's samples end most steps, so a lower order that just
+    spans one interval is cheaper; the motion's radius of convergence is about 0.27 s. The step control meets the
+    tolerance with any order.
     """
     longest = ceil(-1.6 * log10(tolerance))
     covering = 3 + ceil(log(tolerance) / log(min(segment, 0.2) / 0.27))
@@ -208,7 +208,7 @@ def check_options(tolerance: float, overturning_angle: float) -> None:
 
 
 def check_state(specimen: Specimen, state: State, overturning_angle: float) -> None:
-    """Raise InvalidInput for a state that is not a valid start."""
+    """Raise InvalidInput for an invalid initial state."""
     x = state.as_array()
     if not np.isfinite(x).all():
         raise InvalidInput("state", state, "all of its components must be finite")
@@ -223,7 +223,9 @@ def check_state(specimen: Specimen, state: State, overturning_angle: float) -> N
 def motion_of(
     report: NDArray[np.float64], x: NDArray[np.float64], samples: NDArray[np.float64] | None, *, watched: bool
 ) -> Motion:
-    """Result from the kernel's `report`, shape (8,), and end state `x`, shape (6,), with peaks if `watched`."""
+    """Result from the kernel's `report`, shape (8,), and end state `x`, shape (6,), with peaks if they were requested
+    (`watched`).
+    """
     from sim.kernel import steps as kernel
 
     names = {
@@ -249,12 +251,12 @@ class Drive:
         segments = excitation.packed()
         if segments.ndim != 2 or segments.shape[0] < 1 or segments.shape[1] != ROW:
             raise InvalidInput("excitation", segments.shape, f"its table must have at least one row of {ROW} numbers")
-        # a finite sum implies finite terms, at half the cost of checking each
+        # a finite sum implies finite terms, and costs half as much as checking each one
         if not np.isfinite(segments.sum()) and not np.isfinite(segments).all():
             raise InvalidInput("excitation", "a number that is not finite", "all of its numbers must be finite")
         lengths = segments[:, 0]
         if not lengths.min() > 0.0:
-            raise InvalidInput("excitation", float(lengths.min()), "every segment must last a positive time")
+            raise InvalidInput("excitation", float(lengths.min()), "every segment must have a positive duration")
         self.segments = segments
         self.duration = float(lengths.sum())
         self.typical = float(np.median(lengths[:: 1 + lengths.size // 50]))

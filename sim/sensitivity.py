@@ -2,9 +2,9 @@
 
 The rocking orbit is a fixed point x = F(x, p) of the return map. Implicit function theorem: dx/dp = (I - F_x)^-1 F_p;
 F_x is the matrix whose eigenvalues are the Floquet multipliers. A peak is a stationary value u(t*), so its derivative
-is that of u at a fixed t* (envelope theorem): dP/dp = u_x dx/dp + u_p. The larger of both peaks is unsuitable: the
-excursions to both sides are so similar that a small step changes which of them is larger. alpha = P / P_bare then
-follows by the quotient rule.
+is that of u at a fixed t* (envelope theorem): dP/dp = u_x dx/dp + u_p. Differencing the larger of the two peaks is
+unsuitable: the excursions to the two sides are so similar that a small step changes which one is larger. alpha = P /
+P_bare then follows by the quotient rule.
 """
 
 from collections.abc import Mapping
@@ -27,7 +27,7 @@ STEP = 3e-5
 """Relative step of the differences, of fourth order; absolute for a parameter that is zero."""
 
 TOLERANCE = 1e-13
-"""Tolerance of the runs whose differences are taken."""
+"""Integration tolerance of the runs that are differenced."""
 
 SAMPLES, ZOOMS = 401, 2
 """Samples of each search for a peak, and number of successive refinements."""
@@ -67,8 +67,8 @@ def sensitivities(
     """Derivatives of alpha_1 and alpha_2 with respect to every name of `parameter_values`.
 
     `orbit`: the orbit there, if already known. The bare test depends on the parameters too: it has the same frame,
-    frequency [rad/s] and amplitude [m/s2]. beta is k_C / k1: a change of k1 alone changes k_C too. Where the peaks to
-    both sides are equal, the derivative is that of one of them.
+    frequency [rad/s] and amplitude [m/s2]. beta is k_C / k1: a change of k1 alone changes k_C too. Where the peaks on
+    the two sides are equal, the derivative is that of one of them.
 
     Raises InvalidInput as `rocking_orbit` does, NoOrbit when the branch does not exist.
     """
@@ -96,7 +96,7 @@ def sensitivities(
 
 
 def _along_branch(orbit: Orbit, moved: list[_Point], steps: Floats) -> Floats:
-    """Derivatives of the peaks of u1 and drift along the branch of orbits, shape (n, 2)."""
+    """Derivatives of the peaks of u1 and drift along the branch, shape (n, 2)."""
     here, section, times = _Point(orbit.specimen, orbit.omega, orbit.amplitude), orbit.section, _peak_times(orbit)
     q = parameters(*here)
     there = np.concatenate([parameters(*point) for point in moved])
@@ -155,13 +155,15 @@ def _linear(point: _Point, *, resting: bool = False) -> Floats:
 
 
 def _slopes(values: Floats, steps: Floats) -> Floats:
-    """Derivatives by n numbers, shape (n, k), from values at the nodes around each, shape (4 n, k)."""
+    """Derivatives with respect to n parameters, shape (n, k), from values at the nodes around each, shape (4 n, k)."""
     nodes, weights = STENCIL[4]
     return np.einsum("s,nsk->nk", weights, values.reshape(steps.size, nodes.size, -1)) / steps[:, None]
 
 
 def _moved(specimen: Specimen, values: dict[str, float], name: str, change: float) -> _Point:
-    """The point with one parameter changed. Not validated: a step may take a parameter just below its limit of zero."""
+    """The point with one parameter changed. It is not validated, since a step may take a parameter just below its limit
+    of zero.
+    """
     new = {**values, name: values[name] + change}
 
     def part(names: Any) -> dict[str, Any]:
@@ -201,7 +203,7 @@ def budget(
     matrix = np.eye(len(names))
     for (one, other), coefficient in (correlation or {}).items():
         if one not in names or other not in names or one == other or not -1.0 <= coefficient <= 1.0:
-            allowed = "two different parameters that have an uncertainty, and a coefficient from -1 to 1"
+            allowed = "it must be two different parameters that have an uncertainty, with a coefficient from -1 to 1"
             raise InvalidInput("correlation", ((one, other), coefficient), allowed)
         i, j = names.index(one), names.index(other)
         matrix[i, j] = matrix[j, i] = coefficient

@@ -17,14 +17,14 @@ Array = NDArray[np.float64]
 
 
 class Laser(Parameters):
-    """A triangulation laser similar to the optoNCDT 1420, read at its analogue output; at rest in mid range.
+    """A triangulation laser similar to the optoNCDT 1420, read at its analogue output; at rest it reads mid range.
 
-    The current is 4 mA at the start and 20 mA at the end of the measuring range, with a reserve of 1 % on either
-    side (manual of the optoNCDT 1420 and of its family); the number of bits of the output and the error current
-    are not clearly documented and therefore parameters.
+    The current is 4 mA at the start and 20 mA at the end of the measuring range, with a reserve of 1 % on either side
+    (manual of the optoNCDT 1420 and of its family); the number of bits of the output and the error current are not
+    clearly documented and are therefore parameters.
     """
 
-    measuring_range: float = quantity(0.200, "m", "measuring range; the storey rests in its middle", gt=0)
+    measuring_range: float = quantity(0.200, "m", "measuring range; the storey rests at mid range", gt=0)
     rate: float = quantity(4000.0, "1/s", "measurements per second of the laser's own clock", gt=0)
     clock_error: float = quantity(20e-6, "1", "relative error of the laser's clock", gt=-0.01, lt=0.01)
     latency: int = quantity(2, "1", "measurements between exposure and output", ge=0, le=100)
@@ -144,7 +144,7 @@ class Accelerometer(LinearSensor):
 
 
 class DisplacementSensor(LinearSensor):
-    """A displacement transducer between the table and the ground."""
+    """Displacement transducer between table and ground."""
 
     sensitivity: float = quantity(100.0, "V/m", "volts per metre as calibrated", gt=0)
     noise_density: float = quantity(5e-7, "m/Hz^0.5", "spectral density of the white noise", ge=0)
@@ -161,7 +161,7 @@ class PlacedSensor(LinearSensor):
     name: str = quantity(..., "", "name of its channel")
     measures: str = quantity(..., "", "one of SIMULATED")
     unit: str = quantity(..., "", "SI unit of the values")
-    place: Place = quantity(..., "", "part that it is mounted on")
+    place: Place = quantity(..., "", "part on which it is mounted")
     sensitivity: float = quantity(..., "V/unit", "volts per unit as calibrated")
     zero: float = quantity(0.0, "V", "voltage at zero")
     noise_density: float = quantity(0.0, "unit/Hz^0.5", "spectral density of the white noise", ge=0)
@@ -178,7 +178,7 @@ class Converter(Parameters):
     """The analogue-to-digital converter; beyond its range it saturates."""
 
     bits: int = quantity(14, "1", "resolution", ge=8, le=16)
-    range: float = quantity(10.0, "V", "largest magnitude of the input", gt=0)
+    range: float = quantity(10.0, "V", "largest input magnitude", gt=0)
     noise: float = quantity(0.0004, "V", "standard deviation of the input noise of a sample", ge=0)
 
     @property

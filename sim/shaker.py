@@ -4,8 +4,8 @@
 
 The amplifier either holds the coil voltage e, so that i = (e - Bl v) / R and the back-EMF makes the table nearly a
 velocity source, or it holds the current i, which makes it a force source. The coil's inductance is neglected: it
-matters above some hundred hertz only. Orders of magnitude follow the data sheets of long-stroke shakers such as
-the APS 400 and 420 (445 to 900 N, 0.15 m stroke, 1 m/s).
+matters only above several hundred hertz. Orders of magnitude follow the data sheets of long-stroke shakers such as the
+APS 400 and 420 (445 to 900 N, 0.15 m stroke, 1 m/s).
 """
 
 from typing import Literal
@@ -37,7 +37,7 @@ class Shaker(Parameters):
     current_limit: float = quantity(18.0, "A", "largest coil current of the amplifier", gt=0)
     drive_range: float = quantity(10.0, "V", "largest magnitude of the drive at the amplifier's input", gt=0)
     friction: float = quantity(1.5, "N", "Coulomb friction F_c of the guides", ge=0)
-    friction_velocity: float = quantity(0.004, "m/s", "velocity v_c over which the friction reverses", gt=0)
+    friction_velocity: float = quantity(0.004, "m/s", "velocity v_c within which the friction reverses", gt=0)
     half_stroke: float = quantity(0.075, "m", "distance from mid stroke to each end stop", gt=0)
     stop_stiffness: float = quantity(4.0e5, "N/m", "stiffness of an end stop", gt=0)
     stop_damping: float = quantity(

@@ -36,7 +36,9 @@ class Frame(Parameters):
     @model_validator(mode="after")
     def _a_frame_that_can_stand(self) -> "Frame":
         if self.h1 >= self.h2:
-            raise InvalidInput("h1", self.h1, f"the first storey must be below the second, h2 = {self.h2:g} m")
+            raise InvalidInput(
+                "h1", self.h1, f"it must be less than h2 = {self.h2:g} m, the height of the second storey"
+            )
         try:
             lower, upper = self.natural_frequencies
         except ArithmeticError:

@@ -29,7 +29,7 @@ SEED_SECTION = (3.11068, -0.0010828, 0.00037455, 0.049398, -0.11073, 0.67994)
 
 
 class NoOrbit(RockbenchError):
-    """No periodic rocking motion was found."""
+    """Error: no periodic rocking motion was found."""
 
     error_code = "no_orbit"
 
@@ -90,7 +90,7 @@ class Orbit:
         Raises InvalidInput for n < 1.
         """
         if n < 1:
-            raise InvalidInput("n", n, "at least one sample of the period")
+            raise InvalidInput("n", n, "it must be at least one sample per period")
         phases = np.arange(n) * (tau / n)
         # integrate from the known point to the start of the next period of the base's sine
         wait = -self.phase % tau
@@ -128,7 +128,7 @@ def rocking_branch(specimen: Specimen, omegas: Sequence[float] | NDArray[np.floa
 
 
 def branch_solutions(specimen: Specimen, omegas: Sequence[float], amplitude: float) -> dict[float, Solution]:
-    """The fixed points of `rocking_branch`, phases without jumps by 2 pi, in the order of the frequencies."""
+    """The fixed points of `rocking_branch`, with phases unwrapped, in the order of the frequencies."""
     known: dict[float, Solution] = {}
     origin, section = _seed()
     for omega in omegas:

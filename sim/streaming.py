@@ -29,11 +29,11 @@ class Stream:
     """A specimen whose motion advances as its base acceleration arrives.
 
     The acceleration consists of values `dt` [s] apart, interpolated linearly; the very first value is only the start of
-    the first line. With `held`, each value instead stays for the `dt` after it, as at a converter's output. `divisions`
-    states are evaluated in each interval, at equal parts up to its end: the drive's updates may be far coarser than the
-    samples required, because the motion between them is a polynomial. 0 evaluates none. `peaks_from` [s] starts the
-    window of the running peaks, None requests none; the other arguments are those of `sim.rocking.simulate`, and the
-    motion is bit for bit the one that it returns for a `SampledRecord`.
+    the first line. With `held`, each value is instead held for the following `dt`, as at a converter's output.
+    `divisions` states are evaluated in each interval, at equal parts up to its end: the drive's updates may be far
+    coarser than the samples required, because the motion between them is a polynomial. With 0, none are evaluated.
+    `peaks_from` [s] is the start of the window of the running peaks, or None for no peaks; the other arguments are
+    those of `sim.rocking.simulate`, and the motion is bit-identical to the one that it returns for a `SampledRecord`.
 
     Raises InvalidInput for values outside their range.
     """

@@ -26,7 +26,7 @@ Done = Callable[[int, int], None]
 
 
 class SchedulerUnavailable(RockbenchError):
-    """The scheduler does not respond."""
+    """Error: the scheduler does not respond."""
 
     error_code = "scheduler_unavailable"
 
@@ -55,14 +55,14 @@ def sweep(
 
     By default in as many threads as there are processors, see `in_threads`. With the address of a dask `scheduler`,
     such as "tcp://10.0.0.5:8786", its workers run it; they need this package, and function and items must be picklable.
-    A task has `batch` items: choose it so that a task takes much longer than the milliseconds of its transfer.
+    A task has `batch` items; choose a value that makes a task much longer than the few milliseconds of its transfer.
     `done` then counts tasks.
 
     Raises InvalidInput for batch < 1, MissingExtra without the extra "distributed", SchedulerUnavailable when the
     scheduler does not answer.
     """
     if batch < 1:
-        raise InvalidInput("batch", batch, "a task has at least one item")
+        raise InvalidInput("batch", batch, "a task must have at least one item")
     todo = list(items)
     if scheduler is not None:
         return _distributed(function, todo, scheduler, batch, done)

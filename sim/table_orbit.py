@@ -1,7 +1,7 @@
 """Steady rocking on a table moved by the reaction of the specimen: its orbit and Floquet multipliers.
 
-The motion of the table is part of the state, so a disturbance of the block moves the table, which changes the stability
-of the orbit: the same orbit may be stable on a light table and unstable on fixed ground. The drive is periodic and
+The motion of the table is part of the state: a disturbance of the block moves the table, which changes the stability of
+the orbit, so that the same orbit may be stable on a light table and unstable on fixed ground. The drive is periodic and
 unchanging, as under a slow amplitude control within a few cycles; its harmonics are such that the acceleration of the
 table is a sine.
 """
@@ -26,11 +26,11 @@ TICKS, SUBSTEPS = 600, 2
 """Intervals of a constant drive per period, and Runge-Kutta steps in each; the error of the multipliers is 4e-5."""
 
 STEP = 1e-5
-"""Step of the differences, relative to the size of each state."""
+"""Step of the differences, relative to the magnitude of each state."""
 
 CLOSED, QUICK = 1e-9, 0.2
-"""Relative mismatch over a period at which an orbit counts as closed, and its reduction by a step of Newton's method
-with known derivatives.
+"""Relative mismatch over a period at which an orbit counts as closed, and the reduction per Newton step below which the
+derivatives are kept.
 """
 
 PURE = 1e-4
@@ -67,7 +67,7 @@ class TableOrbit:
 
 
 def table_orbit(fixed: Orbit, shaker: Shaker, harmonics: int = 5) -> TableOrbit:
-    """The orbit on the table of `shaker` that belongs to the rocking orbit `fixed` on fixed ground.
+    """The orbit on the table of `shaker` that corresponds to the rocking orbit `fixed` on fixed ground.
 
     The harmonics 1 to `harmonics` of the drive give the table's acceleration the fundamental of `fixed` and no others.
     Raises NoOrbit when Newton's method does not find it, or the block comes to rest or falls.
@@ -94,7 +94,10 @@ def table_orbit(fixed: Orbit, shaker: Shaker, harmonics: int = 5) -> TableOrbit:
             multipliers = np.linalg.eigvals(jacobian).astype(np.complex128)
             return TableOrbit(fixed.omega, phase, start, drive, multipliers, drift)
         drive = drive + error * response
-    raise NoOrbit(f"no drive makes the table's motion a sine at omega = {fixed.omega:g} rad/s with the block rocking")
+    raise NoOrbit(
+        f"no drive was found that keeps the table's motion sinusoidal at omega = {fixed.omega:g} rad/s "
+        "while the block rocks"
+    )
 
 
 def _widest(fixed: Orbit) -> tuple[float, Array]:
@@ -161,7 +164,7 @@ class TablePeriod:
         raise NoOrbit(f"no steady rocking on the table was found at omega = {self._omega:g} rad/s")
 
     def jacobian(self, start: Array, drive: NDArray[np.complex128]) -> Array:
-        """Derivatives of the state after a period by that before it, by central differences."""
+        """Derivatives of the state after one period with respect to the state before it, by central differences."""
         columns = list[Array]()
         for step in np.diag(STEP * self.scales(start)):
             ahead, behind = self.run(start + step, drive)[0], self.run(start - step, drive)[0]

@@ -76,10 +76,10 @@ class Truth:
 class VirtualBench:
     """Bench that converts drive voltage to counts, tick by tick, indefinitely.
 
-    Channels of `further` sensors follow those of table and lasers. All random numbers depend on `seed`; the same seed
-    and drive give the same counts, however the drive is divided into blocks. Tick i of a block is sampled just before
-    its drive sample takes effect. A part held by hand is released between two ticks, without a push, a few seconds
-    after `arm`.
+    The channels of the `further` sensors follow those of table and lasers. All random numbers depend on `seed`; the
+    same seed and drive give the same counts, however the drive is divided into blocks. Tick i of a block is sampled
+    just before its drive sample takes effect. A part held by hand is released between two ticks, without a push, a few
+    seconds after `arm`.
     """
 
     def __init__(
@@ -129,7 +129,7 @@ class VirtualBench:
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """The input channels in column order with nominal calibrations, which ignore the simulated scale errors."""
+        """The input channels in column order, with nominal calibrations that ignore the simulated scale errors."""
         p, lsb = self.parameters, self.parameters.converter.lsb
         lowest, highest = (code + inward for code, inward in zip(p.converter.codes, (1, -1), strict=True))
         linear = (
@@ -197,7 +197,7 @@ class VirtualBench:
         if arrangement.table_locked:
             self._state[0] = 0.0
         self._carried[:] = 0.0
-        # a hand-held block moves no more than one in the catch
+        # a hand-held block moves no more than one held by the catch
         self._mode = self._kernel.REST if arrangement.tilt == 0.0 else self._kernel.FALLEN
 
     def arm(self) -> None:
@@ -206,7 +206,7 @@ class VirtualBench:
             self._held_for = round(self._hand_random.uniform(*_LET_GO) * self.parameters.sample_rate)
 
     def disarm(self) -> None:
-        """Disarm the bench: a part held by hand stays held."""
+        """Disarm the bench: a part held by hand is no longer released."""
         self._held_for = None
 
     def _arrange(self, arrangement: Arrangement) -> None:
@@ -237,7 +237,7 @@ class VirtualBench:
             self._held_for -= n
 
     def _stream(self, ticks: slice, requests: Array, noise: Array) -> None:
-        """Advance through some of the ticks of a block."""
+        """Advance through part of a block's ticks."""
         self._mode = self._kernel.stream(
             self._plant,
             1.0 / self.parameters.sample_rate,

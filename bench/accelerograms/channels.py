@@ -11,7 +11,9 @@ from sim.errors import InvalidInput
 
 @dataclass(frozen=True)
 class Channel:
-    """Channel of a file: its header begins at line `first`, its accelerations follow line `data`, up to `last` - 1."""
+    """Channel of a file: its header begins at line `first`; its accelerations follow line `data`, up to line `last` -
+    1.
+    """
 
     number: int
     name: str
@@ -28,14 +30,14 @@ def chosen(text: RecordText, channels: Sequence[Channel], choices: Choices) -> C
     item, wanted = f"channel of {text.path.name}", choices.channel
     if wanted is None:
         if len(channels) > 1:
-            raise InvalidInput(item, None, f"the file has several; select one with @channel=NUMBER: {offered}")
+            raise InvalidInput(item, None, f"the file has several channels; select one with @channel=NUMBER: {offered}")
         return channels[0]
     number = re.fullmatch(r"\s*(\d+)\s*", wanted)
     found = [channel for channel in channels if number is not None and channel.number == int(number[1])]
     if not found:
         found = [channel for channel in channels if _bare(channel.name) == _bare(wanted)]
     if len(found) != 1:
-        raise InvalidInput(item, wanted, f"the file has {offered}; select one number")
+        raise InvalidInput(item, wanted, f"the file has {offered}; select one by number")
     return found[0]
 
 

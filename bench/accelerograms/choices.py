@@ -1,4 +1,4 @@
-"""Merge of the user's choices for a file with the contents read from it; conflicts are refused."""
+"""Merges the user's choices for a file with its contents; conflicts raise an error."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -13,7 +13,7 @@ from bench.accelerograms.units import UNITS, unit_of
 from sim.errors import InvalidInput
 
 _SAME_STEP = 1e-6
-"""Relative difference up to which two steps count as equal, written with different digits."""
+"""Relative difference up to which two steps written with different numbers of digits count as equal."""
 
 
 @dataclass(frozen=True)
@@ -42,8 +42,11 @@ class Reading:
 
 
 def refuse_choice(text: RecordText, choices: Choices, *names: str) -> None:
-    """Refuse the choice of a part that a file does not have."""
-    remedies = {"channel": "this format has no channels", "column": "a column can be chosen only in plain columns"}
+    """Raise InvalidInput for the choice of a part that the file does not have."""
+    remedies = {
+        "channel": "this format has no channels",
+        "column": "a column can be selected only in a file of plain columns",
+    }
     for name in names:
         value = getattr(choices, name)
         if value is not None:
@@ -51,7 +54,9 @@ def refuse_choice(text: RecordText, choices: Choices, *names: str) -> None:
 
 
 def combine(text: RecordText, choices: Choices, reading: Reading) -> Accelerogram:
-    """The record in m/s2. Raises InvalidInput where choice and file disagree, or neither states a value."""
+    """The record in m/s2. Raises InvalidInput where the user's choice and the file disagree, or neither states a
+    value.
+    """
     name = text.path.name
     dt = _step(name, choices.dt, reading.dt)
     unit = _unit(name, choices.unit, reading.unit)
@@ -77,13 +82,13 @@ def _step(name: str, given: float | None, stated: float | None) -> float:
         raise InvalidInput(f"dt of {name}", given, "it must be positive seconds")
     if stated is not None and not (isfinite(stated) and stated > 0.0):
         raise InvalidInput(
-            f"dt of {name}", stated, "the file states a step that is not positive seconds: it is damaged"
+            f"dt of {name}", stated, "the step stated in the file is not a positive time: the file is damaged"
         )
     if given is None and stated is None:
         raise InvalidInput(f"dt of {name}", None, "the file does not state its time step; give it as @dt=SECONDS")
     if given is not None and stated is not None and not isclose(given, stated, rel_tol=_SAME_STEP):
         raise InvalidInput(f"dt of {name}", given, f"the file states {stated:g} s; omit dt")
-    # the digits of the file, if any
+    # prefer the file's digits, if any
     return stated if stated is not None else float(given or 0.0)
 
 

@@ -26,7 +26,7 @@ _UNIT = re.compile(r"\b[cm]?m/s(?:ec)?(?:(?:\^|\*\*)?2\b|/s(?:ec)?\b)", re.IGNOR
 
 
 def check_comments(text: RecordText, count: int, choices: Choices) -> None:
-    """Refuse a step or a unit that one of the first `count` lines contradicts. Raises InvalidInput naming the line."""
+    """Check step and unit against the first `count` lines. Raises InvalidInput naming the line."""
     for index, line in enumerate(text.lines[:count]):
         step, unit = _STEP.search(line), _UNIT.search(line)
         if step is not None and choices.dt is not None and not isclose(value_of(step[1]), choices.dt, rel_tol=1e-6):
@@ -40,15 +40,15 @@ def check_comments(text: RecordText, count: int, choices: Choices) -> None:
 _COMMENT = ("%", "#")
 _HEADING = re.compile(r"^(?P<name>.*?)\s*[\[(]\s*(?P<unit>[^\])]+?)\s*[\])]\s*$")
 _RISING = 0.9
-"""Fraction of rising steps above which a first column is a time, which must then be free of errors."""
+"""Fraction of rising steps above which the first column counts as time; it must then be free of errors."""
 
 _EQUAL = 1e-6
-"""Relative difference of numbers that were written as equal."""
+"""Relative difference up to which numbers count as written equal."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Table:
-    """`values` has shape (rows, columns); `first` is the line of its first row."""
+    """`values` has shape (rows, columns); `first` is the line number of its first row."""
 
     values: Array
     headings: list[str]
@@ -57,7 +57,7 @@ class _Table:
 
 
 def recognise(text: RecordText) -> bool:
-    """Whether numbers begin after comments and at most one line of headings."""
+    """Whether the file consists of comments, at most one line of headings, and numbers."""
     first = _first_row(text)
     return first is not None and first - _comments(text) <= 1
 
@@ -72,7 +72,9 @@ def read(text: RecordText, choices: Choices) -> Reading:
     column = _column(text, choices, table, time)
     name, unit = _heading(table.headings[column]) if table.headings else ("", None)
     if unit is not None and spelled(unit) is None:
-        raise text.refusal(table.first - 1, f"column {column + 1} is in {unit}, an unknown unit of acceleration")
+        raise text.refusal(
+            table.first - 1, f"column {column + 1} is in {unit}, which is not a known unit of acceleration"
+        )
     comments = {f"line {k}": line.strip() for k, line in enumerate(text.lines[: table.first], 1)}
     return Reading(
         format="columns" if count > 1 else "one column",
@@ -90,7 +92,7 @@ def _comments(text: RecordText) -> int:
 
 
 def _first_row(text: RecordText) -> int | None:
-    """The first line after the comments that consists of numbers only."""
+    """The first line after the comments that contains only numbers."""
     row = re.compile(rf"\s*{NUMBER}(?:[\s,;]+{NUMBER})*[\s,;]*")
     start = _comments(text)
     return next((k for k in range(start, min(start + 2, len(text.lines))) if row.fullmatch(text.lines[k])), None)
@@ -113,7 +115,7 @@ def _table(text: RecordText) -> _Table:
 
 
 def _parsed(text: RecordText, first: int, separator: str | None) -> Array:
-    """The rows, shape (rows, columns). Raises InvalidInput naming the first line of another form."""
+    """The rows, shape (rows, columns). Raises InvalidInput naming the first line with a different format."""
     lines = text.lines[first:]
     try:
         if "" not in lines:
@@ -127,9 +129,9 @@ def _parsed(text: RecordText, first: int, separator: str | None) -> Array:
     for index, line in enumerate(lines, first):
         cells = line.split(separator)
         if not line.strip():
-            raise text.refusal(index, "it is empty, and samples follow: the record has a gap")
+            raise text.refusal(index, "it is empty but more samples follow: the record has a gap")
         if len(cells) != width:
-            raise text.refusal(index, f"it has {len(cells)} columns, the lines before {width}")
+            raise text.refusal(index, f"it has {len(cells)} columns, but the lines above have {width}")
         for cell in cells:
             if re.fullmatch(NUMBER, cell.strip()) is None or not np.isfinite(value_of(cell.strip())):
                 raise text.refusal(index, f"{cell.strip()!r} is not a finite decimal number")
@@ -137,7 +139,7 @@ def _parsed(text: RecordText, first: int, separator: str | None) -> Array:
 
 
 def _is_time(values: Array) -> bool:
-    """Whether the first of several columns rises like time; unlike ground acceleration."""
+    """Whether the first of several columns rises steadily, as time does and ground acceleration does not."""
     if values.shape[1] < 2 or len(values) < 3:
         return False
     steps = np.diff(values[:, 0])
@@ -145,7 +147,7 @@ def _is_time(values: Array) -> bool:
 
 
 def _step(text: RecordText, table: _Table) -> float:
-    """The constant step of the first column [s], within the rounding of its digits."""
+    """The constant step of the first column [s], to within the rounding of its digits."""
     if table.headings:
         name, unit = _heading(table.headings[0])
         if unit is not None and unit.lower() not in ("s", "sec", "seconds"):
@@ -162,7 +164,7 @@ def _step(text: RecordText, table: _Table) -> float:
     drift = np.abs(time - time[0] - dt * np.arange(time.size))
     if wrong.size or drift.max() > max(rounding, _EQUAL * usual):
         at = int(wrong[0]) + 1 if wrong.size else int(drift.argmax())
-        problem = f"its time does not follow the one above by the step of the others, {usual:g} s"
+        problem = f"its time differs from the one above by something other than the usual step, {usual:g} s"
         raise text.refusal(table.first + at, f"{problem}: there is a gap, or the times have too few digits")
     # the digits of the intended step: 0.01 instead of 0.00999999999
     meant = float(f"{dt:.9g}")
@@ -177,7 +179,9 @@ def _column(text: RecordText, choices: Choices, table: _Table, time: bool) -> in
     item, wanted = f"column of {text.path.name}", choices.column
     if wanted is None:
         if len(offered) > 1:
-            raise InvalidInput(item, None, f"the file has several; select @column=NUMBER: {', '.join(offered)}")
+            raise InvalidInput(
+                item, None, f"the file has several columns; select one with @column=NUMBER: {', '.join(offered)}"
+            )
         return int(time)
     found = [k for k, name in enumerate(names) if name == wanted]
     if re.fullmatch(r"\d{1,6}", wanted):

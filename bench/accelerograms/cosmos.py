@@ -29,11 +29,11 @@ _DATA = re.compile(
 _END = re.compile(r"^\s*End-of-data", re.IGNORECASE)
 _PEAK = re.compile(rf"^\s*Processed:.*?Max\s*=\s*({NUMBER})\s+(\S+)", re.IGNORECASE)
 _STEP = 34
-"""Number of the real that is the time step, counted from 1."""
+"""Position of the time step among the reals, counted from 1."""
 
 
 class _Block(NamedTuple):
-    """Header from line `first`, data below line `data` up to `last` - 1."""
+    """Header from line `first` on; data from below line `data` to line `last` - 1."""
 
     first: int
     data: int
@@ -41,7 +41,7 @@ class _Block(NamedTuple):
 
 
 def recognise(text: RecordText) -> bool:
-    """Whether the first line names a format of COSMOS."""
+    """Whether the first line names a COSMOS format."""
     return _START.search(text.lines[0]) is not None and any(_REALS.match(line) for line in text.lines)
 
 
@@ -83,11 +83,11 @@ def _step(text: RecordText, channel: Channel) -> float:
             if values.size >= _STEP and values[_STEP - 1] > 0.0:
                 return float(values[_STEP - 1])
             raise text.refusal(index, f"number {_STEP} of these, the time step, is unknown")
-    raise text.refusal(channel.first, "no real header follows, which holds the time step; the file is damaged")
+    raise text.refusal(channel.first, "the real header with the time step is missing; the file is damaged")
 
 
 def _channels(text: RecordText) -> list[Channel]:
-    """The channels with an acceleration."""
+    """The channels that contain an acceleration."""
     found: list[Channel] = []
     for block in _blocks(text):
         head = _DATA.match(text.lines[block.data])
@@ -97,7 +97,7 @@ def _channels(text: RecordText) -> list[Channel]:
         number, name = (int(named[0][1]), named[0][2]) if named else (len(found) + 1, "")
         found.append(Channel(number, name, block.first, block.data, block.last))
     if not found:
-        raise text.refusal(0, "this file has no acceleration; use the file of the acceleration")
+        raise text.refusal(0, "this file contains no acceleration; use the acceleration file of the record")
     return found
 
 

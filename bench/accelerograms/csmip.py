@@ -1,8 +1,8 @@
-"""CSMIP's volume 2 (`.V2`): for each channel 25 lines of text, integers and reals, then acceleration, velocity and
-displacement, eight columns of width 10 that may touch.
+"""CSMIP volume 2 files (`.V2`): for each channel 25 lines of text, integers and reals, then acceleration, velocity and
+displacement in eight columns of width 10 that may touch.
 
 Source: California Strong Motion Instrumentation Program, "Standard tape format for CSMIP strong-motion data tapes",
-OSMS 85-03 (1985); its later releases state the columns, like (8f10.6), next to the count.
+OSMS 85-03 (1985); its later releases state the column format, such as (8f10.6), next to the count.
 """
 
 import re
@@ -60,7 +60,7 @@ def read(text: RecordText, choices: Choices) -> Reading:
 
 
 def _channels(text: RecordText) -> list[Channel]:
-    """Every channel, with its block of acceleration."""
+    """All channels with their blocks of acceleration."""
     starts = [(index, match) for index, line in enumerate(text.lines) if (match := _START.match(line)) is not None]
     ends = [index for index, _ in starts[1:]] + [len(text.lines)]
     found: list[Channel] = []
@@ -68,7 +68,7 @@ def _channels(text: RecordText) -> list[Channel]:
         heads = {k: head for k in range(first, last) if (head := _DATA.match(text.lines[k])) is not None}
         data = next((k for k, head in heads.items() if head["what"].upper() == "ACCEL"), None)
         if data is None:
-            raise text.refusal(first, f"no acceleration of channel {match[1]} follows; the file is cut off")
+            raise text.refusal(first, f"the acceleration of channel {match[1]} is missing; the file is truncated")
         stop = next((k for k in range(data + 1, last) if k in heads or _END.match(text.lines[k])), last)
         found.append(Channel(int(match[1]), match[2].strip(), first, data, stop))
     return found

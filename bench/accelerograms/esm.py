@@ -25,7 +25,7 @@ def read(text: RecordText, choices: Choices) -> Reading:
     last = max(where.values())
     for key in (_STEP, _UNIT, _TYPE):
         if not values.get(key):
-            raise text.refusal(last, f"the header above does not state {key}; fetch the file again")
+            raise text.refusal(last, f"the header above does not state {key}; download the file again")
     if values[_TYPE].upper() != "ACCELERATION":
         raise not_acceleration(text, where[_TYPE], values[_TYPE])
     samples = numbers(text, last + 1, len(text.lines), count_in(text, where[_COUNT], values[_COUNT]))
@@ -44,7 +44,7 @@ def read(text: RecordText, choices: Choices) -> Reading:
 
 
 def _keys(text: RecordText) -> dict[str, int]:
-    """The header lines by their keys."""
+    """Header values by key."""
     found: dict[str, int] = {}
     for index, line in enumerate(text.lines[:_LONGEST_HEADER]):
         key, colon, _ = line.partition(":")

@@ -1,4 +1,4 @@
-"""ITACA's older `.acc` files: ten lines of header, then five columns of 14 characters that may touch.
+"""Older ITACA `.acc` files: ten header lines, then five columns of 14 characters that may touch.
 
 The samples are checked against the peak stated in the header. Source: ITACA 1.x (Luzi et al. 2008).
 """

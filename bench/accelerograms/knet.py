@@ -1,8 +1,7 @@
 """Files of K-NET and KiK-net (`.NS`, `.EW1`, ...): 17 lines of header, then counts of the digitizer.
 
-A sample is its count times the scale factor, minus the mean of all: the recorders have an offset, and the peak in the
-header is relative to the mean.
-Source: NIED, "About K-NET ASCII format" and K-NET/KiK-net FAQ 2.
+A sample is its count times the scale factor, minus the mean of all samples: the recorders have an offset, and the peak
+in the header is relative to the mean. Source: NIED, "About K-NET ASCII format" and K-NET/KiK-net FAQ 2.
 """
 
 import re
@@ -13,11 +12,11 @@ from bench.accelerograms.stated import check_peak, count_in, number_in
 from bench.accelerograms.text import RecordText
 
 _HEADER, _KEY = 17, 18
-"""Lines of the header, and characters of a key."""
+"""Number of header lines, and width of a key in characters."""
 
 _SCALE = re.compile(rf"({NUMBER})\s*\(gal\)\s*/\s*({NUMBER})", re.IGNORECASE)
 _CHANNELS = {"1": "NS1", "2": "EW1", "3": "UD1", "4": "NS2", "5": "EW2", "6": "UD2"}
-"""KiK-net's sensors: 1 to 3 in the borehole, 4 to 6 at the surface."""
+"""KiK-net sensors: 1 to 3 in the borehole, 4 to 6 at the surface."""
 
 
 def recognise(text: RecordText) -> bool:
@@ -47,7 +46,7 @@ def read(text: RecordText, choices: Choices) -> Reading:
     if peak is not None:
         number_in(text, where[peak], values[peak], "the peak")
         check_peak(text, where[peak], values[peak], samples, resolution=factor)
-    note = f"the mean of all samples, {factor * offset:.6g} gal, was subtracted: an offset of the recorder"
+    note = f"the mean of all samples, {factor * offset:.6g} gal, was subtracted as the recorder's offset"
     direction = values["Dir."]
     values["Dir."] = f"{direction} ({_CHANNELS[direction]})" if direction in _CHANNELS else direction
     return Reading(

@@ -1,7 +1,7 @@
 """Intensity measures of a record: peaks of acceleration, velocity and displacement, energy and duration.
 
-The samples are interpolated linearly, as everywhere in this software, and the motion starts from rest. Without baseline
-correction or filter, the final velocity and displacement show the drift of a record.
+The samples are interpolated linearly, as everywhere in this software, and the motion starts from rest. Since no
+baseline correction or filter is applied, the final velocity and displacement show the record's drift.
 """
 
 from dataclasses import dataclass
@@ -25,10 +25,10 @@ DRIFTING = 0.05
 class Measures:
     """Measures of one component.
 
-    `pga` [m/s2], `pgv` [m/s] and `pgd` [m] are largest magnitudes, also between samples; `final_velocity` [m/s] and
-    `final_displacement` [m] are those at the last sample. `arias` [m/s] is the intensity of Arias (1970),
-    pi / (2 g) times the integral of a^2. `significant_5_75` and `significant_5_95` [s] are the times in which it grows
-    from 5 to 75 and to 95 per cent (Trifunac and Brady, Bull. Seism. Soc. Am. 65, 1975).
+    `pga` [m/s2], `pgv` [m/s] and `pgd` [m] are the largest magnitudes, including those between samples;
+    `final_velocity` [m/s] and `final_displacement` [m] are those at the last sample. `arias` [m/s] is the intensity of
+    Arias (1970), pi / (2 g) times the integral of a^2. `significant_5_75` and `significant_5_95` [s] are the durations
+    over which it grows from 5 to 75 and to 95 per cent (Trifunac and Brady, Bull. Seism. Soc. Am. 65, 1975).
     """
 
     pga: float
@@ -81,7 +81,7 @@ def _reached(energy: Array, share: float, dt: float) -> float:
 
 
 def _peaks(velocity: Array, displacement: Array, acceleration: Array, dt: float) -> tuple[float, float]:
-    """Largest |v| and |d|: between samples velocity is a parabola and displacement a cubic, with possible extrema."""
+    """Largest |v| and |d|, including extrema between samples, where velocity is a parabola and displacement a cubic."""
     from scipy.interpolate import CubicHermiteSpline, PPoly
 
     time = dt * np.arange(velocity.size)
@@ -92,7 +92,7 @@ def _peaks(velocity: Array, displacement: Array, acceleration: Array, dt: float)
 
 
 def _largest(samples: Array, curve: Any) -> float:
-    """Largest magnitude of a piecewise polynomial: at its knots, with the values `samples`, or at an extremum."""
+    """Largest magnitude of a piecewise polynomial, at a knot (values `samples`) or at an extremum between knots."""
     turns = curve.derivative().roots(extrapolate=False)
     # an interval of zero slope yields NaN, which is ignored
     turns = turns[np.isfinite(turns)]

@@ -1,4 +1,4 @@
-"""Numbers in a block of lines, separated by blanks or, where they touch, by the width of their columns."""
+"""Reading of a block of numbers, separated by blanks or, where they touch, by the column width."""
 
 import re
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ from bench.accelerograms.text import RecordText
 Array = NDArray[np.float64]
 
 NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][+-]?\d+)?"
-"""A decimal number in Fortran or C format; neither NaN nor infinity."""
+"""A decimal number in Fortran or C format, excluding NaN and infinity."""
 
 _FOREIGN = re.compile(r"[^0-9EeDd+\-.\s]")
 
@@ -28,8 +28,8 @@ class Samples:
 def numbers(text: RecordText, first: int, last: int, count: int, width: int | None = None) -> Samples:
     """The `count` numbers in the lines `first` to `last` - 1, with all rows but the last of equal length.
 
-    `width` is that of a column if fixed by the format; otherwise the width that separates the numbers is determined.
-    Raises InvalidInput naming the line with other content, or the count.
+    `width` is the column width if the format fixes it; otherwise it is determined from the numbers. Raises InvalidInput
+    naming the line with unexpected content, or the count.
     """
     lines = [line.rstrip() for line in text.lines[first:last]]
     while lines and not lines[-1]:
@@ -47,18 +47,18 @@ def numbers(text: RecordText, first: int, last: int, count: int, width: int | No
             return found
     _refuse_junk(text, first, lines, width)
     there = sum(len(re.findall(NUMBER, line)) for line in lines)
-    cause = "the file is cut off: fetch it again" if there < count else "the file is damaged or numbers were added"
-    allowed = f"the header states {count} samples, but {there} numbers precede this line; {cause}"
+    cause = "the file is truncated: download it again" if there < count else "the file is damaged or numbers were added"
+    allowed = f"the header states {count} samples, but there are {there} numbers before this line; {cause}"
     raise text.refusal(first + max(len(lines) - 1, 0), allowed)
 
 
 def value_of(word: str) -> float:
-    """Value of a text that matches `NUMBER`; Fortran's exponents may begin with D."""
+    """Value of a string that matches `NUMBER`; Fortran exponents may begin with D."""
     return float(word.replace("D", "E").replace("d", "e"))
 
 
 def place(word: str) -> float:
-    """Value of one unit in the last written digit of a number."""
+    """Value of one unit in the last digit of a written number."""
     mantissa, _, exponent = re.sub("[dD]", "e", word.lower()).partition("e")
     decimals = len(mantissa.partition(".")[2])
     return 10.0 ** (int(exponent or 0) - decimals)
@@ -75,13 +75,15 @@ def _as_samples(fields: list[str]) -> Samples | None:
 
 
 def _columns(lines: list[str], count: int, width: int | None) -> Samples | None:
-    """The numbers of columns that may touch: of the given width, or of the widest at which all are numbers."""
+    """Numbers in columns that may touch: of the given width, or of the largest width at which every cell is a
+    number.
+    """
     full = len(lines[0]) if lines else 0
     for candidate in range(full, 1, -1) if width is None else (width,):
         if full % candidate or any(len(line) % candidate for line in lines):
             continue
         fields = [line[k : k + candidate].strip() for line in lines for k in range(0, len(line), candidate)]
-        # one decimal point in each, at the same position: a number cut in two has none, or at another position
+        # every cell has one decimal point at the same position; a number cut in two has none, or has it elsewhere
         decimals = {len(field.partition(".")[2]) if "." in field else None for field in fields}
         found = _as_samples(fields) if len(fields) == count and len(decimals) == 1 and None not in decimals else None
         if found is not None:
@@ -92,18 +94,22 @@ def _columns(lines: list[str], count: int, width: int | None) -> Samples | None:
 def _refuse_empty(text: RecordText, first: int, lines: list[str]) -> None:
     for index, line in enumerate(lines):
         if not line:
-            raise text.refusal(first + index, "it is empty, and samples follow: the record has a gap; fetch it again")
+            raise text.refusal(
+                first + index, "it is empty but more samples follow: the record has a gap; download it again"
+            )
 
 
 def _refuse_gaps(text: RecordText, first: int, lengths: list[int]) -> None:
-    """Refuse rows, other than the last, of another length than the first."""
+    """Raise InvalidInput for a row, other than the last, whose length differs from the first."""
     for index, length in enumerate(lengths[1:], 1):
         if length != lengths[0] and (index < len(lengths) - 1 or length > lengths[0]):
-            raise text.refusal(first + index, "its row differs in length from those before: samples are missing")
+            raise text.refusal(first + index, "its length differs from the rows above: samples are missing")
 
 
 def _refuse_junk(text: RecordText, first: int, lines: list[str], width: int | None) -> None:
-    """Refuse the first line with anything but numbers, separated by blanks, signs or width."""
+    """Raise InvalidInput for the first line that contains anything but numbers, separated by blanks, signs or column
+    width.
+    """
     run = re.compile(rf"(?:\s*{NUMBER}(?=[\s+-]|$))+")
     for index, line in enumerate(lines):
         fields = [] if width is None else [line[k : k + width].strip() for k in range(0, len(line), width)]
@@ -112,4 +118,4 @@ def _refuse_junk(text: RecordText, first: int, lines: list[str], width: int | No
             raise text.refusal(first + index, "it must contain only numbers; the file is damaged")
         for word in re.findall(NUMBER, line):
             if not np.isfinite(value_of(word)):
-                raise text.refusal(first + index, f"{word} is too large to be a number here; the file is damaged")
+                raise text.refusal(first + index, f"{word} is too large for a number; the file is damaged")

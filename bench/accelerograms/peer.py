@@ -1,9 +1,9 @@
-"""PEER's `.AT2` files: a header of four lines or more, the last with NPTS and DT, then rows of samples.
+"""PEER `.AT2` files: a header of four lines or more, the last with NPTS and DT, then rows of samples.
 
-Variants of that line: `NPTS=  4000, DT= .01000 SEC` (1999 to today, with or without a trailing comma) and
-`4000 0.0100 NPTS, DT` (Pacific Engineering and Analysis). Spectrum-compatible files have the headers of earlier
-processing stages above the valid one. Samples come in 4 to 8 columns, the last row may be partial.
-Source: PEER Strong Motion Database, "Data files"; PEER NGA-West2 (2013).
+Variants of that line: `NPTS= 4000, DT= .01000 SEC` (1999 to today, with or without a trailing comma) and `4000 0.0100
+NPTS, DT` (Pacific Engineering and Analysis). Spectrum-compatible files have the headers of earlier processing stages
+above the valid one. Samples are in 4 to 8 columns; the last row may be partial. Source: PEER Strong Motion Database,
+"Data files"; PEER NGA-West2 (2013).
 """
 
 import re

@@ -34,9 +34,9 @@ def read_accelerogram(
     """Read all samples of a record, in m/s2; the result has the detected `format` and `unit`.
 
     `dt` [s] and `unit` (see `bench.accelerograms.units.UNITS`) are required where the file does not state them, and
-    must not contradict it. `channel`, a number or a name, selects from several channels, `column`, a number from 1 or a
-    heading, from plain columns. Raises InvalidInput, naming the line if possible, for anything but a complete, finite
-    acceleration.
+    must not contradict the file. `channel`, a number or a name, selects one of several channels; `column`, a number
+    from 1 or a heading, one of several plain columns. Raises InvalidInput, naming the line if possible, unless the file
+    holds a complete, finite acceleration.
     """
     text = load(path)
     choices = Choices(dt, unit, channel, column)

@@ -28,7 +28,7 @@ _OPTIONS = re.compile(r"\w+=[^=]*(,\w+=[^=]*)*")
 class RecordReference:
     """A requested record: a file, or a synthetic motion with its seed, and options.
 
-    `text` is the original text; `seed` is None for the default.
+    `text` is the reference as typed; `seed` is None for the default seed.
     """
 
     text: str
@@ -72,7 +72,7 @@ class RecordReference:
     def or_else(
         self, *, unit: str | None, dt: float | None, channel: str | None, column: str | None
     ) -> "RecordReference":
-        """The reference with these defaults for options not specified; a synthetic motion has none of them."""
+        """The reference with these defaults for options that it omits; they do not apply to a synthetic motion."""
         if self.path is None:
             return self
         return replace(
@@ -95,7 +95,7 @@ class RecordReference:
 
 
 def read_records(references: Sequence[RecordReference]) -> tuple[Accelerogram, ...]:
-    """Read all records of a campaign, before it starts. Raises InvalidInput where two share a name."""
+    """Read all records of a campaign before it starts. Raises InvalidInput if two share a name."""
     records: list[Accelerogram] = []
     owners: dict[str, str] = {}
     for reference in references:
@@ -103,7 +103,9 @@ def read_records(references: Sequence[RecordReference]) -> tuple[Accelerogram, .
         # the names are used for groups and files, and some file systems ignore case
         key = record.name.lower()
         if key in owners:
-            allowed = f"its name, {record.name}, is also that of {owners[key]}; omit one, or add name=ANOTHER after @"
+            allowed = (
+                f"its name, {record.name}, is already used by {owners[key]}; omit one, or add name=ANOTHER after @"
+            )
             raise InvalidInput("record", reference.text, allowed)
         owners[key] = reference.text
         records.append(record)
@@ -119,7 +121,7 @@ def _options(text: str, tail: str) -> dict[str, str]:
             allowed = f"a decimal comma in {last}? write {last}={options[last]}.{option}; commas separate options"
             raise InvalidInput("record", text, allowed)
         if key not in _KEYS:
-            raise InvalidInput("record", text, f"{key} is not one of {', '.join(_KEYS)}, which may follow @")
+            raise InvalidInput("record", text, f"{key} is not one of the keys allowed after @: {', '.join(_KEYS)}")
         if key in options or not value.strip():
             raise InvalidInput("record", text, f"{key} must occur once and have a value")
         options[key] = value.strip()
@@ -127,7 +129,7 @@ def _options(text: str, tail: str) -> dict[str, str]:
 
 
 def seconds_of(item: str, value: str) -> float:
-    """A time step [s] from its text. Raises InvalidInput."""
+    """Parse a time step [s]. Raises InvalidInput."""
     try:
         seconds = read_number(value, "s")
     except ValueError as error:
@@ -135,9 +137,7 @@ def seconds_of(item: str, value: str) -> float:
     if seconds <= 0.0:
         raise InvalidInput(item, value, "it must be positive seconds")
     if not SHORTEST_STEP <= seconds <= LONGEST_STEP:
-        allowed = (
-            f"records of earthquakes have steps of {SHORTEST_STEP:g} to {LONGEST_STEP:g} s: write its unit, as 5ms"
-        )
+        allowed = f"earthquake records have steps of {SHORTEST_STEP:g} to {LONGEST_STEP:g} s: write the unit, as in 5ms"
         raise InvalidInput(item, value, allowed)
     return seconds
 

@@ -1,4 +1,4 @@
-"""The U.S. Geological Survey's `.smc` files: 11 lines of text, 48 integers, 50 reals, comments, then samples in cm/s2.
+"""U.S. Geological Survey `.smc` files: 11 lines of text, 48 integers, 50 reals, comments, then samples in cm/s2.
 
 Integer 16 is the number of comment lines, 17 that of samples; real 2 is the sampling rate, 30 and 32 are the largest
 and smallest sample. Columns are 10 wide and may touch. Source: USGS National Strong-Motion Program, "SMC-format data
@@ -13,7 +13,7 @@ from bench.accelerograms.stated import check_peak, count_in, not_acceleration
 from bench.accelerograms.text import RecordText
 
 _TEXT, _INTEGERS, _REALS, _COMMENTS = 11, 17, 27, 27
-"""Number of lines before the integers, the reals, the comments."""
+"""Numbers of lines before the integers, the reals and the comments."""
 
 _WIDTH, _REAL_WIDTH = 10, 15
 _TYPE = re.compile(r"^\s*([0-6])\s+([A-Z][A-Z ]+)")
@@ -41,7 +41,7 @@ def read(text: RecordText, choices: Choices) -> Reading:
     first = _COMMENTS + comments
     for index in range(_COMMENTS, first):
         if index >= len(text.lines) or not text.lines[index].startswith("|"):
-            raise text.refusal(min(index, len(text.lines) - 1), f"{comments} lines of comment must begin with |")
+            raise text.refusal(min(index, len(text.lines) - 1), f"{comments} comment lines must begin with |")
     count = count_in(text, _TEXT + 2, _field(text, _TEXT, 17))
     reals = numbers(text, _INTEGERS, _REALS, 50, _REAL_WIDTH)
     rate = float(reals.values[1])
@@ -63,14 +63,16 @@ def read(text: RecordText, choices: Choices) -> Reading:
 
 
 def _comments(text: RecordText) -> int:
-    """Number of comment lines, integer 16; an unknown one is refused."""
+    """Number of comment lines, integer 16. Raises InvalidInput if it is unknown."""
     word = _field(text, _TEXT, 16).strip()
     if re.fullmatch(r"\d+", word) is None:
-        raise text.refusal(_TEXT + 1, "its last number, the lines of comment, must not be negative; fetch it again")
+        raise text.refusal(
+            _TEXT + 1, "its last number, the number of comment lines, must not be negative; download the file again"
+        )
     return int(word)
 
 
 def _field(text: RecordText, first: int, number: int) -> str:
-    """One of the integers, counted from 1, eight to a line."""
+    """The integer at a position counted from 1; a line holds eight."""
     row, column = divmod(number - 1, 8)
     return text.lines[first + row][_WIDTH * column : _WIDTH * (column + 1)]

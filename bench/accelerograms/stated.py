@@ -1,4 +1,4 @@
-"""Checks of a header's statements against the samples."""
+"""Checks of the samples against the values stated in the header."""
 
 import re
 
@@ -11,7 +11,7 @@ from sim.errors import InvalidInput
 
 
 def check_peak(text: RecordText, index: int, stated: str, samples: Samples, resolution: float | None = None) -> None:
-    """Refuse samples whose largest magnitude differs from that stated in line `index`, in the unit of the samples.
+    """Check the largest magnitude of the samples against the value stated in line `index`, in the samples' unit.
 
     Both may be off by one in their last digit; `resolution` replaces that of the samples if they were written in
     another unit.
@@ -21,7 +21,8 @@ def check_peak(text: RecordText, index: int, stated: str, samples: Samples, reso
     last_digit = place(samples.texts[at]) if resolution is None else resolution
     if abs(abs(value_of(stated)) - found) > (place(stated) + last_digit) * (1.0 + 1e-9):
         raise text.refusal(
-            index, f"its peak is {stated}, but the largest sample is {found:g}: the file is damaged or was changed"
+            index,
+            f"the stated peak is {stated}, but the largest sample is {found:g}: the file is damaged or was changed",
         )
 
 
@@ -50,5 +51,7 @@ def acceleration_unit(text: RecordText, index: int, stated: str) -> str:
 
 
 def not_acceleration(text: RecordText, index: int, quantity: str) -> InvalidInput:
-    """Refusal of a file of another quantity, stated in line `index`."""
-    return text.refusal(index, f"it is a {quantity.lower()} file; use the acceleration of the same record (PEER: .AT2)")
+    """The error for a file of another quantity, which line `index` states."""
+    return text.refusal(
+        index, f"this is a {quantity.lower()} file; use the acceleration file of the same record (PEER: .AT2)"
+    )

@@ -1,16 +1,16 @@
 """Synthetic ground motions with the main parameters of the paper's seven records, for use without record files.
 
 They consist of filtered shot noise and a near-fault velocity pulse. The envelope of the noise is that of Saragoni and
-Hart (Earthquake Eng. Struct. Dyn. 2, 1974) with an exponent of 1, e(t) = c t exp(1 - c t). The filters are those of
-Kanai (1957) and Tajimi (1960), the ground as an oscillator, with the high-pass of Clough and Penzien (Dynamics of
-Structures, 1975), which brings velocity and displacement back to zero. Noise modulated before filtering: Amin and Ang,
-J. Eng. Mech. Div. ASCE 94, 1968.
+Hart (Earthquake Eng. Struct. Dyn. 2, 1974) with an exponent of 1, e(t) = c t exp(1 - c t). The filters are that of
+Kanai (1957) and Tajimi (1960), which models the ground as an oscillator, and the high-pass of Clough and Penzien
+(Dynamics of Structures, 1975), which brings velocity and displacement back to zero. The noise is modulated before
+filtering, as by Amin and Ang, J. Eng. Mech. Div. ASCE 94, 1968.
 
-Peaks, durations and bands of six were measured on the records themselves. Parkfield's peak is that of its database,
-its pulse, ten inches of displacement within one and a half seconds, that of Housner and Trifunac (Bull. Seism. Soc.
-Am. 57, 1967); its duration and band are estimates. Periods and amplitudes of the other pulses were chosen by eye from
-the velocity pulses of the records, not fitted. Filter frequencies and noise durations were adjusted so that the mean
-over seeds has the declared values.
+Peaks, durations and bands of six motions were measured on the records themselves. For Parkfield, the peak is the one in
+its database, and the pulse, ten inches of displacement within one and a half seconds, is that of Housner and Trifunac
+(Bull. Seism. Soc. Am. 57, 1967); its duration and band are estimates. Periods and amplitudes of the other pulses were
+chosen by eye from the velocity pulses of the records, not fitted. Filter frequencies and noise durations were adjusted
+so that the mean over seeds has the declared values.
 """
 
 from dataclasses import dataclass
@@ -40,9 +40,9 @@ class Pulse:
 
 @dataclass(frozen=True)
 class Shape:
-    """`peak` [g]; `duration` [s] between 5 and 95 % of the Arias intensity; `band` [Hz] that contains the middle 68 %
-    of the acceleration's energy. `ground`: frequency and damping ratio of the ground and frequency of the high-pass;
-    `significant` [s]: duration of the noise alone.
+    """`peak` [g]; `duration` [s]: time between 5 and 95 % of the Arias intensity; `band` [Hz]: range that contains the
+    middle 68 % of the acceleration's energy. `ground`: frequency and damping ratio of the ground and frequency of the
+    high-pass; `significant` [s]: duration of the noise alone.
     """
 
     peak: float
@@ -64,23 +64,23 @@ SHAPES: dict[str, Shape] = {
 }
 
 NAMES = tuple(SHAPES)
-"""The records, in the paper's order."""
+"""The motions, in the order of the paper's records."""
 
 
 SIGNIFICANT = 2.73905
 """c times the time between 5 and 95 % of the envelope's energy: e^2 is a gamma distribution of shape 3."""
 
 DECAYED = 6.5
-"""c t at which the noise ends, at 2.7 % of its maximum; the filters smooth the end."""
+"""c t at which the noise ends, when its envelope is at 2.7 % of the maximum; the filters smooth the end."""
 
 HIGH_PASS_DAMPING = 0.6
-"""Damping ratio of Clough and Penzien's second filter, their usual value."""
+"""Usual damping ratio of Clough and Penzien's second filter."""
 
 
 def shot_noise(
     seed: int, member: int, n: int, dt: float, significant: float, ground: tuple[float, float, float]
 ) -> Array:
-    """A realisation of the noise, shape (n,), of arbitrary scale, from rest.
+    """A realisation of the noise, shape (n,), starting from rest, with arbitrary scale.
 
     `significant` [s] is the duration between 5 and 95 % of its energy; `ground` are frequency [Hz] and damping ratio of
     the ground and frequency [Hz] of the high-pass. The same `seed` and `member` produce the same noise on every
@@ -91,7 +91,7 @@ def shot_noise(
     rate = SIGNIFICANT / significant
     time = np.arange(n) * dt
     white = _white(seed, member, n) * np.where(rate * time < DECAYED, rate * time * np.exp(1.0 - rate * time), 0.0)
-    # twice the length, so that the filters' ringing does not wrap around to the beginning
+    # double the length, so that the filters' ringing does not wrap around to the beginning
     length = next_fast_len(2 * n, real=True)
     frequency = np.fft.rfftfreq(length, dt).astype(np.float64)
     filtered = np.fft.irfft(np.fft.rfft(white, length) * _response(frequency, *ground), length)
@@ -99,7 +99,7 @@ def shot_noise(
 
 
 def _white(seed: int, member: int, n: int) -> Array:
-    """White noise between -1 and 1, from the generator's integers, which numpy guarantees not to change."""
+    """White noise between -1 and 1, from the generator's integers, whose sequence numpy guarantees not to change."""
     raw = np.random.PCG64(np.random.SeedSequence((seed, member))).random_raw(n)
     return 2.0 * (raw >> np.uint64(11)).astype(np.float64) * 2.0**-53 - 1.0
 
@@ -126,12 +126,12 @@ FADING = 1.5
 def synthetic_record(name: str, seed: int = DEFAULT_SEED) -> Accelerogram:
     """A synthetic ground motion with the main parameters of the record `name`, one of NAMES.
 
-    The peak is exact, duration and band are as declared in the mean over seeds; it begins and ends at rest, with zero
-    velocity and displacement. The same seed produces the same record on every machine, to rounding. Raises
-    InvalidInput.
+    The peak is exact; duration and band have the declared values in the mean over seeds. The motion begins and ends at
+    rest, with zero velocity and displacement. The same seed produces the same record on every machine, to rounding.
+    Raises InvalidInput.
     """
     if name not in SHAPES:
-        raise InvalidInput("synthetic record", name, f"there are {', '.join(NAMES)}")
+        raise InvalidInput("synthetic record", name, f"it must be one of {', '.join(NAMES)}")
     if seed < 0:
         raise InvalidInput("seed", seed, "it must be an integer, at least 0")
     shape = SHAPES[name]

@@ -1,4 +1,4 @@
-"""Text of a record's file as numbered lines, with any line endings."""
+"""Text of a record file as numbered lines, whatever the line endings."""
 
 import re
 from dataclasses import dataclass
@@ -14,18 +14,18 @@ _CONTROL_Z = "\x1a"
 
 @dataclass(frozen=True)
 class RecordText:
-    """Lines of a file without line endings (LF, CR LF, CR CR LF, CR), and the hash of its bytes."""
+    """Lines of a file, stripped of their endings (LF, CR LF, CR CR LF, CR), and the hash of the file's bytes."""
 
     path: Path
     lines: tuple[str, ...]
     sha256: str
 
     def where(self, index: int) -> str:
-        """Name of the line `index`, counted from 0, in a refusal."""
+        """Description of the line `index`, counted from 0, in an error message."""
         return f"{self.path.name}, line {index + 1}"
 
     def refusal(self, index: int, allowed: str) -> InvalidInput:
-        """The refusal of a line, quoted."""
+        """The error for a line, which it quotes."""
         shown = self.lines[index].strip() if index < len(self.lines) else ""
         return InvalidInput(self.where(index), shown if len(shown) <= 60 else shown[:57] + "...", allowed)
 
@@ -37,13 +37,13 @@ def load(path: Path) -> RecordText:
     except FileNotFoundError:
         raise InvalidInput("record", str(path), "there is no such file") from None
     except OSError as error:
-        raise InvalidInput("record", str(path), f"it cannot be read: {error.strerror}") from None
+        raise InvalidInput("record", str(path), f"the file cannot be read: {error.strerror}") from None
     except ValueError as error:
         raise InvalidInput("record", str(path), str(error)) from None
     if b"\0" in content:
-        raise InvalidInput("record", str(path), "it is not a text file of one byte per character; export it as text")
+        raise InvalidInput("record", str(path), "it is not a text file with one byte per character; export it as text")
     # headers contain place names in any encoding, numbers are ASCII: Latin-1 decodes every byte
     text = content.removeprefix(b"\xef\xbb\xbf").decode("latin-1").rstrip(_CONTROL_Z + " \t\r\n")
     if not text:
-        raise InvalidInput("record", str(path), "it is empty")
+        raise InvalidInput("record", str(path), "the file is empty")
     return RecordText(path, tuple(re.split(r"\r*\n|\r", text)), sha256(content).hexdigest())

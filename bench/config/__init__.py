@@ -1,1 +1,1 @@
-"""The bench's configuration: one validated TOML file, every key with its unit."""
+"""The bench's configuration: one validated TOML file in which every key has a unit."""

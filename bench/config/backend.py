@@ -28,7 +28,7 @@ class RigSettings(Parameters):
     acceleration_range: float | None = quantity(
         None,
         "m/s2",
-        "range of the accelerometer; absent: not compared with limits",
+        "range of the accelerometer; if absent, it is not compared with limits",
         gt=0,
         example=100.0,
     )
@@ -38,13 +38,18 @@ class RigSettings(Parameters):
     moving_mass: float | None = quantity(
         None,
         "kg",
-        "mass of armature, table and fixtures, to estimate force and current; absent: no estimate",
+        "mass of armature, table and fixtures, used to estimate force and current; if absent, they are not estimated",
         gt=0,
         usual=(2.0, 500.0),
         example=50.0,
     )
     force_constant: float | None = quantity(
-        None, "N/A", "force per ampere of the coil, to estimate its current", gt=0, usual=(5.0, 200.0), example=50.0
+        None,
+        "N/A",
+        "force per ampere of the coil, used to estimate its current",
+        gt=0,
+        usual=(5.0, 200.0),
+        example=50.0,
     )
     laser_reference: Literal["ground", "table"] = quantity(
         "ground", "", "mounting of the lasers: on the ground they measure x + u, on the table u"
@@ -59,7 +64,7 @@ class RigSettings(Parameters):
 
     @property
     def suspension(self) -> float:
-        """Stiffness between table and ground [N/m], for the estimate of the force."""
+        """Stiffness between table and ground [N/m], used to estimate the force."""
         return 0.0
 
 

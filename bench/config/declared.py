@@ -31,8 +31,8 @@ _COUNT = {0: "any number of", 1: "one or more", 2: "two or more", 3: "three or m
 class Declared:
     """One field of a group of parameters.
 
-    `kind` is the type of a value, or of each of `many` values; `constraints` are the limits of each value and `lengths`
-    those of the number of values; `optional`: the value may be absent.
+    `kind` is the type of the value, or of each value if there are `many`; `constraints` are the limits of each value
+    and `lengths` those of the number of values; `optional`: the value may be absent.
     """
 
     name: str
@@ -72,7 +72,7 @@ class Declared:
 
     @property
     def limits(self) -> str:
-        """The limits of a value, such as "above 0 and at most 60"; empty without limits."""
+        """The limits of a value, such as "above 0 and at most 60"; empty if there are none."""
         return " and ".join(
             f"{word} {_exactly(getattr(constraint, attribute))}"
             for constraint in self.constraints
@@ -81,7 +81,7 @@ class Declared:
 
     @property
     def allowed(self) -> str:
-        """Valid values in words, such as "one or more numbers, each above 0 and at most 60"."""
+        """Description of the valid values, such as "one or more numbers, each above 0 and at most 60"."""
         if self.group is not None:
             return "a table of keys"
         if self.choices:
@@ -96,7 +96,7 @@ class Declared:
 
     @property
     def allowed_in_unit(self) -> str:
-        """`allowed` with its unit, for a sentence: "a number above 0 kg"."""
+        """`allowed` with its unit, as in "a number above 0 kg"."""
         if self.unit in ("", "1"):
             return self.allowed
         return f"{self.allowed} {self.unit}" if self.limits else f"{self.allowed} [{self.unit}]"
@@ -108,7 +108,7 @@ def declared(model: type[Parameters]) -> Iterator[Declared]:
 
 
 def at(model: type[Parameters], path: Sequence[str | int]) -> Declared | None:
-    """The field at `path`, or one of its values if the path ends with an index; None if there is none."""
+    """The field at `path`, or one of its values if the path ends with an index; None if there is no such field."""
     found: Declared | None = None
     group: type[Parameters] | None = model
     for key in path:

@@ -21,9 +21,9 @@ from sim.shaker import Shaker
 from sim.specimen import Specimen
 
 _BLOCKS_OF_WATCHDOG = 3
-"""Least time-out of a device's watchdog in blocks: a single late block must not trip it."""
+"""Minimum time-out of a device's watchdog, in blocks: a single late block must not trip it."""
 _BLOCKS_OF_HEARTBEAT = 4
-"""Least time-out of a heartbeat relay in blocks: two heartbeat periods."""
+"""Minimum time-out of a heartbeat relay, in blocks: two heartbeat periods."""
 _SHORTEST_WITH_SERIAL_LASERS = 0.02
 """Shortest block with serial lasers, whose values arrive in bursts of a few milliseconds [s]."""
 
@@ -33,7 +33,7 @@ _TABLES: dict[str, Literal["simulation", "hardware"]] = {"simulated": "simulatio
 
 
 class BenchConfiguration(Parameters):
-    """Complete description of a bench. The defaults are the paper's specimen on the simulated bench."""
+    """Complete description of a bench. The defaults describe the paper's specimen on the simulated bench."""
 
     backend: str = quantity(
         "simulated", "", 'driver of the bench: "simulated", "hardware", or a backend of another package'
@@ -43,25 +43,26 @@ class BenchConfiguration(Parameters):
     specimen_file: str | None = quantity(
         None,
         "",
-        "JSON file of identified properties of the specimen, relative to this file; absent: none",
+        "JSON file of the specimen's identified properties, relative to this file; if absent, there are none",
         example="specimen.json",
     )
     identified: Identified | None = quantity(
-        None, "", "identified properties of the specimen, in place of a specimen_file; they replace assumed values"
+        None, "", "the specimen's identified properties, in place of a specimen_file; they replace assumed values"
     )
     laser_calibration: str | None = quantity(
         None,
         "",
-        "JSON file of a calibration of the lasers, relative to this file; absent: their data sheets apply",
+        "JSON file of a laser calibration, relative to this file; if absent, the data sheets apply",
         example="laser_calibration.json",
     )
     calibrated: LaserCalibration | None = quantity(
-        None, "", "a calibration of the lasers, in place of a laser_calibration file"
+        None, "", "a laser calibration, in place of a laser_calibration file"
     )
     table_model: str | None = quantity(
         None,
         "",
-        "JSON file of an identified table, from which the drive is predicted; absent: from the simulated shaker",
+        "JSON file of an identified table, from which the drive is predicted; if absent, it is predicted "
+        "from the simulated shaker",
         example="table_model.json",
     )
     limits: Limits = Limits()
@@ -90,7 +91,7 @@ class BenchConfiguration(Parameters):
     def known_on_table(self) -> SpecimenKnowledge:
         """Uncertainty of `known_specimen` in a steady motion on this table, which recoils at the block's impacts.
 
-        The control restores the lost momentum within a period, so predictions are for fixed ground; the full effect of
+        The control restores the lost momentum within a period, so predictions assume fixed ground; the full effect of
         an uncontrolled table on the restitution is added as a half width.
         """
         block, mass = self.known_specimen.block, self.table_mass
@@ -145,12 +146,12 @@ class BenchConfiguration(Parameters):
 
     @property
     def table_band(self) -> tuple[float, float]:
-        """The usable band of the table [Hz], to which records are limited before scaling."""
+        """The table's usable band [Hz], to which records are filtered before scaling."""
         return self.settings.band_low, self.settings.band_high
 
     @property
     def shaker_model(self) -> ShakerModel | None:
-        """Model of the shaker loaded with the known specimen; None without its data."""
+        """Model of the shaker loaded with the known specimen; None if its data are absent."""
         specimen, mass = self.known_specimen, self.table_mass
         payload = specimen.frame.m1 + specimen.frame.m2 + specimen.block.mass
         constant = self.settings.force_constant
@@ -182,12 +183,12 @@ class BenchConfiguration(Parameters):
 
     @property
     def laser_half_ranges(self) -> tuple[float, float]:
-        """Largest displacement from mid range that the lasers on the first and the second storey measure [m]."""
+        """Largest displacement from mid range that the lasers on the first and the second storey can measure [m]."""
         first, second = self.laser_ranges
         return 0.5 * first, 0.5 * second
 
     def at_pace(self, *, realtime: bool) -> "BenchConfiguration":
-        """The configuration with settings that depend on virtual or real time resolved."""
+        """The configuration with the settings resolved that depend on virtual or real time."""
         if self.twin.enabled is not None:
             return self
         twin = self.twin.model_copy(update={"enabled": realtime or self.real_time_only})
@@ -246,7 +247,7 @@ class BenchConfiguration(Parameters):
     @model_validator(mode="after")
     def _what_is_identified_can_be(self) -> "BenchConfiguration":
         if self.specimen_file is not None and self.identified is not None:
-            raise InvalidInput("specimen_file", self.specimen_file, "identified is present too; remove one of them")
+            raise InvalidInput("specimen_file", self.specimen_file, "identified is also present; remove one of them")
         try:
             _ = self.known_specimen
         except InvalidInput as refusal:
@@ -261,7 +262,9 @@ class BenchConfiguration(Parameters):
         for number, channel in enumerate(self.channels):
             item = f"channels[{number}]"
             if channel.name in names:
-                raise InvalidInput(f"{item}.name", channel.name, "another channel has this name; choose another")
+                raise InvalidInput(
+                    f"{item}.name", channel.name, "another channel has this name; choose a different one"
+                )
             names.add(channel.name)
             if self.backend == "simulated":
                 try:
@@ -271,13 +274,13 @@ class BenchConfiguration(Parameters):
             if self.backend != "hardware":
                 continue
             if (other := terminals.setdefault(channel.terminal.lower(), channel.name)) != channel.name:
-                raise InvalidInput(f"{item}.terminal", channel.terminal, f"{other} uses this terminal already")
+                raise InvalidInput(f"{item}.terminal", channel.terminal, f"{other} already uses this terminal")
         return self
 
     @model_validator(mode="after")
     def _one_calibration(self) -> "BenchConfiguration":
         if self.laser_calibration is not None and self.calibrated is not None:
-            allowed = "calibrated is present too; remove one of them"
+            allowed = "calibrated is also present; remove one of them"
             raise InvalidInput("laser_calibration", self.laser_calibration, allowed)
         return self
 
@@ -291,11 +294,12 @@ class BenchConfiguration(Parameters):
             raise InvalidInput("hardware.daq.watchdog", watchdog, allowed)
         heartbeat = self.hardware.daq.heartbeat
         if heartbeat is not None and heartbeat.timeout < _BLOCKS_OF_HEARTBEAT * block:
-            allowed = f"it rises every other block of {block:g} s: use at least {_BLOCKS_OF_HEARTBEAT} blocks"
+            allowed = f"it rises in every other block of {block:g} s: use at least {_BLOCKS_OF_HEARTBEAT} blocks"
             raise InvalidInput("hardware.daq.heartbeat.timeout", heartbeat.timeout, allowed)
         if self.hardware.lasers.connection == "serial" and block < _SHORTEST_WITH_SERIAL_LASERS:
             allowed = (
-                f"serial lasers send in bursts: use at least {_SHORTEST_WITH_SERIAL_LASERS:g} s, or analogue lasers"
+                f"serial lasers send data in bursts: use at least {_SHORTEST_WITH_SERIAL_LASERS:g} s, or analogue "
+                "lasers"
             )
             raise InvalidInput("acquisition.block_duration", block, allowed)
         return self

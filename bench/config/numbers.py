@@ -23,7 +23,7 @@ from typing import Any, cast
 def converted(digits: str, typed: str, unit: str) -> float:
     """Convert the decimal number `digits` from the unit `typed` to the declared `unit` ("1" for a pure number).
 
-    Raises ValueError naming both for an unknown unit or another dimension.
+    Raises ValueError naming both if the unit is unknown or has another dimension.
     """
     if unit == "":
         raise ValueError(f"it has no unit: remove {typed!r}")
@@ -47,12 +47,12 @@ def _factor(typed: str, unit: str) -> float:
     if root in angular and base in cycles and _in_hertz(unit):
         return factor / tau / wanted
     hint = {("gram", "m/s2"): " (g is the gram; the acceleration of gravity is g_0)"}.get((_name(typed), unit), "")
-    what = "a pure number, or in %" if unit == "1" else f"in {unit}, or in a unit of its dimension"
-    raise ValueError(f"{typed} ({root or '1'}) is not of the dimension of {unit} ({base or '1'}): use {what}{hint}")
+    what = "a pure number, or in %" if unit == "1" else f"in {unit}, or in a unit of the same dimension"
+    raise ValueError(f"{typed} ({root or '1'}) does not have the dimension of {unit} ({base or '1'}): use {what}{hint}")
 
 
 def _root(unit: str) -> tuple[float, str]:
-    """Factor to base units, and the base units as text; the radian counts as a base unit."""
+    """Conversion factor to base units, and the base units as a string; the radian counts as a base unit."""
     import pint
 
     try:
@@ -87,7 +87,7 @@ def _registry() -> Any:
 
 
 MOST_VALUES = 10_000
-"""Largest number of values of a range: more is taken as a typing error."""
+"""Largest number of values in a range; a larger one is taken as a typing error."""
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?(?![\d.])", re.ASCII)
 _WHOLE = re.compile(r"[+-]?\d+", re.ASCII)
@@ -109,7 +109,7 @@ def spaced(start: str, stop: str, count: int) -> tuple[float, ...]:
 def read_number(text: str, unit: str = "1", *, whole: bool = False) -> float:
     """One number in the SI `unit`, converted if the text has another; an int if `whole`.
 
-    Raises ValueError with the correct spelling; without a message where the text does not resemble a number.
+    Raises ValueError with the correct spelling, or without a message if the text does not resemble a number.
     """
     digits, typed = _parted(text)
     value = _plain(digits) if not typed else _converted(digits, typed, unit)
@@ -123,14 +123,14 @@ def read_number(text: str, unit: str = "1", *, whole: bool = False) -> float:
 
 
 def read_values(text: str, unit: str = "1", *, whole: bool = False) -> list[float]:
-    """The values of one list item, a number or a range, in the SI `unit`. Raises ValueError likewise."""
+    """The values of one list item, a number or a range, in the SI `unit`. Raises ValueError as `number` does."""
     if ":" not in text:
         return [read_number(text, unit, whole=whole)]
     start, stop, count, *more = (*(part.strip() for part in text.split(":")), "", "")
     count, typed = _parted(count) if _NUMBER.match(count) else (count, "")
     ends = start, stop
     if any((found := _NUMBER.match(end)) and _UNIT.fullmatch(end[found.end() :].strip()) for end in ends):
-        raise ValueError(f"{_RANGE}; its unit is at the end: 2:4:5Hz")
+        raise ValueError(f"{_RANGE}; its unit goes at the end: 2:4:5Hz")
     if any(more) or any(_NUMBER.fullmatch(end) is None for end in ends) or _WHOLE.fullmatch(count) is None:
         for part in (start, stop, count):
             _refuse_comma(part)
@@ -151,7 +151,7 @@ def read_values(text: str, unit: str = "1", *, whole: bool = False) -> list[floa
 
 
 def items_of(tokens: Sequence[str]) -> list[str]:
-    """The items of a typed list, each a number or a range with its unit; an empty token is an empty item.
+    """The items of a typed list, each a number or a range with its unit; an empty token gives an empty item.
 
     Spaces also separate items within a token, except before a unit: "2.5 Hz 3 Hz" has two items.
     """
@@ -168,7 +168,7 @@ def items_of(tokens: Sequence[str]) -> list[str]:
 
 
 def require_units_alike(items: Sequence[str]) -> None:
-    """Raise ValueError when some items of a list have a unit and others do not."""
+    """Raise ValueError if only some items of a list have a unit."""
     given = [carries_unit(item) for item in items if _NUMBER.match(item)]
     if any(given) and not all(given):
         raise ValueError("add a unit to every value, or to none")
@@ -193,7 +193,7 @@ def carries_unit(text: str) -> bool:
 
 
 def _parted(text: str) -> tuple[str, str]:
-    """Digits and unit of a text. Raises ValueError, with the correct spelling if known."""
+    """Digits and unit of a typed number. Raises ValueError, with the correct spelling if known."""
     text = text.strip()
     if not text:
         raise ValueError("there is no value: remove the item, or enter a number")

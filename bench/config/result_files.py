@@ -19,7 +19,7 @@ _HEAD = ("format", "format_version", "software")
 
 @dataclass(frozen=True)
 class KeptFile:
-    """A kind of result file: `item` names it in errors, `remedy` states how to obtain one."""
+    """Kind of result file: `item` is its name in error messages, `remedy` states how to obtain one."""
 
     item: str
     format: str
@@ -34,19 +34,19 @@ class KeptFile:
             with path.open("x", encoding="utf-8", newline="\n") as file:
                 file.write(text + "\n")
         except FileExistsError:
-            raise InvalidInput(self.item, str(path), "it exists and is never overwritten") from None
+            raise InvalidInput(self.item, str(path), "the file exists and is never overwritten") from None
         except OSError as error:
-            raise InvalidInput(self.item, str(path), f"it cannot be written: {error.strerror}") from None
+            raise InvalidInput(self.item, str(path), f"the file cannot be written: {error.strerror}") from None
 
     def read(self, path: Path) -> dict[str, Any]:
-        """Contents of a file without its header. Raises InvalidInput for another kind or version."""
+        """Contents of a file without its header. Raises InvalidInput if kind or version differ."""
         try:
             data: Any = json.loads(read_bounded(path).decode("utf-8-sig"))
             require_shallow(data)
         except FileNotFoundError:
             raise InvalidInput(self.item, str(path), "there is no such file") from None
         except OSError as error:
-            raise InvalidInput(self.item, str(path), f"it cannot be read: {error.strerror}") from None
+            raise InvalidInput(self.item, str(path), f"the file cannot be read: {error.strerror}") from None
         except (ValueError, RecursionError) as error:
             raise InvalidInput(self.item, str(path), f"it is not JSON: {error}") from None
         content = cast(dict[str, Any], data) if isinstance(data, dict) else {}
@@ -54,7 +54,7 @@ class KeptFile:
             allowed = f'it is not a {self.item}: its "format" is not "{self.format}"; {self.remedy}'
             raise InvalidInput(self.item, str(path), allowed)
         if (said := content.get("format_version")) != self.version:
-            allowed = f"this program reads format version {self.version}, the file has {said!r}: use a newer program"
+            allowed = f"this program reads format version {self.version}, the file has {said!r}: update this program"
             raise InvalidInput(self.item, str(path), allowed)
         return {key: value for key, value in content.items() if key not in _HEAD}
 
@@ -90,13 +90,15 @@ def _content(path: Path, content: dict[str, Any]) -> dict[str, Any]:
 
 
 def _with_unit(finding: dict[str, Any]) -> dict[str, Any]:
-    """A finding in the file's form: its unit after its numbers."""
+    """A finding in the file's format, with its unit after its numbers."""
     name, value, uncertainty, *others = finding.items()
     return dict([name, value, uncertainty, ("unit", unit(finding["name"])), *others])
 
 
 def _without_unit(path: Path, place: int, finding: Any) -> Any:
-    """A finding without its unit, after a check that it is that of the quantity. Validation reports other errors."""
+    """A finding without its unit, which is checked against the unit of the quantity. Validation reports other
+    errors.
+    """
     if not isinstance(finding, dict):
         return finding
     entry = dict(cast(dict[str, Any], finding))

@@ -1,7 +1,7 @@
 """Cross-checks of a whole configuration whose parts are valid.
 
-`rockbench config check`, `--dry-run`, a run and the window all use the same function. A limit beyond the capabilities
-of the bench never trips: it is refused unless `limits.confirmed` names it, which every run then reports.
+`rockbench config check`, `--dry-run`, a run and the window all use the same function. A limit beyond the bench's
+capabilities would never trip: it is an error unless `limits.confirmed` names it, which every run then reports.
 """
 
 from collections.abc import Iterator
@@ -17,11 +17,12 @@ from sim.parameters import Parameters
 from sim.specimen import Specimen
 
 _ESTIMATE = 2.0
-"""Largest ratio of the limit of an estimated force or current to its value at the accelerometer's range: larger limits
-are taken as typing errors."""
+"""Largest ratio of the limit on an estimated force or current to its value at the accelerometer's range; larger limits
+are taken as typing errors.
+"""
 _LONGEST_WAIT, _LONGEST_DEBOUNCE, _WORST_CLOCK = 60.0, 1.0, 0.1
-"""Longest delays of the guard for a missing sensor or block, and for an exceeded limit [s]: at full velocity the
-table passes its stroke in a quarter of a second; and a relative clock error beyond that of any quartz.
+"""Longest delays of the guard for a missing sensor or block and for an exceeded limit [s], as the table at full
+velocity passes its stroke in a quarter of a second; and a relative clock error greater than that of any quartz.
 """
 _LEAST_ERROR = 1e-7
 """Smallest plausible linearity error of a triangulation laser [m]: the optoNCDT 1420 resolves 8 um."""
@@ -35,7 +36,7 @@ _REACH = {
 }
 """Usual measuring ranges of each kind of sensor on benches of this size, in SI units, from common data sheets."""
 _LEAST_SHARE = 0.01
-"""Share of a channel's range below which a limit is unusual."""
+"""Fraction of a channel's range below which a limit is unusual."""
 _NOISE = (1e-7, 1e-4)
 """Usual spectral density of a channel's noise relative to its range [1/Hz^0.5]: from a 16-bit converter's to 0.3 % of
 the range in a band of 1 kHz."""
@@ -43,7 +44,7 @@ the range in a band of 1 kHz."""
 
 @dataclass(frozen=True)
 class Review:
-    """Findings: `refusals`, each naming key, value and remedy, and `notices` of unusual values."""
+    """Result of a review: `refusals`, each naming key, value and remedy, and `notices` about unusual values."""
 
     refusals: tuple[InvalidInput, ...]
     notices: tuple[str, ...]
@@ -56,7 +57,7 @@ class Review:
 
 @dataclass(frozen=True)
 class _Reach:
-    """The largest value of a limited quantity that the bench can reach, and its cause."""
+    """The largest value of a limited quantity that the bench can reach, and what determines it."""
 
     limit: str
     most: float
@@ -71,7 +72,7 @@ def review(configuration: BenchConfiguration) -> Review:
         value = float(getattr(configuration.limits, reach.limit))
         if value <= reach.most:
             continue
-        why = f"it can never trip: {reach.owner} ends at {reach.most:.4g} {reach.unit}".rstrip()
+        why = f"it can never trip: the maximum of {reach.owner} is {reach.most:.4g} {reach.unit}".rstrip()
         if reach.limit in confirmed:
             notices.append(f"limits.{reach.limit} = {value:g}: {why}; limits.confirmed names it")
         else:
@@ -88,7 +89,7 @@ def _reaches(configuration: BenchConfiguration) -> Iterator[_Reach]:
     bench = "simulation.bench" if configuration.backend == "simulated" else configuration.table
     position, acceleration, output = _ranges(configuration)
     yield _Reach("drive_voltage", *output)
-    step = f"a step between the limits of the drive (limits.drive_voltage = {limits.drive_voltage:g} V"
+    step = f"a step between the drive limits (limits.drive_voltage = {limits.drive_voltage:g} V"
     owner = f"{step}, {bench}.sample_rate = {rate:g} 1/s)"
     yield _Reach("drive_slew", 2.0 * limits.drive_voltage * rate, "V/s", owner)
     shaker = f"{bench}.shaker" if configuration.backend == "simulated" else bench
@@ -109,7 +110,7 @@ def _reaches(configuration: BenchConfiguration) -> Iterator[_Reach]:
 
 
 def _loads(configuration: BenchConfiguration, acceleration: float) -> Iterator[_Reach]:
-    """Force and current: capacity of the shaker, range of a channel, or the estimate from the motion."""
+    """Reach in force and current: from the shaker's capacity, a channel's range, or the estimate from the motion."""
     found: dict[str, _Reach] = {}
     shaker_model, hardware, settings = configuration.shaker_model, configuration.hardware, configuration.settings
     if configuration.backend == "simulated":
@@ -142,7 +143,7 @@ _Range = tuple[float, str, str]
 
 
 def _ranges(configuration: BenchConfiguration) -> tuple[_Range, _Range, _Range]:
-    """Ranges of displacement sensor, accelerometer and drive."""
+    """Reach in displacement, acceleration and drive, from the ranges of sensors and output."""
     if configuration.backend == "simulated":
         bench, key = configuration.simulation.bench, "simulation.bench"
         volts = bench.converter.range
@@ -202,7 +203,7 @@ def _contradictions(configuration: BenchConfiguration) -> Iterator[InvalidInput]
 
 
 def _waits(configuration: BenchConfiguration) -> dict[str, tuple[float, float, str]]:
-    """Delays of the guard before a limit trips [s], its clock, and their upper bounds."""
+    """Delays of the guard before a limit trips [s] and its tolerance of clock errors, with their upper bounds."""
     limits = configuration.limits
     found = {key: (float(getattr(limits, key)), _LONGEST_WAIT, " s") for key in ("sensor_loss", "stuck", "late")}
     found["clock"] = limits.clock, _WORST_CLOCK, ""
@@ -213,7 +214,7 @@ def _waits(configuration: BenchConfiguration) -> dict[str, tuple[float, float, s
 
 
 def _unusual(configuration: BenchConfiguration) -> Iterator[str]:
-    """Notices about every part that the backend uses."""
+    """Notices about all parts that the backend uses."""
     unused = {"simulation", "hardware", "rig"} - {configuration.table}
     for name in type(configuration).model_fields:
         part = getattr(configuration, name)
@@ -231,7 +232,9 @@ def _unusual(configuration: BenchConfiguration) -> Iterator[str]:
 
 
 def _channels(configuration: BenchConfiguration) -> Iterator[str]:
-    """Notices about additional sensors with an unusual measuring range, or a limit or noise unusual for it."""
+    """Notices about additional sensors with an unusual measuring range, or with a limit or noise that is unusual for
+    that range.
+    """
     for place, channel in enumerate(configuration.channels):
         item = f"channels[{place}] ({channel.name})"
         yield from unusual(channel, f"channels[{place}].")
@@ -245,7 +248,7 @@ def _channels(configuration: BenchConfiguration) -> Iterator[str]:
         quietest, loudest = (share * reach for share in _NOISE)
         if channel.noise_density and not quietest <= channel.noise_density <= loudest:
             noise = f"noise_density = {channel.noise_density:g} {channel.unit}/Hz^0.5"
-            usual = f"usual: {quietest:.2g} to {loudest:.2g}"
+            usual = f"usual values: {quietest:.2g} to {loudest:.2g}"
             yield f"{item}: {noise} with a range of {reach:.3g} {channel.unit}, {usual}"
 
 
@@ -263,13 +266,13 @@ def _findings(configuration: BenchConfiguration) -> Iterator[str]:
 
 
 def _curves(configuration: BenchConfiguration) -> Iterator[str]:
-    """Notices about calibrations with an implausibly small error of a laser."""
+    """Notices about calibrations with an implausibly small laser error."""
     if configuration.calibrated is not None:
         for number, curve in enumerate(configuration.calibrated.lasers, 1):
             largest = max(abs(each) for each in curve.error)
             if largest < _LEAST_ERROR:
                 item = f"calibrated.laser_{number}.error"
-                yield f"{item}: its largest coefficient, {largest:g} m, lies below {_LEAST_ERROR:g} m"
+                yield f"{item}: its largest coefficient, {largest:g} m, is below {_LEAST_ERROR:g} m"
 
 
 def _assumed(specimen: Specimen, name: str) -> float | None:

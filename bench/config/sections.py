@@ -21,7 +21,7 @@ class Acquisition(Parameters):
     lead: float = quantity(
         0.1,
         "s",
-        "drive queued in the output ahead of the newest input, to cover the duration of a loop iteration",
+        "duration of the drive queued in the output ahead of the newest input, to cover a loop iteration",
         ge=0.0,
         le=2.0,
     )
@@ -32,7 +32,7 @@ class Simulation(Parameters):
 
     seed: int = quantity(1, "", "random seed of the virtual bench", ge=0, lt=2**32)
     bench: VirtualBenchParameters = VirtualBenchParameters()
-    specimen: Specimen | None = quantity(None, "", "the true specimen; absent: equal to the assumed one")
+    specimen: Specimen | None = quantity(None, "", "the true specimen; if absent, the same as the assumed one")
     spring_factor: float = quantity(1.0, "1", "ratio of true to nominal stiffness of every mounted spring", gt=0, le=10)
 
     @property
@@ -92,14 +92,14 @@ class Twin(Parameters):
     enabled: bool | None = quantity(
         None,
         "",
-        "whether the model runs during every test; absent: only in real time (in virtual time it doubles the cost)",
+        "whether the model runs during every test; if absent, only in real time (in virtual time it doubles the cost)",
         example=True,
     )
     members: int = quantity(
         39,
         "",
-        "random specimens that represent the uncertainty of the mounted one; the band of n of them covers a "
-        "measurement with probability (n - 1)/(n + 1)",
+        "number of random specimens that represent the uncertainty of the mounted one; the band of n "
+        "specimens covers a measurement with probability (n - 1)/(n + 1)",
         ge=0,
         le=199,
     )
@@ -107,7 +107,7 @@ class Twin(Parameters):
     laser_lag: float | None = quantity(
         None,
         "s",
-        "delay of the lasers after the table's sensors; absent: computed from their settings",
+        "delay of the lasers relative to the table's sensors; if absent, computed from their settings",
         ge=-0.02,
         le=0.02,
         usual=(1e-4, 0.015),
@@ -116,10 +116,15 @@ class Twin(Parameters):
     residual_warn: float | None = quantity(
         0.15,
         "1",
-        "relative rms of the measured drift outside the band above which a warning is issued; absent: never",
+        "relative rms of the measured drift outside the band above which a warning is issued; if absent, never",
         gt=0,
     )
     residual_stop: float | None = quantity(
-        None, "1", "such rms above which the run ends with a smooth ramp; absent: never", gt=0, example=0.5
+        None,
+        "1",
+        "relative rms of the measured drift outside the band above which the run ends with a smooth "
+        "ramp; if absent, never",
+        gt=0,
+        example=0.5,
     )
     persistence: float = quantity(2.0, "s", "time above a limit before it trips", ge=0, le=60)

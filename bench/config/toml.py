@@ -1,8 +1,8 @@
 """Configuration files: TOML in SI units, fully validated before anything starts; and their templates.
 
-Templates have every key, the essential ones, or a bench with NI and optoNCDT devices. They are written from the
-declarations, so that keys, units, limits and defaults are those of the program. Every commented-out line is
-complete: removing its # sets the key.
+A template has every key, the essential keys, or the keys of a bench with NI and optoNCDT devices. Templates are
+generated from the declarations, so that keys, units, limits and defaults are those of the program. Every commented-out
+line is complete: removing its # sets the key.
 """
 
 import re
@@ -40,23 +40,23 @@ def read_table(path: Path, item: str) -> dict[str, Any]:
     except FileNotFoundError:
         raise InvalidInput(item, str(path), "there is no such file") from None
     except OSError as error:
-        raise InvalidInput(item, str(path), f"it cannot be read: {error.strerror}") from None
+        raise InvalidInput(item, str(path), f"the file cannot be read: {error.strerror}") from None
     except UnicodeDecodeError as error:
-        raise InvalidInput(item, str(path), f"it is not UTF-8 text (byte {error.start})") from None
+        raise InvalidInput(item, str(path), f"the file is not UTF-8 text (byte {error.start})") from None
     except RecursionError:
-        raise InvalidInput(item, str(path), "it is nested too deeply") from None
+        raise InvalidInput(item, str(path), "the file is nested too deeply") from None
     except tomllib.TOMLDecodeError as error:
-        raise InvalidInput(item, str(path), f"it is not TOML: {error}{_hint(text, str(error))}") from None
+        raise InvalidInput(item, str(path), f"the file is not valid TOML: {error}{_hint(text, str(error))}") from None
     except ValueError as error:
         raise InvalidInput(item, str(path), str(error)) from None
-    # legal in TOML but refused: numbers have the same grammar everywhere
+    # legal in TOML but not accepted: numbers have the same grammar everywhere
     if found := _NO_DECIMAL.search(text):
         raise InvalidInput(f"{path.name}: {found[1]}", found[2], "write a decimal number without underscores")
     return table
 
 
 def _hint(text: str, error: str) -> str:
-    """Hint for an invalid line, with the correction of a decimal comma."""
+    """Hint for an invalid line: the correction if it has a decimal comma."""
     line = re.search(r"at line (\d+)", error)
     lines = text.splitlines()
     if line is None or not 0 < int(line[1]) <= len(lines):
@@ -67,7 +67,7 @@ def _hint(text: str, error: str) -> str:
 
 
 def read_configuration(path: str | PathLike[str]) -> BenchConfiguration:
-    """The configuration in a file, with the contents of the files that it names, cross-checked.
+    """The cross-checked configuration in a file, including the contents of the files that it names.
 
     Raises InvalidInput naming file and key.
     """
@@ -85,7 +85,7 @@ def former_keys(path: str | PathLike[str]) -> tuple[str, ...]:
 
 
 def problems_of(path: Path) -> list[InvalidInput]:
-    """All refused keys of a configuration file, alone or in combination; empty for a valid file.
+    """All errors of a configuration file, in single keys or their combination; empty for a valid file.
 
     Raises InvalidInput when it is not TOML.
     """
@@ -109,7 +109,7 @@ def _refusals(configuration: BenchConfiguration, path: Path) -> list[InvalidInpu
 
 
 def _with_specimen_file(configuration: BenchConfiguration, path: Path) -> BenchConfiguration:
-    """Identified properties in place of the name of their file, which is relative to the folder of `path`.
+    """Replace the name of the specimen file, which is relative to the folder of `path`, by its contents.
 
     Raises InvalidInput when it cannot be read.
     """
@@ -119,7 +119,7 @@ def _with_specimen_file(configuration: BenchConfiguration, path: Path) -> BenchC
 
 
 def _with_calibration_file(configuration: BenchConfiguration, path: Path) -> BenchConfiguration:
-    """The calibration in place of the name of its file, relative to the same folder.
+    """Replace the name of the calibration file, relative to the same folder, by its contents.
 
     Raises InvalidInput when it cannot be read.
     """
@@ -130,7 +130,7 @@ def _with_calibration_file(configuration: BenchConfiguration, path: Path) -> Ben
 
 
 def with_identified(configuration: BenchConfiguration, identified: Identified) -> BenchConfiguration:
-    """The configuration with other identified properties. Raises InvalidInput when the specimen is impossible."""
+    """The configuration with the given identified properties. Raises InvalidInput when the specimen is impossible."""
     identified.applied(configuration.specimen)
     return configuration.model_copy(update={"specimen_file": None, "identified": identified})
 
@@ -140,7 +140,7 @@ def _within(path: Path) -> Callable[[tuple[str | int, ...]], str]:
 
 
 def as_toml(configuration: BenchConfiguration) -> str:
-    """All keys with a value, without the simulation and hardware tables that the backend does not use."""
+    """All keys with a value, except those of the simulation and hardware tables that the backend does not use."""
     unused = {"rig": {"hardware", "simulation"}, "hardware": {"simulation"}}.get(configuration.table, set[str]())
     plain: dict[str, Any] = configuration.model_dump(mode="json", exclude_none=True, exclude=unused)
     return tomlkit.dumps(plain)
@@ -149,12 +149,12 @@ def as_toml(configuration: BenchConfiguration) -> str:
 Kind = Literal["all", "minimal", "hardware"]
 
 _HEADING = """\
-# Configuration of a shake-table bench for rockbench. SI units; a value in another is a text with its unit: "60 mm".
-# Every key is optional; above it: meaning [unit] and valid values. `rockbench config check` validates the file."""
+# Configuration of a shake-table bench for rockbench. SI units; a value in another unit is a string: "60 mm".
+# Every key is optional; its meaning [unit] and valid values are above it. Check the file with `rockbench config check`."""
 
 _ALL = """\
-# Every key with its default. A line that begins with #, without a space, is absent by default and shows an example:
-# remove the # to set it; each works by itself."""
+# Every key with its default. A line that begins with # and no space has an example of a key that is absent by default:
+# remove the # to set the key; each works by itself."""
 
 _MINIMAL = """\
 # The keys to check before the first run; every other key has its default (`rockbench config init` writes them all)."""
@@ -199,7 +199,7 @@ _DEVICES = [
 def write_template(path: Path, kind: Kind = "all", backend: str | None = None) -> None:
     """Write a template of this kind, or for the `backend` of another package.
 
-    Raises InvalidInput when there is no such backend, or `path` exists or cannot be written.
+    Raises InvalidInput if there is no such backend, or if `path` exists or cannot be written.
     """
     if backend is not None:
         settings = load_backend(backend).settings
@@ -219,9 +219,9 @@ def write_template(path: Path, kind: Kind = "all", backend: str | None = None) -
         with path.open("x", encoding="utf-8", newline="\n") as file:
             file.write(text)
     except FileExistsError:
-        raise InvalidInput("configuration file", str(path), "it exists already; it is never overwritten") from None
+        raise InvalidInput("configuration file", str(path), "the file exists and is never overwritten") from None
     except OSError as error:
-        raise InvalidInput("configuration file", str(path), f"it cannot be written: {error.strerror}") from None
+        raise InvalidInput("configuration file", str(path), f"the file cannot be written: {error.strerror}") from None
 
 
 def _lines(model: type[Parameters], path: tuple[str, ...]) -> Iterator[str]:
@@ -248,14 +248,14 @@ def _lines(model: type[Parameters], path: tuple[str, ...]) -> Iterator[str]:
 
 
 def _absent(group: type[Parameters], of: Declared, prefix: str) -> Iterator[str]:
-    """The lines of an absent group, with dotted keys so that each stays in its table."""
+    """The lines of an absent group, with dotted keys so that each line stays in its table."""
     yield f"# {prefix}: {of.description or summary(group)}"
     required = any(field.is_required() for field in group.model_fields.values())
     for entry in declared(group):
         if entry.group is not None:
             yield from _absent(entry.group, entry, f"{prefix}.{entry.name}")
         elif required:
-            yield f"# {prefix}.{entry.name}, which a run writes: {_meaning(entry)}"
+            yield f"# {prefix}.{entry.name}, written by a run: {_meaning(entry)}"
         else:
             yield from _value_lines(entry, f"{prefix}.", "#")
 
@@ -272,7 +272,7 @@ def _value_lines(entry: Declared, prefix: str = "", mark: str = "") -> Iterator[
 
 
 def _chosen(keys: list[str], given: Mapping[str, Any]) -> Iterator[str]:
-    """The lines of selected keys, by table, with the `given` value or the default."""
+    """The lines of selected keys, by table, with the value in `given` or else the default."""
     table = ""
     # keys of a table before those of its nested tables, tables in the order of their first key
     for key in sorted(keys, key=lambda key: [other.rpartition(".")[0] for other in keys].index(key.rpartition(".")[0])):

@@ -1,4 +1,4 @@
-"""Notices of valid but unusual values: outside the usual range of their declaration."""
+"""Notices about valid but unusual values: those outside the usual range in their declaration."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
@@ -13,11 +13,11 @@ ANGULAR = "rad/s"
 """The unit of circular frequencies; unusual values are shown in Hz too."""
 
 _SLOW, _FAST = 0.6, 2.5
-"""Multiples of the bare frame's first and second natural frequency outside which a frequency is unusual."""
+"""Multiples of the bare frame's first and second natural frequencies; a frequency outside them is unusual."""
 
 
 _SPRING_OFF = 2.0
-"""Ratio of a measured spring to its label beyond which it is unusual."""
+"""Ratio of measured to nominal spring stiffness beyond which it is unusual."""
 
 
 class _Watched(NamedTuple):
@@ -27,9 +27,9 @@ class _Watched(NamedTuple):
 
 
 def unusual(parameters: Parameters, prefix: str = "") -> Iterator[str]:
-    """A notice for each key with a value outside its usual range, naming both; keys begin with `prefix`.
+    """A notice for each key with a value outside its usual range, naming value and range; keys begin with `prefix`.
 
-    Zero, where allowed, causes no notice. For a list the first such value is named.
+    Zero, where allowed, causes no notice. In a list, the first such value is named.
     """
     values, groups = _watched(type(parameters))
     for watched in values:
@@ -42,7 +42,7 @@ def unusual(parameters: Parameters, prefix: str = "") -> Iterator[str]:
             item, value = outside[0]
             unit = "" if watched.unit == "1" else f" {watched.unit}"
             said = f"{item} = {value:g}{unit}{_in_hertz(value, watched.unit)}{_others(outside)}"
-            yield f"{said} lies {'below' if abs(value) < low else 'above'} the usual {low:.3g} to {high:.3g}{unit}"
+            yield f"{said} is {'below' if abs(value) < low else 'above'} the usual {low:.3g} to {high:.3g}{unit}"
     for name in groups:
         group = getattr(parameters, name)
         if isinstance(group, Parameters):
@@ -65,13 +65,13 @@ def off_resonance(parameters: Parameters, modes: tuple[float, float]) -> Iterato
             where = "below" if value < modes[0] else "above"
             natural = " and ".join(f"{mode:.3g}" for mode in modes)
             yield (
-                f"{said} lies far {where} the modes of the bare frame, {natural} rad/s: "
-                "if Hz is intended, write it with its unit"
+                f"{said} is far {where} the modes of the bare frame, {natural} rad/s: if Hz is intended, write it "
+                "with its unit"
             )
 
 
 def in_hertz(parameters: Parameters) -> Iterator[str]:
-    """One line for each circular frequency or list of them, in both units."""
+    """A line for each circular frequency or list of frequencies, in both units."""
     for watched in _watched(type(parameters))[0]:
         values = [value for _, value in _numbers("", getattr(parameters, watched.name))]
         if watched.unit == ANGULAR and values:
@@ -110,7 +110,7 @@ def specimen_notices(specimen: Specimen, prefix: str = "specimen.") -> Iterator[
         ratio = spring.k_c / (spring.label * nominal)
         if not 1.0 / _SPRING_OFF <= ratio <= _SPRING_OFF:
             item, promised = f"{prefix}springs[{place}].k_c = {spring.k_c:g} N/m", spring.label * nominal
-            yield f"{item} is {ratio:.3g} times the nominal value of its label {spring.label:g}, {promised:.4g} N/m"
+            yield f"{item} is {ratio:.3g} times {promised:.4g} N/m, the nominal value for its label {spring.label:g}"
 
 
 def _others(outside: Sequence[object]) -> str:
@@ -129,7 +129,7 @@ def _numbers(item: str, value: Any) -> Iterable[tuple[str, float]]:
 
 @cache
 def _watched(model: type[Parameters]) -> tuple[tuple[_Watched, ...], tuple[str, ...]]:
-    """Numbers of a group with units and usual ranges, and the names of its nested groups."""
+    """The numerical fields of a group with units and usual ranges, and the names of its nested groups."""
     entries = tuple(declared(model))
     numbers = tuple(_Watched(each.name, each.unit, each.usual) for each in entries if each.kind in (int, float))
     return numbers, tuple(each.name for each in entries if each.element is not None)

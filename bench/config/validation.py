@@ -1,4 +1,4 @@
-"""Validation of external values, with a one-line message for each refusal."""
+"""Validation of external values, with a one-line message for each error."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
@@ -22,15 +22,16 @@ _NUMBERS = (int, float)
 
 
 def dotted(path: Path) -> str:
-    """A path in written form: `specimen.frame.k1`, `omega[2]`."""
+    """A path as text: `specimen.frame.k1`, `omega[2]`."""
     text = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in path)
     return text.removeprefix(".")
 
 
 def validated(model: type[P], data: Mapping[str, Any], named: Callable[[Path], str] = dotted) -> P:
-    """An instance of `model` from plain data such as a file's; `named` formats the place of a value for the user.
+    """An instance of `model` from plain data, such as that of a file; `named` formats the location of a value for the
+    user.
 
-    Raises InvalidInput for the first refused value, with the number of further ones.
+    Raises InvalidInput for the first invalid value, with the number of further ones.
     """
     try:
         return _parsed(model, data)
@@ -38,14 +39,14 @@ def validated(model: type[P], data: Mapping[str, Any], named: Callable[[Path], s
         first, *more = _refusals(model, error, named)
     also = ", ".join(dict.fromkeys(refusal.item for refusal in more if refusal.item != first.item))
     if also:
-        raise InvalidInput(first.item, first.value, f"{first.allowed} (refused too: {also})")
+        raise InvalidInput(first.item, first.value, f"{first.allowed} (also refused: {also})")
     raise first
 
 
 def problems(
     model: type[Parameters], data: Mapping[str, Any], named: Callable[[Path], str] = dotted
 ) -> list[InvalidInput]:
-    """Every refused value of `data`, in the order of the declaration; empty if all are valid."""
+    """Every invalid value in `data`, in the order of the declaration; empty if all are valid."""
     try:
         _parsed(model, data)
     except ValidationError as error:
@@ -84,7 +85,7 @@ def with_present_names(model: type[Parameters], data: Mapping[str, Any]) -> dict
 def read_typed(entry: Declared, typed: Any) -> Any:
     """Plain data from typed text or the tokens of a list, with numbers for numeric fields.
 
-    Invalid text is returned unchanged for the validation to refuse.
+    Invalid text is returned unchanged; validation rejects it.
     """
     if entry.kind not in _NUMBERS or isinstance(typed, bool):
         return typed
@@ -108,13 +109,13 @@ def read_fields(model: type[Parameters], typed: Mapping[str, Any]) -> dict[str, 
 
 
 def _parsed(model: type[P], data: Mapping[str, Any]) -> P:
-    # strict JSON validation: accepts a list for a tuple and a word for a choice, but not "12" or true for a number
+    # strict JSON validation: it accepts a list for a tuple and a word for a choice, but not "12" or true for a number
     present = _in_si(model, with_present_names(model, data))
     return model.model_validate_json(dumps(present, default=str), strict=True)
 
 
 def _in_si(model: type[Parameters], data: Mapping[str, Any]) -> dict[str, Any]:
-    """The data of a file with texts of numbers with units, lists and ranges converted to numbers."""
+    """The data of a file, with strings that hold numbers with units, lists or ranges converted to numbers."""
     found = dict(data)
     for entry in declared(model):
         value = found.get(entry.name)
@@ -153,7 +154,7 @@ def _values_or_text(entry: Declared, text: str) -> Sequence[Any]:
 
 
 def _remedy(entry: Declared, text: str, listed: bool) -> str:
-    """Suggested spelling of a number for an invalid text; empty without a suggestion."""
+    """Suggested spelling of a number for an invalid string; empty if there is none."""
     try:
         if listed:
             items = items_of([text])
@@ -199,11 +200,11 @@ def _refusal(model: type[Parameters], detail: Any, named: Callable[[Path], str])
 
 
 def _as_meant(entry: Declared, value: Any) -> str:
-    """Suggestion for a number above its limit that may be a percentage or an angle in degrees."""
+    """Hint for a number above its limit that may be a percentage or an angle in degrees."""
     if not isinstance(value, float | int) or entry.kind is not float or not 1.0 < value <= 360.0:
         return ""
     if entry.unit == "rad":
-        return f'; {value:g} degrees are "{value:g} deg"'
+        return f'; for {value:g} degrees write "{value:g} deg"'
     highest = min((getattr(limit, "lt", getattr(limit, "le", inf)) for limit in entry.constraints), default=inf)
     return f"; {value:g} % is {value / 100.0:g}" if entry.unit == "1" and highest <= 1.0 and value <= 100.0 else ""
 
@@ -219,7 +220,7 @@ def _suggestion(model: type[Parameters], path: Path) -> str:
         return f"; the nearest is {dotted((*parent, close[0]))}"
     everywhere = list(keys(model))
     elsewhere = [key for key in everywhere if key.rpartition(".")[2] == name] or get_close_matches(
-        # paths of the same group are similar in any case
+        # all paths of a group are similar
         dotted(path),
         everywhere,
         n=1,

@@ -14,37 +14,37 @@ import h5py.h5p
 
 h5f, h5p = cast(Any, h5py.h5f), cast(Any, h5py.h5p)
 
-# The oldest format that can be read while it is written; a fixed version, so that older tools can read files of newer
+# The oldest format that can be read while it is being written; fixed, so that older tools can read the files of newer
 # writers.
 VERSIONS = ("v110", "v110")
 
 RETRIES = 28
-"""Attempts at reading metadata of a file that is written: pauses of 1 ns doubled each time, 0.3 s in all.
+"""Attempts to read metadata of a file that is being written, with pauses that double from 1 ns, 0.3 s in total.
 
-HDF5's own 100 attempts at data that another program has cut off take longer than anybody waits, and the whole process
-with its drive waits with them.
+HDF5's default of 100 attempts would take practically forever on data that another program has truncated, and block the
+whole process, including the drive.
 """
 
 
 def locking(system: str = sys.platform) -> Literal["best-effort"] | bool:
-    """The locks of every file, for h5py.
+    """The locking mode of every file, for h5py.
 
-    On Windows locks are mandatory: a reader of a file that is written would make its writer fail at the next flush or
-    at the end, with errno 13. There nobody locks; single-writer mode and creation without replacement protect the file.
-    Elsewhere locks are advisory, and network shares may have none.
+    On Windows locks are mandatory: a reader of a file that is being written would make its writer fail at the next
+    flush or at the end, with errno 13. There no locks are used; single-writer mode and creation without replacement
+    protect the file. Elsewhere locks are advisory, and network shares may have none.
     """
     return False if system == "win32" else "best-effort"
 
 
 def open_living(path: Path) -> Any:
-    """Open a file that is written, in single-writer mode, to read it."""
+    """Open a file that is being written, in single-writer mode, for reading."""
     return _opened(path, h5f.ACC_RDONLY | h5f.ACC_SWMR_READ)
 
 
 def open_to_write(path: Path) -> Any:
     """Open a new, closed file in single-writer mode to append to its datasets.
 
-    A file that is switched to this mode while open would have HDF5's own number of attempts.
+    A file that is switched to this mode while open would use HDF5's default number of attempts.
     """
     return _opened(path, h5f.ACC_RDWR | h5f.ACC_SWMR_WRITE)
 
@@ -61,7 +61,7 @@ def _opened(path: Path, mode: int) -> Any:
 
 @lru_cache(maxsize=1)
 def _retry_limit() -> Any:
-    """The function of the HDF5 library that limits retries, which h5py does not offer; None if it cannot be found."""
+    """The HDF5 library function that limits retries, which h5py does not expose; None if it cannot be found."""
     for library in (cast(str, h5p.__file__), str(Path(h5py.__file__).parent / "hdf5.dll")):
         try:
             found = ctypes.CDLL(library).H5Pset_metadata_read_attempts

@@ -1,7 +1,7 @@
 """Checksums of datasets: those of fixed datasets at the start of the run, those of growing datasets at its end.
 
 A checksum is the SHA-256 of the stored values' bytes, uncompressed and in order, in hexadecimal digits. Those of
-attributes cover their names and values as JSON, to detect a later change of a conversion. Checksums of groups
+attributes cover their names and values as JSON, so that a later change to a conversion is detected. Checksums of groups
 cover their attributes and link targets, such as the plotted data and their axes.
 """
 
@@ -27,7 +27,7 @@ _GROUPS, _CONTENTS = f"{GROUP}/group", f"{GROUP}/group_attributes"
 
 
 class Checksums:
-    """The checksum table of a new file; created last, when every dataset exists."""
+    """The checksum table of a new file, created last, when every dataset exists."""
 
     def __init__(self, entry: hdf5.Group, changing: Iterable[str]) -> None:
         """`changing` are the paths of datasets not yet final: their checksums are empty until `seal`."""
@@ -89,7 +89,7 @@ def _of_contents(group: hdf5.Group, links: Mapping[str, str]) -> str:
 
 
 def _walk(group: hdf5.Group, stored: list[hdf5.Dataset], groups: dict[str, str]) -> None:
-    """Collect every dataset and the checksum of every group; opens each object only once, to save time."""
+    """Collect every dataset and the checksum of every group; each object is opened only once, to save time."""
     links = dict[str, str]()
     groups[group.name] = ""
     for name, member in hdf5.members(group):
@@ -103,13 +103,13 @@ def _walk(group: hdf5.Group, stored: list[hdf5.Dataset], groups: dict[str, str])
 
 
 def covered_groups(entry: hdf5.Group) -> Iterator[hdf5.Group]:
-    """The root, the entry and its contents, without the checksums and the views, which are created later."""
+    """The root, the entry and the entry's contents, except the checksums and the views, which are created later."""
     yield hdf5.group(entry, "/")
     yield from (each for each in hdf5.groups(entry) if each.name.split("/")[2:3] not in ([GROUP], [FIT_VIEWS]))
 
 
 def read_groups(entry: hdf5.Group) -> dict[str, str]:
-    """The checksums of the groups by path; none in older files."""
+    """The checksums of the groups by path; older files have none."""
     if _GROUPS not in entry:
         return {}
     return dict(zip(*(hdf5.read_texts(hdf5.dataset(entry, path)[:]) for path in (_GROUPS, _CONTENTS)), strict=True))
@@ -126,7 +126,7 @@ def _bytes(values: NDArray[Any]) -> bytes:
 
 
 def _of_json(content: Mapping[str, Any]) -> str:
-    # an attribute of a type that this software never writes has no JSON form: its checksum is wrong
+    # an attribute of a type that this software never writes may have no JSON form: its checksum counts as wrong
     return sha256(json.dumps(content, sort_keys=True, default=repr).encode()).hexdigest()
 
 
@@ -144,10 +144,10 @@ SMALL = 2**20
 
 @dataclass(frozen=True)
 class Integrity:
-    """`failing` are the changed datasets by path, `compared` is the number of datasets compared with a checksum.
+    """`failing` holds the changed datasets by path; `compared` is the number of datasets compared with a checksum.
 
-    `unchecked` are the others: without a checksum, as in a file that was not closed, or too large for the requested
-    check.
+    `unchecked` are the others: those without a checksum, as in a file that was not closed, and those too large for the
+    requested check.
     """
 
     compared: int
@@ -163,9 +163,9 @@ class Integrity:
 
 
 def integrity(entry: hdf5.Group, largest: int | None = SMALL, done: Done = lambda _done, _all: None) -> Integrity:
-    """Compare datasets of at most `largest` bytes, or all, and all attributes with the checksums.
+    """Compare with the checksums all attributes, and the datasets of at most `largest` bytes or, if None, all datasets.
 
-    `done` counts the datasets.
+    `done` receives the number of datasets processed.
     """
     if not hdf5.has(entry, GROUP):
         lost: dict[str, str] = {}

@@ -19,7 +19,7 @@ BYTES_AT_ONCE = 2**22
 
 @dataclass
 class Copying:
-    """Scope of a copy: `counted` rows of every part, in a file of `size` bytes, without the paths in `leave`.
+    """Scope of a copy: `counted` rows of every part, from a file of `size` bytes, excluding the paths in `leave`.
 
     `lost` receives the reason for each unreadable path; growing datasets are copied up to the last readable row.
     """
@@ -123,7 +123,7 @@ def renew_drive(entry: hdf5.Group) -> None:
 
 
 def renew_tables(entry: hdf5.Group, lost: Iterable[str]) -> None:
-    """Empty every table with a `lost` path; the journal may refill it."""
+    """Empty every table that has a `lost` path; the journal may refill it."""
     gone = tuple(lost)
     for path, fields in TABLES.items():
         if any(each == f"/entry/{path}" or each.startswith(f"/entry/{path}/") for each in gone):
@@ -135,10 +135,10 @@ def renew_tables(entry: hdf5.Group, lost: Iterable[str]) -> None:
 
 
 def cut(entry: hdf5.Group, counted: Mapping[str, int]) -> dict[str, int]:
-    """Truncate the datasets of each part to the shortest, and match samples and blocks.
+    """Truncate the datasets of each part to the shortest one, and make samples and blocks consistent.
 
-    The last known block is omitted if later `counted` ones were lost, because its end is unknown. Returns the rows of
-    every part.
+    The last known block is omitted if later `counted` blocks were lost, because its end is unknown. Returns the number
+    of rows of every part.
     """
     parts: dict[str, list[hdf5.Dataset]] = {name: [] for name in counted}
     for stored in hdf5.datasets(entry):

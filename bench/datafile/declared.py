@@ -3,7 +3,7 @@
 The tables of events follow from the declarations in `bench.events`; fitted models and identified
 values have their own tables, whose rows refer to one another.
 
-No group can be added to a file with concurrent readers, so the values of all fits are concatenated in one dataset. The
+No group can be added to a file that is being read, so the values of all fits are concatenated in one dataset. The
 NXdata groups of a closed file are views of it (HDF5 virtual datasets) without their own values, for viewers such as
 silx, NexPy and h5web.
 """
@@ -26,10 +26,10 @@ FIT_VIEWS = "fitted"
 FITS = (
     Field("time", Kind.REAL, "s", "bench time"),
     Field("name", Kind.TEXT, "", "name of the fit"),
-    Field("text", Kind.TEXT, "", "findings in one line"),
+    Field("text", Kind.TEXT, "", "summary of the fit in one line"),
     Field("rows", Kind.WHOLE, "1", "number of values in each column"),
-    Field("columns", Kind.WHOLE, "1", "number of its columns, which are rows of fit_columns"),
-    Field("parameters", Kind.WHOLE, "1", "number of its parameters, which are rows of fit_parameters"),
+    Field("columns", Kind.WHOLE, "1", "number of columns, each a row of fit_columns"),
+    Field("parameters", Kind.WHOLE, "1", "number of parameters, each a row of fit_parameters"),
 )
 FIT_COLUMNS = (
     Field("name", Kind.TEXT, "", "name of the column; the first of a fit is its axis"),
@@ -40,7 +40,7 @@ FIT_PARAMETERS = (
     Field("name", Kind.TEXT, "", "name of the parameter"),
     Field("value", Kind.REAL, "of the row", "identified value, in the unit of the row"),
     Field("uncertainty", Kind.REAL, "of the row", "its standard uncertainty; NaN if unknown"),
-    Field("unit", Kind.TEXT, "", "unit of both"),
+    Field("unit", Kind.TEXT, "", "unit of value and standard uncertainty"),
 )
 FIT_VALUES = (Field("value", Kind.REAL, "of the column", "concatenated columns, fit by fit"),)
 FIT_TABLES = {"fits": FITS, "fit_columns": FIT_COLUMNS, "fit_parameters": FIT_PARAMETERS, "fit_values": FIT_VALUES}
@@ -58,7 +58,7 @@ def add_fit(rows: Mapping[str, Rows], fit: FitFinished) -> None:
 
 
 def read_fits(entry: hdf5.Group, whole: int) -> list[FitFinished]:
-    """The first `whole` fits, as published."""
+    """The first `whole` fits, as they were published."""
     columns, parameters = _table(entry, "fit_columns"), _table(entry, "fit_parameters")
     values = hdf5.dataset(entry, "fit_values/value")
     found: list[FitFinished] = []
@@ -90,7 +90,7 @@ def add_fit_views(entry: hdf5.Group, whole: int) -> None:
         axis, *others = fit.columns
         view.attrs["signal"], view.attrs["axes"] = (others or [axis])[0], [axis]
         view.attrs[f"{axis}_indices"], view.attrs["title"] = 0, fit.text
-        # columns of another unit have another scale and would flatten the plot
+        # columns with another unit have another scale and would flatten the plot
         if alike := [each for each in others[1:] if fit.columns[each].unit == fit.columns[others[0]].unit]:
             view.attrs["auxiliary_signals"] = alike
         for each, series in fit.columns.items():
@@ -104,7 +104,7 @@ def add_fit_views(entry: hdf5.Group, whole: int) -> None:
 
 
 def whole_fits(entry: hdf5.Group) -> int:
-    """Number of fits with all rows, in a file with truncated tables."""
+    """Number of complete fits in a file with truncated tables."""
     if "fits" not in entry:
         return 0
     fits = _table(entry, "fits")
@@ -123,19 +123,19 @@ def _table(entry: hdf5.Group, name: str) -> list[dict[str, Any]]:
 
 
 FINDINGS = (
-    Field("number", Kind.WHOLE, "1", "number of earlier findings; the last set is valid"),
+    Field("number", Kind.WHOLE, "1", "number of earlier sets of findings; the last set is valid"),
     Field("time", Kind.REAL, "s", "bench time"),
     Field("name", Kind.TEXT, "", "the quantity, as in a specimen file"),
     Field("value", Kind.REAL, "of the row", "best estimate"),
     Field("standard_uncertainty", Kind.REAL, "of the row", "standard uncertainty (k = 1)"),
-    Field("unit", Kind.TEXT, "", "SI unit of both"),
+    Field("unit", Kind.TEXT, "", "SI unit of value and standard uncertainty"),
     Field("source", Kind.TEXT, "", "source of the value"),
     Field("date", Kind.TEXT, "", "date of the measurement, ISO 8601 with zone"),
 )
 CORRELATIONS = (
-    Field("number", Kind.WHOLE, "1", "the same count for the findings of this correlation"),
+    Field("number", Kind.WHOLE, "1", "number of earlier sets, as for the findings of this correlation"),
     Field("first", Kind.TEXT, "", "name of a finding"),
-    Field("second", Kind.TEXT, "", "name of another"),
+    Field("second", Kind.TEXT, "", "name of another finding"),
     Field("coefficient", Kind.REAL, "1", "correlation coefficient of their errors; 0 for other pairs"),
 )
 FINDING_TABLES = {"identified": FINDINGS, "identified_correlations": CORRELATIONS}
@@ -191,7 +191,7 @@ class EventTable:
     """The table of a kind of events at `path` below /entry.
 
     An event whose columns are arrays of equal length, or that has a tuple of `parts` with their own columns, adds as
-    many rows; these have no time column.
+    many rows, which have no time column.
     """
 
     path: str
@@ -209,7 +209,7 @@ class EventTable:
         return self.path.rpartition("/")[2]
 
     def rows(self, event: Event) -> Iterator[tuple[Any, ...]]:
-        """The rows of an event, a value for each field."""
+        """The rows of an event, each with a value per field."""
         if self.parts is not None:
             attribute, inner = self.parts
             outer = [getattr(event, field.name) for field in self.fields if field.name not in inner]
@@ -243,7 +243,7 @@ EVENT_TABLES: Mapping[type[Event], EventTable] = {
 ENTRY_TABLES: Mapping[type[Event], EventTable] = {
     kind: table for kind, table in EVENT_TABLES.items() if kind.journalled and table.single
 }
-"""The tables with one row per entry of the journal."""
+"""The tables with one row per journal entry."""
 
 TABLES: Mapping[str, tuple[Field, ...]] = {
     "instrument/blocks": BLOCKS,
@@ -266,7 +266,7 @@ _FIRST = (
 """Indices of the tables of earlier versions: later tables follow in the order of declaration."""
 
 COUNTED = (*_FIRST, *(name for name in _PATHS if name not in _FIRST))
-"""Counters of the dataset `complete`: rows beyond the counts were incomplete when the disk or the writer failed."""
+"""Counters in the dataset `complete`: rows beyond these counts were incomplete when the disk or the writer failed."""
 
 FIXED_GROUPS = (
     *("checksums", "data", "fitted", "instrument", "metadata", "notes", "recovery", "user"),
@@ -282,5 +282,5 @@ _PARTS = {f"/entry/{path}": name for name, path in _PATHS.items()}
 
 
 def part_of(path: str) -> str:
-    """The counter of `complete` that applies to a growing dataset: that of its table, or of the samples."""
+    """The counter in `complete` that applies to a growing dataset: that of its table, or that of the samples."""
     return _PARTS.get(path.rpartition("/")[0], "samples")

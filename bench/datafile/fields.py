@@ -1,6 +1,6 @@
-"""Fields of a row, with their types in the file, units and missing values, and the tables that grow during the run.
+"""Fields of a row, with file types, units and missing values, and the tables that grow during the run.
 
-Rows wait in memory until they are written together.
+Rows are buffered in memory and written together.
 """
 
 import dataclasses
@@ -23,7 +23,7 @@ from sim.errors import InvalidInput
 from sim.parameters import Parameters, unit_of
 
 TEXT_WIDTH = 512
-"""Size of a text in a row [bytes]; longer texts are truncated with an ellipsis."""
+"""Size of a string in a row [bytes]; longer strings are truncated with an ellipsis."""
 
 ROWS_PER_CHUNK = 256
 
@@ -39,9 +39,9 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True)
 class Field:
-    """One field. When it is absent, a number is NaN, a switch -1, and a text empty.
+    """A field. An absent number is stored as NaN, an absent switch as -1, and an absent string as empty.
 
-    Of an `array`, each element is a row.
+    If `array` is true, each element of the value is a row.
     """
 
     name: str
@@ -53,7 +53,7 @@ class Field:
 
     @property
     def dtype(self) -> np.dtype[Any]:
-        """The type in memory of the stored values; integers that may be absent are float64, because they need NaN."""
+        """The in-memory type of the stored values; integers that may be absent are float64, because they need NaN."""
         if self.kind is Kind.TEXT:
             return hdf5.text_type(TEXT_WIDTH)
         if self.kind is Kind.SWITCH:
@@ -89,7 +89,7 @@ class Field:
 
 
 def decode(stored: hdf5.Dataset) -> list[Any]:
-    """The inverse of `encode` for the values of a field; absent ones are None."""
+    """The inverse of `encode` for the values of a field; absent values are None."""
     with reading(stored.name):
         return _decoded(Kind(stored.attrs["kind"]), bool(stored.attrs["optional"]), _read(stored))
 
@@ -112,9 +112,10 @@ def field_of(name: str, stored: hdf5.Dataset) -> Field:
 
 
 def fields_of(row_type: type[Any]) -> tuple[Field, ...]:
-    """The fields of a group of parameters, or the columns of a dataclass (`sim.parameters.column`) but for its parts.
+    """The fields of a group of parameters, or the columns of a dataclass (`sim.parameters.column`) other than its
+    parts.
 
-    Raises InvalidInput for types other than number, switch and text.
+    Raises InvalidInput for types other than number, switch and string.
     """
     if issubclass(row_type, Parameters):
         declared = [
@@ -154,7 +155,7 @@ def _columns(row_type: type[Any]) -> list[tuple[str, Any, Mapping[str, str]]]:
 
 def _is_array(hint: Any) -> bool:
     origin = get_origin(hint)
-    # NDArray is a generic type in NumPy up to 2.4 and on Python 3.11, an alias of one after that
+    # NDArray is a generic type in NumPy up to 2.4 and on Python 3.11, and later an alias of one
     return np.ndarray in (origin, get_origin(getattr(origin, "__value__", None)))
 
 
@@ -170,7 +171,7 @@ def _classify(item: str, annotation: Any) -> tuple[Kind, bool]:
         if len(others) == 1:
             return _classify(item, others[0])[0], True
     elif inspect.isclass(annotation):
-        # bool is an int, and an enumeration of texts is a str: the order matters
+        # bool is an int, and a string enumeration is a str: the order matters
         for types, kind in ((bool, Kind.SWITCH), (int, Kind.WHOLE), (float, Kind.REAL), (str, Kind.TEXT)):
             if issubclass(annotation, types):
                 return kind, False
@@ -183,13 +184,13 @@ THREADS = 2
 
 
 class Packer:
-    """Appends to compressed datasets, with threads that start on demand."""
+    """Appends to compressed datasets, using threads that start on demand."""
 
     def __init__(self) -> None:
         self._pool = ThreadPoolExecutor(THREADS, "record packer")
 
     def append(self, target: hdf5.Dataset, values: NDArray[Any]) -> None:
-        """Append rows; h5py writes incomplete chunks."""
+        """Append rows; an incomplete chunk is written through h5py."""
         start, chunk = target.shape[0], (target.chunks or (1,))[0]
         head = min(-start % chunk, len(values))
         whole = (len(values) - head) // chunk
@@ -210,13 +211,13 @@ class Packer:
 
 
 def pack(values: NDArray[Any]) -> bytes:
-    """A chunk after `hdf5.FILTERS`: compressed, the first bytes of all values, then the second, and so on."""
+    """A chunk as filtered by `hdf5.FILTERS`: the first bytes of all values, then the second, and so on, compressed."""
     shuffled = np.ascontiguousarray(values).view(np.uint8).reshape(-1, values.dtype.itemsize).T
     return zlib.compress(shuffled.tobytes(), hdf5.FILTERS["compression_opts"])
 
 
 class Growing:
-    """Appends rows and hashes them, so that the end of a long run needs no second read."""
+    """Appends rows and hashes them, so that they need not be read again at the end of a long run."""
 
     def __init__(self, stored: hdf5.Dataset, packer: Packer | None = None) -> None:
         """`packer` writes compressed chunks."""
@@ -240,7 +241,7 @@ class Growing:
             hdf5.append(self._stored, kept)
         else:
             self._packer.append(self._stored, kept)
-        # a view of bytes, because texts have no buffer
+        # a view of bytes, because strings have no buffer
         self._digest.update(kept.view(np.uint8).data)
 
 
@@ -258,7 +259,7 @@ class Rows:
 
     @property
     def written(self) -> int:
-        """Rows that have been given to the file."""
+        """Number of rows passed to the file."""
         return self._written
 
     @property
@@ -267,13 +268,13 @@ class Rows:
         return [stored for _, stored in self._columns]
 
     def add(self, *values: Any) -> None:
-        """Append one row, a value per field in order; None for an absent value."""
+        """Append one row: a value per field, in order; None for an absent value."""
         self._pending.append(
             tuple(field.encode(value) for (field, _), value in zip(self._columns, values, strict=True))
         )
 
     def extend(self, *columns: NDArray[Any]) -> None:
-        """Append many rows: a column per field in order, all of equal length, without absent values."""
+        """Append many rows: a column per field, in order, all of equal length and without absent values."""
         self._pending += zip(*(column.tolist() for column in columns), strict=True)
 
     def write(self) -> None:

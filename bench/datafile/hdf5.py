@@ -1,5 +1,5 @@
 # pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false
-"""Typed interface of the part of h5py used here; h5py publishes no types.
+"""Typed interface to the part of h5py used here; h5py publishes no types.
 
 Every numeric dataset is created by `write_numbers` or `grow_numbers`, which require its unit.
 """
@@ -47,7 +47,8 @@ FILTERS: dict[str, Any] = {"shuffle": True, "compression": "gzip", "compression_
 
 def create(path: Path) -> File:
     """Create a new file; raises FileExistsError if it exists."""
-    # metadata in pages of the disk's sectors: a power failure does not split an item (measured in decision 10)
+    # metadata are written in pages of disk-sector size, so a power failure does not split an item (measured in decision
+    # 10)
     return cast(File, h5py.File(path, "x", libver=VERSIONS, locking=locking(), fs_strategy="page", fs_page_size=PAGE))
 
 
@@ -114,14 +115,14 @@ def link(parent: Group, name: str, target: str) -> None:
 
 
 def view(parent: Group, name: str, source: Dataset, part: slice) -> Dataset:
-    """Create a virtual dataset that shows part of another one of the same file."""
+    """Create a virtual dataset that shows part of another dataset in the same file."""
     layout = h5py.VirtualLayout(shape=(part.stop - part.start,), dtype=source.dtype)
     layout[:] = h5py.VirtualSource(".", source.name, shape=source.shape, dtype=source.dtype)[part]
     return cast(Dataset, cast(h5py.Group, parent).create_virtual_dataset(name, layout))
 
 
 def write_numbers(parent: Group, name: str, values: object, *, unit: str, description: str) -> Dataset:
-    """Create a dataset with all its numbers; a scalar if `values` is one."""
+    """Create a dataset with all its numbers; a scalar dataset if `values` is a scalar."""
     made = parent.create_dataset(name, data=np.asarray(values))
     made.attrs["units"], made.attrs["description"] = unit, description
     return made
@@ -138,15 +139,15 @@ def grow_numbers(
 
 
 def text_type(width: int) -> np.dtype[Any]:
-    """Texts of `width` bytes of UTF-8, in memory and in the file: HDF5 does not convert from plain bytes."""
+    """Type for UTF-8 strings of `width` bytes, in memory and in the file: HDF5 does not convert from plain bytes."""
     return cast("np.dtype[Any]", h5py.string_dtype("utf-8", width))
 
 
 def grow_texts(parent: Group, name: str, width: int, *, description: str, chunk: int) -> Dataset:
-    """Create an empty, growing dataset of texts of at most `width` bytes of UTF-8.
+    """Create an empty, growing dataset of UTF-8 strings of at most `width` bytes.
 
-    HDF5 stores texts of variable length apart from their dataset, and a reader of a live file may see one without the
-    other; so all texts have a fixed length.
+    HDF5 stores variable-length strings separately from their dataset, and a reader of a live file may see one without
+    the other; therefore all strings have a fixed length.
     """
     made = parent.create_dataset(name, shape=(0,), maxshape=(None,), dtype=text_type(width), chunks=(chunk,))
     made.attrs["description"] = description
@@ -154,7 +155,7 @@ def grow_texts(parent: Group, name: str, width: int, *, description: str, chunk:
 
 
 def write_text(parent: Group, name: str, text: str, *, width: int = 0, description: str = "") -> Dataset:
-    """Create a scalar string as long as `text`, or of `width` bytes if it will be replaced later."""
+    """Create a scalar string as long as `text`, or of `width` bytes if it is to be replaced later."""
     stored = text.encode()
     kind = text_type(max(width, len(stored), 1))
     made = parent.create_dataset(name, data=np.array(stored, dtype=kind), dtype=kind)
@@ -164,7 +165,7 @@ def write_text(parent: Group, name: str, text: str, *, width: int = 0, descripti
 
 
 def write_texts(parent: Group, name: str, texts: Iterable[str], *, description: str) -> Dataset:
-    """Create a dataset with all its texts."""
+    """Create a dataset with all its strings."""
     stored = [text.encode() for text in texts]
     kind = text_type(max([1, *map(len, stored)]))
     made = parent.create_dataset(name, data=np.array(stored, dtype=kind), dtype=kind)
@@ -173,7 +174,9 @@ def write_texts(parent: Group, name: str, texts: Iterable[str], *, description: 
 
 
 def clip_text(text: str, width: int) -> bytes:
-    """UTF-8 of at most `width` bytes; a longer text ends with an ellipsis, without splitting a character."""
+    """The text as UTF-8 of at most `width` bytes; a longer one is cut with an ellipsis, without splitting a
+    character.
+    """
     stored = text.encode()
     if len(stored) <= width:
         return stored
@@ -181,7 +184,7 @@ def clip_text(text: str, width: int) -> bytes:
 
 
 def replace_text(target: Dataset, text: str, width: int) -> None:
-    """Replace the text of a scalar of `width` bytes, truncated if necessary."""
+    """Replace the string in a scalar of `width` bytes; truncates it if necessary."""
     target[()] = np.array(clip_text(text, width), dtype=text_type(width))
 
 
@@ -212,13 +215,14 @@ def is_let_go(path: Path) -> bool:
 
 
 MISSING = b"\xff"
-"""Value returned for every byte beyond the end: a heap of texts has no checksum, and in one of zeros HDF5 would loop
-for ever.
+"""Value returned for every byte beyond the end. A string heap has no checksum, and in one of zeros HDF5 would loop for
+ever.
 """
 
 
 class Quiet(io.RawIOBase):
-    """A file as if its writer had closed it, with the length of its superblock; missing bytes are MISSING.
+    """A file presented as if its writer had closed it, with the length stated in its superblock; missing bytes are
+    MISSING.
 
     Metadata have checksums, which these bytes do not pass. Uncompressed values have none: their readers must first
     determine their end with `bench.datafile.opening`.
@@ -250,7 +254,7 @@ class Quiet(io.RawIOBase):
     def readinto(self, buffer: "WriteableBuffer", /) -> int:
         target = memoryview(buffer).cast("B")
         self._file.seek(self._place)
-        # always the requested length, also beyond the end: h5py would repeat the request for ever
+        # always return the requested length, even beyond the end: otherwise h5py would repeat the request for ever
         wanted = len(target)
         found = self._file.read(wanted).ljust(wanted, MISSING)
         covered = self._head[self._place :][:wanted]
@@ -264,7 +268,7 @@ class Quiet(io.RawIOBase):
 
 
 def lookup3(data: bytes) -> int:
-    """Jenkins' lookup3 hash of bytes, a multiple of 4, as used by HDF5."""
+    """Jenkins' lookup3 hash, as used by HDF5, of bytes whose number is a multiple of 4."""
     a = b = c = (0xDEADBEEF + len(data)) & _32_BITS
     words = list(struct.unpack(f"<{len(data) // 4}I", data))
     while len(words) > 3:

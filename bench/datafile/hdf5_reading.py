@@ -1,5 +1,5 @@
 # pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false
-"""Access to a file's objects through h5py; damage raises a DataFileError naming the object."""
+"""Access to a file's objects through h5py; damage raises a DataFileError that names the object."""
 
 import re
 from collections.abc import Generator, Iterator
@@ -49,7 +49,7 @@ class Dataset(Protocol):
 
 
 class Group(Protocol):
-    """A folder in the file."""
+    """A group in the file."""
 
     @property
     def name(self) -> str: ...
@@ -75,17 +75,17 @@ class File(Group, Protocol):
 
 
 class DataFileError(RockbenchError):
-    """The file could not be written or read further; complete earlier data stay readable."""
+    """Error: the file could not be written or read any further; complete earlier data stay readable."""
 
     error_code = "data_file"
 
 
 UNREADABLE = (OSError, RuntimeError, KeyError, ValueError, TypeError, IndexError, OverflowError, DataFileError)
-"""Exceptions from a damaged file: errors of HDF5, of its Python library, and of decoding."""
+"""Exceptions caused by a damaged file: errors of HDF5, of its Python library, and of decoding."""
 
 
 def reason(error: BaseException) -> str:
-    """One line for a multi-line error of the HDF5 library: the system's message if it has one."""
+    """One line for a multi-line error of the HDF5 library: the system's message, if it contains one."""
     text = str(error).strip()
     found = re.search(r"error message = '([^']+)'", text)
     return found.group(1) if found else text.partition("\n")[0] or type(error).__name__
@@ -115,7 +115,7 @@ def group(parent: Group, path: str) -> Group:
 def members(parent: Group, lost: dict[str, str] | None = None) -> Iterator[tuple[str, "Dataset | Group | str"]]:
     """Members of a group, by name: datasets, groups, and the target path of a soft link.
 
-    Unreadable members are added to `lost`, as reason by path; without `lost` they raise DataFileError.
+    For unreadable members the reason is added to `lost` by path; without `lost`, DataFileError is raised.
     """
     try:
         names = list(parent)
@@ -132,8 +132,8 @@ def members(parent: Group, lost: dict[str, str] | None = None) -> Iterator[tuple
 
 
 def datasets(parent: Group, lost: dict[str, str] | None = None) -> Iterator[Dataset]:
-    """Every dataset below `parent`, in the order of creation; link targets once, views excluded. Unreadable members are
-    treated as by `members`.
+    """Every dataset below `parent`, in order of creation, excluding views; link targets occur once. Unreadable members
+    are handled as in `members`.
     """
     for _, member in members(parent, lost):
         if isinstance(member, h5py.Dataset):
@@ -182,7 +182,7 @@ def place(stored: Dataset) -> tuple[int, int] | None:
 
 def places_of_chunks(stored: Dataset) -> dict[int, tuple[int, int]]:
     """Offset and size in the file [bytes] of every written chunk, by its first row, as far as the index can be read.
-    All in one pass: HDF5 searches from the first chunk for each single lookup.
+    Reads them in one pass, since HDF5 searches from the first chunk for every single lookup.
     """
     found: dict[int, tuple[int, int]] = {}
 
@@ -207,7 +207,7 @@ def attribute(owner: Group | Dataset, name: str) -> Any:
 
 
 def read_text(parent: Group, path: str) -> str:
-    """A scalar text."""
+    """Read a scalar string."""
     stored = dataset(parent, path)
     with reading(stored.name):
         return bytes(stored[()]).decode()

@@ -48,17 +48,17 @@ def analysis_overview(file: hdf5.File, path: Path) -> dict[str, Any]:
 
 
 def analysis_problems(file: hdf5.File, path: Path) -> Iterator[str]:
-    """Problems other than wrong checksums: no checksums, or a changed campaign file."""
+    """Problems other than wrong checksums: missing checksums, or a changed campaign file."""
     entry = hdf5.group(file, "entry")
     if GROUP not in entry:
-        yield "it has no checksums, being from an older version; write it again"
+        yield "the file has no checksums because an older version wrote it; write it again"
     source = hdf5.group(entry, "original")
     if _original(source, path) == "changed":
-        yield f"the file of its campaign, {hdf5.read_text(source, 'file')}, is not the analysed one"
+        yield f"the file of its campaign, {hdf5.read_text(source, 'file')}, is not the one that was analysed"
 
 
 def _original(source: hdf5.Group, path: Path) -> str:
-    """Whether the campaign's file in the same folder is the analysed one."""
+    """Whether the campaign file in the same folder is the one that was analysed."""
     beside = path.with_name(Path(hdf5.read_text(source, "file")).name)
     if not beside.is_file():
         return "not in the same folder"
@@ -128,7 +128,8 @@ class Verdict:
 
 
 def verify(path: Path, done: Done = lambda _done, _all: None) -> Verdict:
-    """Verify the whole file of a campaign or re-analysis, in pieces of bounded memory. `done` counts the datasets.
+    """Verify the complete file of a campaign or re-analysis, piece by piece in bounded memory. `done` receives the
+    number of datasets processed.
 
     Raises InvalidInput for a file of another kind, DataFileError for one that cannot be opened.
     """
@@ -157,12 +158,15 @@ def _verdict(entry: hdf5.Group, problems: Iterator[str], done: Done) -> Verdict:
 def _of_record(record: DataFile, size: int) -> Iterator[str]:
     closed = record.status != Status.RUNNING
     if not closed:
-        yield "it was not closed: being written, or its writer crashed; `rockbench file recover` writes a clean file"
+        yield (
+            "the file was not closed: it is being written, or its writer crashed; `rockbench file recover` "
+            "writes a clean file"
+        )
     if not record.channels:
-        yield "it has no channel"
+        yield "the file has no channel"
     entry = hdf5.group(record.file, "entry")
     if record.format_version > 1 and GROUP not in entry:
-        yield "its checksums are missing"
+        yield "the checksums are missing"
     for stored in hdf5.datasets(entry):
         yield from _of_layout(stored, record.counted, size, closed=closed)
     plot = hdf5.group(entry, PLOT)
@@ -173,7 +177,7 @@ def _of_record(record: DataFile, size: int) -> Iterator[str]:
 
 
 def _of_layout(stored: hdf5.Dataset, counted: Mapping[str, int], size: int, *, closed: bool) -> Iterator[str]:
-    """Violations of the layout: units, lengths, and values missing in the file."""
+    """Violations of the layout: missing units, wrong lengths and missing values."""
     path = stored.name
     if stored.dtype.kind in "iuf" and not stored.attrs.get("units"):
         yield f"{path} has no units"
@@ -182,8 +186,8 @@ def _of_layout(stored: hdf5.Dataset, counted: Mapping[str, int], size: int, *, c
             yield f"{path} lies beyond the end of the file: it is truncated"
         return
     length, rows = stored.shape[0], counted[part_of(path)]
-    # in a file that was not closed, additional rows are incomplete ones
+    # in a file that was not closed, additional rows are incomplete
     if length < rows or (closed and length > rows):
         yield f"{path} has {length} rows, {rows} were written"
     if (there := intact_rows(stored, size)) < min(length, rows):
-        yield f"only {there} of the {rows} rows of {path} are in the file: it is truncated or damaged"
+        yield f"the file has only {there} of the {rows} rows of {path}: it is truncated or damaged"

@@ -1,5 +1,5 @@
-"""The skeleton of the file: everything is created before the first sample, because nothing can be added with concurrent
-readers. `docs/file-format.md` describes the layout for users.
+"""The skeleton of the file. Everything is created before the first sample, because nothing can be added to a file that
+is being read. `docs/file-format.md` describes the layout for users.
 """
 
 from collections.abc import Mapping, Sequence
@@ -50,7 +50,7 @@ class Skeleton:
     def check(self) -> None:
         """Raise InvalidInput for contents that the file cannot store."""
         if not self.channels:
-            raise InvalidInput("channels", 0, "a data file needs at least one")
+            raise InvalidInput("channels", 0, "a data file needs at least one channel")
         if not self.sample_rate > 0.0:
             raise InvalidInput("sample_rate", self.sample_rate, "it must be positive samples per second")
         names = [channel.name for channel in self.channels]
@@ -65,7 +65,7 @@ class Skeleton:
 
 @dataclass(frozen=True)
 class Parts:
-    """The growing or changing parts of a new file."""
+    """The parts of a new file that grow or change."""
 
     samples: Samples
     rows: Mapping[str, Rows]
@@ -77,7 +77,7 @@ class Parts:
     checksums: Checksums
 
     def reopened(self, file: hdf5.File) -> "Parts":
-        """Use the same groups and datasets in the reopened file."""
+        """Replace groups and datasets by those of the reopened file."""
         for each in self.grown:
             each.reopen(file)
         self.checksums.reopen(hdf5.group(file, "entry"))
@@ -137,7 +137,7 @@ def create_ends(entry: hdf5.Group) -> tuple[hdf5.Dataset, hdf5.Dataset, hdf5.Dat
 
 
 def now() -> str:
-    """The wall clock as ISO 8601 with the zone."""
+    """The wall-clock time as ISO 8601 with time zone."""
     return datetime.now().astimezone().isoformat(timespec="milliseconds")
 
 
@@ -152,6 +152,6 @@ def software_version() -> str:
 def _check_names(item: str, names: Sequence[str], taken: Sequence[str]) -> None:
     for name in names:
         if not name or "/" in name or "\0" in name or name.strip(".") == "":
-            raise InvalidInput(item, name, "a name in the file must not be empty, be only dots, or contain '/'")
+            raise InvalidInput(item, name, "a name in the file must not be empty, consist only of dots, or contain '/'")
         if name in taken or names.count(name) > 1:
             raise InvalidInput(item, name, "this name is already used in the file")

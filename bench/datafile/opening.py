@@ -1,6 +1,7 @@
 """Opening of a data file: checks of kind, version and completeness.
 
-Files of wording 1 have some data only in the sentences of their journal, from which `columns_from` reads them.
+Files of wording version 1 hold some data only in the sentences of their journal, from which `columns_from` extracts
+them.
 """
 
 import re
@@ -19,7 +20,7 @@ from sim.errors import CauseCode, InvalidInput
 
 
 def intact_rows(stored: hdf5.Dataset, size: int) -> int:
-    """Number of rows before the first chunk that is lost or not entirely in the first `size` bytes of the file."""
+    """Number of rows before the first chunk that is lost or that extends beyond the first `size` bytes of the file."""
     length, chunk = stored.shape[0], (stored.chunks or (1,))[0]
     places = hdf5.places_of_chunks(stored)
     for start in range(0, length, chunk):
@@ -30,13 +31,13 @@ def intact_rows(stored: hdf5.Dataset, size: int) -> int:
 
 
 def is_within(stored: hdf5.Dataset, size: int) -> bool:
-    """Whether a fixed dataset is entirely in the first `size` bytes of the file."""
+    """Whether a fixed dataset lies entirely within the first `size` bytes of the file."""
     place = hdf5.place(stored)
     return place is None or place[0] + place[1] <= size
 
 
 def check_whole(entry: hdf5.Group, counted: Mapping[str, int], size: int) -> None:
-    """Read all metadata, and locate the counted rows.
+    """Read all metadata and locate the counted rows.
 
     Raises HDF5's exceptions for damage, and DataFileError for rows beyond `size` bytes.
     """
@@ -51,27 +52,27 @@ def check_whole(entry: hdf5.Group, counted: Mapping[str, int], size: int) -> Non
         else:
             whole = is_within(stored, size)
         if not whole:
-            raise DataFileError(f"{stored.name} reaches beyond the end of the file: it is truncated")
+            raise DataFileError(f"{stored.name} extends beyond the end of the file: the file is truncated")
 
 
 FORMAT, FORMAT_VERSION = "rocking-bench record", 2
-"""Format of the file of a campaign."""
+"""Format of a campaign file."""
 
-WORDING = 4
+WORDING = 5
 """Version of the sentences in journal and results; replay compares them with those of a file of the same version."""
 
 ANALYSIS, ANALYSIS_VERSION = "rocking-bench analysis", 1
-"""Format of the file of a re-analysis, stored next to that of its campaign."""
+"""Format of a re-analysis file, stored next to the campaign file."""
 
 _VERSIONS = {FORMAT: FORMAT_VERSION, ANALYSIS: ANALYSIS_VERSION}
 _ATTEMPTS, _PAUSE = 3, 0.1
-"""Attempts to open, and the pause between them [s]: a read may coincide with a write."""
+"""Number of attempts to open a file, and the pause between them [s]: a read may coincide with a write."""
 
 _HINT = "`rockbench file recover` restores the readable part"
 
 
 def open_file(path: Path, *, judging: bool = False, kinds: tuple[str, ...] = (FORMAT,)) -> hdf5.File:
-    """Open a file of one of these kinds, see `bench.datafile.reader.open_datafile`."""
+    """Open a file of one of the `kinds`, see `bench.datafile.reader.open_datafile`."""
     if path.is_dir():
         raise InvalidInput("record", str(path), "it is a directory; name the file in it")
     if not path.is_file():
@@ -97,13 +98,13 @@ def _opened(path: Path, judging: bool) -> hdf5.File:
         raise InvalidInput("record", str(path), f"it cannot be opened ({error.strerror})") from error
     except UNREADABLE as error:
         if not hdf5.is_hdf5(path):
-            raise InvalidInput("record", str(path), "it is not an HDF5 file") from error
+            raise InvalidInput("record", str(path), "this is not an HDF5 file") from error
         told = f"{path} cannot be read ({reason(error)}): another program has locked it, or it is damaged; {_HINT}"
         raise DataFileError(told) from error
 
 
 def _rehearse(path: Path) -> None:
-    """Raise the exceptions of a damaged file; in single-writer mode HDF5 would try to read it for hours."""
+    """Raise an exception if the file is damaged; in single-writer mode HDF5 would try to read it for hours."""
     for left in reversed(range(_ATTEMPTS)):
         try:
             with hdf5.open_to_judge(path) as file:
@@ -135,7 +136,7 @@ def _check_format(path: Path, file: hdf5.File, kinds: tuple[str, ...]) -> None:
         raise DataFileError(told) from error
     kind = str(found.get("format"))
     if kind not in _VERSIONS or "format_version" not in found:
-        raise InvalidInput("record", str(path), "it is an HDF5 file but not a data file of rocking-bench")
+        raise InvalidInput("record", str(path), "this is an HDF5 file, but not a data file of rocking-bench")
     try:
         version = int(found["format_version"])
     except (TypeError, ValueError):
@@ -147,7 +148,7 @@ def _check_format(path: Path, file: hdf5.File, kinds: tuple[str, ...]) -> None:
         raise InvalidInput("record", str(path), f"its format version {version} is newer: update this software")
     if kind not in kinds:
         of = hdf5.read_text(file, "entry/original/file")
-        raise InvalidInput("record", str(path), f"it is a re-analysis of {of}; name the file of the campaign")
+        raise InvalidInput("record", str(path), f"this is a re-analysis of {of}; specify the campaign file")
 
 
 Columns = dict[str, Any]
@@ -161,7 +162,7 @@ _TWIN_BEHIND = "the twin did not keep up, and is off until the rig is armed agai
 
 
 def columns_from(kind: str, text: str) -> Columns:
-    """The columns of an entry of the journal that replay needs, under the names of later files."""
+    """The columns of a journal entry that replay needs, under the names used in later files."""
     read = _READERS.get(kind)
     return {} if read is None else read(text)
 

@@ -1,4 +1,4 @@
-"""Reader of the file of a campaign: finished, being written, or left by a killed writer."""
+"""Reader of a campaign file that is finished, being written, or left by a killed writer."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -24,7 +24,7 @@ from sim.sweep import Done
 
 @dataclass(frozen=True)
 class JournalEntry:
-    """An entry of the journal: bench time [s], the name of the event, and one line of text."""
+    """A journal entry: bench time [s], name of the event, and one line of text."""
 
     time: float
     kind: str
@@ -34,7 +34,7 @@ class JournalEntry:
 def open_datafile(path: Path, *, judging: bool = False) -> "DataFile":
     """Open the file of a campaign; use it in a `with` statement.
 
-    A file being written can be followed, except when `judging`: then its state on the disk is read, and damage raises
+    A file being written can be followed, except if `judging`: then its state on the disk is read, and damage raises
     an error at once. Raises InvalidInput when the file does not exist or is of another kind, DataFileError when it
     cannot be read.
     """
@@ -50,7 +50,7 @@ def open_datafile(path: Path, *, judging: bool = False) -> "DataFile":
 
 
 class DataFile(SampleReader):
-    """An open data file. Everything is read on access; `refresh` updates the view of a file being written."""
+    """An open data file. Everything is read on access; `refresh` includes what a writer has added since."""
 
     def __init__(self, file: hdf5.File) -> None:
         super().__init__(hdf5.group(file, "entry"))
@@ -70,7 +70,7 @@ class DataFile(SampleReader):
         self._file.close()
 
     def refresh(self) -> None:
-        """Include data added by the writer since. Raises DataFileError where the file was truncated meanwhile."""
+        """Include data that the writer has since added. Raises DataFileError if the file was truncated meanwhile."""
         self._check_size()
         self._count_again()
         for path in self._growing:
@@ -78,7 +78,7 @@ class DataFile(SampleReader):
                 hdf5.dataset(self._entry, path).refresh()
 
     def _check_size(self) -> None:
-        # HDF5 would search for what is cut off
+        # HDF5 would search for the truncated data
         with reading(str(self._file.filename)):
             size = Path(self._file.filename).stat().st_size
         if size < self._size:
@@ -113,20 +113,21 @@ class DataFile(SampleReader):
         return checksums.read(self._entry) if hdf5.has(self._entry, checksums.GROUP) else {}
 
     def integrity(self, largest: int | None = SMALL, done: Done = lambda _done, _all: None) -> Integrity:
-        """Changed datasets: `record.integrity().failing`, one line by path; `str` of it is one line.
+        """Check for changed datasets: `record.integrity().failing` has a line for each path, and `str` of the result is
+        one line.
 
-        Reads datasets of at most `largest` bytes, or all if None. `done` counts them.
+        Reads datasets of at most `largest` bytes, or all if None. `done` receives the number processed.
         """
         return integrity(self._entry, largest, done)
 
     @property
     def status(self) -> str:
-        """Status of the campaign; "running" while it is written, and permanently when its writer was killed."""
+        """Status of the campaign; "running" while it is being written, and permanently if its writer was killed."""
         return hdf5.read_text(self._entry, "status")
 
     @property
     def summary(self) -> str:
-        """Reason of the campaign's end."""
+        """Reason for the campaign's end."""
         return hdf5.read_text(self._entry, "summary")
 
     @property
@@ -152,7 +153,7 @@ class DataFile(SampleReader):
 
     @cached_property
     def metadata(self) -> dict[str, str]:
-        """Metadata stored by the recorder, as text by name."""
+        """Metadata stored by the recorder, as strings by name."""
         group = hdf5.group(self._entry, "metadata")
         return {name: hdf5.read_text(group, name) for name in hdf5.names(group)}
 
@@ -163,7 +164,7 @@ class DataFile(SampleReader):
 
     @property
     def points(self) -> list[dict[str, Any]]:
-        """The results, one dict per point with the fields of its type; enumerations are texts, absent values None."""
+        """The results, one dict per point with the fields of its type; enumerations are strings, absent values None."""
         return self._rows("points")
 
     @property
@@ -184,7 +185,7 @@ class DataFile(SampleReader):
         return as_rows(self.columns_of(event))
 
     def growing(self, path: str) -> dict[Field, list[Any]]:
-        """The complete rows of the table at `path` below /entry, by column as the file declares it."""
+        """The complete rows of the table at `path` below /entry, by column as declared in the file."""
         if not hdf5.has(self._entry, path):
             return {}
         group = hdf5.group(self._entry, path)
@@ -195,12 +196,12 @@ class DataFile(SampleReader):
 
     @property
     def fits(self) -> list[FitFinished]:
-        """The published fits; none in a file of an older version without them."""
+        """The published fits; empty for a file of an older version without fits."""
         return read_fits(self._entry, self._complete("fits")) if hdf5.has(self._entry, "fits") else []
 
     @property
     def identified(self) -> Identified | None:
-        """The last identified properties of the specimen; None where the run identified none."""
+        """The last identified properties of the specimen; None if the run identified none."""
         return last_findings(*(self._rows(name) for name in FINDING_TABLES))
 
     @property

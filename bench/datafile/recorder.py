@@ -1,4 +1,6 @@
-"""The recorder, a subscriber that writes a campaign to its file in a thread: a slow disk never delays the drive."""
+"""The recorder, a subscriber that writes a campaign to its file in a thread, so that a slow disk never delays the
+drive.
+"""
 
 import queue
 import threading
@@ -25,13 +27,13 @@ PERIOD = 0.5
 """Longest time between two writes of waiting data [s]; the length of a chunk of samples in real time."""
 
 PAUSE = 0.05
-"""Shortest time between two writes of events [s], so that a slow disk writes many at once."""
+"""Shortest time between two writes of events [s], so that on a slow disk many are written at once."""
 
 BATCH = 100
 """Number of chunks written at once when samples arrive faster than real time."""
 
 BACKLOG = 4096
-"""Largest number of events that wait for the disk: minutes in real time. A longer backlog ends the run."""
+"""Largest number of events that may wait for the disk, minutes in real time. A longer backlog ends the run."""
 
 PATIENCE = 60.0
 """Longest wait for the disk with the bench at rest [s]: at the end, and in `sync`."""
@@ -61,13 +63,11 @@ class Recorder:
     """Writes a new HDF5 file; called with each event of the engine, and closed at the end.
 
     Samples are on the disk within a second, journalled events almost at once. An error of the disk is raised as
-    DataFileError by the next call, once; later data are not recorded, and earlier data stay
-    readable. A disk that does not keep up is such an error: a call waits at most `hold_up` seconds, non-zero only in
-    virtual time.
+    DataFileError by the next call, once; later data are not recorded, and earlier data stay readable. A disk that does
+    not keep up also causes this error: a call waits at most `hold_up` seconds, which is non-zero only in virtual time.
 
-    `metadata` is stored as texts under /entry/metadata, `tables` (such as {"prediction": ...}) under /entry.
-    Raises InvalidInput, without creating a file, when `path` exists or cannot be created, or a name or table is
-    invalid.
+    `metadata` is stored as strings under /entry/metadata, `tables` (such as {"prediction": ...}) under /entry. Raises
+    InvalidInput, without creating a file, when `path` exists or cannot be created, or a name or table is invalid.
     """
 
     def __init__(
@@ -122,13 +122,13 @@ class Recorder:
         if not self._closed:
             marker = _Sync(threading.Event())
             if not (self._put(marker, PATIENCE) and marker.done.wait(PATIENCE)):
-                self._fall_behind(f"has not answered for {PATIENCE:g} s")
+                self._fall_behind(f"has not responded for {PATIENCE:g} s")
         self._raise_failure()
 
     def close(self, status: Status | str, summary: str = "") -> None:
         """Write pending data, status and end time, and close the file; closing again has no effect.
 
-        Raises InvalidInput for an unknown status, DataFileError when the end could not be written. An unresponsive disk
+        Raises InvalidInput for an unknown status, DataFileError if the end could not be written. An unresponsive disk
         does not block the end of the program.
         """
         ends = [str(end) for end in Status if end not in (Status.RUNNING, Status.INTERRUPTED)]
@@ -142,7 +142,7 @@ class Recorder:
         self._put(_Sync(threading.Event()), 0.0)
         self._thread.join(PATIENCE)
         if self._thread.is_alive():
-            self._fall_behind(f"has not answered for {PATIENCE:g} s")
+            self._fall_behind(f"has not responded for {PATIENCE:g} s")
         self._raise_failure()
 
     def _offer(self, item: _Block | Event) -> None:
@@ -151,7 +151,7 @@ class Recorder:
             self._raise_failure()
 
     def _put(self, item: _Block | Event | _Sync, patience: float) -> bool:
-        """Queue an item if there is room within `patience` seconds."""
+        """Queue an item if space becomes free within `patience` seconds."""
         try:
             self._queue.put(item, block=patience > 0.0, timeout=patience)
         except queue.Full:
@@ -160,11 +160,11 @@ class Recorder:
 
     def _fall_behind(self, how: str) -> None:
         """Record the failure of a slow disk: pending data are still written if it recovers, new data are ignored."""
-        told = f"{self.path} is not recorded further, its disk {how}: earlier data are readable; check the disk"
+        told = f"recording to {self.path} has stopped because its disk {how}: earlier data are readable; check the disk"
         self._behind = self._behind or DataFileError(told)
 
     def _checked(self, event: Acquired) -> _Block:
-        """The block's own copy of the arrays, transposed: a driver may reuse its buffer."""
+        """Transposed copies of the block's arrays: a driver may reuse its buffer."""
         counts, n = event.block.counts, len(event.block)
         if counts.shape != (n, self._n_channels) or event.drive.shape != (n,):
             raise DataFileError(
@@ -175,7 +175,7 @@ class Recorder:
         return _Block(event.time, event.run, event.block.first, copy, event.drive.astype(np.float32))
 
     def _raise_failure(self) -> None:
-        """Raise a failure only once: the events of bringing the bench to rest must not raise it again."""
+        """Raise a failure only once: events that follow while the bench is brought to rest must not raise it again."""
         failure = self._failure or self._behind
         if failure is not None and not self._told:
             self._told = True
@@ -201,11 +201,11 @@ class Recorder:
         except Exception as error:
             # any failure must end the run: an unrecorded campaign is worthless
             failure = DataFileError(
-                f"{self.path} cannot be written further ({reason(error)}): check the disk, start a new run"
+                f"{self.path} cannot be written any further ({reason(error)}): check the disk, then start a new run"
             )
             failure.__cause__ = error
             self._failure = failure
-            # what failed may fail again
+            # the operation that failed may fail again
             with suppress(Exception):
                 self._writer.abandon()
 

@@ -1,4 +1,4 @@
-"""Recovery of a clean file after a killed writer, a full disk or truncation, or from an old version.
+"""Recovery of a clean file after a killed writer, a full disk or truncation, or from a file of an old version.
 
 The original is only read. The copy has the intact data in the present layout, with checksums.
 """
@@ -34,8 +34,8 @@ Row = Mapping[str, Any]
 def add_lost_events(entry: hdf5.Group, lines: Sequence[Row]) -> tuple[int, int]:
     """Append the journal's additional rows to the tables of events and points; returns the number of each.
 
-    Points are checked separately, because they can be missing without their event. Raises DataFileError, without
-    appending, for the journal of another file, which has a different beginning.
+    Points are checked separately, because a point can be missing although its event is present. Raises DataFileError,
+    without appending, for the journal of another file, whose beginning differs.
     """
     points = [line["point"] for line in lines if "point" in line]
     events = _beyond(hdf5.group(entry, "events"), lines, ("time", "kind"))
@@ -53,7 +53,7 @@ def add_lost_events(entry: hdf5.Group, lines: Sequence[Row]) -> tuple[int, int]:
 def _beyond(
     table: hdf5.Group, rows: Sequence[Row], compared: Sequence[str] | None = None
 ) -> list[tuple[hdf5.Dataset, NDArray[Any]]]:
-    """Every dataset of a table with the rows to add; the preceding rows must equal those of the table."""
+    """Every dataset of a table, with the rows to add; the preceding rows must equal those of the table."""
     new: list[tuple[hdf5.Dataset, NDArray[Any]]] = []
     for name in table:
         stored = hdf5.dataset(table, name)
@@ -79,7 +79,7 @@ NOTE = "recovery"
 class Recovery:
     """Result: the new file, its rows of samples, and the numbers of events and points from the journal.
 
-    `lost` are the counted rows of the original missing in the copy, by part. `damage` names objects that are missing,
+    `lost` holds the counted rows of the original that the copy lacks, by part. `damage` names objects that are missing,
     or were copied although they differ from their checksum.
     """
 
@@ -102,9 +102,9 @@ class Recovery:
 
 
 def write_ends(record: DataFile, path: Path, entry: hdf5.Group, lengths: Mapping[str, int], loss: str) -> None:
-    """Write the values set at the end of a run: the original ones, or replacements with the reason.
+    """Write the values that are set at the end of a run: the original ones, or replacements with the reason.
 
-    `lengths` are the rows of every part, `loss` describes the missing data.
+    `lengths` are the numbers of rows of every part; `loss` describes the missing data.
     """
     complete, status, summary, end_time = create_ends(entry)
     complete[...] = [lengths.get(name, 0) for name in COUNTED]
@@ -219,7 +219,7 @@ def _is_made_anew(path: str) -> bool:
 
 
 def _counted(record: DataFile, judged: Integrity) -> Mapping[str, int]:
-    """The rows written to the disk or, if unknown, the length of the datasets."""
+    """The number of rows written to the disk or, if unknown, the length of the datasets."""
     if "/entry/complete" not in judged.failing:
         return record.counted
     lengths = dict.fromkeys(record.counted, 0)

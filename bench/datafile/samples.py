@@ -1,7 +1,7 @@
 """The samples of all channels and of the drive with their times, appended in whole chunks.
 
-Rewriting a compressed chunk leaves its first copy as unused space, so rows are buffered until a chunk is full unless
-they must be written now.
+Rewriting a compressed chunk leaves its first copy as unused space, so rows are buffered until a chunk is full, unless
+they must be written immediately.
 """
 
 import json
@@ -19,15 +19,15 @@ PLOT, TIME = "data", "time"
 
 
 def create_plot(entry: hdf5.Group, channels: Sequence[Channel], chunk: int) -> hdf5.Dataset:
-    """Create the plot of the first channel and those of its kind against time, with links to all others; the time axis
-    is filled later. Counts remain counts: by the NXdata standard, values are (counts + `<name>_offset`) *
-    `<name>_scaling_factor`.
+    """Create the plot of the first channel, and the others of its kind, against time, with links to all others; the
+    time axis is filled later. The counts are not converted: by the NXdata standard, values are (counts +
+    `<name>_offset`) * `<name>_scaling_factor`.
     """
     data = hdf5.create_group(entry, PLOT, "NXdata")
     first, *others = channels
     data.attrs["signal"], data.attrs["axes"] = first.name, [TIME]
     data.attrs[f"{TIME}_indices"] = 0
-    # channels of another kind have another scale and would flatten the plot
+    # channels of another kind have a different scale and would flatten the plot
     alike = [channel.name for channel in others if (channel.quantity, channel.unit) == (first.quantity, first.unit)]
     if alike:
         data.attrs["auxiliary_signals"] = alike
@@ -45,7 +45,7 @@ def create_plot(entry: hdf5.Group, channels: Sequence[Channel], chunk: int) -> h
     for channel in channels:
         hdf5.link(data, channel.name, f"/entry/instrument/{channel.name}/counts")
         factor, offset = companions(channel.name)
-        hdf5.write_numbers(data, factor, channel.scale, unit=channel.unit, description="value of a count, NXdata")
+        hdf5.write_numbers(data, factor, channel.scale, unit=channel.unit, description="value per count, NXdata")
         hdf5.write_numbers(
             data, offset, channel.offset / channel.scale, unit="counts", description="added before scaling, NXdata"
         )
@@ -60,7 +60,7 @@ def companions(name: str) -> tuple[str, str]:
 class Timeline:
     """Times that rise by one sample period within a run, and jump where samples are missing.
 
-    A run is placed by the time at which its first block had been read; all times of the run include the delay of that
+    A run is positioned by the time at which its first block had been read; all its times include the delay of that
     read.
     """
 
@@ -82,13 +82,13 @@ class Timeline:
 
 
 CHUNK_TIME = 0.5
-"""Duration of a chunk of samples [s]: the buffered time in a real-time run."""
+"""Duration of a chunk of samples [s]; in a real-time run, the buffered time."""
 
 
 class Samples:
-    """Counts per channel, the drive as float32 and the time as float64, always of equal length.
+    """Datasets of the counts of each channel, the drive as float32 and the time as float64, always of equal length.
 
-    `time` is the dataset of the times, with chunks of `chunk_of(sample_rate)` rows.
+    `time` is the dataset for the times, with chunks of `chunk_of(sample_rate)` rows.
     """
 
     def __init__(
@@ -108,12 +108,12 @@ class Samples:
 
     @property
     def written(self) -> int:
-        """Rows that have been given to the file."""
+        """Number of rows passed to the file."""
         return self._written
 
     @property
     def full_chunks(self) -> int:
-        """Number of chunks completed by the pending rows."""
+        """Number of complete chunks among the pending rows."""
         return len(self) // self.chunk - self._written // self.chunk
 
     def add(self, counts: Counts, drive: NDArray[np.float32], seconds: NDArray[np.float64]) -> None:
@@ -141,12 +141,12 @@ class Samples:
 
 
 def chunk_of(sample_rate: float) -> int:
-    """Rows in a chunk of the samples."""
+    """Number of rows in a chunk of the samples."""
     return max(1, round(CHUNK_TIME * sample_rate))
 
 
 def read_channels(instrument: hdf5.Group) -> tuple[Channel, ...]:
-    """The inputs, in the order of the rig. Raises DataFileError where one is damaged."""
+    """The inputs, in the order of the rig. Raises DataFileError if one is damaged."""
     names = [name for name in hdf5.names(instrument) if hdf5.has(instrument, f"{name}/counts")]
     return tuple(read_channel(instrument, name) for name in names)
 
@@ -196,7 +196,8 @@ def _create_channel(instrument: hdf5.Group, channel: Channel, chunk: int) -> hdf
 
 def create_drive(instrument: hdf5.Group, chunk: int) -> hdf5.Dataset:
     """The empty dataset of the drive, with chunks of `chunk` rows."""
-    # a 24-bit mantissa resolves full scale 256 times finer than a 16-bit converter: the played values are preserved
+    # a 24-bit mantissa resolves full scale 256 times more finely than a 16-bit converter, so the played values are
+    # preserved
     drive = hdf5.create_group(instrument, "drive", "NXcollection")
     voltage = hdf5.grow_numbers(
         drive, "voltage", np.float32, unit="V", description="drive as sent to the amplifier", chunk=chunk, compress=True

@@ -21,9 +21,9 @@ ROWS_AT_ONCE = 2**18
 
 @dataclass(frozen=True)
 class Series:
-    """An array of one dimension in the file: `series[i]`, `series[a:b]`, `series[:]` and `numpy.asarray(series)`.
+    """A one-dimensional array in the file: `series[i]`, `series[a:b]`, `series[:]` and `numpy.asarray(series)`.
 
-    `unit` and `quantity` are those of its values. Nothing is kept in memory.
+    `unit` and `quantity` describe its values. Nothing is kept in memory.
     """
 
     name: str
@@ -116,7 +116,9 @@ class SampleReader:
 
     @cached_property
     def blocks(self) -> dict[str, NDArray[Any]]:
-        """Starts of the blocks: arrays `row`, `run`, `first` (sample index in the run) and `time` [s] when read."""
+        """Starts of the blocks: arrays `row`, `run`, `first` (sample index in the run) and `time` at which the block
+        was read [s].
+        """
         stored = {name: hdf5.dataset(self._instrument, f"blocks/{name}") for name in ("row", "run", "first", "time")}
         columns = {name: hdf5.read(each, slice(None)) for name, each in stored.items()}
         whole = min(self._complete("blocks"), *(len(values) for values in columns.values()))
@@ -133,7 +135,7 @@ class SampleReader:
 
     @property
     def runs(self) -> tuple[RecordedRun, ...]:
-        """The runs in order, as far as they are in the file, with their channels as arrays."""
+        """The runs in the file so far, in order, with their channels as arrays."""
         blocks, rows = self.blocks, self.rows
         begins = np.flatnonzero(np.diff(blocks["run"], prepend=-1))
         ends = [*blocks["row"][begins[1:]].tolist(), rows][: len(begins)]
@@ -158,7 +160,7 @@ class SampleReader:
 
     @cached_property
     def counted(self) -> Mapping[str, int]:
-        """Number of complete rows of every part, independent of the length of its datasets; older files have fewer
+        """Number of complete rows of every part, regardless of the length of its datasets; older files have fewer
         parts.
 
         It is read once, before the data, for a consistent view of a growing file.

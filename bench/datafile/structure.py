@@ -2,8 +2,8 @@
 # pyright: reportUnknownArgumentType=false
 """Validation of the structure of an untrusted file before its contents are read.
 
-Values, link targets and external storage are not accessed. Refused structures would take hours or all memory, crash the
-process, or refer to other files.
+Values, link targets and external storage are not accessed. The structures rejected here would take hours or all memory,
+crash the process, or refer to other files.
 """
 
 from pathlib import Path
@@ -19,7 +19,7 @@ from bench.datafile.declared import FIT_VIEWS
 from bench.datafile.hdf5_reading import UNREADABLE, DataFileError, File
 
 MOST_OBJECTS = 20_000
-"""Maximum number of groups and datasets; the file of a long campaign has some hundred."""
+"""Maximum number of groups and datasets; the file of a long campaign has several hundred."""
 DEEPEST = 8
 MOST_ATTRIBUTES = 64
 LARGEST_ATTRIBUTE = 2**20
@@ -34,7 +34,7 @@ SPARE = 2**26
 FILTERS = frozenset({1, 2, 3})
 """Compression, shuffling and checksum filters built into HDF5; others are loaded as plugins."""
 KINDS = frozenset("iufSb")
-"""Kinds of values: numbers, texts of fixed length, Booleans."""
+"""Kinds of values: numbers, fixed-length strings, Booleans."""
 
 
 class _Judge:
@@ -60,14 +60,14 @@ class _Judge:
             except DataFileError:
                 raise
             except UNREADABLE:
-                # damage is reported and recovered from where the object is read
+                # damage is handled where the object is read
                 continue
 
     def _member(self, group: Any, name: str, path: str, depth: int) -> None:
         link = group.get(name, getlink=True)
         if isinstance(link, h5py.SoftLink):
             if not link.path.startswith("/entry/") or "/data/" in link.path:
-                raise DataFileError(f"{path} is a link to {link.path!a:.80}, which is no dataset of the campaign")
+                raise DataFileError(f"{path} is a link to {link.path!a:.80}, which is not a dataset of the campaign")
             return
         if not isinstance(link, h5py.HardLink):
             raise DataFileError(f"{path} is a link to another file; such links are never followed")
@@ -88,12 +88,12 @@ class _Judge:
         self._seen.add(place)
         self._objects += 1
         if self._objects > MOST_OBJECTS:
-            raise DataFileError(f"it has more than {MOST_OBJECTS} objects")
+            raise DataFileError(f"the file has more than {MOST_OBJECTS} objects")
         check_attributes(member, path)
 
     def _dataset(self, stored: Any, path: str) -> None:
         made, dtype = stored.id.get_create_plist(), stored.dtype
-        # other programs may add texts of any length
+        # other programs may add strings of any length
         known = dtype.kind in KINDS or h5py.check_string_dtype(dtype) is not None
         if not known or dtype.itemsize > LARGEST_VALUE or dtype.subdtype is not None:
             raise DataFileError(f"{path} has values of type {dtype!s:.40}, which this program never writes")
@@ -119,16 +119,16 @@ class _Judge:
             raise DataFileError(f"{told}: it is truncated or invalid")
 
     def _view(self, made: Any, path: str) -> None:
-        """Check that a view refers to this file and is in the group of views."""
+        """Check that a view refers to this file and is in the group for views."""
         if not path.startswith(f"/entry/{FIT_VIEWS}/"):
-            raise DataFileError(f"{path} is virtual; only views of fits may be")
+            raise DataFileError(f"{path} is a virtual dataset; only views of fits may be virtual")
         for number in range(made.get_virtual_count()):
             if made.get_virtual_filename(number) != ".":
                 raise DataFileError(f"{path} shows values of another file, which is never read")
 
 
 def check_attributes(owner: Any, path: str) -> None:
-    """Raise DataFileError for more or larger attributes than this program writes."""
+    """Raise DataFileError if there are more or larger attributes than this program writes."""
     if (count := len(owner.attrs)) > MOST_ATTRIBUTES:
         raise DataFileError(f"{path} has {count} attributes; at most {MOST_ATTRIBUTES} are allowed")
     for name in owner.attrs:
@@ -138,7 +138,7 @@ def check_attributes(owner: Any, path: str) -> None:
 
 
 def check_structure(file: File, path: Path) -> None:
-    """Raise DataFileError, which names the object, for a structure that this program never writes.
+    """Raise DataFileError, naming the object, for a structure that this program never writes.
 
     Unreadable members are left to the readers and to recovery.
     """
@@ -146,6 +146,6 @@ def check_structure(file: File, path: Path) -> None:
     try:
         judge.group(root)
     except DataFileError as error:
-        raise DataFileError(f"{path} is refused: {error}") from None
+        raise DataFileError(f"{path} is not accepted: {error}") from None
     except UNREADABLE:
         return

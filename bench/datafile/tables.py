@@ -27,14 +27,16 @@ Table = Mapping[str, Column]
 
 
 def check(name: str, table: Table) -> None:
-    """Raise InvalidInput unless the columns are one-dimensional, of equal length, and numbers have a unit."""
+    """Raise InvalidInput unless the columns are one-dimensional and of equal length, and numbers have a unit."""
     lengths: set[int] = set()
     for key, column in table.items():
         item, values = f"column {key} of table {name}", column.values
         if values.ndim != 1 or values.dtype.kind not in "fiubU":
-            raise InvalidInput(item, (values.shape, str(values.dtype)), "it must be one row of numbers or texts")
+            raise InvalidInput(
+                item, (values.shape, str(values.dtype)), "it must be a one-dimensional array of numbers or strings"
+            )
         if values.dtype.kind in "fiu" and not column.unit:
-            raise InvalidInput(item, column.unit, 'numbers need a unit; "1" for pure numbers')
+            raise InvalidInput(item, column.unit, 'numbers need a unit, "1" for pure numbers')
         lengths.add(len(values))
     if len(lengths) > 1:
         raise InvalidInput(f"table {name}", sorted(lengths), "its columns must have equal length")
@@ -42,7 +44,7 @@ def check(name: str, table: Table) -> None:
 
 def write(parent: "hdf5.Group", name: str, table: Table) -> None:
     """Store a table as a group with one dataset per column; booleans become int8."""
-    from bench.datafile import hdf5  # a table that is not stored needs no HDF5
+    from bench.datafile import hdf5  # HDF5 is needed only to store a table
 
     group = hdf5.create_group(parent, name, "NXcollection")
     for key, column in table.items():
@@ -57,7 +59,7 @@ def write(parent: "hdf5.Group", name: str, table: Table) -> None:
 
 
 def read(group: "hdf5.Group") -> dict[str, Column]:
-    """The table passed to `write`; booleans with absent values (-1) are returned as numbers with NaN."""
+    """Read a table stored by `write`; booleans with absent values (-1) are returned as numbers with NaN."""
     from bench.datafile import hdf5
 
     table: dict[str, Column] = {}

@@ -1,4 +1,4 @@
-"""Writer of the file of a campaign, which can be read at any time and survives a crash of the writer."""
+"""Writer of a campaign file, which can be read at any time and survives a crash of the writer."""
 
 import json
 import os
@@ -31,20 +31,20 @@ from sim.errors import InvalidInput
 
 
 class FileSync:
-    """Flushes a file from the system's cache to the disk, through its own handle: HDF5 does not share its handle on
-    some systems. Detects changes to the file by other programs.
+    """Flushes a file from the system's cache to the disk through a separate handle, since HDF5 does not share its own
+    on some systems. Detects changes to the file by other programs.
     """
 
     def __init__(self, path: Path) -> None:
         self._path = path
         self._handle = os.open(path, os.O_RDWR)
         self._size = 0
-        # on some network shares the identity of a file changes with every query
+        # on some network shares a file's identity changes with every query
         self._identified = os.path.samestat(os.fstat(self._handle), path.stat())
         sync_folder(path.parent)
 
     def sync(self) -> None:
-        """Flush the file to the disk. Raises OSError when the disk fails, DataFileError as `check`."""
+        """Flush the file to the disk. Raises OSError when the disk fails, DataFileError as `check` does."""
         os.fsync(self._handle)
         self.check()
         self._size = os.fstat(self._handle).st_size
@@ -52,7 +52,7 @@ class FileSync:
     def check(self) -> None:
         """Raise DataFileError if another program has truncated, renamed, replaced or deleted the file.
 
-        To be called before HDF5 looks for its data in the file: for truncated data it searches for hours.
+        Must be called before HDF5 looks for data in the file: it would search for hours for truncated data.
         """
         if (size := os.fstat(self._handle).st_size) < self._size:
             raise DataFileError(f"another program has truncated it from {self._size} to {size} bytes")
@@ -64,7 +64,7 @@ class FileSync:
             raise DataFileError("another program has replaced it")
 
     def restore(self) -> None:
-        """Write a deleted file again, with the data flushed before, where nothing else has its name."""
+        """Write a deleted file again, with the data flushed so far, unless another file has its name."""
         with suppress(OSError):
             if os.fstat(self._handle).st_nlink or self._path.exists():
                 return
@@ -89,8 +89,8 @@ class FileSync:
 
 
 def sync_folder(folder: Path) -> None:
-    """Flush the directory entry of a new file to the disk, where the system requires it."""
-    # Windows cannot open folders, and writes their entries itself
+    """Flush the directory entry of a new file to the disk, if the system requires it."""
+    # Windows cannot open folders, and flushes their entries itself
     with suppress(OSError):
         handle = os.open(folder, os.O_RDONLY)
         try:
@@ -112,7 +112,7 @@ class JournalWriter:
         self._written = False
 
     def add(self, time: float, kind: str, text: str, more: Mapping[str, Any]) -> None:
-        """Append one event at `time` [s], with `more` of its content."""
+        """Append one event at `time` [s], with `more` content."""
         line = json.dumps({"time": time, "kind": kind, "text": text, **more}, ensure_ascii=False) + "\n"
         # one unbuffered call: a killed program leaves complete lines
         os.write(self._handle, line.encode())
@@ -132,10 +132,10 @@ class JournalWriter:
 
 
 def read_journal(path: Path) -> Iterator[dict[str, Any]]:
-    """The lines of a journal before the first truncated or damaged one; empty without a journal."""
+    """The lines of a journal before the first truncated or damaged one; empty if there is no journal."""
     if not path.is_file():
         return
-    # not splitlines: a text may contain other line separators
+    # not splitlines, because a text may contain other line separators
     for line in path.read_text(encoding="utf-8", errors="replace").split("\n"):
         try:
             read = json.loads(line)
@@ -149,13 +149,13 @@ def read_journal(path: Path) -> Iterator[dict[str, Any]]:
 _EXISTS = "the file exists and is never overwritten; choose another name"
 
 ROOM = 1_000_000
-"""Free space required before a file is created [bytes]: many times an empty file."""
+"""Free space required before a file is created [bytes]: many times the size of an empty file."""
 
 
 def _try_folder(folder: Path) -> None:
     """Raise OSError unless a file of some size can be created in `folder`.
 
-    HDF5 reports the cause of a failure poorly, and crashes the process when the disk fills up during creation.
+    HDF5 does not report the cause of a failure clearly, and crashes the process when the disk fills up during creation.
     """
     with tempfile.TemporaryFile(dir=folder, prefix=".room-") as room:
         room.write(bytes(ROOM))
@@ -164,8 +164,8 @@ def _try_folder(folder: Path) -> None:
 class DataFileWriter:
     """Creates the file and appends to it.
 
-    When the disk fails, methods raise h5py's exceptions, mostly OSError. Raises InvalidInput when the file exists,
-    cannot be created, or has contents that cannot be stored, and DataFileError when the disk fails during creation.
+    If the disk fails, methods raise h5py's exceptions, mostly OSError. Raises InvalidInput when the file exists, cannot
+    be created, or has contents that cannot be stored, and DataFileError when the disk fails during creation.
     """
 
     def __init__(self, path: Path, skeleton: Skeleton) -> None:
@@ -251,8 +251,8 @@ class DataFileWriter:
         complete = [samples.written, *(rows.written for rows in tables)]
         if complete == self._complete:
             return
-        # a failing disk or computer may store the new length of a dataset without its rows, so the count of complete
-        # rows is written afterwards, in place
+        # a failing disk or computer may store a dataset's new length without its rows, so the count of complete rows is
+        # written afterwards, in place
         self._journal.sync()
         self._flush()
         self._parts.complete[...] = complete
@@ -269,7 +269,7 @@ class DataFileWriter:
         self._flush()
         self._file.close()
         if whole := len(self._parts.rows["fits"]):
-            # the data are complete without them; recovery adds them if another program holds the file now
+            # the data are complete without them; if another program holds the file now, recovery adds them later
             with suppress(OSError, RuntimeError), hdf5.open_again(self._path) as file:
                 add_fit_views(hdf5.group(file, "entry"), whole)
         self._file_sync.sync()

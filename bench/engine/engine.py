@@ -62,9 +62,10 @@ class Engine:
         return self._output.state
 
     def run(self, plan: Plan) -> Ending:
-        """Run `plan` to its end, or to the first cause of an earlier end.
+        """Run `plan` until it ends or is ended early.
 
-        Returns an ending for an error of rig, data file, plan or analysis; cuts the output and raises any other.
+        Returns an ending for an error of rig, data file, plan or analysis. For any other error it cuts the output and
+        raises the error.
         """
         ending_of = self._output.ending_of
         try:
@@ -82,7 +83,7 @@ class Engine:
         output = self._output
         ending = output.ending_of(lambda: self._carry_out(plan)) or Ending("completed", "the plan was carried out")
         if output.driven:
-            # the rig still works where data file, plan or analysis failed: stop smoothly
+            # the rig still works after an error of data file, plan or analysis: stop smoothly
             ending = ending.then(
                 output.ending_of(lambda: self._loop.ramp_out(State.ABORTING, ending.reason, ending.cause))
             )

@@ -1,4 +1,4 @@
-"""Interface of the engine to its session: operator and requests as inputs, events and an ending as outputs."""
+"""Interface between engine and session: operator and requests as inputs, events and an ending as outputs."""
 
 from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager, suppress
@@ -46,7 +46,7 @@ class Ended(Interruption):
 
 
 class Operator(Protocol):
-    """Carries out the operator actions between two tests."""
+    """Carries out the operator actions between tests."""
 
     @property
     def name(self) -> str:
@@ -63,7 +63,9 @@ class Operator(Protocol):
 
 @dataclass(frozen=True)
 class Unattended:
-    """Confirms every request at once: for tests, and for a simulated bench, which carries out the actions itself."""
+    """Operator that confirms every request at once, for tests and for a simulated bench, which carries out the actions
+    itself.
+    """
 
     name: str = "unattended run"
 
@@ -88,13 +90,17 @@ class Requests:
         self.interrupted = False
         """Whether a signal caused the request: the session then exits as soon as the rig is at rest."""
         self.breaking: Callable[[], BaseException] | None = None
-        """Exception that a signal handler raises in the main thread after its request; None while the loop polls."""
+        """Exception that a signal handler raises in the main thread after its request; None while the loop polls for
+        requests.
+        """
         self.rig_closed = False
         """Whether no rig is open, so that the process may exit at once."""
 
     @contextmanager
     def breakable(self, error: Callable[[], BaseException]) -> Generator[None]:
-        """Context manager in which signal handlers raise `error()`: for long computations that do not poll requests."""
+        """Context manager in which signal handlers raise `error()`, for long computations that do not poll for
+        requests.
+        """
         before, self.breaking = self.breaking, error
         try:
             yield
@@ -107,15 +113,15 @@ class Requests:
         self.rig_closed = True
         with self.breakable(KeyboardInterrupt):
             yield
-        # not reset after an error: the session then ends without opening a rig
+        # not reset after an error, because the session then ends without opening a rig
         self.rig_closed = False
 
     def cut_by(self, cut: Callable[[], None]) -> None:
-        """Make `halt` call `cut`, in the requesting thread."""
+        """Register `cut`, which `halt` calls in the requesting thread."""
         self._cut = cut
 
     def stop(self, why: str = "stop requested", code: CauseCode = CauseCode.REQUEST) -> None:
-        """Request the smooth ramp; the measurement remains valid. The first `why` is the reason recorded."""
+        """Request the smooth ramp; the measurement remains valid. The first `why` is recorded as the reason."""
         self._stop = self._stop or (why, Cause(code, "stop"))
 
     def abort(self, why: str = "abort requested", code: CauseCode = CauseCode.REQUEST) -> None:
@@ -126,7 +132,7 @@ class Requests:
         """Cut the enable line now, in this thread; the loop then finds the rig halted and ends."""
         self._halt = self._halt or (why, Cause(code, "halt"))
         if self._cut is not None:
-            # the loop cuts again and reports a failure
+            # the loop cuts the line again and reports a failure
             with suppress(RigError):
                 self._cut()
 
@@ -141,7 +147,7 @@ class Requests:
 
     @property
     def reason(self) -> str:
-        """Reason of the strongest request; empty without any."""
+        """Reason for the strongest request; empty if there is none."""
         made = self._halt or self._abort or self._stop
         return made[0] if made else ""
 
@@ -163,7 +169,7 @@ class EventStream:
         """Finished points, in order."""
 
     def join(self, subscriber: Subscriber) -> None:
-        """Add a subscriber, called after those that joined before it."""
+        """Add a subscriber; subscribers are called in the order in which they were added."""
         self._subscribers += (subscriber,)
 
     def now(self) -> float:

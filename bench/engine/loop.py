@@ -36,7 +36,9 @@ from sim.specimen import Specimen
 
 
 class Loop:
-    """Exchanges blocks until a request or an exceeded limit ends the run: raises `Ended` with the output at zero."""
+    """Exchanges blocks until a request or an exceeded limit ends the run; then raises `Ended`, with the output at
+    zero.
+    """
 
     def __init__(self, output: Output, guard: Guard, stream: EventStream, requests: Requests) -> None:
         self.output = output
@@ -69,7 +71,7 @@ class Loop:
 
     def signals(self) -> tuple[NDArray[np.float64], bool]:
         """Run one iteration. Returns signals, shape (block, len(SIGNALS)), and whether the rocking block has fallen."""
-        # missing samples of a further channel must not invalidate the cycles of a plan
+        # missing samples of a further channel must not invalidate the plan's cycles
         signals = self.exchange().signals[:, : len(SIGNALS)]
         return signals, self.fall is not None and self.fall.fallen(signals)
 
@@ -92,7 +94,7 @@ class Loop:
         return fell
 
     def ramp_out(self, way: State, reason: str, cause: Cause = UNKNOWN) -> bool:
-        """Bring the output to zero along the ramp of `way` and stop the rig. Returns whether the block fell."""
+        """Bring the output to zero along the ramp for `way` and stop the rig. Returns whether the block fell."""
         begin = self._guard.abort if way is State.ABORTING else self._guard.stop
         begin()
         if self.output.state is not way:
@@ -124,7 +126,7 @@ def _cause(over: Violation) -> Cause:
 
 
 class AtRest:
-    """Steps with the output at zero: arming and taring, and acquisition at rest."""
+    """Steps with the output at zero: arming, taring and acquisition at rest."""
 
     def __init__(self, loop: Loop, rig: Rig, guard: Guard, stream: EventStream) -> None:
         self._loop, self._rig, self._guard, self._stream = loop, rig, guard, stream
@@ -188,7 +190,7 @@ class SineDrive:
         self._cycles = None
 
     def sweep(self, step: Sweep) -> Outcome:
-        """Drive along the legs, from the present amplitude and frequency."""
+        """Drive the sweep's legs, from the present amplitude and frequency."""
         output = self._loop.output
         output.source.require_silence("legs")
         oscillator = output.source.oscillator
@@ -250,11 +252,11 @@ class PreparedDrive:
     def play(self, step: Play) -> Outcome:
         """Play the whole drive, or until the block falls.
 
-        Raises InvalidInput before the first sample for a drive that is unsuitable or that the guard would refuse.
+        Raises InvalidInput before the first sample for an unsuitable drive, or one that the guard would refuse.
         """
         output = self._loop.output
         if output.state is not State.RUNNING:
-            raise InvalidInput("prepared drive on a bench that is", str(output.state), "arm it first")
+            raise InvalidInput("prepared drive while the bench is", str(output.state), "arm it first")
         volts = np.asarray(step.volts, dtype=np.float64)
         output.source.require_playable(volts)
         if (refused := self._guard.refusal(volts)) is not None:

@@ -50,7 +50,9 @@ Array = NDArray[np.float64]
 
 
 class DriveSource:
-    """Generates the drive block by block: from a prepared drive while one is playing, else from the oscillator."""
+    """Generates the drive block by block, from a prepared drive while one is playing and otherwise from the
+    oscillator.
+    """
 
     def __init__(self, sample_rate: float, drive_range: float) -> None:
         self.oscillator = Oscillator(sample_rate)
@@ -68,14 +70,14 @@ class DriveSource:
         return self._prepared.size > 0
 
     def play(self, volts: Array) -> None:
-        """Play `volts`, shape (n,), already checked, from the next sample on."""
+        """Play `volts`, shape (n,), which must already be checked, from the next sample on."""
         self._prepared = volts.copy()
 
     def require_playable(self, volts: Array) -> None:
         """Check a prepared drive.
 
-        Raises InvalidInput unless it is one-dimensional, finite, zero at both ends and within the drive range, and
-        unless the present drive is zero.
+        Raises InvalidInput unless it is one-dimensional, finite, zero at both ends and within the drive range, and the
+        present drive is zero.
         """
         if volts.ndim != 1 or volts.size == 0:
             raise InvalidInput("shape of a prepared drive", volts.shape, "it must be a non-empty one-dimensional array")
@@ -86,17 +88,19 @@ class DriveSource:
             ends = float(volts[0]), float(volts[-1])
             raise InvalidInput("ends of a prepared drive", ends, "it must begin and end at 0 V: taper it")
         if (peak := float(np.abs(volts).max())) > self._range:
-            raise InvalidInput("peak of a prepared drive", peak, f"the drive range is +-{self._range:g} V: scale it")
+            raise InvalidInput(
+                "peak of a prepared drive", peak, f"the drive range is +-{self._range:g} V: scale the drive"
+            )
         if self.oscillator.amplitude != 0.0 or self.oscillator.remaining > 0:
             asked = f"{self.oscillator.amplitude:g} m/s2"
-            raise InvalidInput("prepared drive on a sine of", asked, "ramp the sine to zero first")
+            raise InvalidInput("prepared drive during a sine of", asked, "ramp the sine to zero first")
         self.require_silence("another prepared drive")
 
     def require_silence(self, wanted: str) -> None:
-        """Raise InvalidInput naming the `wanted` step while a prepared drive is playing."""
+        """Raise InvalidInput naming the requested step, `wanted`, if a prepared drive is playing."""
         if self.playing:
             left = f"{self._prepared.size} samples left"
-            raise InvalidInput(f"{wanted} during a prepared drive", left, "ramp it out first")
+            raise InvalidInput(f"{wanted} during a prepared drive", left, "ramp the prepared drive out first")
 
     def next(self, n: int) -> Array:
         """The next `n` samples of drive [V], shape (n,)."""
@@ -118,7 +122,7 @@ class Alignments:
         self._run = run
 
     def publish(self) -> None:
-        """Publish the alignments of the run once, if any. A rig that fails to report them causes only a warning."""
+        """Publish the alignments of the run once, if any. A failure of the rig to report them causes only a warning."""
         run, self._run = self._run, None
         if run is None:
             return
@@ -132,15 +136,17 @@ class Alignments:
 
 
 RESERVE = 2**25
-"""Memory released when there is none left [bytes], so that the output can be ramped to zero."""
-NO_MEMORY = "the memory of the computer is exhausted: close other programs, then start again"
+"""Reserve [bytes] that is released when memory runs out, so that the output can still be ramped to zero."""
+NO_MEMORY = "the computer has run out of memory: close other programs, then start again"
 
 _DRIVEN = (State.ARMED, State.RUNNING, State.STOPPING, State.ABORTING)
 """States in which the rig is armed."""
 
 
 class Output:
-    """State of the bench and its drive: passes `source` through the guard, `block` samples per iteration."""
+    """Output of the bench: sends the drive from `source` through the guard, `block` samples per iteration, and tracks
+    the bench's state.
+    """
 
     def __init__(self, rig: Rig, guard: Guard, stream: EventStream, requests: Requests, block: int) -> None:
         self._rig, self._guard, self._stream, self._requests = rig, guard, stream, requests
@@ -233,7 +239,7 @@ class Output:
         return None
 
     def rescue(self, error: BaseException, lasts: Sequence[Callable[[], object]]) -> None:
-        """Cut the output before `error` is raised, then call `lasts`; further errors are added to it as notes."""
+        """Cut the output before `error` is raised, then call `lasts`; further errors are added to `error` as notes."""
         ending = Ending("failed", f"{type(error).__name__} in the plan or a subscriber")
         for last in (lambda: self.cut(ending), *lasts):
             try:

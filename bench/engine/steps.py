@@ -1,6 +1,6 @@
 """Steps of a plan and their outcomes.
 
-A plan is a generator: it yields steps and receives their outcomes. It can be run, summarised or timed without a device.
+A plan is a generator: it yields steps and receives their outcomes. It can be run, summarised or timed without hardware.
 """
 
 from collections.abc import Callable, Generator
@@ -19,10 +19,10 @@ from sim.specimen import Specimen
 
 @dataclass(frozen=True)
 class OperatorAction:
-    """Operator action at the resting bench, described by `request`. Returns `Done`.
+    """Operator action on the bench at rest, described by `request`. Returns `Done`.
 
-    `specimen` is the specimen on the table afterwards. `amount` is that of the work, see `drivers.rig.OperatorTask`;
-    by default the nominal stiffness of the specimen's spring, if it has one [N/m].
+    `specimen` is the specimen on the table afterwards. `amount` is the amount involved in the task, see
+    `drivers.rig.OperatorTask`; by default the nominal stiffness [N/m] of the specimen's spring, if it has one.
     """
 
     work: OperatorTask
@@ -63,7 +63,7 @@ class Calibrate:
 
 @dataclass(frozen=True)
 class Sweep:
-    """Sweep along legs from the present sine. Returns `Fallen` as soon as the block has fallen, else `Done`."""
+    """Sweep along `legs` from the present sine. Returns `Fallen` as soon as the block has fallen, else `Done`."""
 
     legs: tuple[Leg, ...]
 
@@ -100,7 +100,7 @@ Watch = Callable[[NDArray[np.float64]], Event | None]
 
 @dataclass(frozen=True, eq=False)
 class Play:
-    """Play prepared `volts`, shape (n,), one per sample, zero at both ends, on an armed rig at zero drive.
+    """Play the prepared `volts`, shape (n,), one value per sample, zero at both ends, on an armed rig at zero drive.
 
     `watch` receives every block of signals, from the first sample of `volts` on. Returns `Played`, or `Fallen` as soon
     as the block has fallen: the drive then continues until the plan ramps it out.
@@ -139,7 +139,7 @@ class Done:
 class Fallen:
     """The block has fallen; the drive continues until the plan ramps it out.
 
-    For a `Play`, `signals`, shape (n, n_signals), are those until then, as in `Played`.
+    For a `Play`, `signals`, shape (n, n_signals), are those acquired until then, as in `Played`.
     """
 
     signals: NDArray[np.float64] | None = None
@@ -148,7 +148,7 @@ class Fallen:
 @dataclass(frozen=True, eq=False)
 class Played:
     """Result of a played drive of n samples: `signals`, shape (n, n_signals), in the order of `bench.analysis.signals`,
-    and `drive` as sent [V], shape (n,). Row i was sampled while sample i of the volts was played.
+    and `drive` as sent [V], shape (n,). Row i was sampled while sample i of the drive was played.
 
     Missing values of a sensor are NaN.
     """
@@ -168,7 +168,7 @@ class Measured:
 class RestSamples:
     """Counts of all inputs with the output at zero, shape (n, n_channels).
 
-    `violation` is the limit that ended the acquisition, if one did; the plan continues.
+    `violation` is the exceeded limit that ended the acquisition, if any; the plan continues.
     """
 
     channels: tuple[Channel, ...]
@@ -178,4 +178,4 @@ class RestSamples:
 
 Outcome = Done | Fallen | Measured | Played | RestSamples
 Plan = Generator[Step, Outcome, object]
-"""Steps in order; the engine keeps the returned value."""
+"""A plan: yields its steps in order; the engine keeps its return value."""

@@ -1,1 +1,1 @@
-"""The guard: nothing reaches the shaker except through it."""
+"""The guard, the only path to the shaker."""

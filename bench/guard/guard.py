@@ -27,11 +27,11 @@ from sim.errors import InvalidInput
 class Exchange:
     """One iteration of the acquisition loop.
 
-    `values` are the block's channel values in their units, shape (n, n_channels), `signals` those of the experiment,
-    shape (n, n_signals; 0 without a signal map), and `drive` [V], shape (n,), the samples played meanwhile. `violation`
-    is the first limit exceeded, if any, and `runaway` the first of the table itself. `warnings` are the limits whose
-    warning level was reached for the first time since arming. `opened` names the open safety inputs; the enable line
-    is then cut.
+    `values` are the block's channel values in their units, shape (n, n_channels), `signals` the signals of the
+    experiment, shape (n, n_signals; 0 without a signal map), and `drive` [V], shape (n,), the samples played meanwhile.
+    `violation` is the first limit exceeded, if any, and `runaway` the first of the table itself. `warnings` are the
+    limits whose warning level was reached for the first time since arming. `opened` names the open safety inputs; the
+    enable line is then cut.
     """
 
     block: Block
@@ -106,8 +106,8 @@ class Guard:
     def exchange(self, volts: NDArray[np.float64]) -> Exchange:
         """Send a block of commands [V] and read as many samples.
 
-        From the first command beyond the limits on, none is sent: the last valid value is held and ramped to zero
-        along the fast ramp.
+        Commands from the first one beyond the limits on are not sent: the last valid value is ramped to zero along the
+        fast ramp.
         """
         refused = self.refusal(volts) if self._held is None else None
         if refused is not None:
@@ -194,7 +194,7 @@ class Guard:
             try:
                 self._rig.stop()
             except RigError as another:
-                failed = f"{failed}, nor the output be stopped ({another}): press the emergency stop"
+                failed = f"{failed}, and the output could not be stopped ({another}): press the emergency stop"
                 raise RigError(failed) from another
             raise RigError(f"{failed}, the output was stopped: switch the amplifier off") from error
 
@@ -237,7 +237,7 @@ class Guard:
         return volts
 
     def _slewed(self, volts: NDArray[np.float64]) -> NDArray[np.float64]:
-        """`volts` with the slew limited: a command may use all of the limit, and the ramp adds its own slew."""
+        """`volts` with limited slew: a command may use the entire limit, and the ramp adds to its slew."""
         if np.abs(np.diff(volts, prepend=self._sent)).max() <= self._slew:
             return volts
         slowed, last = np.empty_like(volts), self._sent
@@ -250,7 +250,7 @@ class Guard:
         if self._signals is None:
             return np.empty((len(values), 0))
         if self._first_block:
-            # the drive is zero: an approximate zero until the storeys are at rest
+            # the drive is zero: this zero is approximate until the storeys are at rest
             self._signals.tare(values)
             self._first_block = False
         return self._signals.of(values)
@@ -264,6 +264,6 @@ def _limits_of(signals: SignalMap, further: Sequence[FurtherChannel]) -> tuple[C
         if each.limit is None:
             continue
         if each.name not in columns:
-            raise InvalidInput("channels", each.name, "the rig has no such channel, and its limit could not be watched")
+            raise InvalidInput("channels", each.name, "the rig has no such channel, so its limit could not be checked")
         found.append(ChannelLimit(each.name, each.unit, columns[each.name], each.limit, each.warning, each.debounce))
     return tuple(found)

@@ -16,7 +16,9 @@ _PERSISTENCE = "time for which the limit must be exceeded before it trips"
 
 
 DEBOUNCE = (1e-3, 0.05)
-"""Usual debounce of a limit [s]: above single spikes, below the time from a limit to the end of the stroke."""
+"""Usual debounce of a limit [s]: longer than single spikes, shorter than the time from a limit to the end of the
+stroke.
+"""
 
 
 class Warnings(Parameters):
@@ -58,7 +60,7 @@ Confirmable = Literal[
     "drift",
     "late",
 ]
-"""Limits that can be too wide to trip on a given bench."""
+"""Limits that can be set too wide to trip on a given bench."""
 
 
 class Limits(Parameters):
@@ -74,12 +76,12 @@ class Limits(Parameters):
     heating: float = quantity(9.0, "A", "largest root mean square current of the coil over heating_time", gt=0)
     heating_time: float = quantity(60.0, "s", "time constant of the coil's temperature", gt=0)
     laser_range: float = quantity(
-        0.99, "1", "largest distance of a storey from the laser's mid-range, relative to half the range", gt=0
+        0.99, "1", "largest distance of a storey from the laser's mid range, relative to half the range", gt=0
     )
     drift: float = quantity(0.080, "m", "largest drift of the specimen from rest", gt=0)
     sensor_loss: float = quantity(0.5, "s", "time without a valid sample of a sensor before the run aborts", gt=0)
     stuck: float = quantity(
-        1.0, "s", "time for which a sensor may give a constant count while the table is driven", gt=0
+        1.0, "s", "time for which a sensor's count may stay constant while the table is driven", gt=0
     )
     late: float = quantity(0.5, "s", "largest delay of a block of samples", gt=0)
     clock: float = quantity(
@@ -93,12 +95,12 @@ class Limits(Parameters):
 
 
 class Ramps(Parameters):
-    """Lengths of the ramps to zero."""
+    """Durations of the ramps to zero."""
 
     stop: float = quantity(
-        4.0, "s", "length of the smooth ramp, for a stop or the normal end of a test", ge=0.05, le=60
+        4.0, "s", "duration of the smooth ramp, for a stop or the normal end of a test", ge=0.05, le=60
     )
-    abort: float = quantity(0.5, "s", "length of the fast ramp, for an abort", ge=0.05, le=10)
+    abort: float = quantity(0.5, "s", "duration of the fast ramp, for an abort", ge=0.05, le=10)
 
     @model_validator(mode="after")
     def _abort_is_the_fast_one(self) -> "Ramps":
@@ -108,13 +110,15 @@ class Ramps(Parameters):
 
 
 def ramp_refusal(limits: Limits, ramps: Ramps) -> InvalidInput | None:
-    """Refusal of ramps that exceed the slew limit from the largest drive, or None. A ramp is half a cosine."""
+    """Error message if the ramps, each half a cosine, exceed the slew limit when starting from the largest drive;
+    otherwise None.
+    """
     shortest = min(ramps.stop, ramps.abort)
     steepest = 0.5 * pi * limits.drive_voltage / shortest
     if steepest <= limits.drive_slew:
         return None
     slew = f"limits.drive_slew = {limits.drive_slew:g} V/s"
-    needs = f"a ramp from {limits.drive_voltage:g} V needs {steepest:.0f} V/s, {slew} allows less"
+    needs = f"a ramp from {limits.drive_voltage:g} V needs {steepest:.0f} V/s, but {slew}"
     return InvalidInput("ramps.abort", shortest, needs)
 
 
@@ -122,8 +126,8 @@ def ramp_refusal(limits: Limits, ramps: Ramps) -> InvalidInput | None:
 class Violation:
     """Exceeded limit: `quantity` reached `value` beyond `limit`, in `unit`, at this sample index since arming.
 
-    `of_table`: the limit concerns motion or load of the table, not a sensor, a clock or the specimen.
-    `timing`: the limit concerns the arrival time of blocks, which is not in the samples.
+    `of_table`: the limit concerns motion or load of the table, not a sensor, a clock or the specimen. `timing`: the
+    limit concerns the arrival times of blocks, which the samples do not contain.
     """
 
     quantity: str
@@ -141,7 +145,7 @@ class Violation:
 class Persistence:
     """Counter that rises by one with each bad sample and falls by one with each good one, never below zero.
 
-    An interrupted condition still reaches the limit; a single spike does not.
+    An intermittent condition still reaches the limit; a single spike does not.
     """
 
     def __init__(self, samples: int) -> None:

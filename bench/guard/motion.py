@@ -36,10 +36,10 @@ _MEASURED_BY = {
     "force": TABLE_FORCE,
     "current": COIL_CURRENT,
 }
-"""Channels that measure a quantity directly: a limit beyond their range could never trip."""
+"""Channels that measure a quantity directly; a limit beyond their range could never trip."""
 
 _OF_TABLE = frozenset({"displacement", "velocity", "acceleration", "force", "current"})
-"""Quantities that a zero drive brings to zero at once."""
+"""Quantities that vanish as soon as the drive is zero."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class ChannelLimit:
 
 
 class MotionWatch:
-    """Checks blocks of values against the limits. Channels are found by name; absent ones are not watched.
+    """Checks blocks of values against the limits. Channels are found by name; absent ones are not checked.
 
     `further` are the limits of the signals with these columns. Raises InvalidInput for a limit that its channel cannot
     measure.
@@ -98,10 +98,10 @@ class MotionWatch:
         signals: NDArray[np.float64],
         extremes: Extremes | None = None,
     ) -> tuple[list[Violation], list[Violation]]:
-        """Limits exceeded by a block, and those whose warning level it reaches for the first time.
+        """Limits that a block exceeds, and those whose warning level it reaches for the first time.
 
-        Values have shape (n, n_channels), signals (n, n_signals). With its `extremes`, a block below all warning levels
-        is accepted by these alone, unless the count of an earlier condition is above zero.
+        Values have shape (n, n_channels), signals (n, n_signals). If `extremes` are given, a block below all warning
+        levels is accepted on their basis alone, unless the debounce count of an earlier condition is above zero.
         """
         if extremes is not None and not self._counting and self._quiet(values, signals, extremes):
             return [], []
@@ -126,14 +126,14 @@ class MotionWatch:
         return exceeded, near
 
     def _quiet(self, values: NDArray[np.float64], signals: NDArray[np.float64], extremes: Extremes) -> bool:
-        """Whether a block is below all warning levels; it is then skipped."""
+        """Whether a block is below all warning levels; if so, the block is skipped."""
         bounds = self._quantities.bounds(values, extremes)
         if self.drift_watched:
             bounds["drift"] = largest(signals[:, DRIFT])
         for each in self._further:
             bounds[each.name] = largest(signals[:, each.column])
         for key, bound in bounds.items():
-            # a comparison with NaN is false: such a block is not quiet
+            # a comparison with NaN is false, so a block with NaN is not quiet
             if not bound <= self._quiet_below[key]:
                 return False
         self._quantities.skip(values, bounds)
@@ -149,12 +149,12 @@ def _check_reach(channels: tuple[Channel, ...], limits: Limits, further: Sequenc
     for each in further:
         reach = min(-by_name[each.name].limits[0], by_name[each.name].limits[1])
         if each.limit > reach:
-            allowed = f"the channel {each.name} measures up to {reach:.4g} {each.unit} only"
+            allowed = f"the channel {each.name} measures only up to {reach:.4g} {each.unit}"
             raise InvalidInput(f"channels.{each.name}.limit", each.limit, allowed)
     for key, name in _MEASURED_BY.items():
         if (channel := by_name.get(name)) is None:
             continue
         limit, reach = float(getattr(limits, key)), min(-channel.limits[0], channel.limits[1])
         if limit > reach:
-            allowed = f"the channel {name} measures up to {reach:.4g} {channel.unit} only"
+            allowed = f"the channel {name} measures only up to {reach:.4g} {channel.unit}"
             raise InvalidInput(f"limits.{key}", limit, allowed)

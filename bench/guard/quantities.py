@@ -13,13 +13,15 @@ from sim.channel import COIL_CURRENT, STOREYS, TABLE_ACCELERATION, TABLE_DISPLAC
 Array = NDArray[np.float64]
 
 VELOCITY_WINDOW = 0.02
-"""Interval of the velocity's difference quotient [s]: long compared with the noise, short compared with the motion."""
+"""Interval of the difference quotient for the velocity [s]: long enough to suppress noise, short compared with the
+motion.
+"""
 
 MOST_SKIPPED = 4000
 """Number of skipped samples after which the heating is updated."""
 
 ROUNDING = 1e-9
-"""Allowance for rounding errors of a mean over this number of samples."""
+"""Relative allowance for rounding errors in a mean over this number of samples."""
 
 
 class WatchedQuantities:
@@ -107,8 +109,8 @@ class WatchedQuantities:
                 self._catch_up()
 
     def _largest_heating(self, current: float) -> float:
-        """Upper bound of the heating up to the end of a block of this largest `current` [A]: a mean lies between its
-        start and the largest square since.
+        """Upper bound of the heating up to the end of a block whose largest current is `current` [A]: a running mean
+        stays between its initial value and the largest square since.
         """
         before = float(self._heat[0]) / self._forget if self._forget > 0.0 else 0.0
         return sqrt(max(before, self._skipped_current**2, current**2) * (1.0 + ROUNDING))

@@ -13,7 +13,8 @@ from drivers.rig import Channel, Counts
 
 LATE, CLOCKS = "delay of a block of samples", "difference of the clocks"
 TIMING = (LATE, CLOCKS)
-"""Quantities of the limits on the arrival of samples, which depend on computer and link, not on the motion."""
+"""Quantities whose limits concern the arrival of samples, which depends on computer and link rather than on the motion.
+"""
 _DRIVEN = 0.05
 """Drive change, relative to the largest command, above which the table counts as driven and all counts must change."""
 
@@ -41,10 +42,10 @@ class SensorWatch:
         drive: NDArray[np.float64],
         extremes: Extremes | None = None,
     ) -> list[Violation]:
-        """Violations by the sensors, from counts and values, shape (n, n_channels), and drive [V], shape (n,).
+        """Sensor violations, from counts and values, shape (n, n_channels), and drive [V], shape (n,).
 
-        With its `extremes`, a block without missing samples is accepted without examining single samples if all
-        channels change.
+        If `extremes` are given and all channels change, a block without missing samples is accepted without examining
+        single samples.
         """
         self._keep(drive)
         if extremes is not None and not self._counting and all(map(lt, extremes.low, extremes.high)):
@@ -61,12 +62,14 @@ class SensorWatch:
             at = self._lost[column].first(invalid[:, column])
             if at is not None:
                 why = channel.faults.get(int(counts[at, column]))
-                what = f"time without a valid sample of {channel.name}" + (f" ({why})" if why else "")
+                what = f"time without a valid sample from {channel.name}" + (f" ({why})" if why else "")
                 found.append(Violation(what, self._limits.sensor_loss, self._limits.sensor_loss, "s", first + at))
         return found
 
     def _stuck(self, first: int, counts: Counts) -> list[Violation]:
-        """Violations by channels with a constant count over the last `needed` samples while the table was driven."""
+        """Violations for channels whose count was constant over the last `needed` samples while the table was
+        driven.
+        """
         n = len(counts)
         same = (counts == counts[0]).all(axis=0) & (counts[0] == self._last)
         self._still = np.where(same, self._still + n, 0)
@@ -80,7 +83,7 @@ class SensorWatch:
         ]
 
     def _keep(self, drive: NDArray[np.float64]) -> None:
-        """Store the blocks of drive that contain the last `needed` samples."""
+        """Keep the drive blocks that contain the last `needed` samples."""
         self._drives.append(drive)
         self._driven_samples += drive.size
         while self._driven_samples - self._drives[0].size >= self._needed:
@@ -100,9 +103,9 @@ class SensorWatch:
 
 
 _SETTLED = 20.0
-"""Time before two clocks are compared [s]; the delay of a block is small compared with it."""
+"""Time before two clocks are compared [s], long compared with the delay of a block."""
 _STRETCH = 5.0
-"""Length of the windows at the start and at present whose earliest blocks are compared [s]."""
+"""Length [s] of the initial and of the present window whose earliest blocks are compared."""
 
 
 class TimeWatch:
@@ -117,13 +120,13 @@ class TimeWatch:
         self._recent: deque[tuple[float, float]] = deque()
 
     def check(self, now: float, end: int) -> list[Violation]:
-        """Violations by a block that arrived at `now` [s] and ends before sample `end`."""
+        """Violations for a block that arrived at `now` [s] and ends before sample `end`."""
         if self._origin is None:
             self._origin, self._first_end = now, end
             return []
         sampled = (end - self._first_end) / self._rate
         late = now - self._origin - sampled
-        # single blocks may be late, including the first of a run
+        # single blocks may be late, including the first one of a run
         if sampled <= _STRETCH:
             self._early = min(self._early, (late, sampled))
         self._recent.append((late, sampled))

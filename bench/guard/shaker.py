@@ -1,4 +1,4 @@
-"""Model of the shaker: force on the table, current and heating of the coil, from the motion."""
+"""Model of the shaker: force on the table, and current and heating of the coil, computed from the motion."""
 
 from dataclasses import dataclass
 from typing import TypeVar
@@ -14,8 +14,8 @@ Motion = TypeVar("Motion", float, NDArray[np.float64], NDArray[np.complex128])
 class ShakerModel:
     """Estimates force and current where no channel measures them.
 
-    `mass` is everything that moves with the table, specimen included [kg], `stiffness` that of the suspension [N/m],
-    and `force_constant` that of the coil [N/A].
+    `mass` is the mass of everything that moves with the table, including the specimen [kg], `stiffness` that of the
+    suspension [N/m], and `force_constant` that of the coil [N/A].
     """
 
     mass: float

@@ -47,7 +47,7 @@ def follow(
     """
     configuration = prepared.configuration
     follower = make()
-    # the follower first, so that it processes a block before the plan continues
+    # the follower comes first, so that it processes a block before the plan continues
     heard = [follower, *subscribers]
     plan = _watched(prepared.plan(), follower)
     replayed = replay(record, plan, configuration, clock=VirtualClock(), subscribers=heard)
@@ -62,7 +62,7 @@ def carry_out(
     """Carry out a plan with `changed` settings on the recorded samples. Returns the replay and its points.
 
     `configuration` is the recorded one. Raises NotComparable if the plan with these settings would have driven the
-    table differently: the recorded motion is not the response to that drive.
+    table differently, since the recorded motion is not the response to that drive.
     """
     replayed = replay(record, changed.plan(), configuration, clock=VirtualClock(), subscribers=subscribers)
     if (why := replayed.parted(DRIVE)) is not None:
@@ -84,7 +84,7 @@ def _watched(plan: Plan, follower: Follower) -> Generator[Step, Outcome, object]
 class Analysis:
     """Re-analysed `points` of type `point_type`, and the inputs of their computation.
 
-    `settings` are the changed settings by name; `used` and `configuration` are all settings in force.
+    `settings` are the changed settings by name; `used` and `configuration` hold all settings in force.
     """
 
     points: Sequence[Parameters]
@@ -95,8 +95,8 @@ class Analysis:
 
 
 def write_analysis(original: Path, record: DataFile, analysis: Analysis, out: Path | None = None) -> Path:
-    """Write a new file, `<name>.analysis-<n>.h5` in the folder of the original with the first free n unless `out` is
-    given. Returns its path.
+    """Write a new file, `<name>.analysis-<n>.h5` in the original's folder with the first free n, unless `out` is given.
+    Returns its path.
 
     Raises InvalidInput when `out` exists or cannot be created, DataFileError when the disk fails.
     """
@@ -122,7 +122,7 @@ def write_analysis(original: Path, record: DataFile, analysis: Analysis, out: Pa
         except (OSError, RuntimeError) as error:
             raise DataFileError(f"{path} could not be written ({reason(error)}): check the disk") from error
         return path
-    raise AssertionError("unreachable: a free name always exists")
+    raise AssertionError("unreachable: there is always a free name")
 
 
 def _names(original: Path) -> Iterator[Path]:
@@ -142,7 +142,7 @@ def _fill(file: hdf5.File, original: Path, digest: str, record: DataFile, analys
         "settings": (json.dumps(dict(analysis.settings), default=str), "changed settings, by name (JSON)"),
         "used": (analysis.used.model_dump_json(), "every setting of the analysis that was in force (JSON)"),
         "configuration": (analysis.configuration.model_dump_json(), "configuration of the bench, as used (JSON)"),
-        "software": (json.dumps(software()), "versions of what numbers depend on (JSON)"),
+        "software": (json.dumps(software()), "versions of the software on which the numbers depend (JSON)"),
     }
     for name, (text, description) in texts.items():
         hdf5.write_text(process, name, text, description=description)

@@ -17,20 +17,20 @@ from bench.events import Acquired, Event, PointFinished, SensorsAligned, TwinEst
 from bench.replay.recording import RecordedCourse
 
 ROUNDING = 1e-9
-"""Relative difference of results attributed to rounding by another processor or library."""
+"""Relative difference of results that is attributed to rounding on another processor or with another library."""
 
 DRIVE_ROUNDING = 1e-6
-"""Difference of the drive [V] attributed to rounding: far below the step of a 16-bit converter."""
+"""Difference of the drive [V] that is attributed to rounding: far below the step of a 16-bit converter."""
 
 ROWS_AT_ONCE = 2**16
 
 DRIVE, JOURNAL, POINTS, ENDING = "drive samples", "journal entries", "points", "ending"
-"""Compared parts, in addition to the other tables."""
+"""Parts that are compared in addition to the other tables."""
 
 
 @dataclass(frozen=True)
 class Difference:
-    """Difference from the recording in `part`; `rounding` if the last bits of a number explain it."""
+    """Difference from the recording in `part`; `rounding` is true if it concerns only the last bits of a number."""
 
     text: str
     part: str
@@ -39,7 +39,7 @@ class Difference:
 
 @dataclass
 class Found:
-    """Number of compared values by part, and all differences."""
+    """Number of compared values per part, and all differences."""
 
     compared: dict[str, int] = field(default_factory=dict[str, int])
     differences: list[Difference] = field(default_factory=list[Difference])
@@ -95,8 +95,8 @@ class Comparison:
                 continue
             common = max(len(stored), len(rows))
             if broken_off is not None and kind in (TwinEstimate, SensorsAligned):
-                # the last samples of a killed program may be lost although the twin's estimates from them are not;
-                # the end of its run was not published at all
+                # a killed program may lose its last samples but not the twin's estimates from them; the end of its run
+                # was never published
                 common = min(len(stored), len(rows))
             elif broken_off is not None and kind in ENTRY_TABLES:
                 common = entries[kind.__name__]
@@ -127,13 +127,13 @@ class Comparison:
                 return came
         if broken_off is None and len(stored) > len(came):
             kind, text, _ = stored[len(came)]
-            said = f"journal entry {len(came) + 1} is missing from the replay: {kind} {text!r}"
+            said = f"journal entry {len(came) + 1} is missing in the replay: {kind} {text!r}"
             found.differences.append(Difference(said, JOURNAL))
         return came
 
 
 class _DriveComparison:
-    """Compares the drive of the replay with the recorded drive in its stored precision."""
+    """Compares the drive of the replay with the recorded drive at the stored precision."""
 
     def __init__(self, record: DataFile) -> None:
         self._record = record
@@ -161,7 +161,9 @@ class _DriveComparison:
         if self._first is None and (distance > DRIVE_ROUNDING).any():
             at = int(np.argmax(distance > DRIVE_ROUNDING))
             where = f"sample {event.block.first + at} of run {event.run}"
-            self._first = f"the drive differs from {where} on: recorded {stored[at]:.7g} V, replayed {came[at]:.7g} V"
+            self._first = (
+                f"the drive differs from {where} onward: recorded {stored[at]:.7g} V, replayed {came[at]:.7g} V"
+            )
 
     def report(self, found: Found) -> None:
         found.compared[DRIVE] = self.played
@@ -206,7 +208,7 @@ def _plain(value: Any) -> Any:
 
 
 def _are_sentences(was: Any, now: Any) -> bool:
-    """Whether both are sentences, which depend on the wording, rather than names, codes or JSON."""
+    """Whether both are sentences, which depend on the wording version, rather than names, codes or JSON."""
     if isinstance(now, Enum) or not (isinstance(was, str) and isinstance(now, str) and was and now):
         return False
     return any(" " in text and text[0] not in "{[" for text in (was, now))

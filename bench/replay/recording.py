@@ -35,7 +35,7 @@ _AHEAD = 10.0
 
 @dataclass(frozen=True)
 class _Stretch:
-    """Consecutive samples: index of the first, number of samples, and file row of the first."""
+    """Consecutive samples: index of the first sample, number of samples, and row of the first sample in the file."""
 
     first: int
     length: int
@@ -53,7 +53,7 @@ class RunRecording:
 
     @property
     def stretches(self) -> Sequence[tuple[int, int]]:
-        """First sample and length of each stretch without a gap."""
+        """First sample and length of each gap-free section."""
         return [(stretch.first, stretch.length) for stretch in self._stretches]
 
     def counts(self, first: int, n: int) -> Counts:
@@ -69,7 +69,7 @@ class RunRecording:
         stretch = self._stretches[max(place, 0)]
         left = stretch.first + stretch.length - first
         if place < 0 or n > left:
-            raise InvalidInput("sample", first, f"the file does not have {n} consecutive samples from there")
+            raise InvalidInput("sample", first, f"the file does not have {n} consecutive samples from this one on")
         row = stretch.row + first - stretch.first
         rows = slice(row, row + min(left, max(n, round(_AHEAD * self._record.sample_rate))))
         self._held = np.column_stack([self._record.counts(c.name, rows) for c in self._record.channels])
@@ -120,7 +120,7 @@ class DataFileRecording:
 
     @property
     def runs(self) -> tuple[RunRecording, ...]:
-        """Runs in order, as of the first access."""
+        """Runs in order, as they were at the first access."""
         return self._runs
 
     @cached_property
@@ -134,7 +134,7 @@ class DataFileRecording:
 
 
 def _stretches(blocks: dict[str, NDArray[Any]], ends: NDArray[np.int64], chosen: NDArray[np.intp]) -> list[_Stretch]:
-    """Stretches of one run: consecutive blocks are joined."""
+    """Gap-free sections of one run: consecutive blocks are joined."""
     row, first, end = blocks["row"][chosen], blocks["first"][chosen], ends[chosen]
     length = end - row
     follows = first[1:] == first[:-1] + length[:-1]
@@ -161,7 +161,7 @@ def _configuration(record: DataFile) -> BenchConfiguration:
         first = error.errors(include_url=False)[0]
         if first["loc"] == ("backend",):
             raise InvalidInput("backend", first["input"], f"{first['msg']}; {record.title} was made with it") from error
-        allowed = "its configuration is from another version of this software: replay it with that version"
+        allowed = "its configuration was written by another version of this software: replay it with that version"
         raise InvalidInput("record", record.title, allowed) from error
     # files of versions without a twin have no table of its estimates
     if record.columns_of(TwinEstimate):
@@ -170,7 +170,7 @@ def _configuration(record: DataFile) -> BenchConfiguration:
 
 
 _REQUESTS = (CauseCode.REQUEST, CauseCode.CLIENT_LOST)
-"""Causes that samples and computation cannot reproduce."""
+"""Causes that recorded samples and computation cannot reproduce."""
 
 Row = dict[str, Any]
 
@@ -200,7 +200,7 @@ class RecordedCourse:
     """`drivers.replay.Course` of an open file; `journal` has its entries.
 
     The replay delivers blocks in time. A run that the guard ended for late blocks is ended by an abort request with the
-    same reason; `in_place` lists these reasons.
+    same reason; `in_place` lists the reasons of such requests.
     """
 
     def __init__(self, record: DataFile) -> None:
@@ -215,12 +215,14 @@ class RecordedCourse:
         self._alignments = record.alignments
         self._block_times = blocks["time"]
         self.same_wording = record.wording == WORDING
-        """Whether texts can be compared."""
+        """Whether sentences can be compared."""
         self._rows = {kind.__name__: as_rows(columns) for kind in ENTRY_TABLES if (columns := record.columns_of(kind))}
         entries = self._entries()
         members = record.columns_of(TwinEstimate).get("members", ())
         self.twin_in_time = len({*members}) <= 1 and not any(each.columns.get("realtime") for each in entries)
-        """Whether the live twin kept up. A replay waits for the twin, so that its estimates differ if it did not."""
+        """Whether the live twin kept up. A replay waits for the twin, so if the live twin did not keep up, its
+        estimates differ.
+        """
         self.in_place: tuple[str, ...] = ()
         self.journal = self._without_timing(entries)
         kinds = {each.kind for each in self.journal}
@@ -246,7 +248,7 @@ class RecordedCourse:
 
     @property
     def begin(self) -> int:
-        """Number of journal entries before the first of the engine."""
+        """Number of journal entries before the engine's first."""
         kinds = (entry.kind != Warned.__name__ for entry in self.journal)
         return next((index for index, other in enumerate(kinds) if other), len(self.journal))
 
@@ -274,7 +276,7 @@ class RecordedCourse:
         for index, entry in enumerate(self.journal):
             columns = entry.columns
             if columns.get("code") in _REQUESTS:
-                # an ending appends failures during the ramp-down to the reason of the request
+                # failures during the ramp-down are appended to the reason of the request
                 reason = columns["reason"].partition("; then ")[0]
                 yield _Request(entry.blocks, index, columns["subject"], reason, CauseCode(columns["code"]))
 

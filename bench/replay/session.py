@@ -51,7 +51,7 @@ class PacedClock:
         if ahead <= 0.0:
             return
         self._now = instant
-        # delays of slow computations are not made up
+        # delays by slow computations are not made up for
         self._due = max(self._due + min(ahead, LONGEST_WAIT) / self._speed, now())
         while (remaining := self._due - now()) > 0.0:
             time.sleep(remaining)
@@ -105,9 +105,9 @@ class Replayed:
     """Result of a replay.
 
     `ended` states where and why the recording broke off before the end of the plan: at an error of the rig or a killed
-    program, which recorded data cannot reproduce. `in_place` are violations that are not in the samples, replaced by
-    abort requests. `played` of `rows` samples were requested. `same_wording` is false for a file written with other
-    message texts, which were not compared. `returned` is the result of the plan, None where it broke off.
+    program, which recorded data cannot reproduce. `in_place` are violations that the samples do not contain and that
+    abort requests replace. `played` of `rows` samples were requested. `same_wording` is false for a file written with
+    other message texts, which were not compared. `returned` is the result of the plan; None if it broke off.
     """
 
     status: str
@@ -133,7 +133,7 @@ class Replayed:
 
     @property
     def agrees(self) -> bool:
-        """Whether replay and recording agree except for rounding."""
+        """Whether replay and recording agree to within rounding."""
         return all(difference.rounding for difference in self.found.differences)
 
 
@@ -152,12 +152,12 @@ def replay(
 ) -> Replayed:
     """Carry out `plan` on the samples of an open file, with the recorded `configuration`, and compare.
 
-    `clock` begins at 0. Raises InvalidInput when the file cannot be played.
+    `clock` begins at 0. Raises InvalidInput when the file cannot be replayed.
     """
     recording, course = DataFileRecording(record), RecordedCourse(record)
     comparison, requests = Comparison(record, course), Requests()
     with ReplayRig(recording, clock=clock, course=course) as rig:
-        # requests last: all subscribers have received the earlier events
+        # requests come last, when all subscribers have received the earlier events
         stream = EventStream(clock, [comparison, *subscribers, RequestReplay(course, requests)])
         engine = configured_engine(rig, configuration, stream, requests, RecordedOperator(course))
         for warning in course.first_warnings:
@@ -173,7 +173,7 @@ def replay(
         said = f"the run was {was}; the replay was {ending.status} ({ending.reason})"
         found.differences.append(Difference(said, ENDING))
     played, rows = comparison.drive_played, record.rows
-    # an incomplete block is not played
+    # an incomplete block is not replayed
     if rows - played >= (configuration.block_samples if broke_off else 1):
         found.differences.append(Difference(f"{played} of {rows} recorded samples were requested", DRIVE))
     return Replayed(
@@ -192,7 +192,7 @@ def replay(
 
 
 def _broke_off(record: DataFile, over: str | None) -> str | None:
-    """Position and reason if the recording ends before its plan; None if the plan ended."""
+    """Where and why the recording ends before its plan; None if the plan ended."""
     if record.status == UNFINISHED:
         return f"{over or 'it ends'}: the program that wrote it was killed, or still writes"
     if over is None or record.status not in ("failed", "halted", "interrupted"):
@@ -201,7 +201,7 @@ def _broke_off(record: DataFile, over: str | None) -> str | None:
 
 
 def _changed(metadata: dict[str, str]) -> tuple[str, ...]:
-    """Changes of the software that results depend on since the file was written, by version or git hash."""
+    """Changes, since the file was written, in the software on which results depend, by version or git hash."""
     now = software()
     known = {name: metadata.get(name, "unknown") for name in now}
     versions = (f"{name} was {known[name]} and is {now[name]}" for name in now if known[name] != now[name])

@@ -1,1 +1,1 @@
-"""Live twin: model of the specimen under the measured table motion, computed during every test."""
+"""Live twin: a model of the specimen under the measured table motion, computed during every test."""

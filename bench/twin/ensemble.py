@@ -29,7 +29,7 @@ class Members:
         return Members([specimen.bare() for specimen in self.specimens], self.scales)
 
     def first(self, n: int) -> "Members":
-        """The first `n` of them."""
+        """The first `n` members."""
         return Members(self.specimens[:n], self.scales[:n])
 
 
@@ -63,7 +63,7 @@ class Ensemble:
     def feed(self, acceleration: Array) -> Array:
         """Compute u1, u2 [m] and theta [rad], shape (3, n_specimens, n), for accelerations [m/s2], shape (n,).
 
-        NaN after the fall of a block. Raises InvalidInput for accelerations that are not finite.
+        NaN after the block has fallen. Raises InvalidInput for accelerations that are not finite.
         """
         motions = np.full((3, len(self._streams), acceleration.size), np.nan)
         for k, (stream, scale) in enumerate(zip(self._streams, self._scales, strict=False)):
@@ -94,12 +94,12 @@ class Gains:
         self._bare_peaks = np.zeros(len(those.specimens))
         self._bare: Ensemble | None = None
         self._bare_per_unit: tuple[float, Array] | None = None
-        # required accelerations and peak drifts: all of them until the kind of test is known
+        # accelerations and peak drifts still required: all of them until the kind of test is known
         self._held: deque[tuple[Array, Array]] = deque()
 
     def push(self, acceleration: Array, drift: Array, measured: Measured | None) -> Array:
         """alpha_2 of the k remaining members, shape (k,), after further accelerations [m/s2], shape (n,), and drifts
-        [m], shape (k, n). NaN after the fall of a block, and before a gain is `measured`.
+        [m], shape (k, n). NaN after the block has fallen, and before a gain is `measured`.
         """
         k = len(drift)
         if not self._coupled:

@@ -18,16 +18,18 @@ from bench.twin.ensemble import Ensemble, Gains, Measured, Members
 from sim.errors import RockbenchError
 
 _PIPELINE = 3
-"""Measurements from exposure to output of an optoNCDT 1420; the output begins up to one later (manual, p. 52)."""
+"""Number of measurements from exposure to output of an optoNCDT 1420; the output begins up to one measurement later
+(manual, p. 52).
+"""
 _HELD = 0.5
-"""Mean age of the value at an output, which is held until the next measurement, in measurements."""
+"""Mean age of the output value, which is held until the next measurement, in measurement periods."""
 
 
 def laser_lag(configuration: BenchConfiguration) -> tuple[float, float]:
     """Delay of the lasers relative to the accelerometer and to the displacement sensor [s].
 
-    Serial lasers are aligned to the sample clock by `hardware.lasers.delay` and have none. A backend of another package
-    is assumed to have none.
+    It is zero for serial lasers, which `hardware.lasers.delay` aligns to the sample clock, and is assumed zero for
+    backends of other packages.
     """
     if (told := configuration.twin.laser_lag) is not None:
         return told, told
@@ -45,7 +47,9 @@ def laser_lag(configuration: BenchConfiguration) -> tuple[float, float]:
 Array = NDArray[np.float64]
 
 _CUTOFF = 0.35
-"""Middle of the transition band, as a share of the model's rate. The filter cards limit the motion to far below it."""
+"""Middle of the transition band, as a fraction of the model's rate. The filter cards limit the motion to frequencies
+far below it.
+"""
 _HALF_WIDTH = 6
 """Half the length of the impulse response [samples of the model]."""
 _KAISER = 5.65
@@ -53,10 +57,10 @@ _KAISER = 5.65
 
 
 class Resampler:
-    """Linear-phase low-pass for signals in blocks; the output does not depend on the division into blocks.
+    """Linear-phase low-pass filter for signals in blocks; the output does not depend on the division into blocks.
 
-    Delays every signal by `latency` [s], and signal i by `delays[i]` [s] (0 or more) in addition, with interpolation
-    between samples. Outputs a sample every `dt` [s]. The input before the first block is zero.
+    Delays every signal by `latency` [s] and signal i by a further `delays[i]` [s] (0 or more), interpolating between
+    samples. Outputs a sample every `dt` [s]. The input before the first block is zero.
     """
 
     def __init__(self, sample_rate: float, delays: Sequence[float]) -> None:
@@ -92,7 +96,7 @@ SPAN = 1.0
 class Residual:
     """Root mean squares over the last `SPAN`, relative to the largest measured drift so far.
 
-    `least` [m] replaces a smaller largest drift: differences below the sensors' resolution are not significant.
+    `least` [m] is the lower bound of this drift: differences below the sensors' resolution are not significant.
     """
 
     def __init__(self, dt: float, least: float) -> None:
@@ -101,7 +105,8 @@ class Residual:
         self._largest = 0.0
 
     def push(self, measured: Array, model: Array, low: Array, high: Array) -> tuple[float, float]:
-        """Relative rms of measured minus model and of the excess over the band, after further samples [m], shape (n,).
+        """Relative rms of measured minus modelled drift and of the excess over the band, after further samples [m],
+        shape (n,).
 
         NaN until the window is full, and while more than half of its values are missing.
         """
@@ -122,7 +127,7 @@ class Residual:
 
 
 class Limit:
-    """Limit that trips once, after a value has exceeded it for `persistence` [s]."""
+    """Limit that trips once, when a value has exceeded it for `persistence` [s]."""
 
     def __init__(self, limit: float | None, persistence: float) -> None:
         self.limit = limit
@@ -161,7 +166,7 @@ class Setting:
 
 
 class NoEstimate(RockbenchError):
-    """Missing samples of the table's acceleration: the model cannot continue."""
+    """Error: samples of the table's acceleration are missing, so the model cannot continue."""
 
     error_code = "no_estimate"
 
@@ -186,11 +191,11 @@ class Estimator:
 
     @property
     def members(self) -> int:
-        """Number of members besides the nominal one."""
+        """Number of members, excluding the nominal one."""
         return len(self._ensemble) - 1
 
     def shed(self) -> None:
-        """Drop half of the members; their band becomes narrower."""
+        """Drop half of the members, which makes their band narrower."""
         self._ensemble.keep(1 + self.members // 2)
 
     def take(self, time: float, end: int, signals: Array, measured: Measured | None) -> TwinEstimate | None:
@@ -198,7 +203,7 @@ class Estimator:
 
         `signals`, shape (n, n_signals), are those of the block that ends before sample `end` of the run.
 
-        Raises NoEstimate where the table's acceleration is missing.
+        Raises NoEstimate if the table's acceleration is missing.
         """
         setting = self._setting
         samples, newer = self._resampler.push(signals[:, [ACCELERATION, DISPLACEMENT, LASER_1, LASER_2]])
@@ -224,7 +229,9 @@ class Estimator:
         theta: Array,
         measured: Measured | None,
     ) -> TwinEstimate:
-        """From u1, u2 and drift, measured (`seen`, (3, n)) and modelled ((3, k, n)), and theta (k, n)."""
+        """Estimate from u1, u2 and drift, measured (`seen`, shape (3, n)) and modelled (shape (3, k, n)), and theta,
+        shape (k, n).
+        """
         low, high = _band(u.swapaxes(0, 1), self._uncertainties[:, None])
         residual, excess = self._residual.push(seen[2], u[2, 0], low[2], high[2])
         alphas = self._gains.push(acceleration, u[2], measured)
@@ -262,7 +269,7 @@ class Estimator:
 
 
 def _band(values: Array, uncertainty: float | Array) -> tuple[Array, Array]:
-    """Least and largest value of the members whose block stands, along the first axis, widened by the sensors'
+    """Smallest and largest value along the first axis for the members whose block is standing, widened by the sensors'
     `uncertainty`; NaN where fewer than half of the members stand.
     """
     few = 2 * np.count_nonzero(np.isfinite(values), axis=0) < len(values)

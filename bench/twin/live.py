@@ -1,4 +1,4 @@
-"""Live twin of a run. Its model is loaded only if the configuration enables it."""
+"""Live twin of a run. The model is loaded only if the configuration enables it."""
 
 from collections.abc import Generator
 from contextlib import contextmanager
@@ -17,7 +17,9 @@ def live_twin(
     *,
     patient: bool,
 ) -> Generator[None]:
-    """Context manager in which a `Twin`, if enabled by the configuration, subscribes to and publishes on `stream`."""
+    """Context manager in which a `Twin` is subscribed to `stream` and publishes on it, if the configuration enables
+    it.
+    """
     if not configuration.twin.enabled:
         yield
         return

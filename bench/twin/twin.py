@@ -1,7 +1,7 @@
 """Live twin as a subscriber: the model runs in a separate thread, and the acquisition never waits for it.
 
-The estimate of a block is published with the next block. A late model drops half of its members; one that is a second
-behind is off until the rig is armed again.
+The estimate for a block is published with the next block. A late model drops half of its members; one that is a second
+behind is switched off until the rig is armed again.
 """
 
 from collections import deque
@@ -50,7 +50,7 @@ _ENDS = {
     OperatorTask.MOUNT_SPRING: _MOUNTED,
     OperatorTask.REMOVE_BLOCK: _MOUNTED,
 }
-"""Operator actions that revoke an earlier one and its reason."""
+"""Operator actions that revoke an earlier action and its reason."""
 
 
 class Applicability:
@@ -69,7 +69,9 @@ class Applicability:
 
     @property
     def specimen(self) -> Specimen | None:
-        """Mounted specimen to which the model applies; None if it is unknown, or for the reason `why_not`."""
+        """Mounted specimen to which the model applies; None if it is unknown or the model does not apply (see
+        `why_not`).
+        """
         return None if self._against else self._mounted
 
     @property
@@ -84,12 +86,12 @@ _LATE = 0.15
 """Backlog at which the model drops members [s]; at least two blocks."""
 _BEHIND = 1.0
 """Backlog above which the twin is switched off [s]."""
-_NOT_IN_TIME = "the twin did not keep up, and is off until the rig is armed again"
+_NOT_IN_TIME = "the twin did not keep up and is off until the rig is armed again"
 
 
 @dataclass(eq=False)
 class _Run:
-    """Run of the rig that is followed by the model."""
+    """Run of the rig that the model follows."""
 
     estimator: Future[Estimator]
     warn: Limit
@@ -101,7 +103,7 @@ class Twin:
     """Follows every test from arming to rest if the model applies to the mounted specimen.
 
     `publish` is called in the engine's thread. A `patient` twin waits for its model, so that its estimates are
-    reproducible: for benches in virtual time. A residual beyond its limit requests a stop.
+    reproducible, as needed in virtual time. A residual beyond its limit requests a stop.
     """
 
     def __init__(
@@ -132,7 +134,7 @@ class Twin:
         self._worker = ThreadPoolExecutor(1, "twin")
 
     def close(self) -> None:
-        """Release the thread. Allowed any number of times."""
+        """Release the thread; may be called repeatedly."""
         self._worker.shutdown(wait=False, cancel_futures=True)
 
     def __call__(self, event: Event) -> None:
@@ -155,7 +157,7 @@ class Twin:
                 pass
 
     def _draw(self) -> None:
-        """Draw the members for the mounted specimen, while nothing moves."""
+        """Draw the members for the mounted specimen while nothing moves."""
         specimen = self._applicability.specimen
         if specimen is not None and (self._members is None or self._members[0] != specimen):
             self._members = specimen, self._worker.submit(draw_members, specimen, self._configuration)
@@ -197,7 +199,9 @@ class Twin:
 
     def _offer(self, run: _Run, event: Acquired) -> None:
         if len(run.waiting) >= self._most:
-            self._give_up(event.time, f"{_NOT_IN_TIME}: {len(run.waiting)} blocks wait for its model", realtime=True)
+            self._give_up(
+                event.time, f"{_NOT_IN_TIME}: {len(run.waiting)} blocks are waiting for its model", realtime=True
+            )
             return
         shed = len(run.waiting) >= self._late
         end = event.block.first + len(event.block)

@@ -130,7 +130,7 @@ def test_where_one_method_cannot_the_other_does_and_where_none_can_it_is_refused
         ("synthetic:kobe --share 2", "--share = 2.0 is refused"),
         ("synthetic:kobe --table-band 3:1", "--table-band = '3:1' is refused"),
         ("synthetic:kobe --length-ratio 0", "--length-ratio = 0.0 is refused"),
-        ("synthetic:kobe --out taken", "it exists and is never overwritten"),
+        ("synthetic:kobe --out taken", "the file exists and is never overwritten"),
         ("synthetic:kobe --plot figure.jpg", "its name must end with .png"),
     ],
 )

@@ -135,10 +135,10 @@ def test_a_byte_order_mark_is_no_error(tmp_path: Path):
         ("[specimen.frame]\nxi2 = 3.5", "xi2 = 3.5 is refused: it must be .* below 1; 3.5 % is 0.035"),
         (
             "[simulation.bench]\ncatch_angle = 20",
-            'catch_angle = 20 is refused: it must be .* below 1 rad; 20 degrees are "20 deg"',
+            'catch_angle = 20 is refused: it must be .* below 1 rad; for 20 degrees write "20 deg"',
         ),
         ("[simulation]\nseed = 1_000", "bench.toml: seed = '1_000' is refused: write a decimal number"),
-        ("[specimen.frame]\nk1 = 213,44", "it is not TOML.*k1 = 213,44; a decimal comma. write k1 = 213.44"),
+        ("[specimen.frame]\nk1 = 213,44", "not valid TOML.*k1 = 213,44; a decimal comma. write k1 = 213.44"),
         ("[simulation]\nseed = 1.5", "simulation.seed = 1.5 is refused: it must be a whole number"),
         ("[specimen.frame]\nk3 = 1.0", "specimen.frame.k3 = 1.0 is refused: .* nearest is specimen.frame.k[12]"),
         ("[frame]\nk1 = 1.0", "frame = 'a table' is refused: there is no such key"),
@@ -155,9 +155,9 @@ def test_a_byte_order_mark_is_no_error(tmp_path: Path):
         ),
         (
             "[limits]\nvelocity = 0\n[ramps]\nstop = 0",
-            r"limits.velocity = 0 .* \(refused too: bench.toml: ramps.stop\)",
+            r"limits.velocity = 0 .* \(also refused: bench.toml: ramps.stop\)",
         ),
-        ("backend = 'simulated'\n[specimen\n", "it is not TOML: .*line 2"),
+        ("backend = 'simulated'\n[specimen\n", "not valid TOML: .*line 2"),
     ],
 )
 def test_what_is_wrong_is_said_in_one_line_with_key_value_and_what_is_allowed(

@@ -134,7 +134,7 @@ def test_a_value_with_a_unit_is_converted(text: str, unit: str, value: float) ->
 @pytest.mark.parametrize(
     ("text", "unit", "said"),
     [
-        ("5 m", "s", r"m \(meter\) is not of the dimension of s \(second\)"),
+        ("5 m", "s", r"m \(meter\) does not have the dimension of s \(second\)"),
         ("2.5 Hz", "m", "Hz .* is not of the dimension of m "),
         ("3 1/s", "rad/s", "1/s .* is not of the dimension of rad/s"),
         ("2 rad/s", "1/s", "rad/s .* is not of the dimension of 1/s"),

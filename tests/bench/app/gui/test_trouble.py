@@ -59,7 +59,7 @@ OUT = Path("runs", "one")
         (cause_of(OSError(errno.ENOSPC, "whatever the system calls it")), "Free disk space"),
         (cause_of(PermissionError(errno.EACCES, "Permission denied")), "Look at the bench"),
         (ConnectionLost("cDAQ1Mod1 is gone").cause, "search for devices"),
-        (DeviceTimeout("laser_1 on COM3 has not answered for 1 s").cause, "search for devices"),
+        (DeviceTimeout("laser_1 on COM3 has not responded for 1 s").cause, "search for devices"),
         (DeviceNotFound("no gRPC device server answers").cause, "search for devices"),
         (CommandRefused("laser_1", "OUTPUT RS422", "E210 refused").cause, "search for devices"),
         (DriveUnderflow("the drive was written too late").cause, "Look at the bench"),
