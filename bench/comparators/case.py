@@ -1,6 +1,6 @@
 """The standard case: 120 s of steady rocking with 649 impacts, and its independently known values.
 
-START and PHASE are the periodic orbit at beta 0.64, Omega 17 rad/s to ten digits: they define the case and count as
+START and PHASE are the periodic orbit at beta 0.64, Omega 17 rad/s to ten digits: they define the case and are taken as
 exact. END and PEAKS are its solution by heyoka in 80-bit arithmetic at tolerance 1e-19, with an integrator and
 equations independent of ours; `tests/benchmarks/reference.py` recomputes them and checks their beginning with mpmath at
 30 digits.

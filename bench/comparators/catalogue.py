@@ -55,7 +55,9 @@ def paper(problem: Problem, step: float) -> Motion:
 
 
 def rk4_located(problem: Problem, step: float) -> Motion:
-    """RK4, steps of at most `step` that end at events, located by steps of other lengths: order 4 across impacts."""
+    """RK4 with steps of at most `step` that end at events; events are located by steps of other lengths, which
+    preserves order 4 across impacts.
+    """
     from bench.comparators.kernel.located_step import run_located
 
     x, samples, report = _outputs(problem)
@@ -101,7 +103,12 @@ SOLVERS: Mapping[str, Solver] = MappingProxyType(
         solver.name: solver
         for solver in (
             Solver(
-                "taylor", "Taylor series with events on the polynomials", "tolerance", TOLERANCE, (1e-15, 1e-3), None
+                "taylor",
+                "Taylor series with events located on the polynomials",
+                "tolerance",
+                TOLERANCE,
+                (1e-15, 1e-3),
+                None,
             ),
             Solver("paper", "RK4 at 1 ms with a sign test, as section 3.3", "step", PAPER_STEP, (1e-6, 0.1), paper),
             Solver("rk4-located", "RK4 with events located by stepping", "step", PAPER_STEP, (1e-6, 0.1), rk4_located),
@@ -109,7 +116,7 @@ SOLVERS: Mapping[str, Solver] = MappingProxyType(
         )
     }
 )
-"""Solvers by name; the first is for use, the others are for comparison."""
+"""Solvers by name: the first is the one to use, the others are for comparison."""
 
 
 def solve(
@@ -127,8 +134,8 @@ def solve(
     """`sim.rocking.simulate` by the solver `name`; its knob, `tolerance` or `step` [s], has a default.
 
     With `paper` the block never returns to rest, impacts occur at ends of steps and peaks are sampled at steps. The
-    others agree with `taylor` within their order.
-    Raises InvalidInput for an unknown name, another solver's knob, and values outside their range.
+    others agree with `taylor` within their order. Raises InvalidInput for an unknown name, the knob of another solver,
+    or a value out of range.
     """
     solver = SOLVERS.get(name)
     if solver is None:
@@ -156,10 +163,10 @@ def solve(
 
 
 LAST_PERIODS = 60
-"""Periods of the drive at the end of a run over which its peaks are taken.
+"""Number of drive periods at the end of a run over which its peaks are taken.
 
-A solver that does not locate impacts wanders about its steady state: a short window misses its excursions, and its
-result depends on the window (docs/benchmarks.md has the spread). One that locates them has the same result for any
+A solver that does not locate impacts wanders about its steady state: a short window misses excursions, so the result
+depends on the window (docs/benchmarks.md has the spread). A solver that locates them gives the same result for any
 window.
 """
 
@@ -185,7 +192,7 @@ def steady_gain_by_time(
     tolerance: float | None = None,
     step: float | None = None,
 ) -> TimedGain:
-    """Gain coefficients of the last LAST_PERIODS periods of a run of `duration` [s] by the solver `name`.
+    """Gain coefficients over the last LAST_PERIODS periods of a run of `duration` [s] by the solver `name`.
 
     Without `state` the run starts on the exact rocking orbit, at its phase [rad] of the base's sine,
     and settles on the solver's steady state: from rest the outcome would depend on a chaotic transient. The

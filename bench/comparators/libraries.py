@@ -1,14 +1,14 @@
-"""heyoka and CVODE on the standard case. heyoka (Biscani and Izzo, 2021): Taylor series compiled by LLVM.
+"""heyoka and CVODE applied to the standard case. heyoka (Biscani and Izzo, 2021): Taylor series compiled by LLVM.
 
 The equations are deliberately repeated here: an independent reference must not share ours. One system covers both
-corners, with the sign of the corner as a parameter that the impact changes. The event is a falling sg theta. With theta
-itself as the event, the start of the case at theta = 0 would count as an impact and turn the block to the wrong corner,
-and it would overturn. sg theta rises from every impact and from the start, and a rising root is not an event, so that
+corners, with the sign of the corner as a parameter that the impact changes. The event is a falling sg theta. If theta
+itself were the event, the start of the case at theta = 0 would count as an impact, transfer the block to the wrong
+corner, and overturn it. sg theta rises from every impact and from the start, and a rising root is not an event, so that
 no guard time after an impact is required. The impacts of the case are vigorous and do not test heyoka's guard against
 chatter.
 
-CVODE of SUNDIALS, through scikit-sundae, has its own root finding. It is a multistep method and restarts at order 1
-after every impact. It uses our equations, so it compares only the integrator. The root at the start of a phase is
+CVODE (SUNDIALS), used through scikit-sundae, has its own root finding. It is a multistep method and restarts at order 1
+after every impact. It uses our equations, so only the integrators are compared. The root at the start of a phase is
 divided out of the event.
 """
 
@@ -74,7 +74,7 @@ class HeyokaPeer:
         return Outcome(np.array(ta.state), self._impacts, int(steps), peaks)
 
     def _on_impact(self) -> Any:
-        # a function, not a method: heyoka copies its callbacks with everything bound to them
+        # a function, not a method, because heyoka copies its callbacks with everything bound to them
         def strike(ta: Any, _sign: int) -> bool:
             self._impacts += 1
             ta.state[4] = self._real(0)
@@ -96,7 +96,7 @@ class HeyokaPeer:
 
 
 def _equations(hy: Any, real: Any) -> list[tuple[Any, Any]]:
-    """Eq. (8) and (A.1) in the form that does not cancel at small angles."""
+    """Eq. (8) and (A.1) in a form without cancellation at small angles."""
     m1, m2, k1, k2, c1, c2, h1, k_c, d, b, h_b, mass, inertia, _, g, _ = (real(v) for v in SPECIMEN.packed()[:16])
     u1, u2, v1, v2, theta, omega = hy.make_vars("u1", "u2", "v1", "v2", "theta", "omega")
     sg = hy.par[0]

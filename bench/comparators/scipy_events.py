@@ -35,10 +35,11 @@ def dop853(problem: Problem, tolerance: float) -> Motion:
 
 
 def integrate(method: Method, problem: Problem, tolerance: float, equations: DrivenRates | None = None) -> Motion:
-    """`problem` by the `method` of `scipy.integrate.solve_ivp`; the absolute tolerance is a hundredth of `tolerance`.
+    """Integrate `problem` by the `method` of `scipy.integrate.solve_ivp`; the absolute tolerance is a hundredth of
+    `tolerance`.
 
     The root theta = 0 at the start of a phase is divided out of the impact event. Peaks and samples cost time only when
-    requested: each requires the dense output. `equations` are the compiled ones by default.
+    requested, since both require the dense output. `equations` are the compiled ones by default.
     """
     from scipy.integrate import solve_ivp
 
@@ -117,7 +118,7 @@ def integrate(method: Method, problem: Problem, tolerance: float, equations: Dri
 
 
 def python_rates(p: Vector, sg: float, row: Vector, t: float, x: Vector, out: Vector) -> None:
-    """`bench.comparators.kernel.fixed_step.driven_rates` uncompiled, as usual with scipy."""
+    """`bench.comparators.kernel.fixed_step.driven_rates` without compilation, as usual with scipy."""
     from bench.comparators.kernel import fixed_step
 
     plain_base, plain_rates = _python(fixed_step.base), _python(fixed_step.rates)

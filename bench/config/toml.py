@@ -150,7 +150,7 @@ Kind = Literal["all", "minimal", "hardware"]
 
 _HEADING = """\
 # Configuration of a shake-table bench for rockbench. SI units; a value in another unit is a string: "60 mm".
-# Every key is optional; its meaning [unit] and valid values are above it. Check the file with `rockbench config check`."""
+# Every key is optional; its meaning [unit] and valid values stand above it. To validate: `rockbench config check`."""
 
 _ALL = """\
 # Every key with its default. A line that begins with # and no space has an example of a key that is absent by default:

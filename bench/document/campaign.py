@@ -85,7 +85,7 @@ class Campaign:
 
     @cached_property
     def known(self) -> SpecimenKnowledge:
-        """Knowledge of the specimen, in a steady motion on the file's table."""
+        """Knowledge of the specimen in a steady motion on the table of the file."""
         return SpecimenKnowledge() if self.configuration is None else self.configuration.known_on_table
 
     @cached_property
@@ -105,5 +105,5 @@ class Campaign:
         try:
             found = json.loads(self.record.metadata.get(name, "{}"))
         except json.JSONDecodeError as error:
-            raise InvalidInput("record", str(self.path), f"its {name} are not JSON: {error}") from None
+            raise InvalidInput("record", str(self.path), f"its {name} are not valid JSON: {error}") from None
         return cast(dict[str, Any], found) if isinstance(found, dict) else {}

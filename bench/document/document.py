@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a table: its heading, its unit ("" for texts and pure numbers), and whether it contains words."""
+    """A table column: its heading, its unit ("" for text and pure numbers), and whether it contains words."""
 
     title: str
     unit: str = ""
@@ -24,7 +24,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Table:
-    """A table of printed cells; the first column names the row. Raises ValueError for rows of another length."""
+    """A table of formatted cells; the first column names the row. Raises ValueError for rows of another length."""
 
     caption: str
     columns: Sequence[Column]
@@ -59,7 +59,7 @@ class Notice:
 
 
 Part = str | Notice | Listing | Table | Picture
-"""Parts of a section; a paragraph is a plain text."""
+"""Parts of a section; a paragraph is a plain string."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +73,7 @@ class Section:
 
 @dataclass(frozen=True, eq=False)
 class Document:
-    """A whole report. `summary` follows the title; `provenance` is the line below it: date, program, definitions."""
+    """A complete report. `summary` follows the title; `provenance` is the line below it: date, program, definitions."""
 
     title: str
     summary: Sequence[Part]
@@ -85,8 +85,8 @@ def template_content(document: Document, draw: Callable[[Picture, int], Any]) ->
     """Returns title, provenance, summary and sections (key, heading, parts) for a template.
 
     A part is a dictionary whose `kind` is "text", "notice", "listing", "table" or "picture". Tables and figures are
-    counted separately: their `name` is "Table 3" or "Fig. 2". `draw` takes a figure and its number and returns the
-    `drawing` of the template.
+    numbered separately: their `name` is "Table 3" or "Fig. 2". `draw` takes a figure and its number and returns the
+    template's `drawing`.
     """
     counts = {"Table": 0, "Fig.": 0}
 

@@ -39,14 +39,15 @@ def map_section(specimen: Specimen, amplitude_factor: float, measured: Sequence[
     lost = int(np.isnan(rocking.multiplier).sum())
     amplitude = amplitude_factor * specimen.uplift_acceleration
     text = (
-        f"Steady motions under a sine of {amplitude:.4g} m/s² ({amplitude_factor:g} g/λ), computed as periodic orbits "
-        f"at {len(request.omega)} frequencies by {len(request.beta)} stiffnesses, with their stability. Where the "
-        "block may rest, two steady motions exist and the start of a test decides which one it reaches. Hatched: the "
-        "rocking motion is unstable, so a test shows a modulated motion or the block topples."
+        f"Steady motions under a sine of {amplitude:.4g} m/s² ({amplitude_factor:g} g/λ), computed as "
+        f"periodic orbits at {len(request.omega)} frequencies by {len(request.beta)} stiffnesses, with their "
+        "stability. Where the block may rest, two steady motions exist, and the start of a test decides "
+        "which one it reaches. In the hatched areas the rocking motion is unstable: a test shows a modulated "
+        "motion, or the block topples."
     )
     parts: list[Part] = [text]
     if lost:
-        parts.append(f"No rocking orbit was found at {lost} points; they are blank.")
+        parts.append(f"No rocking orbit was found at {lost} points, which are blank.")
     found = " Circles are measured points with their α₂." if measured else ""
     description = "Surfaces and contour maps of alpha 1 and alpha 2 over frequency and stiffness ratio."
     parts.append(Picture(figure, f"Gain surfaces (a) and maps (b, c) of α₁ and α₂, predicted.{found}", description))
@@ -54,7 +55,7 @@ def map_section(specimen: Specimen, amplitude_factor: float, measured: Sequence[
 
 
 def _axis(low: float, high: float, step: float, places: Sequence[float], margin: float) -> tuple[float, ...]:
-    """Equal steps over the usual or the measured range, coarser where there would be too many."""
+    """Equal steps over the usual or the measured range, coarser if there would be too many."""
     least = min([low, *(place - margin for place in places if place < low)])
     most = max([high, *(place + margin for place in places if place > high)])
     least = max(least, step)

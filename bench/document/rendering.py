@@ -1,8 +1,8 @@
 # pyright: reportUnknownMemberType=false
 """Rendering of a report as one HTML file, and as A4 pages of a PDF.
 
-The HTML has no script and no reference to another file; its template escapes every text. For the PDF matplotlib draws
-each figure as a PDF file, which Typst embeds; texts reach the template `report.typ` as JSON and are never read as
+The HTML has no script and no reference to another file; its template escapes all text. For the PDF, matplotlib draws
+each figure as a PDF file, which Typst embeds; text is passed to the template `report.typ` as JSON and is never read as
 markup.
 """
 
@@ -36,7 +36,7 @@ def html_page(document: Document) -> str:
     from jinja2 import Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
 
-    # matplotlib's own output, whose texts are outlines; every other text is escaped by the template
+    # matplotlib's output, in which text is outlines; all other text is escaped by the template
     content = template_content(document, lambda picture, number: Markup(_inline_svg(picture, number)))
     environment = Environment(
         loader=PackageLoader("bench.document", ""),
@@ -71,7 +71,7 @@ def write_pdf(path: Path, document: Document) -> None:
 def _inline_svg(picture: Picture, number: int) -> str:
     """An `<svg>` element without header and references, with identifiers unique on the page.
 
-    Letters are outlines, independent of fonts; title and description are for screen readers.
+    Letters are outlines and need no fonts; title and description are for screen readers.
     """
     import matplotlib
 
@@ -97,9 +97,10 @@ def _inline_svg(picture: Picture, number: int) -> str:
 
 
 def _save_pdf(figure: "Figure", path: Path) -> None:
-    """Saves a figure no larger than a page; the height is reduced by the square root of the factor of the width.
+    """Saves a figure no larger than a page; if the width is reduced, the height is reduced by the square root of the
+    same factor.
 
-    The figure is drawn at that size instead of being scaled, so letters keep their size.
+    The figure is drawn at that size rather than scaled, so that letters keep their size.
     """
     import matplotlib
 
@@ -107,7 +108,7 @@ def _save_pdf(figure: "Figure", path: Path) -> None:
     narrower = min(1.0, WIDTH / width)
     figure.set_size_inches(narrower * width, min(HEIGHT, height * narrower**0.5))
     try:
-        # embedded fonts instead of outlines: text can be searched and copied
+        # embedded fonts instead of outlines, so that text can be searched and copied
         with matplotlib.rc_context({"pdf.fonttype": 42}):
             figure.savefig(path, format="pdf")
     finally:

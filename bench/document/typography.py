@@ -1,4 +1,4 @@
-"""Typography of a report: numbers with their uncertainty, symbols, units, dates, counted words."""
+"""Typography of a report: numbers with uncertainties, symbols, units, dates, counted nouns."""
 
 import re
 from datetime import datetime, timedelta
@@ -23,7 +23,7 @@ _WORDS = re.compile(rf"(?<![\w.`-])({'|'.join(_SYMBOLS)})(?![\w:`]|\.\w)")
 """Stand-alone symbols, not part of a key, flag or file name."""
 
 _UNIT = re.compile(r"(?:(?<=/s)2|(?<=/m)[23]|(?<=kg m)2)(?!\w|\.\d)")
-"""Powers within a unit; m2 by itself may be a mass."""
+"""Powers within a unit; m2 alone may be a mass."""
 
 _POWER = re.compile(r"(?<=[a-z])([23])(?!\d)")
 _RAISED = {"2": "²", "3": "³"}
@@ -37,7 +37,7 @@ _NAME = re.compile(r"(?<=[a-z]{4})_(?=[a-z]{3})")
 
 
 def plain(value: float | None, digits: int = 4) -> str:
-    """A number to the given significant digits; a dash if absent."""
+    """A number with the given number of significant digits; a dash if absent."""
     if value is None or not isfinite(value):
         return ABSENT
     text = f"{value:.{digits}g}"
@@ -64,7 +64,7 @@ def percent(share: float | None, places: int = 2) -> str:
 
 
 def yes_or_no(value: bool | None) -> str:
-    """A boolean as a word."""
+    """A Boolean as a word."""
     return ABSENT if value is None else "yes" if value else "NO"
 
 
@@ -74,14 +74,14 @@ def unit_text(unit: str) -> str:
 
 
 def typeset(text: str) -> str:
-    """A line of a journal or a summary with printed symbols, units and signs: α₂, Ω, m/s², ±."""
+    """A line of a journal or a summary with typeset symbols, units and signs: α₂, Ω, m/s², ±."""
     text = _WORDS.sub(lambda found: _SYMBOLS[found[1]], text.replace("+-", "±"))
     text = re.sub(r"(?<=\d)%", " %", text)
     return _UNIT.sub(lambda found: _RAISED[found[0]], text)
 
 
 def moment(iso: str) -> str:
-    """Date and time of an ISO 8601 text, to the second, with its zone; any other text unchanged."""
+    """Date and time of an ISO 8601 string, to the second, with time zone; any other string unchanged."""
     try:
         found = datetime.fromisoformat(iso)
     except ValueError:
@@ -98,7 +98,7 @@ def counted(number: int, one: str, more: str = "") -> str:
 
 
 def listed(items: list[str]) -> str:
-    """Items in a sentence: a, b and c."""
+    """Items as an enumeration: a, b and c."""
     return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}" if items else ""
 
 

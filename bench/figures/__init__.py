@@ -1,1 +1,1 @@
-"""Figures, the summary file and the text tables of a campaign."""
+"""Figures, summary file and text tables of a campaign."""

@@ -1,5 +1,5 @@
 # pyright: reportUnknownMemberType=false
-"""Uncertainty budgets: one bar per measured value, of the length of its expanded uncertainty."""
+"""Uncertainty budgets: one bar per measured value, whose length is the expanded uncertainty."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
@@ -18,8 +18,8 @@ def budget_figure(
     expanded: Sequence[float],
     quantity: str = "expanded uncertainty of α₂",
 ) -> "Figure":
-    """Each bar is divided by the contributions' shares of the variance. `budgets` are standard uncertainties by
-    contribution, `expanded` the lengths of the bars [%].
+    """Each bar is divided in proportion to the contributions' shares of the variance. `budgets` are standard
+    uncertainties by contribution, `expanded` the lengths of the bars [%].
     """
     total = {name: sum(budget.get(name, 0.0) ** 2 for budget in budgets) for budget in budgets for name in budget}
     figure = new_figure(6.8, 1.2 + 0.22 * len(labels))

@@ -1,5 +1,5 @@
 # pyright: reportUnknownMemberType=false
-"""Measured gains, table motions and drifts under earthquake records, as in Fig. 7 to 9 of the paper."""
+"""Measured gains, table motions and drifts under earthquake records, as in Figs. 7 to 9 of the paper."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -24,10 +24,10 @@ COLUMNS, WIDTH, ROW, LEGEND = 3, 3.4, 2.7, 0.9
 GAIN_HEADROOM = 1.15
 
 SHIFT = 0.006
-"""Offset of the prediction for the achieved motion from the measured point, as a share of the panel's width."""
+"""Offset of the prediction for the achieved motion from the measured point, as a fraction of the panel's width."""
 
 HISTORY_WIDTH, HISTORY_ROW, HISTORY_LEGEND = 8.5, 1.55, 0.8
-"""Figure of histories [inch]: width, height of a row, height of legend and axis."""
+"""Dimensions of a figure of histories [inch]: width, height of a row, height of legend and axis."""
 
 HISTORY_HEADROOM = 1.1
 
@@ -58,8 +58,8 @@ class DriftPicture:
 def gain_figure(points: Sequence[PointLike], prediction: Mapping[str, NDArray[Any]]) -> "Figure":
     """alpha_2 against beta, one panel per record.
 
-    `points` have the fields of an earthquake point; `prediction` has record, beta and alpha_2 (NaN where the block
-    topples) under the requested motion. Intervals hold 95 % of the expected measurements; a cross at the upper edge
+    `points` have the fields of an earthquake point; `prediction` has record, beta and alpha_2 under the requested
+    motion (NaN where the block topples). Intervals hold 95 % of the expected measurements; a cross at the upper edge
     marks a toppled block.
     """
     rows = plain(points)
@@ -217,7 +217,7 @@ def _finish(figure: "Figure", panels: "Sequence[Axes]", count: int) -> None:
         panels[0].text(0.5, 0.5, "no record was played", ha="center", va="center")
         return
     panels[-1].set_xlabel(r"$t$  [s]", fontsize=8)
-    # some curves are absent for a record that toppled the block or was not played
+    # a record that toppled the block or was not played lacks some curves
     labels = {label for panel in panels[:count] for label in panel.get_legend_handles_labels()[1]}
     add_legend(figure, panels[:count], len(labels) if len(labels) < 4 else 2)
 

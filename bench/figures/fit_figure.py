@@ -21,19 +21,19 @@ LINES = ((BLUE, "-", 1.4), (VERMILLION, "--", 1.0), (BLACK, ":", 1.0), (GREEN, "
 POWERS = str.maketrans({"2": "²", "3": "³"})
 
 PREFIXED = {"m": ((1e-3, "µm", 1e6), (1.0, "mm", 1e3)), "rad": ((1.0, "mrad", 1e3),)}
-"""For each unit: upper bound of the values, prefixed unit, and factor."""
+"""For each unit: upper limit of the values, prefixed unit, and factor."""
 
 APART = 8.0
-"""Largest ratio of a panel's span to that of any of its columns."""
+"""Largest ratio of a panel's span to the span of any of its columns."""
 
 UNCERTAINTY, COVERAGE = "_uncertainty", 2.0
-"""Suffix of columns drawn as error bars of others, and the coverage factor."""
+"""Suffix of columns that are drawn as error bars of others, and the coverage factor."""
 
 
 def fit_figure(fit: FitFinished) -> "Figure":
     """One panel per unit, and one for the residuals of each unit, against the first column.
 
-    Columns of very different scale have separate panels. The standard uncertainty of a column is drawn as error
+    Columns of very different scale are drawn in separate panels. The standard uncertainty of a column is drawn as error
     bars (k = 2).
     """
     axis, *names = fit.columns

@@ -81,7 +81,7 @@ def _draw_block(panel: "Axes", motion: Motion) -> "Axes":
 
 
 def _before_the_fall(motion: Motion) -> NDArray[np.float64]:
-    """Angles that scale the panel; those of a falling block are clipped."""
+    """Angles that set the panel's scale; those of a falling block are clipped."""
     theta = motion.values["theta_rad"]
     if np.isfinite(theta).all():
         return theta
@@ -92,7 +92,7 @@ def _before_the_fall(motion: Motion) -> NDArray[np.float64]:
 
 
 def _mark_end(panel: "Axes", motion: Motion) -> None:
-    """Draws a line where the block fell."""
+    """Draws a line at the instant at which the block fell."""
     lost = np.flatnonzero(~np.isfinite(motion.values["theta_rad"]))
     if lost.size:
         end = float(motion.values["time_s"][lost[0]])

@@ -30,10 +30,10 @@ GAINING, LOSING = "#DCEBF5", "#B9B9B9"
 """Light where the block reduces the response, dark where it does not."""
 
 FEWEST_LEVELS = 4
-"""Number of usual levels below which other levels are drawn."""
+"""Number of usual levels crossed below which other levels are drawn."""
 
 JUMP = 0.1
-"""Step of the frequency of least gain, as a share of the range, above which it is a jump between valleys."""
+"""Step in the frequency of least gain, as a fraction of the range, above which it counts as a jump between valleys."""
 
 FOUND, LOST = "o", "X"
 MARK: Mapping[str, Any] = {
@@ -43,7 +43,7 @@ MARK: Mapping[str, Any] = {
     "markeredgecolor": BLUE,
     "markeredgewidth": 1.6,
 }
-"""Measured points: marker with a gain, marker without one, common style."""
+"""Measured points: marker with a gain, marker without a gain, common style."""
 
 SYMBOLS = {"alpha_1": r"$\alpha_1$", "alpha_2": r"$\alpha_2$"}
 
@@ -185,7 +185,7 @@ def _draw_map(panel: "Axes", omegas: Floats, betas: Floats, layer: Layer, name: 
     panel.clabel(lines, fmt="%g", fontsize=7, inline_spacing=3)
     unstable = np.ma.masked_invalid(layer.multiplier)
     if (unstable > 1.0).any():
-        # hatched rather than coloured, so that the gain remains legible
+        # hatched rather than coloured, so that the gain stays legible
         hatched = panel.contourf(omegas, betas, unstable, levels=[1.0, np.inf], colors="none", hatches=["////"])
         hatched.set_edgecolor(VERMILLION)
         hatched.set_linewidth(0.0)
@@ -226,7 +226,14 @@ def _add_legend(figure: "Figure", unstable: bool, boundary: bool, measured: Sequ
         )
     if boundary:
         entries.append(
-            Line2D([], [], color=GREEN, linewidth=1.6, linestyle=(0, (6, 1.5)), label="block may rest to the right")
+            Line2D(
+                [],
+                [],
+                color=GREEN,
+                linewidth=1.6,
+                linestyle=(0, (6, 1.5)),
+                label="block may rest to the right of this line",
+            )
         )
     for marker, words, gainless in (
         (FOUND, r"measured, with its $\alpha_2$", False),
@@ -255,7 +262,9 @@ def least_over_omega(omegas: Floats, gain: Floats) -> Floats:
 
 
 def levels_for(gain: Floats, usual: Sequence[float]) -> list[float]:
-    """The `usual` contour levels that a gain crosses, ascending; round numbers between its extremes if too few."""
+    """The `usual` contour levels that a gain crosses, ascending; round numbers between its extremes if there are too
+    few.
+    """
     from matplotlib.ticker import MaxNLocator
 
     finite = gain[np.isfinite(gain)]

@@ -1,7 +1,7 @@
 # pyright: reportUnknownMemberType=false
 """Modes as in Fig. 3 of the paper: shapes and frequencies of the bare frame and the coupled system.
 
-Up to five stiffnesses are drawn as shapes, more as curves over the stiffness.
+Up to five stiffnesses are drawn as shapes, a larger number as curves against stiffness.
 """
 
 from collections.abc import Mapping
@@ -22,7 +22,7 @@ REACH = 0.13
 """Largest drawn displacement relative to the height of the frame."""
 
 BAY = 0.36
-"""Drawn width of the frame relative to its height; the model has none."""
+"""Drawn width of the frame relative to its height; the model does not define a width."""
 
 LIFT = 0.02
 """Height of an arrow above the displaced point [m]."""
@@ -32,7 +32,7 @@ Shape = tuple[float, float, float]
 
 
 def draw_shape(panel: "Axes", specimen: Specimen, shape: Shape) -> None:
-    """Draws a mode, scaled to a visible displacement; x and y are in metres, to equal scale."""
+    """Draws a mode, scaled to a visible displacement; x and y are in metres, at the same scale."""
     u1, u2, theta = shape
     frame, block = specimen.frame, specimen.block
     top = 0.0 if isnan(theta) else 2.0 * block.h_b * theta
@@ -47,7 +47,7 @@ def draw_shape(panel: "Axes", specimen: Specimen, shape: Shape) -> None:
         # positive rotation moves the top towards the frame
         _arrow(panel, specimen.d + block.b, 2.0 * block.h_b, -scale * top)
     margin, width = 1.2 * REACH * frame.h2, specimen.d + 2.0 * block.b
-    # draw the bare frame centred, to the scale of the coupled one
+    # draw the bare frame centred, at the scale of the coupled one
     shift = 0.5 * width if isnan(theta) else 0.0
     left, right = -BAY * frame.h2 - margin - shift, width + margin - shift
     tallest = max(frame.h2, 2.0 * block.h_b)
@@ -136,7 +136,9 @@ def modes_figure(modes: Modes, specimen: Specimen) -> "Figure":
 
 
 def _shapes(modes: Modes, betas: NDArray[np.float64], specimen: Specimen) -> "Figure":
-    """One column per system, one row per mode of the coupled one; the last two rows are the modes of the bare frame."""
+    """One column per system and one row per mode of the coupled system; the last two rows also show the modes of the
+    bare frame.
+    """
     columns = len(betas) + 1
     figure = new_figure(columns * SKETCH[0], 3 * SKETCH[1] + 0.5)
     # equal axes shrink after the layout: reserve space for titles
@@ -147,7 +149,7 @@ def _shapes(modes: Modes, betas: NDArray[np.float64], specimen: Specimen) -> "Fi
     systems += [(np.flatnonzero(modes["beta"] == beta), rf"$\beta$ = {beta:g}") for beta in betas]
     for k, (rows, title) in enumerate(systems):
         for row in rows:
-            # the coupled system has an additional mode, below those of the frame
+            # the coupled system has an additional mode below those of the frame
             line = int(modes["mode"][row]) - (0 if rows is bare else 1)
             panel = figure.add_subplot(3, columns, line * columns + k + 1)
             shape = [float(modes[name][row]) for name in ("shape_u1", "shape_u2", "shape_theta_rad_per_m")]

@@ -32,10 +32,12 @@ WIDTH, ROW = 9.0, 4.2
 """Width of the figure, height of a record [inch]."""
 
 LATE = 0.8
-"""Position in a history, as a share of its length, beyond which the peak value is printed to the left of its mark."""
+"""Position in a history, as a fraction of its length, beyond which the peak value is printed to the left of its
+mark.
+"""
 
 MOST_POINTS = 4000
-"""Largest number of drawn points; longer histories are drawn as minimum and maximum of equal intervals."""
+"""Largest number of drawn points; longer histories are drawn as the minima and maxima of equal intervals."""
 
 FIT_WIDTH, FIT_HEIGHT = 11.0, 6.0
 """Size of the figure of a fit [inch]."""
@@ -97,8 +99,8 @@ def record_figure(records: Sequence[RecordPicture]) -> "Figure":
 
 
 def stroke_figure(title: str, histories: Sequence[History], spectra: Spectra, reach: tuple[float, float]) -> "Figure":
-    """Histories on the left, response spectra on the right. The first of `histories` is before the fit; `reach`
-    is the allowed displacement [m] and velocity [m/s].
+    """Histories on the left, response spectra on the right. The first of `histories` is the motion before the fit;
+    `reach` is the allowed displacement [m] and velocity [m/s].
     """
     figure = new_figure(FIT_WIDTH, FIT_HEIGHT)
     grid = figure.add_gridspec(6, 2, width_ratios=[3.0, 2.0])

@@ -45,7 +45,9 @@ PANELS, PANELS_WIDTH, PANEL_HEIGHT = 3, 9.5, 2.5
 """Panels per row; width of the figure and height of a row [inch]."""
 
 TOPPLED, LOWER, HEADROOM = 0.96, 0.06, 0.3
-"""Height of the marks of a toppled block, offset per further stiffness, and space for them, relative to the panel."""
+"""Height of the marks for a toppled block, offset for each further stiffness, and space for the marks, relative to the
+panel.
+"""
 
 
 @dataclass(frozen=True, eq=False)

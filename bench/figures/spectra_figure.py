@@ -38,11 +38,12 @@ LEGEND = (
 
 HEADROOM = 1.35
 FLOOR, CEILING = 0.01, 20.0
-"""Predicted gains outside these limits do not extend the axis: no bench can distinguish them from 0 or a resonance."""
+"""Limits beyond which predicted gains do not extend the axis: no bench can distinguish them from 0 or a resonance."""
 
 Prediction = Mapping[str, NDArray[Any]]
-"""Arrays of equal length: omega [rad/s], beta, alpha_2, stable (truth values), layer ("rocking" or "resting"), and
-optionally the band of alpha_2: alpha_2_low, alpha_2_high."""
+"""Arrays of equal length: omega [rad/s], beta, alpha_2, stable (Booleans), layer ("rocking" or "resting"), and
+optionally the band of alpha_2: alpha_2_low, alpha_2_high.
+"""
 
 
 def gain_spectra(points: Sequence[PointLike], prediction: Prediction, *, title: str = "") -> "Figure":
@@ -97,7 +98,7 @@ def _draw_prediction(panel: "Axes", prediction: Mapping[str, NDArray[Any]]) -> N
                 linewidth=0.0,
                 label=BAND,
             )
-        # extend an unstable stretch to its stable neighbours, so that the branch has no gaps
+        # extend an unstable section to its stable neighbours, so that the branch has no gaps
         near = ~stable | np.append(~stable[1:], False) | np.append(False, ~stable[:-1])
         panel.plot(
             omega,
@@ -201,7 +202,9 @@ def _dress(panel: "Axes", beta: float, limits: tuple[tuple[float, float], tuple[
 
 
 def _ranges(rows: list[dict[str, Any]], prediction: Prediction) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Common ranges of frequency and gain: all measured points, and predictions between FLOOR and CEILING."""
+    """Common ranges of frequency and gain, which include all measured points, and predictions between FLOOR and
+    CEILING.
+    """
     omega = np.array([*prediction["omega"], *(row["omega_rad_s"] for row in rows)], dtype=np.float64)
     predicted = prediction["alpha_2"].astype(np.float64)
     predicted = predicted[(predicted > FLOOR) & (predicted < CEILING)]

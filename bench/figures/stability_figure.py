@@ -1,5 +1,5 @@
 # pyright: reportUnknownMemberType=false
-"""Slowest multiplier over the frequency, on fixed ground and on the table: a panel for each stiffness."""
+"""Slowest multiplier against frequency, on fixed ground and on the table; one panel per stiffness."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -19,7 +19,7 @@ Values = Mapping[str, NDArray[Any]]
 
 
 def stability_figure(points: Values, boundaries: Values) -> "Figure":
-    """Arrays of the tables of `bench.prediction.stability`. A circle is a boundary of stability."""
+    """Arguments are arrays of the tables from `bench.prediction.stability`. A circle marks a stability boundary."""
     betas = sorted({float(beta) for beta in points["beta"]})
     across = min(COLUMNS, len(betas))
     down = -(-len(betas) // across)

@@ -30,7 +30,7 @@ MARKERS = "osD^v<>"
 """Colours and markers of the curves of a panel, in order."""
 
 HEADROOM = 1.12
-"""Ratio of a panel's edge to the largest value."""
+"""Ratio of the axis limit to the largest value."""
 
 MILLI = 1e3
 """Factor from m and rad to the drawn mm and mrad."""
@@ -63,7 +63,7 @@ def set_grid(panel: "Axes") -> None:
 
 
 def centre(panel: "Axes", *curves: NDArray[np.float64]) -> None:
-    """Centres the vertical axis at zero, with a margin above the largest value of the curves."""
+    """Centres the vertical axis at zero, with a margin beyond the curves' largest value."""
     finite = np.concatenate([curve[np.isfinite(curve)] for curve in curves])
     reach = HEADROOM * float(np.abs(finite).max(initial=0.0)) or 1.0
     panel.set_ylim(-reach, reach)

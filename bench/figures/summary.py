@@ -23,9 +23,10 @@ def plain(points: Sequence[PointLike]) -> list[dict[str, Any]]:
 
 @dataclass(frozen=True)
 class Summary:
-    """Content of the summary. Times in seconds: `elapsed` by the wall clock, `bench_time` by the bench's clock.
+    """Contents of the summary. Times are in seconds: `elapsed` by the wall clock, `bench_time` by the bench's clock.
 
-    `plan_hash` is that of the preflight (docs/preflight.md). `findings` are the protocol's conclusions from its points.
+    `plan_hash` is the hash from the preflight (docs/preflight.md). `findings` are the protocol's conclusions from its
+    points.
     """
 
     protocol: str
@@ -43,7 +44,7 @@ class Summary:
     findings: Mapping[str, object] = field(default_factory=dict[str, object])
 
     def as_dict(self) -> dict[str, Any]:
-        """Content for JSON: enumerations as their values, NaN and infinity as null, paths with forward slashes."""
+        """Contents for JSON: enumerations as their values, NaN and infinity as null, paths with forward slashes."""
         content: dict[str, Any] = {
             "protocol": self.protocol,
             "status": self.status,
@@ -79,7 +80,7 @@ def json_ready(value: Any) -> Any:
     if isinstance(value, Enum):
         return json_ready(value.value)
     if isinstance(value, float):
-        # a NumPy scalar is a float but prints its type
+        # a NumPy scalar is a float, but its repr contains its type
         return float(value) if math.isfinite(value) else None
     if isinstance(value, dict):
         return {str(key): json_ready(item) for key, item in cast(dict[Any, Any], value).items()}

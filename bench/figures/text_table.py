@@ -9,7 +9,7 @@ UNLIMITED = 1_000_000
 
 @dataclass(frozen=True)
 class TextColumn:
-    """Column: title, unit below it ("" for none), and whether its cells are words, aligned left."""
+    """Column: title, unit below it ("" for none), and whether its cells are words and therefore left-aligned."""
 
     title: str
     unit: str = ""
@@ -39,7 +39,7 @@ def text_table(columns: Sequence[TextColumn], rows: Iterable[Sequence[str]]) -> 
     if any(len(row) != len(columns) for row in cells):
         raise ValueError(f"a table of {len(columns)} columns has rows of {sorted({len(row) for row in cells})} cells")
     if cells:
-        # one cell of many lines for each column: rich takes a quarter of the time
+        # one multi-line cell per column takes rich a quarter of the time
         table.add_row(*(Text("\n".join(column)) for column in zip(*cells, strict=True)))
     console = Console(width=UNLIMITED, color_system=None, force_terminal=False, legacy_windows=False)
     with console.capture() as captured:

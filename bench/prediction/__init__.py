@@ -1,1 +1,1 @@
-"""Predictions of the model as tables: modes, time histories, steady motions, spectra, maps."""
+"""Model predictions as tables: modes, time histories, steady motions, spectra, maps."""

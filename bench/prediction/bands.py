@@ -18,7 +18,7 @@ from sim.steady import NoOrbit, Orbit
 from sim.sweep import Done
 
 INTERVAL = (0.025, 0.975)
-"""Percentiles that enclose 95 % of the members of a Monte Carlo."""
+"""Percentiles that enclose 95 % of the members of a Monte Carlo simulation."""
 
 SEED = 20260101
 """Seed of the members: the same for every point, so that a band is as smooth as its curve."""
@@ -28,10 +28,10 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Bands:
-    """Bands of alpha_2 at n steady motions, arrays of shape (n,); NaN where none can be stated.
+    """Bands of alpha_2 at n steady motions, arrays of shape (n,); NaN where no band can be stated.
 
     `uncertainty` is expanded (k = 2); `low` and `high` enclose 95 %; `share` is the fraction of the members that have
-    such a motion, 1 to first order.
+    such a motion (1 to first order).
     """
 
     uncertainty: Floats
@@ -49,9 +49,9 @@ def bands(
 ) -> Bands:
     """Band around each `alpha_2`, shape (n,), of the motions `orbits`.
 
-    With `members` > 0, by a Monte Carlo with as many draws; otherwise to first order: the gain is computed one standard
-    uncertainty to either side along each independent direction (GUM 5.1.4, note 2), and the band is symmetric. Where a
-    motion exists on one side only, that side is used.
+    With `members` > 0, the band is from a Monte Carlo simulation with as many draws. Otherwise it is to first order:
+    the gain is computed one standard uncertainty to either side along each independent direction (GUM 5.1.4, note 2),
+    and the band is symmetric. Where a motion exists on one side only, that side is used.
     """
     best = np.asarray(alpha_2, dtype=np.float64)
     of: dict[Specimen, list[Specimen]] = {}
@@ -66,9 +66,10 @@ def bands(
 
 
 def record_bands(specimens: Sequence[Specimen], record: SampledRecord, known: SpecimenKnowledge, members: int) -> Bands:
-    """Band of alpha_2 of each of n `specimens` under `record`, from rest, by a Monte Carlo with `members` draws.
+    """Band of alpha_2 of each of n `specimens` under `record`, from rest, by a Monte Carlo simulation with `members`
+    draws.
 
-    First order does not apply here: toppling and the times of impacts do not change smoothly.
+    A first-order band does not apply here, because toppling and the times of impacts do not change smoothly.
     """
     drawn = [_members(specimen, known, members) for specimen in specimens]
     gains = record_gains([one for own in drawn for one in own], record)[:, 1]

@@ -1,4 +1,4 @@
-"""Output of predictions as CSV, HDF5 or JSON data."""
+"""Output of predictions as CSV, HDF5 or JSON."""
 
 import csv
 import json
@@ -20,7 +20,7 @@ FORMAT, FORMAT_VERSION = "rocking-bench prediction", 1
 
 
 def provenance(request: Parameters, specimen: Specimen, known: SpecimenKnowledge | None = None) -> dict[str, Any]:
-    """Inputs and software of a prediction, with the knowledge of the specimen if it states an uncertainty."""
+    """Inputs and software versions of a prediction, with the knowledge of the specimen if it states an uncertainty."""
     found = {"request": request.model_dump(mode="json"), "specimen": specimen.model_dump(mode="json")}
     if known is not None:
         found["known"] = known.model_dump(mode="json")

@@ -25,8 +25,8 @@ def map_table(
 ) -> Table:
     """One row for each layer that exists at a point, sorted by stiffness, then frequency.
 
-    With `known`, the knowledge of the specimen, additional columns give the band of alpha_2.
-    Raises SchedulerUnavailable if the requested scheduler does not respond.
+    If `known`, the knowledge of the specimen, is given, additional columns contain the band of alpha_2. Raises
+    SchedulerUnavailable if the requested scheduler does not respond.
     """
     betas, omegas = np.sort(request.beta), np.sort(request.omega)
     amplitude = amplitude_of(specimen, request)
@@ -59,7 +59,7 @@ def map_table(
 
 
 def grids(table: Mapping[str, NDArray[Any]], request: MapRequest, layer: str, name: str) -> NDArray[np.float64]:
-    """Column of one layer over the grid, shape (n_beta, n_omega), ascending in both; NaN where it has no row."""
+    """Column for one layer over the grid, shape (n_beta, n_omega), ascending in both; NaN where it has no row."""
     betas, omegas = np.sort(request.beta), np.sort(request.omega)
     grid = np.full((betas.size, omegas.size), np.nan)
     rows = table["layer"] == layer
@@ -72,7 +72,7 @@ def grids(table: Mapping[str, NDArray[Any]], request: MapRequest, layer: str, na
 def resting_margin(specimen: Specimen, request: MapRequest) -> NDArray[np.float64]:
     """Margin of a resting block against uplift, shape (n_beta, n_omega), ascending in both.
 
-    Amplitude that would uplift the block relative to the amplitude of the test, minus one: the resting layer exists
+    Ratio of the amplitude that would uplift the block to the amplitude of the test, minus one; the resting layer exists
     where it is positive.
     """
     amplitude = amplitude_of(specimen, request)

@@ -20,7 +20,7 @@ from sim.specimen import Specimen
 from sim.steady import Orbit
 
 FROM_REST = "from rest"
-"""Name of the motion from rest; the others are named after the layer of the steady state."""
+"""Name of the motion from rest; other motions are named after the layer of the steady state."""
 
 TIME = "time_s"
 
@@ -40,7 +40,7 @@ QUANTITIES: dict[str, tuple[str, str]] = {
 class History:
     """Motion: `values` holds an array of shape (n,) for each of `QUANTITIES`.
 
-    `status` is the ending at `end_time` [s]; `impacts` counts the impacts until then.
+    `status` is the ending at `end_time` [s]; `impacts` is the number of impacts until then.
     """
 
     omega: float
@@ -60,10 +60,10 @@ class History:
 def histories(specimen: Specimen, request: HistoryRequest, progress: Progress = silent) -> list[History]:
     """One history for each frequency at each stiffness, or one for each steady motion that exists there.
 
-    Raises InvalidInput for steady motions by another solver than taylor, or a tolerance outside the solver's range.
+    Raises InvalidInput for steady motions by a solver other than taylor, or a tolerance outside the solver's range.
     """
     if request.steady and request.solver != "taylor":
-        raise InvalidInput("--solver", request.solver, "steady histories are those of taylor; leave --steady out")
+        raise InvalidInput("--solver", request.solver, "steady histories are available from taylor only; omit --steady")
     amplitude = amplitude_of(specimen, request)
     made: list[History] = []
     points, begun = len(request.beta) * len(request.omega), 0
@@ -166,7 +166,7 @@ def _steady(orbit: Orbit, request: HistoryRequest) -> History:
 def _values(
     times: NDArray[np.float64], base: NDArray[np.float64], coupled: NDArray[np.float64], bare: NDArray[np.float64]
 ) -> dict[str, NDArray[np.float64]]:
-    """`QUANTITIES` from coupled (u1, u2, theta), shape (n, 3), and bare (u1, u2), shape (n, 2)."""
+    """Arrays for `QUANTITIES` from coupled (u1, u2, theta), shape (n, 3), and bare (u1, u2), shape (n, 2)."""
     return dict(zip(QUANTITIES, _in_order(times, base, coupled, bare), strict=True))
 
 

@@ -48,13 +48,13 @@ class SineRequest(OrbitsRequest):
     """Parameters of every prediction of a response to a sine."""
 
     solver: SolverName = quantity(
-        "taylor", "", "solver; those other than taylor are for comparison, and simulate 120 s for a steady motion"
+        "taylor", "", "solver; all but taylor are for comparison and simulate 120 s for a steady motion"
     )
     tolerance: float | None = quantity(
         None,
         "1",
-        "relative tolerance per step of taylor (1e-10 if absent) or dop853; other solvers have a step of 1 ms; steady "
-        "motions by taylor close to 1e-11 or better, regardless of it",
+        "relative tolerance per step of taylor (1e-10 if absent) or dop853; other solvers use a step of 1 "
+        "ms; steady motions by taylor are closed to 1e-11 or better, whatever the tolerance",
         ge=1e-15,
         le=1e-3,
     )
@@ -66,7 +66,7 @@ class GainRequest(SineRequest):
     members: int = quantity(
         0,
         "1",
-        "specimens drawn for the band of alpha_2, which encloses 95 % of them; 0: computed to first order",
+        "number of specimens drawn for the band of alpha_2, which encloses 95 % of them; 0: a first-order band",
         ge=0,
         le=100_000,
     )
@@ -106,7 +106,7 @@ class StabilityRequest(OrbitsRequest):
     table_mass: float | None = quantity(
         None,
         "kg",
-        "moving mass of the table, without the specimen; absent: that of the simulated bench",
+        "moving mass of the table, without the specimen; if absent, that of the simulated bench",
         gt=0,
         le=1e6,
         usual=(5.0, 5000.0),
@@ -121,10 +121,10 @@ class HistoryRequest(SineRequest):
 
     omega: tuple[Frequency, ...] = _frequencies((16.0, 14.0, 17.5))
     beta: tuple[Stiffness, ...] = _stiffnesses((0.40,))
-    duration: float = quantity(12.0, "s", "length of a history that starts from rest", gt=0, le=3600)
+    duration: float = quantity(12.0, "s", "duration of a history that starts from rest", gt=0, le=3600)
     steady: bool = quantity(False, "", "show the steady motions instead of a start from rest")
-    periods: int = quantity(3, "1", "drive periods in a steady history", ge=1, le=1000)
-    samples_per_period: int = quantity(200, "1", "samples in a period of the drive", ge=8, le=10000)
+    periods: int = quantity(3, "1", "number of drive periods in a steady history", ge=1, le=1000)
+    samples_per_period: int = quantity(200, "1", "number of samples per drive period", ge=8, le=10000)
 
 
 class RecordsRequest(Parameters):
@@ -136,14 +136,18 @@ class RecordsRequest(Parameters):
     table_band: str | None = quantity(
         None,
         "",
-        "band of the table LOW:HIGH [Hz] to which records are filtered before scaling, or none; absent: that of "
-        "the configured shaker",
+        "table's band LOW:HIGH [Hz] to which records are filtered before scaling, or none; if absent, that "
+        "of the configured shaker",
     )
     trim: float = quantity(
-        0.0005, "1", "share of the Arias intensity removed at either end of a record; 0: none", ge=0, lt=0.5
+        0.0005, "1", "fraction of the Arias intensity removed at either end of a record; 0: none", ge=0, lt=0.5
     )
     length_ratio: float = quantity(
-        1.0, "1", "length scale, model over prototype: time scales with its root, acceleration is kept", gt=0, le=1
+        1.0,
+        "1",
+        "length scale, model over prototype: time scales with its square root, acceleration is unchanged",
+        gt=0,
+        le=1,
     )
 
 
@@ -157,7 +161,7 @@ class SeismicRequest(RecordsRequest):
     members: int = quantity(
         0,
         "1",
-        "specimens drawn at every stiffness for a band that encloses 95 % of their alpha_2; 0: no band",
+        "number of specimens drawn at every stiffness for a band that encloses 95 % of their alpha_2; 0: no band",
         ge=0,
         le=100_000,
     )
@@ -183,20 +187,28 @@ class StrokeFitRequest(Parameters):
     """Fit of a record to the table's stroke."""
 
     method: Literal["both", "least-change", "high-pass"] = quantity(
-        "both", "", "fitting method; both: fit by both and compare"
+        "both", "", "fitting method; both: fit by both methods and compare them"
     )
-    share: float = quantity(0.9, "1", "share of the bench's stroke and limits that the motion may use", gt=0, le=1)
+    share: float = quantity(0.9, "1", "fraction of the bench's stroke and limits that the motion may use", gt=0, le=1)
     peak_factor: float | None = quantity(
-        None, "1", "peak before the fit, relative to the uplift acceleration g/lambda; absent: unscaled", gt=0, le=1000
+        None,
+        "1",
+        "peak before the fit, relative to the uplift acceleration g/lambda; if absent, the record is not scaled",
+        gt=0,
+        le=1000,
     )
     table_band: str = quantity("none", "", "band LOW:HIGH [Hz] to which the record is filtered first, or none")
     trim: float = quantity(
         0.0005,
         "1",
-        "share of the Arias intensity removed at either end of the record; 0: none",
+        "fraction of the Arias intensity removed at either end of the record; 0: none",
         ge=0,
         lt=0.5,
     )
     length_ratio: float = quantity(
-        1.0, "1", "length scale, model over prototype: time scales with its root, acceleration is kept", gt=0, le=1
+        1.0,
+        "1",
+        "length scale, model over prototype: time scales with its square root, acceleration is unchanged",
+        gt=0,
+        le=1,
     )

@@ -29,7 +29,7 @@ Band = tuple[float, float] | None
 class SeismicCurve:
     """Prediction for one record: the table motion, and a gain for each stiffness.
 
-    `bands` of alpha_2 at each stiffness, if requested.
+    `bands` are the bands of alpha_2 at each stiffness, if requested.
     """
 
     accelerogram: Accelerogram
@@ -130,7 +130,7 @@ def _curve(
 
 
 DIGITS = 9
-"""Significant digits of peaks and gains: the error of a step is 1e-10, and impacts amplify it."""
+"""Significant digits of peaks and gains: the error of a step is 1e-10 and is amplified by impacts."""
 
 Columns = Mapping[str, tuple[type, str, str]]
 
@@ -171,13 +171,13 @@ GAIN_BANDS: Columns = {
         "1",
         "lower bound of the 95 % interval of alpha_2 over the drawn specimens that did not topple",
     ),
-    "alpha_2_high": (np.float64, "1", "upper bound of this interval"),
+    "alpha_2_high": (np.float64, "1", "upper bound of the 95 % interval of alpha_2"),
     "members_share": (np.float64, "1", "share of the drawn specimens that did not topple"),
 }
 
 MOTIONS: Columns = {
     **RECORD,
-    "source": (np.str_, "", "file of the record, or its synthesis"),
+    "source": (np.str_, "", "file of the record, or method of its synthesis"),
     "sha256": (np.str_, "", "hash of the file's bytes, or of the samples"),
     **BAND,
     "record_peak_m_s2": (np.float64, "m/s2", "greatest acceleration of the record"),
@@ -186,7 +186,7 @@ MOTIONS: Columns = {
     "velocity_max_m_per_s": (np.float64, "m/s", "greatest velocity of the table"),
     "displacement_max_m": (np.float64, "m", "greatest displacement of the table"),
     "begin_s": (np.float64, "s", "start of the motion on the record's time axis"),
-    "duration_s": (np.float64, "s", "length of the motion"),
+    "duration_s": (np.float64, "s", "duration of the motion"),
     "steps": (np.str_, "", "processing steps, in order"),
 }
 
@@ -202,7 +202,7 @@ def gains_table(curves: Sequence[SeismicCurve]) -> Table:
 
 
 def motions_table(curves: Sequence[SeismicCurve]) -> Table:
-    """One row for each motion of the table: its record and its processing."""
+    """One row for each table motion, with its record and processing."""
     return _table(MOTIONS, [_motion(curve) for curve in curves])
 
 

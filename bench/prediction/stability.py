@@ -17,7 +17,7 @@ from sim.sweep import in_threads
 from sim.table_orbit import table_orbit
 
 GROUNDS = {"fixed ground": "modulus", "table": "table_modulus"}
-"""Column of the moduli of each ground."""
+"""Column of the moduli for each ground."""
 
 BOUNDARY = 1e-4
 """Largest error of the frequency of a boundary [rad/s]."""
@@ -25,14 +25,14 @@ BOUNDARY = 1e-4
 UNKNOWN = complex(nan, nan)
 
 REAL = 0.02
-"""Largest distance of a multiplier's angle from 0 or pi [rad] for a real one."""
+"""Largest distance of a multiplier's argument from 0 or pi [rad] at which it counts as real."""
 
 
 def multipliers_table(
     specimen: Specimen, shaker: Shaker, request: StabilityRequest, progress: Progress = silent
 ) -> Table:
     """One row per rocking orbit, by stiffness and ascending frequency: its gain, and its slowest multiplier on fixed
-    ground and on the table, NaN where no orbit was found there.
+    ground and on the table, NaN where no orbit was found on the table.
     """
     found = predict_spectra(specimen, request, progress)
     layers = [(each.beta, each.omega, each.rocking) for each in found if each.rocking is not None]
@@ -99,12 +99,14 @@ def boundaries_table(
         "ground": Column(np.array([ground for ground, *_ in changes], dtype=np.str_), "", "fixed ground, or table"),
         "omega_rad_s": Column(np.array([omega for omega, _ in found]), "rad/s", "frequency at which the orbit changes"),
         "argument_rad": Column(
-            np.array([float(np.angle(each)) for _, each in found]), "rad", "argument of the multiplier there"
+            np.array([float(np.angle(each)) for _, each in found]),
+            "rad",
+            "argument of the multiplier at this frequency",
         ),
         "kind": Column(
             np.array([_kind(each) for _, each in found], dtype=np.str_),
             "",
-            "fold, flip or Neimark-Sacker; empty where no orbit was found on the way",
+            "fold, flip or Neimark-Sacker; empty if the bisection found no orbit",
         ),
     }
 

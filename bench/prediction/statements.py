@@ -79,26 +79,26 @@ POINTS = {"A": 16.0, "B": 14.0, "C": 17.5}
 POINTS_BETA = 0.4
 
 HERTZ = 0.05
-"""Tolerance of a frequency given to one decimal place [Hz]."""
+"""Tolerance for a frequency stated to one decimal place [Hz]."""
 
 NEAR = 0.5
-"""Tolerance of the frequency of the least gain around the second mode [rad/s]: 3 %."""
+"""Tolerance for the frequency of the least gain around the second mode [rad/s]: 3 %."""
 
 CLOSE = 0.3
-"""Tolerance of point C around the boundary of the gain region [rad/s]: 2 %."""
+"""Tolerance for point C around the boundary of the gain region [rad/s]: 2 %."""
 
 PEAK = 0.1
-"""Tolerance of the peak of a spectrum around the paper's frequency [rad/s]."""
+"""Tolerance for the peak of a spectrum around the paper's frequency [rad/s]."""
 
 ALMOST = 30.0
-"""Largest deviation from in-phase or counter-phase motion that is still "almost" [degrees]."""
+"""Largest deviation from in-phase or counter-phase motion that counts as "almost" [degrees]."""
 
 MUCH = 10.0
 """Ratio regarded as "much": the factor by which the paper magnifies u1 relative to theta."""
 
 
 def harmonic_statements(specimen: Specimen, amplitude: float) -> list[Statement]:
-    """Statements 1 to 7 under a sine of `amplitude` [m/s2]. Raises RockbenchError where there is no orbit."""
+    """Statements 1 to 7 under a sine of `amplitude` [m/s2]. Raises RockbenchError if there is no orbit."""
     omegas = np.linspace(LOW, HIGH, round((HIGH - LOW) / STEP) + 1)
     gains = {beta: _section(specimen, beta, omegas, amplitude) for beta in sorted({*BETAS, *RIDGE})}
     points = {name: _rocking(specimen, omega, amplitude) for name, omega in POINTS.items()}
@@ -114,7 +114,7 @@ def harmonic_statements(specimen: Specimen, amplitude: float) -> list[Statement]
 
 
 def lead_of_u1(layer: Layer) -> float:
-    """Phase [degrees] by which u1 leads theta, in the fundamental of the drive and the paper's positive directions."""
+    """Phase [degrees] by which u1 leads theta, at the drive frequency and in the paper's positive directions."""
     table = layer.orbit.samples(720)
     wave = np.exp(-1j * table[:, 0])
     return float(np.degrees(np.angle((table[:, 1] @ wave) / (table[:, 3] @ wave))))
@@ -247,7 +247,7 @@ def _listed(values: Mapping[float, float], form: str) -> str:
 
 
 ABOUT = 0.1
-"""Tolerance of the best gain around 0.5."""
+"""Tolerance for the best gain around 0.5."""
 
 
 def seismic_statement(curves: Sequence[SeismicCurve]) -> Statement:
@@ -264,7 +264,7 @@ def seismic_statement(curves: Sequence[SeismicCurve]) -> Statement:
     least = float(known.min()) if known.size else float("nan")
     most = float(known.max()) if known.size else float("nan")
     everywhere = Check(
-        "α₂ < 1 for every record and stiffness, and nothing topples",
+        "α₂ < 1 for every record and stiffness, and the block never topples",
         f"α₂ < 1 in {below} of {len(gains)} runs, from {least:.3f} to {most:.3f}; the block topples in {toppled}",
         below == len(gains),
         {"below": below, "runs": len(gains), "toppled": toppled, "least": least, "most": most},
@@ -280,7 +280,7 @@ def seismic_statement(curves: Sequence[SeismicCurve]) -> Statement:
     ends = [_ends(curve) for curve in curves]
     nearer = sum(last < first for first, last in ends)
     towards = Check(
-        "α₂ is nearer to 1 at the largest β than at the smallest, for every record",
+        "α₂ is closer to 1 at the largest β than at the smallest, for every record",
         f"true for {nearer} of {len(curves)} records",
         nearer == len(curves),
         {"nearer": nearer, "records": len(curves)},
@@ -290,6 +290,6 @@ def seismic_statement(curves: Sequence[SeismicCurve]) -> Statement:
 
 
 def _ends(curve: SeismicCurve) -> tuple[float, float]:
-    """Distance of alpha_2 from 1 at the smallest and the largest stiffness with a gain; NaN without any."""
+    """Distance of alpha_2 from 1 at the smallest and the largest stiffness with a gain; NaN if there are none."""
     known = [gain.alpha_2 for gain in curve.gains if gain.alpha_2 is not None]
     return (abs(known[0] - 1.0), abs(known[-1] - 1.0)) if known else (float("nan"), float("nan"))

@@ -60,7 +60,7 @@ def timed_gains(
     scheduler: str | None = None,
     done: Done | None = None,
 ) -> list[Timed | None]:
-    """One simulation by the requested solver per prediction, on all processors; None without a rocking orbit.
+    """One simulation per prediction by the requested solver, on all processors; None without a rocking orbit.
 
     Raises InvalidInput for a tolerance outside the solver's range.
     """
@@ -107,7 +107,9 @@ def modes_table(specimen: Specimen, betas: Sequence[float]) -> Table:
         "mode": Column(mode.astype(np.int64), "1", "number of the mode, in ascending order of the eigenvalue"),
         "divergent": Column(divergent, "1", "whether the mode grows instead of oscillating: negative stiffness"),
         "omega_rad_s": Column(np.where(divergent, np.nan, omega), "rad/s", "circular frequency; absent if divergent"),
-        "frequency_hz": Column(np.where(divergent, np.nan, omega / (2.0 * np.pi)), "Hz", "frequency, likewise"),
+        "frequency_hz": Column(
+            np.where(divergent, np.nan, omega / (2.0 * np.pi)), "Hz", "frequency; absent if divergent"
+        ),
         "growth_rate_per_s": Column(np.where(divergent, -omega, np.nan), "1/s", "growth rate if divergent"),
         "signed_root_rad_s": Column(omega, "rad/s", "sign(lambda) sqrt|lambda|, lambda an eigenvalue of M^-1 K"),
         "shape_u1": Column(
@@ -150,7 +152,7 @@ COLUMNS: dict[str, tuple[str, str, int | None]] = {
     "impacts_per_period": ("1", "impacts of the block per period of the drive", None),
     "floquet_modulus": (
         "1",
-        "greatest |Floquet multiplier|: remaining share of a disturbance after a period",
+        "greatest |Floquet multiplier|: fraction of a disturbance that remains after a period",
         MULTIPLIER_DIGITS,
     ),
     "floquet_argument_rad": ("rad", "argument of that multiplier: 0 fold, pi flip, between them Neimark-Sacker", 6),
@@ -161,10 +163,10 @@ EXTRA: dict[str, tuple[str, str, int | None]] = {
     "alpha_2_uncertainty": ("1", "expanded uncertainty of alpha_2 (k = 2) due to the specimen", 6),
     "alpha_2_low": ("1", "lower bound of the 95 % band of alpha_2", 6),
     "alpha_2_high": ("1", "upper bound of the 95 % band of alpha_2", 6),
-    "members_share": ("1", "share of the drawn specimens that have this motion; 1 to first order", 6),
+    "members_share": ("1", "fraction of the drawn specimens that have this motion; 1 to first order", 6),
     "status": ("", "exact, or the ending of the simulation by another solver", None),
     "outcome": ("", "outcome of the sine switched on at rest: rocking, resting, other, toppled or failed", None),
-    "outcome_time_s": ("s", "time of overturning, or at which the outcome was decided", None),
+    "outcome_time_s": ("s", "time at which the block overturned or the outcome was decided", None),
 }
 
 Row = dict[str, float | str | bool | None]
@@ -187,7 +189,7 @@ def predict_points(specimen: Specimen, request: SineRequest, progress: Progress 
 
 
 def predict_spectra(specimen: Specimen, request: OrbitsRequest, progress: Progress = silent) -> list[GainPrediction]:
-    """The same, continued along ascending frequency from neighbouring points: five times faster."""
+    """The same predictions, continued along ascending frequency from neighbouring points: five times faster."""
     amplitude, omegas = amplitude_of(specimen, request), sorted(request.omega)
     found: list[GainPrediction] = []
     for i, beta in enumerate(request.beta):
@@ -205,9 +207,9 @@ def steady_table(
 ) -> Table:
     """One row for each layer of each prediction, rounded to the significant digits.
 
-    `timed`, one for each prediction: gains of the rocking layer by another solver, which replace the exact ones; an
-    additional column gives the ending of its simulation. `known`: knowledge of the specimen; additional columns then
-    give the band of alpha_2, see `bench.prediction.bands.bands`.
+    `timed` has one entry for each prediction: gains of the rocking layer by another solver, which replace the exact
+    ones; an additional column gives the ending of its simulation. `known`: knowledge of the specimen; additional
+    columns then give the band of alpha_2, see `bench.prediction.bands.bands`.
     """
     rows: list[Row] = []
     for k, prediction in enumerate(predictions):
@@ -240,7 +242,7 @@ def band_columns(
     members: int,
     done: Done | None = None,
 ) -> dict[str, NDArray[np.float64]]:
-    """Columns of a band of alpha_2, by name."""
+    """Columns for a band of alpha_2, by name."""
     found = bands(orbits, alpha_2, known, members, done)
     return {
         "alpha_2_uncertainty": found.uncertainty,
@@ -265,7 +267,7 @@ EXACT_POWER = 22
 """Largest power of ten that a double represents exactly: dividing by it rounds once, like reading a decimal number."""
 
 NEAR_TIE = 1e-3
-"""Distance of the discarded digits from one half below which rounding is left to the decimal conversion."""
+"""Distance of the discarded digits from one half below which the decimal conversion does the rounding."""
 
 
 def rounded(values: NDArray[np.float64], digits: int) -> NDArray[np.float64]:

@@ -65,7 +65,9 @@ def stroke_fits(record: Accelerogram, request: StrokeFitRequest, configuration: 
 
 
 def change_at(fit: StrokeFit, periods: Array) -> Array:
-    """Relative change of the response spectrum at `periods` [s], same shape, which must be among its own."""
+    """Relative change of the response spectrum at `periods` [s], same shape; they must be among the spectrum's
+    periods.
+    """
     return fit.change[np.searchsorted(fit.periods, periods)]
 
 

@@ -37,7 +37,9 @@ class TableResponse(Protocol):
 
     @property
     def friction(self) -> float:
-        """Additional drive to overcome friction [V]: fundamental of a force that changes sign with the velocity."""
+        """Additional drive needed to overcome friction [V]: fundamental of a force that changes sign with the
+        velocity.
+        """
         ...
 
 
@@ -60,7 +62,7 @@ class SimulatedTable:
 
 @dataclass(frozen=True)
 class IdentifiedTable:
-    """Identified table; includes specimen and friction at the time of identification."""
+    """Response of an identified table; includes the specimen and friction at the time of identification."""
 
     model: TableModel
 
@@ -78,8 +80,8 @@ class IdentifiedTable:
 def response_of(configuration: BenchConfiguration) -> TableResponse | None:
     """Response of this bench's table; None for a real table without a stored model.
 
-    Raises InvalidInput when the stored model cannot be read or was identified at another sample rate. Its age is
-    not checked: an old one still gives the approximate drive of a motion.
+    Raises InvalidInput if the stored model cannot be read or was identified at another sample rate. Its age is not
+    checked, since an old model still gives the approximate drive for a motion.
     """
     if configuration.table_model is not None:
         model = TableModel.read(Path(configuration.table_model))
@@ -114,7 +116,7 @@ def _amplitude(program: SineProgram, times: Array) -> Array:
 
 
 def _parts(program: SineProgram, times: Array) -> Iterator[tuple[Sweep, slice, Array]]:
-    """Each sweep with its slice of the ascending `times` [s], and these times since its start; the last sweep
+    """Each sweep with its slice of the ascending `times` [s], and those times relative to its start; the last sweep
     includes all later times.
     """
     begins = [0.0, *accumulate(sweep.duration for sweep in program.sweeps)][: len(program.sweeps)]
@@ -135,8 +137,8 @@ def load(
 ) -> dict[str, float]:
     """Largest value of each quantity of table and shaker from `begin` [s] on; unknown quantities are absent.
 
-    The heating is evaluated at the end of the last sine, held for `held` [s], if it is largest there, with the time
-    constant `heating_time` [s]. It begins at zero, as in the guard after arming.
+    The heating, with time constant `heating_time` [s], begins at zero, as in the guard after arming, and is also
+    evaluated at the end of the last sine, which is held for `held` [s].
     """
     times = np.arange(0.0, program.duration, STEP)
     amplitude, omega, _ = envelope(program, times)
@@ -162,7 +164,7 @@ def _heating(current: Array, held: float, time: float) -> float:
 
 
 PER_CYCLE = 32
-"""Samples per cycle of the highest frequency: a peak between two samples is missed by at most 0.5 %."""
+"""Samples per cycle of the highest frequency; a peak between two samples is underestimated by at most 0.5 %."""
 
 TOLERANCE = 1e-7
 """Relative tolerance of the simulations."""
@@ -170,8 +172,8 @@ TOLERANCE = 1e-7
 
 @dataclass(frozen=True)
 class Travel:
-    """Largest displacement at either laser and largest drift [m], as magnitudes, and the time [s] at which the block
-    `toppled`, where that counts.
+    """Largest magnitudes of the displacement at either laser and of the drift [m], and the time [s] at which the block
+    `toppled`, where that matters.
     """
 
     storey_1: float
@@ -183,7 +185,7 @@ class Travel:
 def travel_demands(
     travels: Sequence[Travel], halves: tuple[float, float], off_middle: float
 ) -> dict[str, NDArray[np.float64]]:
-    """`laser_demands` of each specimen, shape (n,), with the storeys at rest off the lasers' mid-range by the share
+    """`laser_demands` of each specimen, shape (n,), with the storeys at rest away from mid range by the fraction
     `off_middle`.
     """
     moved = np.array([(each.storey_1, each.storey_2, each.drift) for each in travels]).T
@@ -198,10 +200,10 @@ def stage_travels(
     reference: Literal["ground", "table"],
     catch_angle: float,
 ) -> list[Travel]:
-    """Travels of each specimen under its program, from rest; evaluated from `begin` [s] to the end, or to a fall of the
-    block.
+    """Travels of each specimen under its program, from rest; evaluated from `begin` [s] until the end, or until the
+    block falls.
 
-    The programs differ in their amplitudes only. `reference` is the mounting of the lasers; from `catch_angle` [rad] on
+    The programs differ only in their amplitudes. `reference` is the mounting of the lasers; from `catch_angle` [rad] on
     the block counts as fallen.
     """
     highest = max(max(sweep.omega) for sweep in programs[0].sweeps)
@@ -225,12 +227,12 @@ def stage_travels(
 
 
 LIKELY = 0.95
-"""Share of the drawn specimens that a likely demand covers."""
+"""Fraction of the drawn specimens that a likely demand covers."""
 
 UNKNOWN_SHAKER = {
-    "force": "the moving mass is not known: give hardware.moving_mass and hardware.force_constant",
-    "current": "the force constant is not known: give hardware.moving_mass and hardware.force_constant",
-    "heating": "the force constant is not known: give hardware.moving_mass and hardware.force_constant",
+    "force": "the moving mass is unknown: set hardware.moving_mass and hardware.force_constant",
+    "current": "the force constant is unknown: set hardware.moving_mass and hardware.force_constant",
+    "heating": "the force constant is unknown: set hardware.moving_mass and hardware.force_constant",
 }
 """Reasons why quantities of the shaker may not be predicted."""
 
@@ -240,11 +242,11 @@ UNPROBED = {
     "drive_slew": "unknown table: determined by the probes, within limits.drive_slew",
     **UNKNOWN_SHAKER,
 }
-"""Reasons for a table that the run itself probes."""
+"""Reasons that apply to a table that the run itself probes."""
 
 
 def demands_of(known: Mapping[str, float], where: str, configuration: BenchConfiguration) -> tuple[Demand, ...]:
-    """Demand of every limited quantity in the decisive part `where` of a run, on a table that the run itself probes."""
+    """Demand on every limited quantity in the decisive part `where` of a run, on a table that the run itself probes."""
     return tuple(
         Demand(quantity, known[quantity], None, where)
         if quantity in known
@@ -266,7 +268,7 @@ class StageDemands:
 
 
 def demand(quantity: str, asked: Sequence[StageDemands], unknown: Mapping[str, str]) -> Demand:
-    """Largest demand of `quantity` over the parts, or the reason in `unknown` where none is predicted."""
+    """Largest demand on `quantity` over the parts, or the reason in `unknown` if none is predicted."""
     known = [each for each in asked if quantity in each.values]
     if not known:
         return Demand(quantity, None, None, unknown[quantity])

@@ -18,9 +18,8 @@ from sim.errors import InvalidInput
 class Demand:
     """Largest predicted value of one limited quantity, a key of `bounds`, in its SI unit.
 
-    `value` is for the nominal specimen; 95 % of the specimens within the uncertainty stay below `likely`.
-    `where` is the part of the run in which it occurs. Both values are None if not predicted; `where` is
-    then the reason.
+    `value` is for the nominal specimen; 95 % of the specimens within the uncertainty stay below `likely`. `where` is
+    the part of the run in which it occurs. If not predicted, both values are None and `where` is the reason.
     """
 
     quantity: str
@@ -31,7 +30,7 @@ class Demand:
 
 @dataclass(frozen=True)
 class Stage:
-    """Part of a run: table motions from rest, and the estimated chance of success, if known."""
+    """Part of a run: table motions from rest, and the estimated probability of success, if known."""
 
     name: str
     legs: tuple[Leg, ...]
@@ -40,7 +39,7 @@ class Stage:
 
 @dataclass(frozen=True)
 class Forecast:
-    """Forecast of a run; empty if its protocol predicts nothing. `duration` is the expected length [s].
+    """Forecast of a run; empty if its protocol predicts nothing. `duration` is the expected duration [s].
 
     `warnings` do not prevent the run. `notes` describe the processing of the input.
     """
@@ -52,9 +51,9 @@ class Forecast:
     notes: tuple[str, ...] = ()
 
 
-_LESS = "ask for less acceleration"
-_FASTER = f"{_LESS}, or for higher frequencies"
-_AWAY = f"{_LESS}, or keep the frequencies farther from the resonances of the specimen"
+_LESS = "reduce the acceleration"
+_FASTER = f"{_LESS}, or use higher frequencies"
+_AWAY = f"{_LESS}, or choose frequencies farther from the specimen's resonances"
 
 
 @dataclass(frozen=True)
@@ -70,7 +69,7 @@ class Bound:
 
     @property
     def suffix(self) -> str:
-        """The unit after a number, empty for a pure number."""
+        """The unit as printed after a number; empty for a pure number."""
         return "" if self.unit == "1" else f" {self.unit}"
 
 
@@ -84,7 +83,7 @@ def bounds(configuration: BenchConfiguration) -> dict[str, Bound]:
     laser = min(guarded("laser_range"), (1.0, "the laser's range"))
     found = {
         "drive_voltage": ("drive", "V", min([guarded("drive_voltage"), *_drive(configuration)]), _FASTER),
-        "drive_slew": ("slew of the drive", "V/s", guarded("drive_slew"), f"{_LESS}, or for lower frequencies"),
+        "drive_slew": ("slew of the drive", "V/s", guarded("drive_slew"), f"{_LESS}, or use lower frequencies"),
         "displacement": (*WATCHED["displacement"], min(guarded("displacement"), _stroke(configuration)), _FASTER),
         "velocity": (*WATCHED["velocity"], guarded("velocity"), _FASTER),
         "acceleration": (*WATCHED["acceleration"], guarded("acceleration"), _LESS),
@@ -92,7 +91,7 @@ def bounds(configuration: BenchConfiguration) -> dict[str, Bound]:
         "current": (*WATCHED["current"], min([guarded("current"), *_current(configuration)]), _LESS),
         "heating": (*WATCHED["heating"], guarded("heating"), _LESS),
         **{
-            name: (f"share of laser {number}'s half range", "1", laser, _AWAY)
+            name: (f"fraction of laser {number}'s half range", "1", laser, _AWAY)
             for number, name in enumerate(STOREYS, start=1)
         },
         "drift": (*WATCHED["drift"], guarded("drift"), _AWAY),
@@ -151,7 +150,7 @@ def margins(demands: Iterable[Demand], bounds: Mapping[str, Bound]) -> tuple[Mar
 
 
 def refusal(found: Sequence[Margin]) -> InvalidInput | None:
-    """Refusal naming the exceeded limit with the least margin, or None. `found` is in ascending order of margin."""
+    """Error naming the exceeded limit with the smallest margin, or None. `found` is in ascending order of margin."""
     binding = found[0] if found else None
     if binding is None or binding.margin is None or binding.margin >= 0.0:
         return None
@@ -161,7 +160,7 @@ def refusal(found: Sequence[Margin]) -> InvalidInput | None:
 
 
 def warnings(found: Sequence[Margin]) -> tuple[str, ...]:
-    """Warnings of limits that the nominal specimen keeps but others within the uncertainty may exceed."""
+    """Warnings about limits that the nominal specimen does not exceed but others within the uncertainty may."""
     return tuple(
         f"at the 95 % bound of the specimen's uncertainty {bound.owner} = {bound.limit:g} would be exceeded: "
         + _needs(each, each.demand.likely, each.likely)
@@ -173,7 +172,7 @@ def warnings(found: Sequence[Margin]) -> tuple[str, ...]:
 
 def _needs(each: Margin, value: float | None, margin: float | None) -> str:
     bound = each.bound
-    return f"{each.demand.where} takes {value:.4g}{bound.suffix} ({bound.name}), margin {100.0 * (margin or 0.0):.1f} %"
+    return f"{each.demand.where} needs {value:.4g}{bound.suffix} ({bound.name}), margin {100.0 * (margin or 0.0):.1f} %"
 
 
 def margins_table(margins: Sequence[Margin]) -> Table:
@@ -208,8 +207,10 @@ def drive_table(stages: Sequence[Stage]) -> Table:
     chances = [nan if stage.chance is None else stage.chance for stage, _ in rows]
     return {
         "stage": Column(np.array([stage.name for stage, _ in rows], dtype=np.str_), "", "part of the run"),
-        "chance": Column(np.array(chances), "1", "estimated chance that the start succeeds; NaN: not a start"),
-        "duration": Column(np.array([leg.duration for _, leg in rows]), "s", "length of the leg"),
-        "amplitude": Column(np.array([leg.amplitude for _, leg in rows]), "m/s2", "table acceleration at its end"),
-        "omega": Column(np.array([leg.omega for _, leg in rows]), "rad/s", "circular frequency at its end"),
+        "chance": Column(np.array(chances), "1", "estimated probability that the start succeeds; NaN: not a start"),
+        "duration": Column(np.array([leg.duration for _, leg in rows]), "s", "duration of the leg"),
+        "amplitude": Column(
+            np.array([leg.amplitude for _, leg in rows]), "m/s2", "table acceleration at the end of the leg"
+        ),
+        "omega": Column(np.array([leg.omega for _, leg in rows]), "rad/s", "circular frequency at the end of the leg"),
     }

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 def table_demands(
     displacement: Motion, velocity: Motion, acceleration: Motion, shaker: ShakerModel | None
 ) -> dict[str, Motion]:
-    """Demands on the table, plus force and current if the shaker is known; accepts samples, spectra or peaks."""
+    """Demands on the table, and force and current if the shaker is known; accepts samples, spectra or peaks."""
     found = {"displacement": displacement, "velocity": velocity, "acceleration": acceleration}
     if shaker is not None:
         found |= {"force": shaker.force(acceleration), "current": shaker.current(acceleration, displacement)}
@@ -35,10 +35,10 @@ def peaks(series: Mapping[str, Array]) -> dict[str, float]:
 
 
 RESTING = "resting"
-"""Key of the uplift moment relative to the moment of the block's weight."""
+"""Key for the ratio of the uplift moment to the moment of the block's weight."""
 
 _SILENCE = 30.0
-"""Time at rest after the record in the transform, so that ringing does not wrap around to its beginning [s]."""
+"""Time at rest [s] appended to the record in the transform, so that ringing does not wrap around to the beginning."""
 
 
 def resting_demands(

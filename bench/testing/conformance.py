@@ -61,7 +61,7 @@ def refusal(error: type[RigError] = RigError) -> Generator[None]:
 
 
 def fresh(rig: Rig) -> None:
-    """Leave the rig as opened or stopped."""
+    """Leave the rig as it is after opening or stopping."""
     assert rig.sample_rate > 0.0
 
 
@@ -107,7 +107,7 @@ def closed(rig: Rig) -> None:
 
 
 BEFORE_CLOSE = [fresh, armed, loaded, playing, stopped, halted, starved]
-"""All states of an open rig, as functions that produce them."""
+"""All states of an open rig, as functions that bring a rig into them."""
 AT_REST = [fresh, stopped, halted, starved]
 UNDER_WAY = [armed, loaded, playing]
 QUANTITIES = ("displacement", "acceleration", "force", "current", "voltage")
@@ -122,7 +122,7 @@ def refuses_to_play_and_to_read(rig: Rig) -> None:
 
 
 class RigConformance:
-    """Conformance tests; derive from this class and provide a `make_rig` fixture, see the module."""
+    """Conformance tests: derive from this class and provide a `make_rig` fixture, see the module's docstring."""
 
     drive = 0.4
     """Largest voltage that the tests output [V]."""
@@ -206,7 +206,7 @@ class RigConformance:
     def test_close_is_allowed_in_every_state_any_number_of_times_and_leaves_nothing_behind(
         self, make_rig: RigFactory
     ) -> None:
-        # resources that libraries never release exist after the first rig
+        # after the first rig, the resources exist that libraries never release
         make_rig().close()
         before = held()
         for state in (armed, playing, halted, starved):

@@ -1,4 +1,4 @@
-"""Resources held by this process, for tests that all of them are released."""
+"""Resources held by this process, for tests that check that all of them are released."""
 
 import threading
 import time
@@ -22,7 +22,7 @@ def held() -> dict[str, int]:
 
 
 def held_at_last(allowed: dict[str, int]) -> dict[str, int]:
-    """Resources held, as soon as they are within `allowed` or after a timeout."""
+    """Resources held as soon as they are within `allowed`, or at a time-out."""
     deadline = time.monotonic() + _PATIENCE
     now = held()
     while any(count > allowed[kind] for kind, count in now.items()) and time.monotonic() < deadline:
@@ -32,7 +32,7 @@ def held_at_last(allowed: dict[str, int]) -> dict[str, int]:
 
 
 def _text(path: Path) -> str:
-    """Text of a thread's file; empty if the thread has just ended."""
+    """Contents of a thread's file; empty if the thread has just ended."""
     try:
         return path.read_text()
     except (FileNotFoundError, ProcessLookupError):

@@ -223,7 +223,7 @@ def test_surfaces_stand_above_the_maps_of_both_layers(gain_maps: Figure) -> None
         "gain of 1",
         r"minimum over $\Omega$",
         "rocking motion unstable",
-        "block may rest to the right",
+        "block may rest to the right of this line",
     }
 
 
@@ -263,7 +263,7 @@ def test_without_a_resting_layer_there_is_no_row_for_it() -> None:
     nowhere = Layer({name: gain * nan for name, gain in resting.gains.items()}, resting.multiplier * nan)
     figure = map_figure(OMEGAS, BETAS, rocking, nowhere, -np.abs(margin) - 1.0)
     assert len(figure.axes) == 4
-    assert "block may rest to the right" not in legend_of(figure)
+    assert "block may rest to the right of this line" not in legend_of(figure)
 
 
 def test_a_least_gain_on_the_edge_or_beside_a_gap_is_no_valley() -> None:
