@@ -20,11 +20,11 @@ PROTOCOLS, EXPORTS = "rockbench.protocols", "rockbench.exports"
 """Groups of entry points."""
 
 CHECK = "check"
-"""The protocol with a top-level command instead of `rockbench run`."""
+"""The protocol that has a top-level command instead of `rockbench run`."""
 
 
 def protocol_names() -> tuple[str, ...]:
-    """Names of all installed protocols, in alphabetical order; loads none."""
+    """Names of all installed protocols, in alphabetical order; none is loaded."""
     return plugin_names(PROTOCOLS)
 
 
@@ -59,7 +59,7 @@ def all_backends() -> tuple[dict[str, RigBackend], Sequence[str]]:
 
 
 def format_names() -> tuple[str, ...]:
-    """Names of all installed export formats, in alphabetical order; loads none."""
+    """Names of all installed export formats, in alphabetical order; none is loaded."""
     return plugin_names(EXPORTS)
 
 
@@ -80,7 +80,8 @@ def parameters_of(record: "DataFile", protocol: "Protocol[Any]", changed: dict[s
     """The stored parameters of a run, updated with `changed`. Raises InvalidInput for parameters unknown to this
     version.
 
-    A parameter that a file of an earlier version lacks is absent if it may be, so that the run is repeated without it.
+    A parameter missing in the file of an earlier version stays absent if allowed, so that the run is repeated without
+    it.
     """
     from bench.config.validation import dotted, validated
 

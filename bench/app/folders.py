@@ -22,14 +22,14 @@ def result_names(protocol: "Protocol[Any]") -> tuple[str, ...]:
 
 
 def default_folder(protocol: str, now: datetime) -> Path:
-    """`runs/<protocol>-<date>T<time>`; hyphens in the time, because a colon is not allowed on every system."""
+    """`runs/<protocol>-<date>T<time>`; the time has hyphens, because a colon is not allowed on every system."""
     return Path("runs", f"{protocol}-{now:%Y-%m-%dT%H-%M-%S}")
 
 
 def make_folder(first: Path, taken: Container[Path] = ()) -> Path:
     """Create a unique folder: `first`, or if that exists or is `taken`, the same name with -2, -3 and so on.
 
-    Concurrent processes get different folders. Raises InvalidInput when none can be created.
+    Concurrent processes get different folders. Raises InvalidInput if none can be created.
     """
     for number in count(1):
         folder = first if number == 1 else first.with_name(f"{first.name}-{number}")
@@ -46,10 +46,10 @@ def make_folder(first: Path, taken: Container[Path] = ()) -> Path:
         except FileExistsError:
             continue
         except OSError as error:
-            raise InvalidInput("--out", str(folder), f"it cannot be created: {error.strerror}") from None
+            raise InvalidInput("--out", str(folder), f"the folder cannot be created: {error.strerror}") from None
         break
     raise InvalidInput(
-        "--out", str(first), f"{first.parent} is repeatedly removed by another program; give another folder"
+        "--out", str(first), f"{first.parent} is repeatedly removed by another program; choose another folder"
     )
 
 
@@ -57,7 +57,7 @@ def _make_parent(folder: Path) -> None:
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
     except FileExistsError:
-        raise InvalidInput("--out", str(folder), f"{folder.parent} is a file; give a folder") from None
+        raise InvalidInput("--out", str(folder), f"{folder.parent} is a file; choose a folder") from None
 
 
 def remove_unused(folder: Path) -> None:
@@ -68,7 +68,7 @@ def remove_unused(folder: Path) -> None:
 
 
 def check_folder(folder: Path, results: Iterable[str]) -> None:
-    """Refuse a folder to which the `results` of a run cannot be written. Creates no folder.
+    """Check that the `results` of a run can be written to a folder, without creating it.
 
     Raises InvalidInput naming the obstacle.
     """
@@ -76,11 +76,11 @@ def check_folder(folder: Path, results: Iterable[str]) -> None:
     try:
         for name in results:
             if (folder / name).exists():
-                raise InvalidInput("--out", str(folder), f"it contains {name} already; results are never overwritten")
+                raise InvalidInput("--out", str(folder), f"it already contains {name}; results are never overwritten")
         while not existing.exists() and existing != existing.parent:
             existing = existing.parent
         if not existing.is_dir():
-            raise InvalidInput("--out", str(folder), f"{existing} is a file; give a folder")
+            raise InvalidInput("--out", str(folder), f"{existing} is a file; choose a folder")
         # permission bits are not reliable on every file system
         with tempfile.TemporaryFile(dir=existing):
             pass

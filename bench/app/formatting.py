@@ -1,9 +1,9 @@
-"""Formatting of numbers and texts for display."""
+"""Formatting of numbers and text for display."""
 
 from math import floor, isfinite, log10
 
 ABSENT = "-"
-"""Placeholder of a missing value."""
+"""Placeholder for a missing value."""
 
 
 def clock(seconds: float) -> str:

@@ -25,14 +25,14 @@ from sim.errors import InvalidInput
 from sim.specimen import Specimen
 
 REST = 2.0
-"""Longest time at rest that is averaged for the zero of a signal, unless the protocol specifies another [s]."""
+"""Longest time at rest that is averaged for the zero of a signal [s], unless the protocol specifies another."""
 
 _ZERO_TAKEN = f"{State.ARMED} -> {State.RUNNING}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Quantity(NDArrayOperatorsMixin):
-    """An array with its SI unit: "1" for pure numbers, "" for texts and booleans. numpy and matplotlib treat it as an
+    """An array with its SI unit: "1" for pure numbers, "" for strings and Booleans. numpy and matplotlib treat it as an
     array; arithmetic returns plain arrays without a unit.
     """
 
@@ -92,7 +92,7 @@ class Run:
 
 class Campaign:
     """The data file of a campaign: finished, interrupted, or still being written. Use it in a `with` statement. Data
-    are read on access; `refresh` updates the view of a file that is being written.
+    are read on access; `refresh` includes what has since been written to a file that is being written.
     """
 
     def __init__(self, path: str | PathLike[str]) -> None:
@@ -123,7 +123,7 @@ class Campaign:
 
     @property
     def status(self) -> str:
-        """Completed, stopped, aborted or failed; running while the file is being written, or if its writer was
+        """Completed, stopped, aborted or failed; running while the file is being written, and also if its writer was
         killed.
         """
         return self._file.status
@@ -148,7 +148,7 @@ class Campaign:
         """Configuration of the bench. Raises InvalidInput if this version cannot read it."""
         found = self._contents.configuration
         if found is None:
-            allowed = "its configuration is from another version of this software; read it with that version"
+            allowed = "its configuration was written by another version of this software; read it with that version"
             raise InvalidInput("record", str(self.path), allowed)
         return found
 
@@ -169,7 +169,7 @@ class Campaign:
 
     @property
     def events(self) -> list[JournalEntry]:
-        """The journal: `time` [s] of bench time, `kind` and `text` of each entry."""
+        """The journal: bench time `time` [s], `kind` and `text` of each entry."""
         return self._file.events
 
     @property
@@ -185,7 +185,7 @@ class Campaign:
 
     @cached_property
     def runs(self) -> tuple[Run, ...]:
-        """The runs in order, as far as the file contains them."""
+        """The runs in the file so far, in order."""
         mounted = [event for event in self.events if event.kind == SpecimenMounted.__name__]
         found: list[Run] = []
         for run, start in zip(self._file.runs, self._starts(), strict=True):
@@ -207,13 +207,13 @@ class Campaign:
     ) -> Samples:
         """Samples of a signal in SI units, relative to the zero of each run, with the calibration of the lasers
         applied. Selects the `run` by number, the specimen (`coupled`: the label of a spring, True for any, False for
-        the bare frame) and the bench time from `start` to before `stop` [s]. NaN where a sensor had no valid value.
-        Raises InvalidInput for an unknown signal or run.
+        the bare frame) and the bench times from `start` up to but not including `stop` [s]. NaN where a sensor had no
+        valid value. Raises InvalidInput for an unknown signal or run.
         """
         if signal not in self.signals:
             raise InvalidInput("signal", signal, f"one of {', '.join(self.signals)}")
         if run is not None and run not in [each.number for each in self.runs]:
-            raise InvalidInput("run", run, f"the file contains the runs 1 to {len(self.runs)}")
+            raise InvalidInput("run", run, f"the file contains runs 1 to {len(self.runs)}")
         times, values = [np.empty(0)], [np.empty(0)]
         for each, stored in zip(self.runs, self._file.runs, strict=True):
             specimen = each.beta is not None if isinstance(coupled, bool) else each.beta
@@ -243,9 +243,7 @@ class Campaign:
         return np.column_stack([self._file.values(channel.name, rows) for channel in self._file.channels])
 
     def _rest(self, run: Run, begin: int) -> slice:
-        """Rows of the rest whose mean was the zero of the run that starts at row `begin`; empty if no zero was
-        taken.
-        """
+        """Rows at rest whose mean is the zero of the run that starts at row `begin`; empty if no zero was taken."""
         half = 0.5 / self.sample_rate
         for event in self.events:
             taken = event.kind == StateChanged.__name__ and event.text.startswith(_ZERO_TAKEN)

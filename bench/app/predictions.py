@@ -56,9 +56,9 @@ _OF_BRANCH = {
 
 @dataclass(frozen=True, eq=False)
 class Branch:
-    """A branch of steady motions; arrays of shape (n_beta, n_omega), NaN where the motion does not exist. An axis given
-    as a single number is dropped. The band `alpha_2_low` to `alpha_2_high` is NaN unless requested. `multiplier` is the
-    greatest |Floquet multiplier|.
+    """A branch of steady motions; arrays of shape (n_beta, n_omega), NaN where the motion does not exist. An axis
+    specified by a single number is dropped. The band `alpha_2_low` to `alpha_2_high` is NaN unless requested.
+    `multiplier` is the greatest |Floquet multiplier|.
     """
 
     alpha_1: Quantity
@@ -154,20 +154,22 @@ def predict(
     """Predict steady motions at `omega` [rad/s], the gain under a `record`, or, without either, the modes.
 
     `specimen` is a Specimen, a TOML file, or a specimen file (.json), by default that of the `configuration` or of the
-    paper. `beta` are labels of springs, by default that of the specimen. `options` of a sine are `amplitude_factor` and
+    paper. `beta` are spring labels, by default that of the specimen. `options` of a sine are `amplitude_factor` and
     `members`, those of a record are the fields of `bench.prediction.requests.SeismicRequest`. `band` adds the
-    first-order uncertainty band of alpha_2, `members` that of a Monte Carlo simulation with so many specimens. Raises
-    InvalidInput.
+    first-order uncertainty band of alpha_2, `members` the band from a Monte Carlo simulation with that many specimens.
+    Raises InvalidInput.
     """
     chosen, known, bench = _known(specimen, configuration)
     if beta is None and chosen.label is None:
-        raise InvalidInput("beta", None, "give the label of a spring, k_C/k1, or several")
+        raise InvalidInput("beta", None, "specify one or more spring labels, k_C/k1")
     if omega is not None and record is not None:
-        raise InvalidInput("record", record, "give omega or record, not both")
+        raise InvalidInput("record", record, "specify omega or record, not both")
     options["beta"] = chosen.label if beta is None else beta
     allowed = list(SeismicRequest.model_fields) if record is not None else [*OF_SINE] if omega is not None else []
     for name in set(options) - {"beta", *allowed}:
-        raise InvalidInput(name, options[name], f"the options here are {', '.join(allowed) or 'omega and record'}")
+        raise InvalidInput(
+            name, options[name], f"the options for this prediction are {', '.join(allowed) or 'omega and record'}"
+        )
     with python_names():
         load_model()
         if omega is not None:
@@ -218,7 +220,7 @@ def _seismic(
     request = valid(SeismicRequest, given)
     (curve,) = seismic_curves(specimen, [record], request, configuration, known)
     table = gains_table([curve])
-    # the stiffnesses of the curve are in ascending order
+    # the curve has its stiffnesses in ascending order
     order = np.argsort(np.argsort(request.beta))[_index(given["beta"])]
 
     def column(name: str, unit: str = "1") -> Quantity:
@@ -253,7 +255,7 @@ def _modes(specimen: Specimen, given: Mapping[str, Any]) -> Modes:
 
 
 def _places(values: NDArray[np.float64], axis: Sequence[float]) -> NDArray[np.intp]:
-    """Index of each of `values` in `axis`, which has no duplicates."""
+    """Index in `axis`, which has no duplicates, of each of `values`."""
     order = np.argsort(axis)
     return order[np.searchsorted(np.array(axis), values, sorter=order)]
 
@@ -264,7 +266,7 @@ def _index(given: Any) -> int | slice:
 
 
 def valid(model: type[P], given: Mapping[str, Any]) -> P:
-    """Validated parameters from numbers, arrays and texts; a single value becomes a list where the field is one."""
+    """Validated parameters from numbers, arrays and strings; a single value becomes a list if the field is a list."""
     plain: dict[str, Any] = {}
     for name, value in given.items():
         plain[name] = value.tolist() if isinstance(value, np.ndarray | np.generic) else value
@@ -284,7 +286,7 @@ def configured(given: BenchConfiguration | File | None) -> BenchConfiguration:
 def _known(
     given: Specimen | File | None, configuration: BenchConfiguration | File | None
 ) -> tuple[Specimen, SpecimenKnowledge, BenchConfiguration]:
-    """The specimen of a prediction, its uncertainty, and the bench."""
+    """The specimen for a prediction, its uncertainty, and the bench."""
     bench = configured(configuration)
     if given is None:
         return bench.known_specimen, bench.known, bench
@@ -310,7 +312,7 @@ def _accelerogram(given: Record) -> Accelerogram:
 
 @contextmanager
 def python_names() -> Generator[None]:
-    """Convert command-line flags named in errors to the names of Python arguments."""
+    """Replace command-line flags in error messages by the names of Python arguments."""
     try:
         yield
     except InvalidInput as refused:

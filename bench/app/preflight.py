@@ -25,13 +25,13 @@ from sim.loading import BENCH, load_model
 from sim.parameters import Parameters
 
 SPARE = 3.0
-"""Factor on the expected duration: every start may fail, every motion may settle slowly."""
+"""Factor on the expected duration, since every start may fail and every motion may settle slowly."""
 
 OVERHEAD = 1.1
-"""Everything but the samples, as a factor: blocks, events, estimates, tables, and the format itself."""
+"""Factor for everything but the samples: blocks, events, estimates, tables, and the overhead of the format."""
 
 DRIVE_BYTES = 4
-"""Bytes of a sample of the drive in the file."""
+"""Bytes per drive sample in the file."""
 
 
 @dataclass(frozen=True)
@@ -43,11 +43,11 @@ class DiskSpace:
     free: int
 
     def refusal(self) -> InvalidInput | None:
-        """Refusal of a run whose data file may not fit, or None."""
+        """Error for a run whose data file may not fit, or None."""
         if self.needed <= self.free:
             return None
-        sizes = f"the data file may need {_readable(self.needed)}, {_readable(self.free)} are free on that disk"
-        return InvalidInput("--out", str(self.folder), f"{sizes}; free some, or name a folder on another disk")
+        sizes = f"the data file may need {_readable(self.needed)}, but {_readable(self.free)} are free on that disk"
+        return InvalidInput("--out", str(self.folder), f"{sizes}; free disk space, or choose a folder on another disk")
 
 
 def disk_space(configuration: BenchConfiguration, duration: float, folder: Path) -> DiskSpace:
@@ -60,7 +60,9 @@ def disk_space(configuration: BenchConfiguration, duration: float, folder: Path)
 
 
 def bytes_per_second(configuration: BenchConfiguration) -> float:
-    """Counts of all channels and the drive, 16 bit simulated, up to 32 bit elsewhere, and the estimates of the twin."""
+    """Data rate of all channels and the drive, with counts of 16 bits if simulated and up to 32 bits otherwise, and of
+    the twin's estimates.
+    """
     inputs = len(configuration.hardware.transducers) + 2 if configuration.backend == "hardware" else 4
     width = 2 if configuration.backend == "simulated" else 4
     channels = inputs + len(configuration.channels)
@@ -98,7 +100,7 @@ def plan_hash(
 
 
 def _rounded(value: Any) -> Any:
-    """The content with every float as text of `DIGITS` significant digits."""
+    """The content, with every float as a string of `DIGITS` significant digits."""
     if isinstance(value, float):
         return f"{value:.{DIGITS}g}"
     if isinstance(value, dict):
@@ -111,7 +113,7 @@ def _rounded(value: Any) -> Any:
 @dataclass(frozen=True)
 class Preflight:
     """Result of the check. `margins` are in ascending order; `room` is None if the run's duration is unknown; `sensors`
-    are warnings about their calibration; `reviewed` are the cross-checks of configuration and parameters, and `scales`
+    holds warnings about sensor calibrations, `reviewed` the cross-checks of configuration and parameters, and `scales`
     the frequencies in both units.
     """
 
@@ -125,7 +127,7 @@ class Preflight:
 
     @property
     def refusal(self) -> InvalidInput | None:
-        """Refusal by the configuration, the binding limit, or the disk, in this order; None when the run may begin."""
+        """Error due to the configuration, the binding limit or the disk, in this order; None if the run may begin."""
         contradiction = next(iter(self.reviewed.refusals), None)
         return contradiction or refusal(self.margins) or (self.room.refusal() if self.room else None)
 
@@ -150,7 +152,7 @@ class Preflight:
         return kept
 
     def require(self) -> None:
-        """Raise InvalidInput, naming the binding limit, when the run is refused."""
+        """Raise InvalidInput, naming the binding limit, if the run is refused."""
         if (refused := self.refusal) is not None:
             raise refused
 
@@ -172,8 +174,8 @@ def prepare(
 
 
 def compile_run(protocol: str, prepared: Prepared[Any], folder: Path, progress: Progress = silent) -> Preflight:
-    """Compute and check the whole run of a protocol, with results in `folder`, without opening a device or creating a
-    file. Raises InvalidInput only for a run that cannot be planned: a refusal is part of the result.
+    """Compute and check the complete run of a protocol, with results in `folder`, without opening a device or creating
+    a file. Raises InvalidInput only for a run that cannot be planned; a refusal is part of the result.
     """
     prepared.progress = progress
     forecast, configuration = prepared.forecast, prepared.configuration
@@ -196,9 +198,9 @@ def _aged(configuration: BenchConfiguration) -> tuple[str, ...]:
 
 
 def _unpredicted(configuration: BenchConfiguration) -> tuple[str, ...]:
-    """Warnings for the limits of further channels, for which no margin is predicted."""
+    """Warnings about the limits of further channels, for which no margin is predicted."""
     return tuple(
-        f"the limit of {channel.name} ends a run, but its demand is not predicted"
+        f"the limit on {channel.name} ends a run, but its demand is not predicted"
         for channel in configuration.channels
         if channel.limit is not None
     )

@@ -39,11 +39,11 @@ def run(
 ) -> Campaign:
     """Run a protocol and return its campaign, whose `status` states how it ended.
 
-    Parameters come from the mapping and from `more`. `specimen` is a specimen file (.json); `seed` is that of a
-    simulated bench, which runs in virtual time unless `realtime`. Results are written to the folder `out`, by default
+    Parameters are taken from the mapping and from `more`. `specimen` is a specimen file (.json); `seed` is the seed of
+    a simulated bench, which runs in virtual time unless `realtime`. Results are written to the folder `out`, by default
     runs/<protocol>-<date>. `operator` is called with each request to the person at the bench and returns True once it
-    is done; without it, a simulated bench confirms, and a real one is refused. `progress` is called with an activity
-    and its completed share, 0 to 1.
+    is done; without it, a simulated bench confirms every request, and a real bench is refused. `progress` is called
+    with an activity and its completed fraction, 0 to 1.
 
     Raises InvalidInput for a refusal before the table moves, and KeyboardInterrupt after Ctrl-C (or SIGTERM), once the
     output has been ramped to zero and the file closed as aborted.
@@ -60,7 +60,7 @@ def run(
         bench = with_identified(bench, read_specimen(Path(specimen)))
     review(bench).require()
     if operator is None and not bench.serves_itself:
-        allowed = "the bench is real: give a function that shows a request and returns True once it is done"
+        allowed = "the bench is real: pass a function that shows a request and returns True once it is done"
         raise InvalidInput("operator", None, allowed)
     person, requests = _Person(operator), Requests()
     folder = default_folder(protocol, datetime.now()) if out is None else Path(out)
@@ -94,12 +94,12 @@ def run(
             if out is None:
                 remove_unused(folder)
     if interrupts.first is not None:
-        raise KeyboardInterrupt(f"the run was interrupted; {folder} has its results")
+        raise KeyboardInterrupt(f"the run was interrupted; its results are in {folder}")
     return Campaign(folder)
 
 
 class _Person:
-    """The operator of a run: the function of the caller, or the bench itself."""
+    """The operator of a run: the caller's function, or the bench itself."""
 
     def __init__(self, answer: Callable[[str], bool] | None) -> None:
         self._answer, self.asking = answer, False

@@ -22,7 +22,7 @@ from bench.events import (
 )
 
 NOTICES = 5
-"""Number of displayed recent events."""
+"""Number of recent events that are displayed."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class Row:
             status=str(point.get("status", ABSENT)),
             alpha_2=plus_minus(value, point.get("alpha_2_uncertainty")),
             predicted=number(predicted) + (" unstable" if unstable else ""),
-            # a motion that is not compared with the prediction may be another one
+            # a motion that is not compared with the prediction may be on another branch
             difference=ABSENT if agrees is None else difference(value, predicted),
             agrees=ABSENT if agrees is None else "yes" if agrees else "NO",
             effort=f"{effort}, {starts} starts" if starts and starts > 1 else effort,
@@ -139,7 +139,7 @@ def notice_of(event: Event) -> Notice | None:
 
 
 def twin_line(event: TwinEstimate) -> str:
-    """Peak drifts, difference of measured and modelled drift, and gains where there are any, with the model's band."""
+    """Peak drifts, difference of measured and modelled drift, and gains, if any, with the model's band."""
     words = [f"drift peak {_millimetres(event.drift_peak_measured)}, model {_millimetres(event.drift_peak)}"]
     words.append(f"residual {_share(event.residual)}, outside the band {_share(event.excess)}")
     if isfinite(event.alpha_2):
@@ -160,8 +160,8 @@ def _share(value: float) -> str:
 
 @dataclass
 class RunDisplay:
-    """The displayed state: `rows` of finished points, the last `notices` that are not points, and other values. `live`
-    has the live values of the protocol, one line each, by label.
+    """The displayed state: `rows` of finished points, the latest `notices` about anything else, and other values.
+    `live` has the live values of the protocol, one line each, by label.
     """
 
     time: float = 0.0
@@ -191,17 +191,19 @@ class RunDisplay:
         self._told, self.preparing = self.time, True
 
     def expect(self, duration: float | None) -> None:
-        """The rig is open: show the `duration` [s] of the plan, None if unknown, until the run reports its progress."""
+        """Show the `duration` [s] of the plan, None if unknown, once the rig is open and until the run reports its
+        progress.
+        """
         self.fraction, self.remaining, self.preparing = 0.0, nan if duration is None else duration, False
         self.reason, self._told = "", self.time
 
     @property
     def time_left(self) -> float:
-        """Remaining time [s], less the bench time since it was estimated; NaN if unknown."""
+        """Remaining time [s], less the bench time elapsed since it was estimated; NaN if unknown."""
         return max(self.remaining - max(self.time - self._told, 0.0), 0.0) if isfinite(self.remaining) else nan
 
     def update(self, event: Event) -> Notice | None:
-        """Update the state with an event other than a block of samples; returns its line of the log, if it has one."""
+        """Update the state with an event other than a block of samples; returns the event's log line, if any."""
         if self.preparing:
             self.fraction, self.remaining, self.preparing = 0.0, float("nan"), False
         self.time = max(self.time, event.time)

@@ -30,8 +30,8 @@ from sim.parameters import Parameters
 
 @dataclass(frozen=True)
 class SessionResult:
-    """Result of a campaign. `summary` can be converted to JSON, `table` is text for the terminal. `passed` is the
-    verdict of a protocol that tests the bench, True for any other.
+    """Result of a campaign. `summary` can be converted to JSON; `table` is text for the terminal. `passed` is the
+    verdict of a protocol that tests the bench, and True for any other protocol.
     """
 
     status: str
@@ -59,8 +59,8 @@ def run_session(
     """Run a `prepared` protocol on its bench; write data file, figures and summary to the folder `out`. `opened` is
     called with the rig before the table moves; the rig may be used only while the engine calls a subscriber. `about` is
     stored in the data file with the metadata of the run: the operator's name, notes. `progress` reports the stages
-    before the rig is opened and after it is closed. Raises InvalidInput, or KeyboardInterrupt when an end was
-    requested, before the table moves. Once the rig is armed, every ending is a result with a status.
+    before the rig is opened and after it is closed. Raises InvalidInput before the table moves, or KeyboardInterrupt if
+    an end was requested by then. Once the rig is armed, every ending is a result with a status.
     """
     started = time.monotonic()
     name = f"the protocol {protocol.name}"
@@ -84,7 +84,7 @@ def run_session(
         raise KeyboardInterrupt
     rig = open_rig(configuration, realtime=realtime)
     try:
-        # opening takes long: an end requested meanwhile leaves neither folder nor file
+        # opening takes a long time: an end requested meanwhile leaves neither folder nor file
         if requests.strongest is not None:
             raise KeyboardInterrupt
         out.mkdir(parents=True, exist_ok=True)
@@ -135,13 +135,13 @@ def run_session(
         findings=result.findings if result.passed is None else {"passed": result.passed, **result.findings},
     )
     write_summary(out / SUMMARY, summary)
-    # result files of other runs first: a failing figure must not prevent a result
+    # the protocol's result files come first: a failing figure must not prevent a result
     with plugin_code(name, files=True):
         for file in protocol.files:
             if file in result.files:
                 result.files[file](out / file)
     if not requests.interrupted:
-        # after an interrupt no figures are drawn: `rockbench report` draws them from the file
+        # no figures are drawn after an interrupt; `rockbench report` draws them from the file
         with requests.without_rig(), plugin_code(name, files=True):
             progress("drawing the figures")
             for path in figures:
@@ -158,7 +158,7 @@ def run_session(
 
 
 def _closing(rig: Rig) -> Ending | None:
-    """Close the rig. Returns an ending if that fails, else None."""
+    """Close the rig. Returns an ending if this fails, else None."""
     try:
         rig.close()
     except RigError as error:
@@ -167,7 +167,7 @@ def _closing(rig: Rig) -> Ending | None:
 
 
 def result_of(returned: object, prepared: Prepared[Any], points: Sequence[Parameters]) -> Result:
-    """The result `returned` by a plan, or that of an interrupted run with these `points`."""
+    """The result `returned` by a plan, or the result of an interrupted run with these `points`."""
     return returned if isinstance(returned, Result) else prepared.result(points)
 
 

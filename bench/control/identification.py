@@ -1,8 +1,8 @@
 """Identification of the table: a periodic multisine with random phases as its drive, and the response to it.
 
 The lines of the multisine lie on the grid of its period, so a whole number of periods in steady state has no leakage.
-Within a realisation the periods differ by noise only. Between realisations, which have other phases, they differ by
-noise and by stochastic nonlinear distortion: the variance between realisations in excess of the noise is due to
+Within a realisation, the periods differ only by noise. Between realisations, which have different phases, they differ
+by noise and by stochastic nonlinear distortion: the variance between realisations in excess of the noise is due to
 distortion (the robust method of Pintelon and Schoukens, System Identification, 2nd ed., ch. 4). The crest factor is
 reduced by repeatedly clipping the waveform and combining its phases with the required amplitudes (Van der Ouderaa,
 Schoukens and Renneboog, IEEE Trans. Instrum. Meas. 37, 1988).
@@ -26,16 +26,17 @@ Complex = NDArray[np.complex128]
 Quantity = Literal["displacement", "velocity", "acceleration"]
 
 _CLIPPINGS = 200
-"""Rounds of clipping: the crest factor falls from about 3.5 to 1.5, in less than 0.1 s for 16 000 samples."""
+"""Number of clipping rounds: the crest factor falls from about 3.5 to 1.5, in less than 0.1 s for 16 000 samples."""
 _FIRST_CLIP, _LAST_CLIP = 0.75, 0.95
-"""Clipping level relative to the peak in the first and last round."""
+"""Clipping level relative to the peak in the first and in the last round."""
 
 
 @dataclass(frozen=True)
 class Multisine:
     """One period of drive, made of `lines` (multiples of the period's frequency) with complex `spectrum` [V].
 
-    The amplitude of line k is |spectrum[k]|; both have shape (n_lines,). `samples` in a period, `sample_rate` [1/s].
+    The amplitude of line k is |spectrum[k]|; both have shape (n_lines,). `samples`: number per period; `sample_rate`
+    [1/s].
     """
 
     lines: Lines
@@ -54,20 +55,22 @@ class Multisine:
         return waveform(self.lines, self.spectrum, self.samples)
 
     def scaled_to(self, peak: float, response: Complex | Array) -> "Multisine":
-        """The multisine scaled to a peak of `peak` units in the output of a linear `response` [unit/V] at its lines."""
+        """The multisine scaled so that the output of a linear `response` [unit/V] at its lines has a peak of `peak`
+        units.
+        """
         made = float(np.abs(waveform(self.lines, self.spectrum * response, self.samples)).max())
         return replace(self, spectrum=self.spectrum * (peak / made))
 
     def drive(self, periods: int) -> Array:
-        """The drive [V] of `periods` consecutive periods."""
+        """The drive [V] for `periods` consecutive periods."""
         return np.tile(self.volts, periods)
 
 
 def band_lines(samples: int, sample_rate: float, band: tuple[float, float], *, odd: bool = False) -> Lines:
-    """The lines of a period of `samples` within `band` [Hz], ends included; only every other one if `odd`.
+    """The lines of a period of `samples` samples within `band` [Hz], ends included; only the odd ones if `odd`.
 
-    Odd lines have no distortion of even order. Raises InvalidInput for a band without lines or beyond half the
-    sample rate.
+    Odd lines are free of even-order distortion. Raises InvalidInput for a band without lines or beyond half the sample
+    rate.
     """
     low, high = band
     if not 0.0 < low < high < 0.5 * sample_rate:
@@ -78,7 +81,7 @@ def band_lines(samples: int, sample_rate: float, band: tuple[float, float], *, o
     if odd:
         lines = lines[lines % 2 == 1]
     if lines.size == 0:
-        raise InvalidInput("band of the multisine", band, f"it contains no line: they are {spacing:g} Hz apart")
+        raise InvalidInput("band of the multisine", band, f"it contains no line: the lines are {spacing:g} Hz apart")
     return lines.astype(np.int64)
 
 
@@ -86,7 +89,7 @@ def drive_amplitudes(frequency: Array, gain: Array, flat: Quantity, corner: floa
     """Relative amplitudes of the drive at `frequency` [Hz] for a motion that is flat in `flat` up to `corner` [Hz]
     and flat in acceleration above, shape (n,).
 
-    `gain` is the approximate acceleration of the table per volt, shape (n,): a first `DriveCalibration` suffices.
+    `gain` is the approximate table acceleration per volt, shape (n,); a preliminary `DriveCalibration` suffices.
     """
     power = {"acceleration": 0, "velocity": 1, "displacement": 2}[flat]
     return np.minimum(frequency / corner, 1.0) ** power / gain
@@ -103,7 +106,7 @@ def multisine(
     """A multisine with `amplitudes` [V] at `lines`, random phases from `seed`, and a low crest factor.
 
     The crest factor is that of the drive or, with a `response` at the lines, of the acceleration, which must not lift a
-    standing block. Every realisation of an identification needs another seed, or the same generator.
+    standing block. Every realisation of an identification needs a different seed, or the same generator.
     """
     random = np.random.default_rng(seed)
     spectrum = _with_phases(amplitudes, random.uniform(0.0, 2.0 * np.pi, lines.size))
@@ -135,11 +138,11 @@ def _crest(volts: Array) -> float:
 
 @dataclass(frozen=True)
 class LineResponse:
-    """A response at the lines, everything of shape (n_lines,).
+    """A response at the lines; all arrays have shape (n_lines,).
 
-    `response` [unit/V] with its standard `uncertainty`, noise and distortion together; `noise` is the share of noise
-    in that uncertainty, `distortion` the standard deviation of one realisation's response by distortion alone, NaN
-    for a single realisation. `noise_density` [unit/Hz^0.5] is that of the output.
+    `response` [unit/V] has the standard `uncertainty` due to noise and distortion together; `noise` is the contribution
+    of noise to it, `distortion` the standard deviation of one realisation's response due to distortion alone, NaN for a
+    single realisation. `noise_density` [unit/Hz^0.5] is the density of the noise in the output.
     """
 
     frequency: Array
@@ -154,8 +157,8 @@ class LineResponse:
 def steady_periods(record: Array, samples: int, discard: int) -> Array:
     """Periods of one realisation after the first `discard`, shape (periods, samples).
 
-    `record`, shape (n,), begins with the first sample of the first period. Raises InvalidInput when fewer than two
-    whole periods remain or a sample is missing.
+    `record`, shape (n,), begins with the first sample of the first period. Raises InvalidInput if fewer than two
+    complete periods remain or a sample is missing.
     """
     count = record.size // samples
     kept = record[discard * samples : count * samples]
@@ -167,15 +170,15 @@ def steady_periods(record: Array, samples: int, discard: int) -> Array:
 
 
 def line_amplitudes(periods: Array, lines: Lines) -> Complex:
-    """Complex amplitudes at `lines` of periods of shape (..., samples), shape (..., n_lines)."""
+    """Complex amplitudes at `lines`, shape (..., n_lines), of periods of shape (..., samples)."""
     return np.fft.rfft(periods, axis=-1)[..., lines] * (2.0 / periods.shape[-1])
 
 
 def line_response(drive: Complex, output: Complex, frequency: Array, spacing: float) -> LineResponse:
     """The response from complex amplitudes of drive [V] and output [unit], shape (realisations, periods, n_lines).
 
-    `spacing` [Hz] is one over the period. The drive is taken as noise-free. Raises InvalidInput for fewer than two
-    periods, or for inconsistent arrays.
+    `spacing` [Hz] is the reciprocal of the period. The drive is taken as noise-free. Raises InvalidInput for fewer than
+    two periods, or for inconsistent arrays.
     """
     realisations, periods = drive.shape[0], drive.shape[1]
     if drive.shape != output.shape or drive.shape[2:] != frequency.shape:
@@ -191,7 +194,7 @@ def line_response(drive: Complex, output: Complex, frequency: Array, spacing: fl
     if realisations > 1:
         total = np.sum(np.abs(each - response) ** 2, axis=0) / (realisations * (realisations - 1))
         distortion = np.sqrt(realisations * np.maximum(total - noise, 0.0))
-        # few realisations may agree by chance: use at least the uncertainty due to noise
+        # a few realisations may agree by chance: use at least the uncertainty due to noise
         uncertainty = np.sqrt(np.maximum(total, noise))
     else:
         distortion, uncertainty = np.full(frequency.shape, np.nan), np.sqrt(noise)
@@ -246,8 +249,8 @@ def identify_table(
 def sensor_agreement(acceleration: LineResponse, displacement: LineResponse) -> tuple[float, float]:
     """Gain [1] and lead [s] of the displacement sensor relative to the accelerometer, from the responses of both.
 
-    Two sensors on one rigid table differ in calibration and delay: 1 and 0 when they agree, a negative gain when one of
-    them is reversed. Fitted over the lines, weighted by their uncertainties.
+    Two sensors on one rigid table differ in calibration and delay: 1 and 0 if they agree; the gain is negative if one
+    of them is reversed. The fit over the lines is weighted by their uncertainties.
     """
     omega = 2.0 * np.pi * acceleration.frequency
     ratio = -(omega**2) * displacement.response / acceleration.response

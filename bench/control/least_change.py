@@ -17,18 +17,18 @@ from bench.control.target import Reach
 from sim.errors import InvalidInput
 
 INFEASIBLE = 1e-10
-"""Residual of the least squares below which no vector satisfies the inequalities."""
+"""Least-squares residual below which no vector satisfies the inequalities."""
 
 
 class Infeasible(Exception):
-    """No vector satisfies all constraints."""
+    """Error: no vector satisfies all constraints."""
 
 
 def shortest(equations: tuple[Array, Array], inequalities: tuple[Array, Array]) -> Array:
     """Vector y, shape (n,), of minimum norm with A y = b and G y >= h.
 
-    After separation of the equations' shortest solution, the rest is least-distance programming, whose dual is a
-    non-negative least squares problem. `equations` is (A, b), of full row rank, `inequalities` (G, h). Raises
+    After the minimum-norm solution of the equations is separated, a least-distance problem remains, whose dual is a
+    non-negative least-squares problem. `equations` is (A, b), of full row rank, `inequalities` (G, h). Raises
     Infeasible. Source: Lawson and Hanson, Solving Least Squares Problems, 1974, chapter 23.
     """
     from scipy.optimize import nnls
@@ -70,7 +70,7 @@ class SineModes:
         self._steps: Array = np.pi * orders / (n - 1)
 
     def sum(self, sizes: Array) -> Array:
-        """The sum of the modes with `sizes`, shape (k,), at the samples, shape (n,)."""
+        """The sum of the modes with amplitudes `sizes`, shape (k,), at the samples, shape (n,)."""
         whole = np.zeros(self._n)
         whole[1:-1] = 0.5 * _transformed(np.pad(sizes, (self._below, self._n - 2 - self._below - sizes.size)))
         return whole
@@ -125,7 +125,7 @@ def oscillator_peak(acceleration: Array, dt: float, period: float, damping: floa
     first = np.expm1(x) / x
     second = (np.expm1(x) - x) / x**2
     taps = dt * second, dt * (first - second)
-    # `Any`: scipy's stubs leave the type of a filtered array open
+    # `Any`: scipy's stubs do not specify the type of a filtered array
     z: Any = signal.lfilter(taps, [1.0, -np.exp(x)], acceleration)
     response = np.asarray(-(omega**2 / damped) * z.imag, dtype=np.float64)
     at = int(np.abs(response).argmax())
@@ -138,7 +138,7 @@ def oscillator_peak(acceleration: Array, dt: float, period: float, damping: floa
 
 
 HIGHEST = 2.0
-"""Highest frequency of a change [Hz], or `ABOVE` times its lowest if that is higher."""
+"""Highest frequency of a change [Hz], unless `ABOVE` times its lowest frequency is higher."""
 
 ABOVE = 4.0
 """Two octaves suffice for a change with a lower frequency limit."""
@@ -147,10 +147,10 @@ CHEAP = 0.5
 """Frequency [Hz] at which the weight of the squared change is 1; elsewhere it is (f / CHEAP)^4."""
 
 FLOOR = 0.05
-"""Frequency [Hz] below which the weight is constant: a slower sine would exhaust the stroke at once."""
+"""Frequency [Hz] below which the weight is constant, since a slower sine would exhaust the stroke at once."""
 
 SPECTRUM = 7.0
-"""Duration [s] of a change as large as the record's peak that costs as much as doubling every oscillator's peak."""
+"""Duration [s] for which a change as large as the record's peak costs as much as doubling every oscillator's peak."""
 
 PASSES = 2
 """Number of iterations: each constrains the oscillators' peaks at their previous and new instants."""
@@ -159,11 +159,11 @@ CLOSER = 1e-4
 """Fraction of a limit reserved in the solution for rounding and the samples between peaks."""
 
 MOST_ROUNDS = 60
-"""Largest number of rounds of adding samples; a dozen is usual."""
+"""Largest number of rounds in which samples are added; a dozen is usual."""
 
 
 class _Bound(NamedTuple):
-    """A sample at which `sign` times velocity or displacement is constrained to its limit."""
+    """A sample at which `sign` times the velocity or displacement is constrained to the limit."""
 
     sample: int
     of_displacement: bool
@@ -173,10 +173,11 @@ class _Bound(NamedTuple):
 def fit_by_least_change(
     acceleration: Array, dt: float, reach: Reach, periods: Array, damping: float, lowest: float = 0.0
 ) -> Array:
-    """`acceleration` [m/s2], shape (n,), with the least change that keeps the table in `reach` and ends it at rest.
+    """`acceleration` [m/s2], shape (n,), with the least change that keeps the table within `reach` and leaves it at
+    rest.
 
     `periods` [s] and `damping` are those of the oscillators whose peaks are preserved; the change has no content below
-    `lowest` [Hz]. Raises InvalidInput where no change from there to 2 Hz, or to four times `lowest`, is sufficient.
+    `lowest` [Hz]. Raises InvalidInput if no change between there and 2 Hz, or four times `lowest`, is sufficient.
     """
 
     def peaks_of(record: Array) -> list[Peak]:
@@ -207,7 +208,9 @@ class _Problem:
         self._bounds: list[_Bound] = []
 
     def solved(self, peaks: list[Peak], scales: Array) -> Array:
-        """The record with the least-cost change; changes of the peaks are relative to their scales [m/s2]."""
+        """The record with the least-cost change; the changes of the peaks are weighted relative to their scales
+        [m/s2].
+        """
         from scipy.linalg import cholesky, solve_triangular
 
         pulls = np.array([self._modes.products(peak.weights) for peak in peaks]) / scales[:, None]
@@ -259,7 +262,7 @@ class _Problem:
         return found
 
     def _inequalities(self, bounds: list[_Bound]) -> tuple[Array, Array]:
-        """G and h of G sizes >= h, which keep each bound's sample within its limit, shapes (m, k) and (m,)."""
+        """G and h of G sizes >= h, shapes (m, k) and (m,), which keep the sample of each bound within its limit."""
         samples = np.array([bound.sample for bound in bounds], dtype=np.intp)
         far = np.array([bound.of_displacement for bound in bounds], dtype=np.bool_)
         signs = np.array([bound.sign for bound in bounds], dtype=np.float64)

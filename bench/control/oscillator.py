@@ -39,7 +39,7 @@ class DriveCalibration:
         return np.asarray(np.interp(omega, self.omega, np.asarray(self.response, dtype=np.complex128)), np.complex128)
 
     def beyond(self, other: "DriveCalibration") -> "DriveCalibration":
-        """This calibration, extended above its last frequency by `other`."""
+        """This calibration, extended beyond its last frequency by `other`."""
         above = [(omega, response) for omega, response in other.points if omega > self.omega[-1]]
         return DriveCalibration(
             (*self.omega, *(omega for omega, _ in above)), (*self.response, *(response for _, response in above))
@@ -61,7 +61,9 @@ class Leg:
 
 
 def sweeps(legs: Sequence[Leg], amplitude: float, omega: float) -> list[Sweep]:
-    """The segments as sweeps from `amplitude` and `omega`; from zero drive one begins at its own frequency."""
+    """The segments as sweeps, starting from `amplitude` and `omega`; from zero drive, a segment begins at its own
+    frequency.
+    """
     found: list[Sweep] = []
     for leg in legs:
         begin = omega if amplitude > 0.0 else leg.omega
@@ -79,7 +81,9 @@ Array = NDArray[np.float64]
 
 
 class ShareRamp:
-    """Shares of the harmonics, the fundamental first: a pure sine, (1, 0, 0, ...), then changes along a smoothstep."""
+    """Shares of the harmonics, fundamental first: initially a pure sine, (1, 0, 0, ...); changes follow a
+    smoothstep.
+    """
 
     def __init__(self) -> None:
         self._from = self._to = _pure()
@@ -156,7 +160,7 @@ class Oscillator:
     def reset(self) -> None:
         """Reset to zero drive; keeps the calibration."""
         self._sweeps: deque[Sweep] = deque()
-        self._into = 0  # samples played of the first sweep
+        self._into = 0  # number of samples of the first sweep already played
         self._amplitude, self._omega, self._phase = 0.0, tau, 0.0
         self._shares = ShareRamp()
 
@@ -192,7 +196,7 @@ class Oscillator:
 
     @property
     def remaining(self) -> int:
-        """Number of samples until the last sweep has been played."""
+        """Number of samples remaining until the end of the last sweep."""
         return sum(self._length(sweep) for sweep in self._sweeps) - self._into
 
     def next(self, n: int) -> Array:
@@ -251,7 +255,7 @@ class Oscillator:
         self, calibration: DriveCalibration, amplitude: Array, omega: Array, shares: NDArray[np.complex128]
     ) -> list[tuple[int, NDArray[np.complex128]]]:
         """Orders of the harmonics that are driven, ascending, and their complex amplitudes [V]: shape (n,), or (1,)
-        where amplitude, frequency and shares are constant; these are computed once.
+        where amplitude, frequency and shares are constant; which are then computed once.
         """
         if amplitude.ndim or len(shares) > 1:
             key = None

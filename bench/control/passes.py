@@ -1,4 +1,4 @@
-"""Passes of a replication: errors relative to the target, and the margin to the limits."""
+"""Passes of a replication: errors relative to the target, and margins to the limits."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -40,7 +40,7 @@ class Envelope:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Fraction of a change that fits, 0 to 1, and the limit that `binds` if it is less than 1."""
+    """Fraction of a change that the limits allow, 0 to 1, and the limit that `binds` if it is less than 1."""
 
     share: float
     binds: str | None
@@ -52,18 +52,20 @@ class Verdict:
             return "within every limit"
         unit = UNITS[self.binds]
         return (
-            f"{self.binds} of {self.wanted:.4g} {unit} exceeds the {self.allowed:.4g} {unit} allowed by its limit;"
-            f" {self.share:.1%} of it fits"
+            f"{self.binds} of {self.wanted:.4g} {unit} exceeds its limit of {self.allowed:.4g} {unit}; "
+            f"{self.share:.1%} of it is possible"
         )
 
 
 def fitting(present: Envelope, change: Envelope, limits: Limits, margin: float) -> Verdict:
-    """Largest fraction of `change`, added to `present`, with all quantities below their limits over `margin`."""
+    """Largest fraction of `change` that, added to `present`, keeps all quantities below their limits divided by
+    `margin`.
+    """
     share, binds, wanted, allowed = 1.0, None, 0.0, 0.0
     for name in UNITS:
         base, step = present.series[name], change.series[name]
         limit = float(getattr(limits, name)) / margin
-        # margin in the direction of the step; without margin no part of the step fits
+        # margin in the direction of the step; without margin, no part of the step is possible
         room = limit - np.sign(step) * base
         moving = np.abs(step) > 1e-12 * limit
         fits = float(np.min(room[moving] / np.abs(step[moving]), initial=np.inf))
@@ -74,12 +76,12 @@ def fitting(present: Envelope, change: Envelope, limits: Limits, margin: float) 
 
 
 CLEAR = 2.0
-"""Ratio to its standard deviation due to noise above which a deviation of the response spectrum is significant."""
+"""Ratio of a response-spectrum deviation to its standard deviation due to noise above which it is significant."""
 
 
 @dataclass(frozen=True)
 class Pass:
-    """One pass; errors are relative to the target [1], both filtered by the target's window.
+    """A pass; errors are relative to the target [1], with both filtered by the target's window.
 
     `error` is the measured root mean square; `floor` is its non-repeatable part: measurement noise, and after a second
     play of a drive every difference. `repeatable` is the rest, which a correction can remove. `peak_error` is the
@@ -100,7 +102,7 @@ class Pass:
 
     @property
     def repeatable(self) -> float:
-        """Root mean square of the error without its floor."""
+        """Root mean square of the error, excluding its floor."""
         return max(self.error**2 - self.floor**2, 0.0) ** 0.5
 
     def __str__(self) -> str:
@@ -129,7 +131,7 @@ class SpectrumCheck:
         return float(np.abs(self._spectrum(achieved) / self._wanted - 1.0).max())
 
     def clear_error(self, achieved: Array, frequency: Array, noise: Array) -> tuple[float, float]:
-        """Largest relative deviation not explained by noise, and its period [s]; zero if none.
+        """Largest relative deviation not explained by noise, and its period [s]; both zero if there is none.
 
         `noise`, shape (n_lines,), is the expected |numpy.fft.rfft|^2 of the non-repeatable part of `achieved`, at
         `frequency` [Hz], above zero. Noise shifts a peak by about the noise of the oscillator's response: a deviation

@@ -17,7 +17,7 @@ from sim.errors import InvalidInput
 from sim.excitation import SampledRecord
 
 ROUNDING = 1e-9
-"""Relative tolerance of a ratio of two steps."""
+"""Relative tolerance for the ratio of two steps."""
 
 
 def scaled(record: SampledRecord, length_ratio: float) -> SampledRecord:
@@ -41,7 +41,7 @@ def resampled(record: SampledRecord, dt: float) -> SampledRecord:
         raise InvalidInput("dt", dt, f"it must be above 0 and at most the record's step, {record.dt:g} s")
     steps = record.duration / dt
     count = ceil(steps * (1.0 - ROUNDING))
-    # in steps of the record: an integer number of new steps ends exactly on its last sample
+    # in units of the record's step, so that an integer number of new steps ends exactly on the last sample
     place = np.arange(count + 1) * (dt / record.dt)
     if abs(count - steps) <= ROUNDING * steps:
         place[-1] = record.acceleration.size - 1
@@ -65,7 +65,7 @@ class PreparedMotion:
 
     `record` begins `begin` [s] on the original record's clock; before that the table is at rest. All accelerations were
     multiplied by `factor`. `peak_before` and `peak` are the greatest accelerations [m/s2] of the original record and of
-    the motion; `motion` is the table's velocity and displacement. `band` [Hz] is None without a filter, `reach` and
+    the motion; `motion` has the table's velocity and displacement. `band` [Hz] is None without a filter, `reach` and
     `fit` are None without a stroke; `steps` describes the processing, in order.
     """
 
@@ -83,11 +83,11 @@ class PreparedMotion:
     def target(self, sample_rate: float) -> Target:
         """The motion at `sample_rate` [1/s], for its replication on the table.
 
-        Raises InvalidInput without a band, for one beyond the rate, a rate below the record's own, and a motion that
-        exceeds `reach` by more than `BETWEEN`.
+        Raises InvalidInput if there is no band, if it exceeds the range of the rate, if the rate is below the record's,
+        or if the motion exceeds `reach` by more than `BETWEEN`.
         """
         if self.band is None:
-            raise InvalidInput("band", None, "it is required for a table: specify its ends")
+            raise InvalidInput("band", None, "a band is required for motion of the table: specify its ends")
         check_band(self.band, sample_rate)
         wave = resampled(self.record, 1.0 / sample_rate).acceleration
         # linear interpolation between the record's samples has slight content above the band
@@ -114,11 +114,11 @@ def prepare(
 ) -> PreparedMotion:
     """The motion of the table for `record`: similitude, then `trim`, `band`, `peak` and `reach`, in this order.
 
-    `length_ratio`: model over prototype length, acceleration kept. `trim`: keep the part between this fraction of the
-    Arias intensity and its complement; None keeps everything. `band` [Hz]: -6 dB points of zero-phase filters, with
-    rest before and after; the table then ends at rest where it began. `peak` [m/s2]: of the trimmed and filtered
-    record. `reach`: limits of the table's motion; the fit by `method`, which keeps the response spectrum at `periods`
-    [s], then changes the peak a little. Raises InvalidInput.
+    `length_ratio`: model over prototype length, with unchanged acceleration. `trim`: keep the part between this
+    fraction of the Arias intensity and its complement; None keeps everything. `band` [Hz]: -6 dB points of zero-phase
+    filters, with rest before and after; the table then ends at rest where it began. `peak` [m/s2]: of the trimmed and
+    filtered record. `reach`: limits of the table's motion; the fit by `method`, which preserves the response spectrum
+    at `periods` [s], then changes the peak slightly. Raises InvalidInput.
     """
     peak_before = float(np.abs(record.acceleration).max())
     if not peak_before > 0.0:
@@ -126,7 +126,7 @@ def prepare(
     steps: list[str] = []
     made = scaled(record, length_ratio)
     if length_ratio != 1.0:
-        steps.append(f"similitude: length x {length_ratio:g}, time x {length_ratio**0.5:.4g}, acceleration kept")
+        steps.append(f"similitude: length x {length_ratio:g}, time x {length_ratio**0.5:.4g}, acceleration unchanged")
     begin = 0.0
     if trim is not None:
         made, begin, said = _trimmed(made, trim)
@@ -134,7 +134,9 @@ def prepare(
     if band is not None:
         made, rest = _filtered(made, band)
         begin -= rest
-        steps.append(f"band {band[0]:g} to {band[1]:g} Hz: zero phase, Butterworth of order {ORDER} there and back")
+        steps.append(
+            f"band {band[0]:g} to {band[1]:g} Hz: zero phase, Butterworth of order {ORDER}, forwards and backwards"
+        )
     factor = 1.0
     if peak is not None:
         factor = _factor(made, peak)
@@ -177,18 +179,24 @@ def _trimmed(record: SampledRecord, share: float) -> _Trimmed:
     beyond = np.maximum(np.maximum(first - place, place - last), 0) / room
     kept = record.acceleration[start : stop + 1] * 0.5 * (1.0 + np.cos(np.pi * beyond))
     said = f"kept {first * record.dt:.4g} to {last * record.dt:.4g} s of {record.duration:.4g} s"
-    said += f": {100.0 * share:g} % of the Arias intensity left out at either end"
+    said += f": {100.0 * share:g} % of the Arias intensity removed at either end"
     return _Trimmed(SampledRecord(kept, record.dt), start * record.dt, said)
 
 
 def _filtered(record: SampledRecord, band: tuple[float, float]) -> tuple[SampledRecord, float]:
-    """The band-limited record, and the rest added before it [s]; a corner above its Nyquist frequency has no effect."""
+    """The band-limited record, and the rest added before it [s]; a corner above the record's Nyquist frequency has no
+    effect.
+    """
     from scipy.fft import next_fast_len
 
     low, high = band
     most = 0.5 / record.dt
     if not 0.0 < low < min(high, most):
-        raise InvalidInput("band", band, f"it must ascend from above 0, and begin below the {most:g} Hz of the record")
+        raise InvalidInput(
+            "band",
+            band,
+            f"it must ascend from above 0, and begin below {most:g} Hz, half the sample rate of the record",
+        )
     rest = round(REST / low / record.dt)
     padded = np.zeros(next_fast_len(record.acceleration.size + 2 * rest, real=True))
     padded[rest : rest + record.acceleration.size] = record.acceleration
@@ -203,5 +211,5 @@ def _factor(record: SampledRecord, peak: float) -> float:
         raise InvalidInput("peak", peak, "it must be a positive acceleration")
     there = float(np.abs(record.acceleration).max())
     if not there > 0.0:
-        raise InvalidInput("band", "no motion", "the record has no content within it: widen it")
+        raise InvalidInput("band", "no motion", "the record has no content within this band: widen it")
     return peak / there

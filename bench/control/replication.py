@@ -4,8 +4,8 @@ A pass plays the drive u and measures the table. The error E is corrected throug
 IFFT{ W K conj(H) / (|H|^2 + eps^2 max|H|^2) E }, where K contains the coherence and the fraction of E that is not
 noise. It converges where |1 - Q H_true / H| < 1. After a pass with a large error, H is corrected by its measurement. A
 pass worse than the best one is rolled back; the best drive is played once more to measure the non-repeatable part, and
-the correction is halved. So the accepted error never grows, and neither noise nor non-repeatable motion is learned (De
-Cuyper, Linear feedback control for durability test rigs in the automotive industry, thesis, KU Leuven 2006).
+the correction is halved. Thus the accepted error never grows, and neither noise nor non-repeatable motion is learned
+(De Cuyper, Linear feedback control for durability test rigs in the automotive industry, thesis, KU Leuven 2006).
 
 The passes end when the repeatable error is small enough both as root mean square, over the whole record, and in the
 response spectrum, which is sensitive to the few cycles that excite a structure.
@@ -29,16 +29,16 @@ Complex = NDArray[np.complex128]
 Status = Literal["running", "converged", "out of passes", "limited"]
 
 _REFINE_ABOVE, _REFINE_ON_ABOVE = 0.05, 0.01
-"""Error above which a pass starts to refine the response, and error down to which refinement then continues."""
+"""Error above which refinement of the response starts, and error down to which it then continues."""
 _LEAST_SHARE = 0.02
-"""Fraction of a correction within the limits below which no further pass is made."""
+"""Fraction of a correction permitted by the limits below which no further pass is made."""
 
 
 class ReplicationParameters(Parameters):
     """Parameters of the replication of a record."""
 
-    passes: int = quantity(8, "1", "passes at most", ge=1, le=50)
-    tolerance: float = quantity(0.003, "1", "acceptable relative root mean square error, without noise", gt=0, lt=1)
+    passes: int = quantity(8, "1", "maximum number of passes", ge=1, le=50)
+    tolerance: float = quantity(0.003, "1", "acceptable relative root mean square error, excluding noise", gt=0, lt=1)
     spectrum_tolerance: float = quantity(
         0.01, "1", "acceptable deviation of the response spectrum in excess of noise", gt=0, lt=1
     )
@@ -49,9 +49,14 @@ class ReplicationParameters(Parameters):
         min_length=1,
     )
     replay_first: bool = quantity(
-        False, "", "play the first drive twice before its correction: for a rocking block, whose motion does not repeat"
+        False,
+        "",
+        "whether the first drive is played twice before its correction, as for a rocking block, whose "
+        "motion does not repeat",
     )
-    margin: float = quantity(1.1, "1", "ratio of the limits to the greatest predicted drive and motion", ge=1, le=3)
+    margin: float = quantity(
+        1.1, "1", "required ratio of the limits to the greatest predicted drive and motion", ge=1, le=3
+    )
     beyond: Literal["refuse", "scale"] = quantity(
         "refuse", "", "treatment of a drive beyond a limit: refuse it, or scale it down to fit"
     )
@@ -95,7 +100,7 @@ class Replication:
         self._passes: list[Pass] = []
         self._least = np.inf
         self._status: Status = "running"
-        # before the first pass: no drive, no motion, the error is the whole target
+        # before the first pass there is neither drive nor motion, and the error is the entire target
         still = np.zeros(target.acceleration.size)
         self._best, self._missing = still, self._wanted
         self._present = Envelope.of(still, still, still, target.sample_rate)
@@ -120,25 +125,25 @@ class Replication:
 
     @property
     def status(self) -> Status:
-        """Running, or the reason for the end of the passes."""
+        """ "running", or the reason why the passes ended."""
         return self._status
 
     @property
     def verdict(self) -> Verdict:
-        """Limits applied to `drive` or, with the status "limited", to the correction not played."""
+        """Effect of the limits on `drive` or, with the status "limited", on the correction that was not played."""
         return self._verdict
 
     @property
     def repeatable(self) -> float:
-        """Relative root mean square error of the best drive, without noise; 1 before any pass."""
+        """Relative root mean square error of the best drive, excluding noise; 1 before any pass."""
         power = self._size(np.abs(self._missing) ** 2) ** 2 - self._size(self._noise) ** 2 / self._plays
         return max(power, 0.0) ** 0.5 / self._norm
 
     @property
     def spectrum_error(self) -> tuple[float, float]:
-        """Largest deviation of the response spectrum with the best drive in excess of noise; its period [s].
+        """Largest deviation of the response spectrum with the best drive in excess of noise, and its period [s].
 
-        Zero if none.
+        Both are zero if there is none.
         """
         table = self._table
         seen = table.record(table.window * (self._wanted - self._missing))
@@ -187,7 +192,7 @@ class Replication:
         self._present = Envelope.of(self._drive, acceleration, displacement, rate)
 
     def _compare(self, missing: Complex) -> None:
-        """Update noise and mean error by the second play of the best drive."""
+        """Update noise and mean error from the second play of the best drive."""
         difference = 0.5 * octave_mean(np.abs(missing - self._missing) ** 2, self._table.frequency)
         # two plays may agree by chance: use the largest scatter so far
         self._noise = np.maximum(self._noise, difference)
@@ -234,7 +239,7 @@ class Replication:
                 self._status = "converged"
 
     def _next(self) -> tuple[Array, float, Verdict]:
-        """The best drive with the correction permitted by the limits, the gain, and the verdict of the limits."""
+        """The best drive with the correction permitted by the limits, the gain, and the effect of the limits."""
         gains, rate = self.parameters.gains, self._target.sample_rate
         gain = gains[min(self._corrections, len(gains) - 1)] * 0.5**self._halvings
         self._corrections += 1
@@ -244,7 +249,7 @@ class Replication:
         return self._best + verdict.share * step, gain, verdict
 
     def _ends(self) -> Array:
-        """A factor that ramps the drive from and to zero within the rest before and after the record."""
+        """A factor that ramps the drive up from zero and down to zero within the rest before and after the record."""
         n = max(self._target.rest // 4, 2)
         ramp = 0.5 * (1.0 - np.cos(np.pi * np.arange(n) / n))
         ends = np.ones(self._target.acceleration.size)

@@ -5,9 +5,9 @@ and includes contributions of friction and the block's impacts. These are remove
 
     c_k <- c_k + GAIN (r_k - y_k) / g_k,   r = (1, 0, 0, ...),
 
-at each measurement, in bounded steps, with g_k corrected by the secant (y_k - y_k') / (c_k - c_k') of two measurements
-if the step between them exceeded the noise. c_k is the share measured in the drive, not the command: a measurement
-before the last step has taken effect repeats the same request.
+at each measurement, in bounded steps, where g_k is corrected by the secant (y_k - y_k') / (c_k - c_k') of two
+measurements if the step between them exceeded the noise. c_k is the share measured in the drive, not the commanded one,
+so a measurement made before the last step has taken effect repeats the same request.
 """
 
 from collections.abc import Sequence
@@ -53,10 +53,10 @@ class SineResponse:
 
     @staticmethod
     def of(cycles: Sequence[Cycle], sine: Sine, turn: complex) -> "SineResponse":
-        """The means over two `cycles` or more, of a dwell whose phase is relative to `turn` (see `Sine.turn`).
+        """The means over two or more `cycles` of a dwell whose phase is relative to `turn` (see `Sine.turn`).
 
-        The uncertainty is that of their scatter, at least that of all harmonics together: a few cycles may agree by
-        chance.
+        The uncertainty follows from the scatter of the cycles, and is at least that of all harmonics together, since a
+        few cycles may agree by chance.
         """
         unit = sine.amplitude * turn**_ORDERS
         driven, moved = (
@@ -77,7 +77,7 @@ class SineResponse:
 
     @property
     def phase_error(self) -> float:
-        """Lead of the fundamental over the oscillator [rad]."""
+        """Phase lead of the fundamental over the oscillator [rad]."""
         return float(np.angle(self.achieved[0]))
 
     @property
@@ -87,7 +87,7 @@ class SineResponse:
 
 
 GAIN = 0.9
-"""Fraction of an error removed by one step: below 1 because gains are uncertain."""
+"""Fraction of an error removed by one step, below 1 because gains are uncertain."""
 
 PATIENCE = 6
 """Number of steps after which that fraction falls as 1, 1/2, 1/3 and so on: the mean of a non-repeating motion is then
@@ -98,13 +98,13 @@ LARGEST_STEP = 0.10
 """Largest change of a share per measurement."""
 
 NOTICED = 1.5
-"""Number of standard deviations above which a harmonic is corrected; less is noise."""
+"""Number of standard deviations above which a harmonic is corrected; anything less is noise."""
 
 TELLING = 5.0
 """Number of standard deviations of a step above which its secant is used."""
 
 PLAUSIBLE = (0.5, 2.0)
-"""Plausible magnitudes of a table's secant; an unsettled block causes others."""
+"""Range of plausible magnitudes of a table's secant; an unsettled block causes others."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ class Tolerance:
     distortion: float
 
     def met(self, response: SineResponse) -> bool:
-        """Whether the response is within all three."""
+        """Whether the response is within all three tolerances."""
         return (
             abs(response.amplitude_error) <= self.amplitude
             and abs(response.phase_error) <= self.phase
@@ -140,7 +140,7 @@ class SineControl:
         return self._gains
 
     def next(self, response: SineResponse) -> tuple[complex, ...] | None:
-        """Shares to play next, or None where the response is within the tolerance."""
+        """Shares to play next, or None if the response is within the tolerance."""
         self._learn(response)
         self._before = response
         if self._tolerance.met(response):

@@ -2,9 +2,9 @@
 
 Switching the sine on topples the block at many points, and at high frequencies leaves it at rest. The transient is
 chaotic and the specimen is uncertain, so each candidate is simulated with specimens drawn from the identification's
-uncertainty and with slightly different drives. A few draws select the candidates, new ones rate the remaining ones, so
-the stated probability is not biased by the selection. The sieves take the short candidates first and end once enough of
-them have succeeded with every draw: no longer one could displace them.
+uncertainty and with slightly different drives. A few draws select candidates and new draws rate those that remain, so
+the stated probability is not biased by the selection. Each selection round tries short candidates first and ends once
+enough of them have succeeded with every draw, since no longer candidate could displace them.
 """
 
 from collections.abc import Sequence
@@ -28,7 +28,7 @@ TOPS = (22.0, 24.0, 26.0, 28.0)
 """Frequencies [rad/s] of the soft ramp, at which the block rocks little and the frame is far from resonance."""
 
 RAMPS = ((6.0, 0.0), (12.0, 0.0), (6.0, 10.0))
-"""Duration of the soft ramp, and of the wait before the chirp [s]."""
+"""Durations of the soft ramp and of the wait before the chirp [s]."""
 
 CHIRPS = (0.5, 1.0)
 """Rates of the downward frequency sweep [rad/s per s]."""
@@ -37,10 +37,12 @@ DIRECT_RAMPS = (8.0, 16.0)
 """Durations of a ramp at the requested frequency [s]."""
 
 OVERSHOOTS = (1.0, 1.2)
-"""Ratio of the amplitude of ramp and chirp to the requested one: a larger one lifts a block that would stay at rest."""
+"""Ratio of the amplitude of ramp and chirp to the requested amplitude; a larger amplitude lifts a block that would stay
+at rest.
+"""
 
 EASE = 6.0
-"""Time in which an overshoot is removed at the requested frequency [s]."""
+"""Time within which an overshoot is removed at the requested frequency [s]."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +54,7 @@ class Candidate:
 
     @property
     def duration(self) -> float:
-        """Length [s]."""
+        """Duration [s]."""
         return sum(leg.duration for leg in self.legs)
 
 
@@ -94,22 +96,22 @@ DRIVE = 0.03
 """Relative half width of the table's amplitude during a start-up, before amplitude control takes effect."""
 
 SIEVES = ((5, 2.0), (10, 1.0))
-"""Draws of each selection round, and the number of candidates it keeps per requested start-up."""
+"""Number of draws in each selection round, and number of candidates kept per requested start-up."""
 
 RATING = 32
-"""Draws that rate the remaining candidates."""
+"""Number of draws that rate the remaining candidates."""
 
 SEED = 1
 """Random seed of the draws, for reproducible results."""
 
 DWELL, WINDOW = 40.0, 4.0
-"""Simulated time at the requested frequency, and the evaluated last part of it [s]."""
+"""Simulated time at the requested frequency, and the last part of it that is evaluated [s]."""
 
 TOLERANCE = 1e-7
 """Relative tolerance of the simulations."""
 
 CATCH_ANGLE = 0.35
-"""Tilt [rad] that counts as fallen: beyond it no spring of the campaign returns the block."""
+"""Tilt [rad] beyond which the block counts as fallen: no spring of the campaign would return it."""
 
 CLOSE = 0.10
 """Relative difference of the peaks of drift and tilt below which a motion counts as converging to the orbit."""
@@ -128,7 +130,7 @@ class Start:
 
     @property
     def duration(self) -> float:
-        """Length [s]."""
+        """Duration [s]."""
         return sum(leg.duration for leg in self.legs)
 
 
@@ -151,10 +153,9 @@ def plan_starts(
 ) -> list[Start]:
     """The `count` most robust starts to `amplitude` [m/s2] at `omega` [rad/s], best first, shorter first among equals.
 
-    `orbit` is the rocking orbit of `specimen`, None if it does not exist. A start succeeds with a drawn specimen when
-    the simulated motion ends close to that specimen's own stable orbit; without one, when the block stands. Raises
-    InvalidInput for a bare frame or meaningless numbers. A later question with the same numbers is answered from the
-    cache of results.
+    `orbit` is the rocking orbit of `specimen`, None if it does not exist. A start succeeds with a drawn specimen if the
+    simulated motion ends close to that specimen's stable orbit or, if there is none, if the block is left standing.
+    Raises InvalidInput for a bare frame or meaningless numbers. Results are cached.
     """
     allowed = uncertainty or SpecimenKnowledge()
     aim = None if orbit is None else [*orbit.section.tolist(), orbit.peaks.drift, orbit.peaks.theta, orbit.stable]
@@ -195,10 +196,11 @@ def _search(
 def _sifted(
     ways: list[Candidate], won: Counts, cases: Sequence[_Case], keep: int, most: int
 ) -> tuple[list[Candidate], Counts]:
-    """The `keep` best candidates after these cases too, best first, and in how many cases each has succeeded.
+    """The `keep` best candidates after these cases as well, best first, with the number of cases in which each has
+    succeeded.
 
-    `most` is the number of all cases so far. The candidates are simulated in the order in which equals are preferred;
-    once `keep` of them have succeeded in every case, the others are omitted without simulation.
+    `most` is the total number of cases so far. Candidates are simulated in the order in which equals are preferred;
+    once `keep` of them have succeeded in every case, the others are dropped without simulation.
     """
     order = _best_first(ways, won)
     total = won.copy()
@@ -207,7 +209,7 @@ def _sifted(
         batch = order[len(simulated) : len(simulated) + max(keep - np.count_nonzero(total[simulated] == most), 1)]
         total[batch] += _successes([ways[i] for i in batch], cases)
         simulated += batch
-    # in the order in which they were given, as equals of one length keep it
+    # in the given order, which equals of one length keep
     simulated.sort()
     best = [simulated[k] for k in _best_first([ways[i] for i in simulated], total[simulated])][:keep]
     return [ways[i] for i in best], total[best]

@@ -24,7 +24,7 @@ HALVINGS = 24
 """Number of bisections of that range on a logarithmic scale: the final interval is a millionth wide."""
 
 PAD = 1.5
-"""Length of the zeros added before and after, in periods of the corner per order: the filter decays there."""
+"""Length of the zero padding before and after, in which the filter decays, in periods of the corner per order."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,15 +37,15 @@ class HighPassed:
 
 
 def fit_by_high_pass(acceleration: Array, dt: float, reach: Reach) -> HighPassed:
-    """`acceleration` [m/s2], shape (n,), through the high-pass with the lowest corner that keeps the table in `reach`.
+    """`acceleration` [m/s2], shape (n,), high-pass filtered with the lowest corner that keeps the table within `reach`.
 
-    Raises InvalidInput where no corner up to 5 Hz does.
+    Raises InvalidInput if no corner up to 5 Hz does.
     """
     low, high = CORNERS
     found = high_passed(acceleration, dt, high)
     motion = table_motion(found.acceleration, dt)
     if not reach.holds(motion):
-        needs = f"even above {high:g} Hz it requires {1e3 * motion.peak_displacement:.3g} mm and"
+        needs = f"even high-passed at {high:g} Hz it requires {1e3 * motion.peak_displacement:.3g} mm and"
         allowed = f"{1e3 * reach.displacement:.3g} mm and {reach.velocity:.3g} m/s are allowed: scale it down"
         raise InvalidInput("record", "", f"{needs} {motion.peak_velocity:.3g} m/s; {allowed}")
     for _ in range(HALVINGS):
@@ -59,12 +59,12 @@ def fit_by_high_pass(acceleration: Array, dt: float, reach: Reach) -> HighPassed
 
 
 def high_passed(acceleration: Array, dt: float, corner: float) -> HighPassed:
-    """`acceleration` without its content below `corner` [Hz], ending at rest, with room before and after for the
+    """`acceleration` without its content below `corner` [Hz], ending at rest, padded before and after for the
     filter.
     """
     lead = int(np.ceil(PAD * ORDER / (corner * dt)))
     padded = np.pad(acceleration, lead)
-    # the same number of further zeros prevents wrap-around of the periodic transform
+    # as many zeros again prevent wrap-around of the periodic transform
     length = 2 * padded.size
     frequencies = np.fft.rfftfreq(length, dt)
     gain = np.zeros_like(frequencies)
@@ -77,13 +77,13 @@ PERIODS = np.geomspace(0.1, 2.0, 40)
 """Periods [s] at which the change of the response spectrum is minimised and reported."""
 
 SHORTEST = 16
-"""Least number of samples of a record."""
+"""Minimum number of samples of a record."""
 
 TURNS = 8
-"""Largest number of fits within a band; each leaves about a tenth of its change to the next."""
+"""Maximum number of fits within a band; each leaves about a tenth of its change to the next."""
 
 TIGHTER = 0.995
-"""Fraction of the reach of one fit available to the next."""
+"""Fraction of one fit's reach that is available to the next."""
 
 SAME = 0.01
 """Largest difference between the fitted motion and its band-limited version, as a fraction of the reach."""
@@ -106,9 +106,9 @@ class Method(StrEnum):
 class StrokeFit:
     """A fitted record: it ends at rest where it began, and stays within the table's reach at every sample.
 
-    `record` begins `lead` [s] before the original. `before` and `after` are the table's motions under the original
-    and under the fitted record. `spectrum` and `spectrum_before`, shape (n,), are pseudo-accelerations [m/s2] at
-    `periods` [s]. `done` describes the fit.
+    `record` begins `lead` [s] before the original. `before` and `after` are the table's motions under the original and
+    the fitted record. `spectrum` and `spectrum_before`, shape (n,), are pseudo-accelerations [m/s2] at `periods` [s].
+    `done` describes the fit.
     """
 
     record: SampledRecord
@@ -139,10 +139,10 @@ def fit_stroke(
     damping: float = DAMPING,
     band: tuple[float, float] | None = None,
 ) -> StrokeFit:
-    """`record` modified to keep the table within `reach`; a record within `band` [Hz] stays within it.
+    """`record` modified to keep the table within `reach`; a record within `band` [Hz] stays within that band.
 
-    A record that fits and ends at rest is returned unchanged. Raises InvalidInput for a record without motion or
-    shorter than 16 samples, and where the method finds no fit, with the reason.
+    A record that already fits and ends at rest is returned unchanged. Raises InvalidInput for a record without motion
+    or shorter than 16 samples, and, with the reason, if the method finds no fit.
     """
     original, dt = record.acceleration, record.dt
     if original.size < SHORTEST or not original.any():
@@ -151,7 +151,7 @@ def fit_stroke(
     before = table_motion(original, dt)
     lead = 0
     if reach.holds(before) and _at_rest(before):
-        fitted, done = original, "nothing: the record fits as it is"
+        fitted, done = original, "unchanged: the record already fits"
     elif method is Method.HIGH_PASS:
         passed = fit_by_high_pass(original, dt, reach)
         fitted, lead = passed.acceleration, passed.lead
@@ -176,8 +176,8 @@ def fit_stroke(
 def _least_change(
     original: Array, dt: float, reach: Reach, periods: Array, damping: float, band: tuple[float, float] | None
 ) -> Array:
-    """The least change. Half sines end with the record and so have slight content below their frequency, outside the
-    table's `band`: it is removed, and the resulting excess of reach or final motion is fitted again.
+    """The least change. Half sines end with the record and therefore have slight content below their frequency, outside
+    the table's `band`. This content is removed, and any resulting excess of reach or final motion is fitted again.
     """
     if band is None:
         return fit_by_least_change(original, dt, reach, periods, damping)
@@ -193,11 +193,11 @@ def _least_change(
             return made
         made, share = kept[: made.size], TIGHTER ** (turn + 1)
         asked = Reach(share * reach.displacement, share * reach.velocity)
-    needs = f"no change from {band[0] / FLAT:.3g} Hz up was found, {1e3 * reach.displacement:.3g} mm and"
+    needs = f"no change from {band[0] / FLAT:.3g} Hz upward was found, {1e3 * reach.displacement:.3g} mm and"
     raise InvalidInput("record", "", f"{needs} {reach.velocity:.3g} m/s are allowed; {NOT_BOTH}")
 
 
 def _at_rest(motion: TableMotion) -> bool:
-    """Whether the table ends at rest where it began, within rounding."""
+    """Whether the table ends at rest where it began, to within rounding."""
     still = abs(motion.velocity[-1]) <= ROUNDING * motion.peak_velocity
     return still and abs(motion.displacement[-1]) <= ROUNDING * motion.peak_displacement

@@ -19,7 +19,7 @@ from sim.parameters import Parameters, quantity
 Number = TypeVar("Number", np.float64, np.complex128)
 
 _REACH = exp2(1.0 / 6.0)
-"""Ratio of the outermost frequency of the mean to the centre: a sixth of an octave to either side."""
+"""Ratio of the outermost averaged frequency to the centre: a sixth of an octave to either side."""
 
 
 def octave_mean(values: NDArray[Number], frequency: NDArray[np.float64]) -> NDArray[Number]:
@@ -27,7 +27,7 @@ def octave_mean(values: NDArray[Number], frequency: NDArray[np.float64]) -> NDAr
     total: NDArray[Number] = np.concatenate((np.zeros(1, values.dtype), np.cumsum(values)))
     first = np.searchsorted(frequency, frequency / _REACH)
     last = np.searchsorted(frequency, frequency * _REACH, side="right")
-    # numpy's stubs lose the type of the elements in a division
+    # numpy's stubs lose the element type in a division
     return cast(NDArray[Number], (total[last] - total[first]) / (last - first))
 
 
@@ -36,25 +36,25 @@ Array = NDArray[np.float64]
 Values = tuple[float, ...]
 
 LONGEST_AGE = timedelta(hours=12)
-"""Default age after which a model is refused, because the temperature of coil and guides changes."""
+"""Default age after which a model is rejected, because coil and guides change temperature."""
 
 
 class TableModel(Parameters):
-    """Table acceleration per drive [m/s2/V] at ascending frequencies, everything of shape (n_lines,).
+    """Table acceleration per drive [m/s2/V] at ascending frequencies; all arrays have shape (n_lines,).
 
-    The response covers everything between a drive sample and the sample of the channel: hold, amplifier, table,
-    specimen, filter card. Convention exp(+i omega t).
+    The response covers everything between a drive sample and a channel's sample: hold, amplifier, table, specimen,
+    filter card. Convention exp(+i omega t).
     """
 
-    date: AwareDatetime = quantity(..., "", "when the table was identified")
-    specimen: str = quantity(..., "", "specimen on the table")
+    date: AwareDatetime = quantity(..., "", "date of the identification")
+    specimen: str = quantity(..., "", "specimen mounted on the table")
     sample_rate: float = quantity(..., "1/s", "samples per second of drive and channels", gt=0)
     level: float = quantity(..., "m/s2", "root mean square of the table acceleration during the identification", gt=0)
     frequency: Values = quantity(..., "Hz", "frequencies of the lines, ascending", min_length=2)
     real: Values = quantity(..., "m/s2/V", "real part of the response")
     imaginary: Values = quantity(..., "m/s2/V", "imaginary part of the response")
     uncertainty: Values = quantity(..., "m/s2/V", "standard uncertainty of the response, noise and distortion together")
-    distortion: Values = quantity(..., "m/s2/V", "standard deviation of the response by nonlinear distortion alone")
+    distortion: Values = quantity(..., "m/s2/V", "standard deviation of the response due to nonlinear distortion alone")
     coherence: Values = quantity(..., "1", "fraction of the acceleration's power explained by the drive")
     noise: Values = quantity(..., "m/s2/Hz^0.5", "spectral density of the noise in the acceleration")
 
@@ -74,7 +74,9 @@ class TableModel(Parameters):
         return self.frequency[0], self.frequency[-1]
 
     def response(self, frequency: Array) -> NDArray[np.complex128]:
-        """The response at `frequency` [Hz], same shape. InvalidInput outside the band: nothing is extrapolated."""
+        """The response at `frequency` [Hz], same shape. Raises InvalidInput outside the band: nothing is
+        extrapolated.
+        """
         self._require(frequency)
         return np.interp(frequency, self.frequency, self._complex)
 
@@ -84,7 +86,7 @@ class TableModel(Parameters):
         return np.interp(frequency, self.frequency, self.coherence)
 
     def noise_at(self, frequency: Array) -> Array:
-        """Density of the noise [m/s2/Hz^0.5] at `frequency` [Hz] within the band, same shape."""
+        """Noise density [m/s2/Hz^0.5] at `frequency` [Hz] within the band, same shape."""
         self._require(frequency)
         return np.interp(frequency, self.frequency, self.noise)
 
@@ -99,20 +101,20 @@ class TableModel(Parameters):
             raise InvalidInput("date of the table model", self.date.isoformat(timespec="seconds"), allowed)
 
     def require_rate(self, sample_rate: float) -> None:
-        """Raise InvalidInput when drive and channels run at another rate than during the identification."""
+        """Raise InvalidInput if drive and channels run at a rate other than that of the identification."""
         if sample_rate != self.sample_rate:
             allowed = f"the table model was identified at {self.sample_rate:g}; identify the table again"
             raise InvalidInput("sample_rate", sample_rate, allowed)
 
     def write(self, path: Path) -> None:
-        """Write the model as JSON; InvalidInput when the file exists or cannot be written."""
+        """Write the model as JSON. Raises InvalidInput if the file exists or cannot be written."""
         try:
             with path.open("x", encoding="utf-8", newline="\n") as file:
                 file.write(self.model_dump_json(indent=1) + "\n")
         except FileExistsError:
-            raise InvalidInput("table model", str(path), "it exists and is never overwritten") from None
+            raise InvalidInput("table model", str(path), "the file exists and is never overwritten") from None
         except OSError as error:
-            raise InvalidInput("table model", str(path), f"it cannot be written: {error.strerror}") from None
+            raise InvalidInput("table model", str(path), f"the file cannot be written: {error.strerror}") from None
 
     @staticmethod
     def read(path: Path) -> "TableModel":
@@ -123,9 +125,9 @@ class TableModel(Parameters):
         except FileNotFoundError:
             raise InvalidInput("table model", str(path), "there is no such file") from None
         except OSError as error:
-            raise InvalidInput("table model", str(path), f"it cannot be read: {error.strerror}") from None
+            raise InvalidInput("table model", str(path), f"the file cannot be read: {error.strerror}") from None
         except (ValueError, RecursionError) as error:
-            raise InvalidInput("table model", str(path), f"it is not JSON: {error}") from None
+            raise InvalidInput("table model", str(path), f"the file is not valid JSON: {error}") from None
         return validated(TableModel, data)
 
     @property
@@ -143,7 +145,7 @@ class TableModel(Parameters):
 Complex = NDArray[np.complex128]
 
 REGULARISATION = 1e-3
-"""eps: lines whose response is below this fraction of the largest receive less than half of the required drive."""
+"""eps: lines whose response is below this fraction of the largest receive less than half the required drive."""
 
 _TINY = 1e-12
 """Fraction of the largest power below which a line contains only rounding errors."""
@@ -156,7 +158,7 @@ class TableInverse:
     """
 
     def __init__(self, model: TableModel, target: Target) -> None:
-        """Raises InvalidInput where the model does not cover the target's support or has another sample rate."""
+        """Raises InvalidInput if the model does not cover the target's support or has a different sample rate."""
         model.require_rate(target.sample_rate)
         low, high = target.support
         self._size = target.acceleration.size
@@ -186,8 +188,8 @@ class TableInverse:
     def correction(self, missing: Complex, noise: Array) -> Array:
         """Drive [V] for the spectrum of a `missing` acceleration, at unit gain.
 
-        Every line is weighted by its coherence and by the fraction of its power that is not `noise`, so noise is not
-        learned.
+        Every line is weighted by its coherence and by the fraction of its power that is not `noise`, so that noise is
+        not learned.
         """
         power = octave_mean(np.abs(missing) ** 2, self.frequency)
         real_share = np.maximum(1.0 - noise / np.maximum(power, _TINY * power.max(initial=1e-300)), 0.0)

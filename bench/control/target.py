@@ -1,4 +1,4 @@
-"""Target motion of the table: a record within the table's band, at rest at both ends; and the table's reach."""
+"""Target motion of the table, a record within the table's band that is at rest at both ends; and the table's reach."""
 
 from dataclasses import dataclass, replace
 from math import isfinite
@@ -19,7 +19,7 @@ FLAT, REACH = 1.6, 2.0
 """Factors on the ends of the band: the weight is 1 up to the first and 0 beyond the second."""
 
 REST = 4.0
-"""Rest before and after the record, in periods of the band's lower end, in which the filters settle."""
+"""Rest before and after the record, in which the filters settle, in periods of the band's lower end."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ def band_gain(frequency: Array, band: tuple[float, float]) -> Array:
 
 
 def integrated(acceleration: Array, sample_rate: float) -> tuple[Array, Array]:
-    """Velocity [m/s] and displacement [m] from the first sample on, of an acceleration without its mean."""
+    """Velocity [m/s] and displacement [m], from the first sample on, for an acceleration with its mean removed."""
     spectrum = np.fft.rfft(acceleration)
     omega = 2.0 * np.pi * np.fft.rfftfreq(acceleration.size, 1.0 / sample_rate)
     spectrum[0], omega[0] = 0.0, 1.0
@@ -104,7 +104,9 @@ def integrated(acceleration: Array, sample_rate: float) -> tuple[Array, Array]:
 
 
 def band_window(frequency: Array, band: tuple[float, float]) -> Array:
-    """1 within the band and FLAT beyond, 0 from REACH on, half a cosine over the logarithm between; same shape."""
+    """Weight: 1 within the band extended by FLAT, 0 from REACH on, half a cosine in the logarithm between; same
+    shape.
+    """
     low, high = band
     inside = (frequency > low / REACH) & (frequency < high * REACH)
     beyond = np.zeros_like(frequency)
@@ -114,7 +116,7 @@ def band_window(frequency: Array, band: tuple[float, float]) -> Array:
 
 
 SHARE = 0.9
-"""Fraction of stroke and limits that a record may use, because the table does not follow it exactly."""
+"""Fraction of stroke and limits that a record may use, since the table does not follow it exactly."""
 
 
 @dataclass(frozen=True)
@@ -131,7 +133,7 @@ class Reach:
 
     @staticmethod
     def of(configuration: BenchConfiguration, share: float = SHARE) -> "Reach":
-        """The fraction `share` of a bench's stroke and limits."""
+        """The fraction `share` of the bench's stroke and limits."""
         limits = configuration.limits
         return Reach(share * min(configuration.half_stroke, limits.displacement), share * limits.velocity)
 

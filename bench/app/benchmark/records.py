@@ -35,7 +35,9 @@ MAP_COLUMNS = (
 
 
 def gain_maps(n: int, runs: int, repetitions: int) -> Section:
-    """Time the map of n x n points, and 120 s runs from the orbit at `runs` x `runs` of them, scaled to all points."""
+    """Time the map of n x n points, and 120 s runs that start on the orbit at `runs` x `runs` of them, scaled to all
+    points.
+    """
     betas, omegas = np.linspace(*BETAS, n), np.linspace(*OMEGAS, n)
     specimen = Specimen()
     gain_map(specimen, betas[:2], omegas[:2], AMPLITUDE)
@@ -70,7 +72,7 @@ def gain_maps(n: int, runs: int, repetitions: int) -> Section:
         "1e-13 from the start of the orbit, at nine points from corner to corner.",
     )
     error = rows[0]["error"]
-    # the cost per point of a coarser map differs: its time does not scale to that of the full map
+    # the cost per point of a coarser map differs, so its time cannot be scaled to the full map
     whole = n == FULL
     share = (elapsed / points) / (run_time / ran)
     targets = (
@@ -115,7 +117,7 @@ def _map_error(chart: GainMap) -> float:
 
 
 DT, DURATION = 0.005, 40.0
-"""Step and length of the records [s]."""
+"""Step and duration of the records [s]."""
 
 ROCKING = Specimen(beta=0.4)
 ROCKING_START = State(-0.0010828, 0.00037455, 0.049398, -0.11073, 0.0, 0.67994)
@@ -138,14 +140,14 @@ COLUMNS = (
 
 
 def records(quick: bool, members: int) -> Section:
-    """Run the three cases. With `quick`, the reference of the rocking case covers less of the record."""
+    """Run the three cases. With `quick`, the reference for the rocking case covers a shorter part of the record."""
     rest, at_rest = _resting(20 if quick else 60)
     rock, rocking = _rocking(20 if quick else 60, 2.0 if quick else 10.0)
     many, scattered, overturned = _scatter(members, 1 if quick else 3)
     notes = (
         f"Records of {DURATION:g} s at dt {DT:g} s; all with peaks. Errors of end states in SI units.",
-        f"In the scatter {overturned} of {members} members overturn; its error is the greatest relative difference in "
-        "peak drift over the first members.",
+        f"In the scatter case, {overturned} of {members} members overturn; the error is the greatest relative "
+        "difference in peak drift over the first members.",
     )
     targets = (
         Target("40 s record at rest", 0.3, 1e3 * rest.minimum, "ms"),
@@ -156,7 +158,7 @@ def records(quick: bool, members: int) -> Section:
 
 
 def noise(duration: float, peak: float) -> NDArray[np.float64]:
-    """Band-limited noise, 1.5 to 8 Hz, with a rise and a decay, shape (n,), scaled to `peak` [m/s2]."""
+    """Band-limited noise, 1.5 to 8 Hz, with rise and decay, shape (n,), scaled to `peak` [m/s2]."""
     n = round(duration / DT) + 1
     spectrum = np.fft.rfft(np.random.default_rng(SEED).normal(size=n))
     frequency = np.fft.rfftfreq(n, DT)

@@ -23,7 +23,7 @@ from sim.specimen import Specimen
 from sim.streaming import Stream
 
 SCALING_COLUMNS = (
-    Column("what", "what grows"),
+    Column("what", "growing quantity"),
     Column("size", "size", "d"),
     Column("unit", "unit"),
     Column("min_ms", "min [ms]", ".3g"),
@@ -42,8 +42,8 @@ def scaling(repetitions: int) -> Section:
     ]
     notes = (
         "Exponent: least-squares slope of log(time) over log(size); a constant part reduces it below 1.",
-        "Memory: peak allocation by Python and numpy during a run; the workspace of the compiled kernel depends on "
-        "the order of the series only.",
+        "Memory: peak allocation by Python and numpy during a run; the workspace of the compiled kernel "
+        "depends only on the order of the series.",
     )
     return Section("scaling", "Growth of the cost", SCALING_COLUMNS, rows, notes)
 
@@ -121,7 +121,7 @@ def startup(warm_runs: int) -> Section:
         {"start": "warm", "runs": warm_runs, "min_s": starts[0][0], "median_s": warm, "processor_s": warm_work},
         {"start": "difference: compilation", "runs": 1, "median_s": cold - warm, "processor_s": compiling},
     ]
-    notes = ("On a machine with other load, processor time is more meaningful than elapsed time.",)
+    notes = ("On a machine under other load, processor time is more meaningful than elapsed time.",)
     targets = (
         Target("compilation for predict steady", 12.0, cold - warm, "s"),
         Target("warm start of predict steady", 4.0, warm, "s"),
@@ -130,8 +130,8 @@ def startup(warm_runs: int) -> Section:
 
 
 def _run(cache: Path) -> tuple[float, float | None]:
-    """Elapsed and processor time [s]; the latter is None where the system does not report it. Raises RockbenchError
-    when the command fails.
+    """Elapsed and processor time [s]; the latter is None where the system does not report it. Raises RockbenchError if
+    the command fails.
     """
     code = f"import sys; from bench.app.cli.main import main; sys.exit(main({list(COMMAND)!r}))"
     before = os.times()
@@ -172,7 +172,7 @@ STREAMING_COLUMNS = (
 
 
 def streaming(duration: float, repetitions: int, drives: Sequence[int] = (1_000, 2_000, 20_000)) -> Section:
-    """Time steady rocking for `duration` [s] on one core, at several update rates of the drive."""
+    """Time the streaming of `duration` [s] of steady rocking on one core, at several update rates of the drive."""
     rows = [_row(rate, duration, repetitions) for rate in drives]
     fastest = rows[0]["times_real_time"]
     notes = (
@@ -181,7 +181,7 @@ def streaming(duration: float, repetitions: int, drives: Sequence[int] = (1_000,
         "Error of the end state in SI units against dop853 at 1e-13.",
     )
     share = 200.0 / fastest if isinstance(fastest, float) else None
-    targets = (Target("streaming: 200 over times real time", 1.0, share, "1"),)
+    targets = (Target("streaming: 200 divided by the multiple of real time", 1.0, share, "1"),)
     return Section("streaming", "Streaming", STREAMING_COLUMNS, rows, notes, targets)
 
 

@@ -1,4 +1,4 @@
-"""Sections of the results of a benchmark, and the timing of runs."""
+"""Sections of benchmark results, and the timing of runs."""
 
 import gc
 import time
@@ -36,8 +36,8 @@ def timed(run: Callable[[], T], repetitions: int) -> Timing[T]:
 
 
 def in_turn(runs: Mapping[str, tuple[Callable[[], Any], int]]) -> dict[str, Timing[Any]]:
-    """Times of several runs, each with its number of repetitions, interleaved evenly. Garbage collection is
-    disabled meanwhile.
+    """Times of several runs, each repeated its own number of times, interleaved evenly. Garbage collection is disabled
+    during the runs.
     """
     times: dict[str, list[float]] = {name: [] for name in runs}
     results: dict[str, Any] = {}
@@ -61,7 +61,7 @@ Cell = float | int | str | bool | None
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a table: key of its rows, heading with the unit, format of its numbers."""
+    """A table column: key in the rows, heading with unit, number format."""
 
     key: str
     heading: str
@@ -140,7 +140,7 @@ TARGET_COLUMNS = (
 
 
 def targets_section(sections: Sequence[Section]) -> Section:
-    """All targets in one table, missed ones first."""
+    """All targets in one table, missed targets first."""
     targets = [target for section in sections for target in section.targets]
     order = {False: 0, None: 1, True: 2}
     rows = [target.row() for target in sorted(targets, key=lambda target: order[target.met])]

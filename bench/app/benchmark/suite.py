@@ -1,5 +1,7 @@
 # pyright: reportUnknownMemberType=false
-"""Runs the parts of the benchmark and writes their results: tables, JSON with the machine, work-precision figure."""
+"""Runs the parts of the benchmark and writes the results: tables, JSON with a description of the machine,
+work-precision figure.
+"""
 
 import json
 import os
@@ -115,9 +117,9 @@ RESULTS = (MARKDOWN, JSON, FIGURE)
 
 @dataclass(frozen=True)
 class Scale:
-    """Extent of the measurements: `methods`, with a time `budget` [s] each; `map_points` along each axis of the map, of
-    which `run_points` are run for 120 s; `members` of the scatter; `stream`, the duration of streaming [s];
-    `repetitions` of the growth; number of `warm` starts.
+    """Extent of the measurements: `methods`, each with a time `budget` [s]; `map_points` along each axis of the map, of
+    which `run_points` are run for 120 s; number of `members` in the scatter case; `stream`, the duration of streaming
+    [s]; `repetitions` of the growth measurements; number of `warm` starts.
     """
 
     name: str
@@ -208,7 +210,7 @@ def run_benchmark(
             raise InvalidInput("part", name, f"it must be one of {', '.join(PARTS)}")
     for name in RESULTS:
         if (out / name).exists():
-            raise InvalidInput("out", str(out), f"it contains {name} already; results are never overwritten")
+            raise InvalidInput("out", str(out), f"it already contains {name}; results are never overwritten")
     load_model(progress)
     begin, started = time.perf_counter(), datetime.now().astimezone()
     sections: list[Section] = []

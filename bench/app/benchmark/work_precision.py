@@ -1,4 +1,4 @@
-"""Error against run time of every method on the standard case, and error of the gains from long runs."""
+"""Error against run time for every method on the standard case, and errors of gains from long runs."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -51,7 +51,7 @@ class Method:
 
 
 def methods(quick: bool) -> list[Method]:
-    """All methods; with `quick`, slow ones are omitted or run at a single setting."""
+    """All methods; with `quick`, slow methods are omitted or run at a single setting."""
     taylor = (1e-6, 1e-8, 1e-10, 1e-12, 1e-13) if quick else (1e-6, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12, 1e-13, 1e-14)
     scipy = {"RK45": {1e-6: 1.2}, "DOP853": {1e-10: 1.5}, "LSODA": {1e-10: 1.2}, "Radau": {1e-6: 4.0}}
     if not quick:
@@ -169,9 +169,9 @@ def steady_by_time() -> Section:
                 place | {"solver": name, "alpha_1": found.alpha_1, "alpha_2": found.alpha_2, "off_percent": off}
             )
     notes = (
-        f"Runs of 120 s from a point of the orbit, peaks of the last {LAST_PERIODS} periods. The paper's procedure "
-        "places impacts on its time grid: its solution wanders about the orbit, and the result depends on the "
-        "window.",
+        f"Runs of 120 s from a point of the orbit; peaks over the last {LAST_PERIODS} periods. The paper's "
+        "procedure places impacts on its time grid: its solution wanders about the orbit, and the result "
+        "depends on the window.",
     )
     return Section("steady_by_time", "Gain coefficients by 120 s runs", GAIN_COLUMNS, rows, notes)
 
@@ -185,7 +185,7 @@ COLUMNS = (
     Column("status", "status"),
     Column("impacts", "impacts", "d"),
     Column("steps", "steps", "d"),
-    Column("error", "error of end", ".1e"),
+    Column("error", "error of end state", ".1e"),
     Column("peak_error", "error of peaks", ".1e"),
     Column("first_call_ms", "first call [ms]", ".0f"),
     Column("min_ms", "min [ms]", ".2f"),
@@ -196,9 +196,9 @@ COLUMNS = (
 NOTES = (
     "Errors: greatest deviation of the end state from the reference, in SI units (components reach about 1); errors "
     "of the peaks are relative. The reference is heyoka in 80-bit arithmetic, an independent integrator.",
-    "First call: compiling or loading compiled code, and a tenth of a second of motion (CVODE: none). It is excluded "
-    "from the times; the methods run in turn. Only the rows with an error of the peaks compute peaks; the others do "
-    "less work.",
+    "First call: compiling or loading of compiled code, and a tenth of a second of motion (none for "
+    "CVODE). It is excluded from the times; the methods run in turn. Only rows with an error of the "
+    "peaks compute peaks; the others do less work.",
     'scipy and CVODE call the compiled equations; "Python" marks uncompiled equations, the usual practice.',
     "A method with a different number of impacts has missed or doubled one: its time is meaningless.",
 )
@@ -206,7 +206,7 @@ NOTES = (
 
 def work_precision(quick: bool, budget: float) -> Section:
     """The work-precision table; each method runs for about `budget` [s], at least once and at most 60 times. Ratios use
-    the shortest times: on a loaded machine, only these are repeatable.
+    the shortest times: on a loaded machine only these are repeatable.
     """
     contenders = methods(quick)
     firsts: dict[str, float] = {}
@@ -291,8 +291,8 @@ def _targets(rows: list[dict[str, Cell]]) -> list[Target]:
             "1",
         ),
         Target("the same, equations in Python", 1 / 400, share("scipy DOP853, Python", "rtol 1e-10"), "1"),
-        Target(f"time of taylor ({setting}) over paper's", 1.0, _quotient(fine_time, papers_time), "1"),
-        Target(f"error of taylor ({setting}) over paper's", 1e-10, _quotient(fine_error, papers), "1"),
+        Target(f"time of taylor ({setting}) over time of paper", 1.0, _quotient(fine_time, papers_time), "1"),
+        Target(f"error of taylor ({setting}) over error of paper", 1e-10, _quotient(fine_error, papers), "1"),
     ]
 
 

@@ -1,4 +1,6 @@
-"""Content of an export, independent of its format, and the formats: entry points of the group `rockbench.exports`."""
+"""Contents of an export, independent of its format, and the export formats, which are entry points of the group
+`rockbench.exports`.
+"""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -22,16 +24,16 @@ from sim.errors import InvalidInput
 from sim.extras import require
 
 ROWS_AT_ONCE = 2**18
-"""Maximum number of samples of a signal in memory, for formats that are written in pieces."""
+"""Maximum number of samples of a signal held in memory, for formats that are written in pieces."""
 
 Kind = Literal["number", "whole", "switch", "text"]
 
 
 @dataclass(frozen=True)
 class Signal:
-    """One column of samples: a channel or the drive. `read` takes rows of the file.
+    """One column of samples: a channel or the drive. `read` returns rows of the file.
 
-    With raw counts `conversion` is the conversion to values in `value_unit`.
+    For raw counts, `conversion` is the conversion to values in `value_unit`.
     """
 
     name: str
@@ -53,7 +55,7 @@ class Signal:
 
 @dataclass(frozen=True)
 class TableColumn:
-    """A column of a table of results; None where a value is absent. `unit` is empty for texts and switches."""
+    """A column of a table of results; None where a value is absent. `unit` is empty for strings and switches."""
 
     name: str
     unit: str
@@ -64,7 +66,7 @@ class TableColumn:
 
 @dataclass(frozen=True)
 class Content:
-    """Everything that is exported of an open file. `tables` are the non-empty ones."""
+    """Everything exported from an open file. `tables` holds the non-empty tables."""
 
     runs: tuple[RecordedRun, ...]
     signals: tuple[Signal, ...]
@@ -81,7 +83,7 @@ class Content:
 
 
 def content_of(record: DataFile, path: Path, *, raw: bool) -> Content:
-    """Content of an open file: physical values as float64, or converter counts when `raw`."""
+    """Contents of an open file: physical values as float64, or converter counts if `raw`."""
     signals = [_raw_signal(record, channel) if raw else _signal(record, channel) for channel in record.channels]
     drive = np.dtype(np.float32 if raw else np.float64)
     signals.append(Signal("drive", "V", "drive as sent to the amplifier", "", drive, record.drive))
@@ -161,14 +163,14 @@ def _plain(name: str, unit: str, description: str, values: Sequence[Any]) -> Tab
 
 
 def _anything(content: Content) -> None:
-    """Accept every content."""
+    """Accept all contents."""
 
 
 @dataclass(frozen=True)
 class ExportFormat:
-    """A writer of open files for other programs. Its name for `--to` is that of the entry point. `write` fills a new
-    folder; `check` raises InvalidInput, before the folder is created, for content that the format cannot represent.
-    `title` is the name in the window. `library` is a required module of the extra `export`.
+    """An export format: writes open files for other programs. Its name for `--to` is that of the entry point. `write`
+    fills a new folder; `check` raises InvalidInput, before the folder is created, for contents that the format cannot
+    represent. `title` is the name shown in the window. `library` is a required module of the extra `export`.
     """
 
     title: str
@@ -183,7 +185,7 @@ def load_format(name: str) -> ExportFormat:
 
 
 DAMAGED = "DAMAGED.txt"
-"""File in the folder of an export that lists the damaged datasets."""
+"""File in an export folder that lists the damaged datasets."""
 
 
 def export(
@@ -192,15 +194,15 @@ def export(
     """Export an open data file, read from `path`, to the new folder `out`; returns the written files and the integrity
     of the data file. Damaged datasets are listed in the file DAMAGED.txt of the export.
 
-    Physical values are float64; with `raw` the counts are written with their conversion. Raises InvalidInput for a
-    format that is not installed or cannot represent the content, and when `out` exists or cannot be created;
-    MissingExtra without the format's library.
+    Physical values are float64; with `raw`, counts are written together with their conversion. Raises InvalidInput if
+    the format is not installed or cannot represent the contents, or if `out` exists or cannot be created; MissingExtra
+    if the format's library is not installed.
     """
     wanted = load_format(to)
     if wanted.library:
         require("export", f"--to {to}", wanted.library)
     if out.exists():
-        raise InvalidInput("--out", str(out), "it exists and is never overwritten; choose another folder")
+        raise InvalidInput("--out", str(out), "the folder exists and is never overwritten; choose another folder")
     integrity = record.integrity(None, counting(progress, "verifying the checksums"))
     progress("writing the exported files")
     content = content_of(record, path, raw=raw)

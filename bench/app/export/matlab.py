@@ -1,4 +1,4 @@
-"""MATLAB format 5, which Octave and scipy also read: one file per run, one with the tables of results."""
+"""MATLAB format 5, which Octave and scipy also read: one file per run, and one with the result tables."""
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -30,7 +30,7 @@ def check(content: Content) -> None:
         needed = 8 * len(run.rows)
         if needed > LARGEST:
             size = f"a variable of run {run.number} needs {needed / 2**30:.1f} GiB"
-            raise InvalidInput("--to", "mat", f"{size}, the format is limited to 2 GiB: use --to parquet")
+            raise InvalidInput("--to", "mat", f"{size}, but the format is limited to 2 GiB: use --to parquet")
 
 
 def write(content: Content, folder: Path) -> None:
@@ -72,7 +72,7 @@ def write(content: Content, folder: Path) -> None:
 
 
 def variables(names: Sequence[str], taken: Iterable[str] = ()) -> list[str]:
-    """Valid MATLAB names, distinct from each other and from those that are `taken`."""
+    """Valid MATLAB names, distinct from each other and from those in `taken`."""
     found: list[str] = []
     for name in names:
         plain = re.sub(r"[^A-Za-z0-9_]", "_", name)[:LONGEST]
@@ -119,7 +119,7 @@ def _units(columns: Sequence[TableColumn]) -> dict[str, str]:
 
 
 def _values(column: TableColumn) -> NDArray[Any]:
-    """Numbers and switches (0, 1) as doubles, NaN where absent; texts as a cell array."""
+    """Numbers and switches (0, 1) as doubles, NaN where absent; strings as a cell array."""
     if column.kind == "text":
         cells = np.empty(len(column.values), dtype=object)
         cells[:] = ["" if value is None else value for value in column.values]

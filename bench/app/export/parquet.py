@@ -1,4 +1,6 @@
-"""Parquet: one file per run and per table, with the names of the data file, units in the metadata of each field."""
+"""Parquet: one file per run and per table, with the names used in the data file and units in the metadata of each
+field.
+"""
 
 import json
 from collections.abc import Mapping, Sequence

@@ -1,4 +1,4 @@
-"""Comma-separated values: one file per run, one per table of results, units in the headings."""
+"""Comma-separated values: one file per run and per result table, with units in the headings."""
 
 import csv
 from collections.abc import Sequence
@@ -16,12 +16,12 @@ CHANNELS = "channels.csv"
 
 
 def headed(name: str, unit: str) -> str:
-    """A name with its unit in brackets, if it has one."""
+    """A name followed by its unit, if any, in brackets."""
     return csv_cell(f"{name} [{unit}]" if unit not in ("", "1") else name)
 
 
 def write(content: Content, folder: Path) -> None:
-    """Write every run and table as text: point for decimals, comma between, `nan` where there is no measurement."""
+    """Write every run and table as text: decimal point, comma as separator, `nan` where there is no measurement."""
     write_channels(content.signals, folder / CHANNELS)
     headings = [headed("time", "s"), *(headed(signal.name, signal.unit) for signal in content.signals)]
     formats = [f"%.{DIGITS}g", *("%d" if signal.dtype.kind == "i" else f"%.{DIGITS}g" for signal in content.signals)]

@@ -1,7 +1,8 @@
-"""Universal File Format: one file per run, a dataset 58 (binary) for each signal; tables, which UFF lacks, as text.
+"""Universal File Format: one file per run with a dataset 58 (binary) for each signal; tables, which UFF lacks, are
+written as text.
 
-The format has no missing values, and pyuff writes 0 for them: a signal is cut where samples are missing or invalid, and
-each part is a separate dataset.
+The format has no missing values, and pyuff writes 0 for them, so a signal is split where samples are missing or
+invalid, and each part is a separate dataset.
 """
 
 import shutil
@@ -21,10 +22,10 @@ from bench.datafile.series import RecordedRun
 from sim.errors import InvalidInput
 
 MOST_PARTS = 200
-"""Maximum number of parts of a signal; beyond it the format is unsuitable."""
+"""Maximum number of parts of a signal; if there are more, the format is unsuitable."""
 
 _KINDS = {"m": 8, "m/s": 11, "m/s2": 12, "N": 13}
-"""Specific data type of the ordinate by unit; 0 (unknown) for others."""
+"""Specific data type of the ordinate by unit; 0 (unknown) for other units."""
 
 _TIME_RESPONSE, _TIME, _REAL_DOUBLE, _EVEN = 1, 17, 4, 1
 _LABEL, _LINE = 20, 80
@@ -52,7 +53,7 @@ def _append(pyuff: Any, file: Any, dataset: dict[str, Any], folder: Path) -> Non
     with tempfile.TemporaryDirectory(dir=folder, prefix=".part-") as parts:
         path = Path(parts, "part.uff")
         with warnings.catch_warnings():
-            # pyuff does not close the last file that it opened for binary data: the interpreter does
+            # pyuff does not close the last file that it opened for binary data; the interpreter does
             warnings.simplefilter("ignore", ResourceWarning)
             pyuff.UFF(str(path)).write_sets(dataset, "add")
         with path.open("rb") as part:
@@ -91,7 +92,7 @@ def _dataset(
     time: NDArray[np.float64],
 ) -> dict[str, Any]:
     info = content.info
-    # the header stores six digits of the abscissa: the text lines have the exact value
+    # the header stores six digits of the abscissa; the text lines have the exact value
     exact = (
         f"first sample {round(time[0] * content.sample_rate)} of the run, {content.sample_rate!r} samples per second"
     )

@@ -1,1 +1,1 @@
-"""Session process and its clients: a run continues or ramps out when a window closes, freezes or crashes."""
+"""Session process and its clients: when a window closes, freezes or crashes, a run continues or ramps out."""

@@ -65,7 +65,7 @@ class ClientConnection:
             self._outgoing.put(Alive())
 
     def ask(self, end: Literal["stop", "abort", "halt"]) -> None:
-        """Request an end, possibly before the connection is established, and any number of times."""
+        """Request the end of the run; may be called repeatedly, and before the connection is established."""
         self._outgoing.put(Ask(end))
 
     def answer(self, number: int, *, agreed: bool) -> None:
@@ -116,7 +116,7 @@ class ClientConnection:
             sender.join(SILENCE)
 
     def _keep(self, message: FromSession) -> None:
-        # traces are discarded first when the client does not read
+        # if the client does not read, traces are discarded first
         if isinstance(message, Traces) and len(self._received) > KEPT // 2:
             return
         self._received.append(message)
@@ -136,7 +136,7 @@ class ClientConnection:
         self._tell()
 
     def _by_the_files(self) -> Ended | None:
-        """The end of a run from its summary file, if there is one, when the final message was lost."""
+        """If the final message was lost, the end of a run from its summary file, if any."""
         if self._out is None:
             return None
         with suppress(OSError, ValueError, KeyError):

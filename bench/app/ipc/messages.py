@@ -17,17 +17,17 @@ from sim.errors import UNKNOWN, Cause
 from sim.parameters import Parameters
 
 BEAT = 0.25
-"""Longest interval between messages of either side [s]."""
+"""Longest interval between messages from either side [s]."""
 SILENCE = 1.0
-"""Silence of the session process after which the client shows no link [s]."""
+"""Silence of the session process after which the client shows "no link" [s]."""
 PATIENCE = 3.0
 """Silence of the client after which the session considers it lost [s]."""
 
 
 @dataclass(frozen=True)
 class PlanCheck:
-    """Request to compute the whole run beforehand, without opening a device. `protocol` is the name of an installed
-    one.
+    """Request to compute the complete run in advance, without opening a device. `protocol` is the name of an installed
+    protocol.
     """
 
     protocol: str
@@ -38,9 +38,10 @@ class PlanCheck:
 
 @dataclass(frozen=True)
 class Run(PlanCheck):
-    """Request to run a protocol; its results are written to `out`. With `person` the client answers the questions;
-    otherwise a bench that serves itself performs the operator tasks, and on any other bench every question is answered
-    with yes. With `keep_going` a lost client does not end the run. `about` is stored in the data file.
+    """Request to run a protocol; its results are written to `out`. With `person`, the client answers the questions.
+    Otherwise a bench that needs no operator performs the operator tasks, and on any other bench every question is
+    answered with yes. With `keep_going`, the loss of the client does not end the run. `about` is stored in the data
+    file.
     """
 
     realtime: bool = False
@@ -58,7 +59,7 @@ class Ask:
 
 @dataclass(frozen=True)
 class Answer:
-    """The answer to question `number`; ignored unless that question is pending."""
+    """Answer to question `number`; ignored unless that question is pending."""
 
     number: int
     agreed: bool
@@ -76,7 +77,9 @@ class Leave:
 
 @dataclass(frozen=True)
 class PlanChecked:
-    """Result of a plan check: `refusal` is the reason for a refusal; sizes in bytes, `duration` in seconds."""
+    """Result of a plan check: `refusal` is the reason if the plan is refused; sizes are in bytes, `duration` in
+    seconds.
+    """
 
     margins: tuple[Margin, ...]
     refusal: str | None
@@ -127,8 +130,8 @@ class Opened:
 
 @dataclass(frozen=True)
 class Preparing:
-    """A stage before the rig is opened or after it is closed; `done` of its `total` parts are complete, 0 of 0 where
-    they cannot be counted.
+    """A stage before the rig is opened or after it is closed; `done` of its `total` parts are complete; both are 0 if
+    the parts cannot be counted.
     """
 
     phase: str
@@ -145,7 +148,7 @@ class Published:
 
 @dataclass(frozen=True)
 class Question:
-    """The plan waits for a person, whose answer must have the same `number`."""
+    """The plan waits for a person, whose answer must carry the same `number`."""
 
     number: int
     request: str
@@ -153,7 +156,7 @@ class Question:
 
 @dataclass(frozen=True)
 class SafetyInputs:
-    """The safety inputs by name, and whether each was good at bench time `time` [s]; empty without safety inputs."""
+    """The safety inputs by name, each True if good at bench time `time` [s]; empty if there are none."""
 
     time: float
     good: Mapping[str, bool]
@@ -179,9 +182,9 @@ class Traces:
 
 @dataclass(frozen=True)
 class Beat:
-    """Heartbeat of the session process: the engine's state, bench time [s], numbers of events and of blocks of traces
-    lost because the client did not read, and the time since the last event of the engine [s]. While the rig is armed,
-    the engine publishes every block.
+    """Heartbeat of the session process: state of the engine, bench time [s], numbers of events and of trace blocks lost
+    because the client did not read them, and time since the engine's last event [s]. While the rig is armed, the engine
+    publishes every block.
     """
 
     state: State
@@ -195,8 +198,8 @@ class Beat:
 @dataclass(frozen=True)
 class Ended:
     """The run has ended and its files are written; `summary` can be converted to JSON, `table` is plain text. `passed`
-    is the verdict of a protocol that tests the bench, True for any other. The cause is unknown if the end is known only
-    from the files.
+    is the verdict of a protocol that tests the bench, and True for any other protocol. `cause` is unknown if only the
+    files report the end.
     """
 
     status: str
@@ -210,8 +213,8 @@ class Ended:
 
 @dataclass(frozen=True)
 class Refused:
-    """The request was refused, or the session failed (`failed`): `text` is the message, `cause` its cause, where known.
-    `details` are for developers, and may be long.
+    """The request was refused or, if `failed`, the session failed: `text` is the message, `cause` the cause, if known.
+    `details` are for developers and may be long.
     """
 
     text: str
@@ -238,17 +241,17 @@ FromClient = Ask | Answer | Alive | Leave
 
 
 TRACES = ("drive", "acceleration", "displacement", "u1", "u2", "drift")
-"""Columns of traces: drive [V], table acceleration [m/s2] and displacement [m], storeys and their difference [m], the
-last three relative to the table. Further channels follow, as in `bench.analysis.signals`.
+"""Columns of traces: drive [V], table acceleration [m/s2] and displacement [m], displacements of the storeys and their
+difference [m], the last three relative to the table. Further channels follow, as in `bench.analysis.signals`.
 """
 
 BIN = 0.002
-"""Shortest bin [s], less than a pixel of any window of a second or longer."""
+"""Shortest bin [s]: less than a pixel in any plot of a second or longer."""
 
 
 def extremes(values: NDArray[np.float64], width: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Minimum and maximum of every `width` rows of `values`, shape (n, m); the last bin contains the remainder. NaN
-    only if a bin has no other values.
+    only for bins without other values.
     """
     starts = np.arange(0, len(values), width)
     low = np.fmin.reduceat(values, starts, axis=0)
@@ -268,7 +271,7 @@ class Reduction:
         """The traces of a block."""
         signals = event.signals
         if event.run != self._run:
-            # samples are equally spaced; the times at which blocks are read are not
+            # samples are equally spaced, unlike the times at which blocks are read
             self._run, self._origin = event.run, event.time - (event.block.first + len(signals)) / self._rate
         chosen = np.column_stack(
             (

@@ -23,7 +23,7 @@ from sim.errors import CauseCode, InvalidInput, RockbenchError, cause_of
 
 
 def main() -> None:
-    """Connect, carry out the assignment, send its result."""
+    """Connect, carry out the assignment and send its result."""
     told = json.loads(sys.stdin.readline())
     with Client(told["address"], authkey=bytes.fromhex(told["key"])) as connection:
         serve(connection)
@@ -37,7 +37,7 @@ def serve(connection: Connection) -> None:
 
     def lost(why: str) -> None:
         if not keep_going:
-            requests.stop(f"{why}, and the run was not set to continue without it", CauseCode.CLIENT_LOST)
+            requests.stop(f"{why}, and the run was not set to continue without a client", CauseCode.CLIENT_LOST)
 
     host = SessionServer(connection, requests, lost)
     try:
@@ -106,8 +106,8 @@ def _policy(configuration: BenchConfiguration) -> str:
 
 
 def _give_way() -> None:
-    """Lower the priority of a plan check, since another session may be driving the table; on Windows it is set at
-    creation.
+    """Lower the priority of a plan check, since another session may be driving the table. On Windows it is set when the
+    process is created.
     """
     if sys.platform != "win32":
         os.nice(10)
@@ -115,7 +115,7 @@ def _give_way() -> None:
 
 def _abort_on_terminate(requests: Requests) -> None:
     def handle(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - the signature is Python's
-        # the receiving thread raises this signal too, on a client's request
+        # the receiving thread also raises this signal, at a client's request
         if requests.strongest is None:
             requests.abort("the session process received a request to terminate")
         if requests.breaking is not None:

@@ -1,4 +1,4 @@
-"""The session's side of the connection: sends events and traces, handles the client's requests, detects its loss."""
+"""The session's side of the connection: sends events and traces, handles the client's requests and detects its loss."""
 
 import signal
 import threading
@@ -45,7 +45,7 @@ FAREWELL = 2.0
 """Longest wait at the end for a client that does not read its messages [s]."""
 
 PERIOD = 0.5
-"""Shortest interval between readings [s]; the guard reads the inputs in every block independently."""
+"""Shortest interval between readings [s]; independently, the guard reads the inputs in every block."""
 
 
 class SafetyWatch:
@@ -70,8 +70,8 @@ class SafetyWatch:
             self.look_driven(time, at_once=at_once)
 
     def look_driven(self, time: float | None = None, *, at_once: bool = False) -> None:
-        """Like `look`, while the rig is armed: raises RigError when the inputs cannot be read. The rig has then cut its
-        output, and only this error states the reason.
+        """Like `look`, for an armed rig: raises RigError if the inputs cannot be read. The rig has then cut its output,
+        and only this error states the reason.
         """
         self._time = self._time if time is None else time
         if self._rig is None or (now() - self._looked < PERIOD and not at_once):
@@ -81,7 +81,7 @@ class SafetyWatch:
 
 
 _LOOK = 0.1
-"""Polling interval for other reasons to end while waiting for the operator's answer [s]."""
+"""Interval [s] at which other reasons to end are polled while waiting for the operator's answer."""
 
 
 class SessionServer:
@@ -146,7 +146,7 @@ class SessionServer:
 
     def _send(self, connection: Connection, queue: SendQueue, sent: threading.Event) -> None:
         over, beaten = False, 0.0
-        # the receiving thread detects a lost client too, and reports it
+        # the receiving thread also detects a lost client, and reports it
         with suppress(OSError):
             while not over:
                 for message in queue.take(BEAT / 2):
@@ -221,7 +221,7 @@ class RemoteOperator:
         self._number = 0
 
     def confirm(self, request: str) -> bool:
-        """Wait for the answer to a question; a request to end or a lost client counts as no."""
+        """Wait for the answer to a question; a request to end or the loss of the client counts as no."""
         self._number += 1
         self._host.outbox.put(Question(self._number, request), always=True)
         try:
@@ -246,7 +246,7 @@ class Publisher:
         self._phase, self._prepared = "", 0.0
 
     def prepare(self, phase: str, done: int = 0, total: int = 0, /) -> None:
-        """A `bench.progress.Progress`: sends a new phase at once, its parts at most once per `PERIOD`."""
+        """A `bench.progress.Progress` that sends a new phase immediately, and its parts at most once per `PERIOD`."""
         if phase != self._phase or now() - self._prepared >= PERIOD:
             self._phase, self._prepared = phase, now()
             self._host.outbox.put(Preparing(phase, done, total))

@@ -1,4 +1,4 @@
-"""The file of a queue, replaced atomically at each change, and owned by one program at a time."""
+"""The queue file, replaced atomically at each change and owned by one program at a time."""
 
 import json
 import os
@@ -32,8 +32,8 @@ class QueueFile:
         self._known: str | None = None
 
     def read(self) -> tuple[Queued, ...]:
-        """The tests in the file; empty if there is no file yet. A test abandoned during its run has failed. Raises
-        InvalidInput naming file and key.
+        """The tests in the file; empty if there is no file yet. A test abandoned during its run is marked as failed.
+        Raises InvalidInput naming file and key.
         """
         text = self._text()
         if text is None:
@@ -43,7 +43,7 @@ class QueueFile:
             content: Any = json.loads(text)
             require_shallow(content)
         except (ValueError, RecursionError) as error:
-            raise InvalidInput(ITEM, str(self.path), f"it is not JSON: {error}") from None
+            raise InvalidInput(ITEM, str(self.path), f"the file is not valid JSON: {error}") from None
         data = cast(dict[str, Any], content) if isinstance(content, dict) else {}
         if data.get("format") != FORMAT or data.get("format_version") != VERSION:
             raise InvalidInput(ITEM, str(self.path), f'it must have "format": "{FORMAT}", "format_version": {VERSION}')
@@ -57,7 +57,8 @@ class QueueFile:
         """Replace the file atomically. Raises InvalidInput when that fails."""
         if self._text() != self._known:
             allowed = (
-                "another program has changed it: open it again, in the window or on the command line but not in both"
+                "another program has changed the file: open it again, in the window or on the command line but not "
+                "in both"
             )
             raise InvalidInput(ITEM, str(self.path), allowed)
         plain = [test.model_dump(mode="json", exclude_defaults=True) for test in tests]
@@ -75,7 +76,7 @@ class QueueFile:
             finally:
                 beside.unlink(missing_ok=True)
         except OSError as error:
-            raise InvalidInput(ITEM, str(self.path), f"it cannot be written: {error.strerror}") from None
+            raise InvalidInput(ITEM, str(self.path), f"the file cannot be written: {error.strerror}") from None
         self._known = text
 
     def _text(self) -> str | None:
@@ -84,23 +85,23 @@ class QueueFile:
         except FileNotFoundError:
             return None
         except UnicodeDecodeError:
-            raise InvalidInput(ITEM, str(self.path), "it cannot be read: it is not UTF-8 text") from None
+            raise InvalidInput(ITEM, str(self.path), "the file cannot be read: it is not UTF-8 text") from None
         except (OSError, ValueError) as error:
             why = error.strerror if isinstance(error, OSError) else str(error)
-            raise InvalidInput(ITEM, str(self.path), f"it cannot be read: {why}") from None
+            raise InvalidInput(ITEM, str(self.path), f"the file cannot be read: {why}") from None
 
 
 class Owner:
-    """Ownership of the queue in `path` until `release`; `who` is the owner's name for other programs. The lock is on a
-    separate, permanent file, since the queue file itself is replaced at each change. The name is in a second file,
-    since a locked file cannot be read on Windows. Raises InvalidInput with the current owner, or the reason why locking
-    is impossible.
+    """Ownership of the queue in `path` until `release`; `who` is the owner's name as shown by other programs. The lock
+    is on a separate, permanent file, because the queue file is replaced at each change. The name is in a second file,
+    because a locked file cannot be read on Windows. Raises InvalidInput naming the current owner, or the reason why the
+    queue cannot be locked.
     """
 
     def __init__(self, path: Path, who: str) -> None:
         from filelock import FileLock, Timeout
 
-        # the existence of the file is not the lock, since it would outlive a crashed program
+        # the lock is not the existence of the file, which would outlive a crashed program
         self._lock = FileLock(
             path.with_name(f"{path.name}.lock"), blocking=False, thread_local=False, fallback_to_soft=False
         )
@@ -113,7 +114,7 @@ class Owner:
         except OSError as error:
             reason = f"{self._lock.lock_file} cannot be locked: {error.strerror or error}"
             raise InvalidInput(ITEM, str(path), reason) from None
-        # on a full disk the owner has no name, but the lock still works
+        # on a full disk the owner's name is missing, but the lock still works
         with suppress(OSError):
             self._name.write_text(f"{who} (process {os.getpid()})", encoding="utf-8")
 
@@ -133,7 +134,7 @@ class Owner:
 
 @contextmanager
 def owned(path: Path, who: str) -> Generator[None, None, None]:
-    """Context manager that owns the queue in `path`. Raises InvalidInput like `Owner`."""
+    """Context manager that owns the queue in `path`. Raises InvalidInput as `Owner` does."""
     owner = Owner(path, who)
     try:
         yield

@@ -1,4 +1,4 @@
-"""The tests of a queue: list, editing, and check against a bench."""
+"""The tests of a queue: listing, editing, and checking against a bench."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -35,23 +35,27 @@ OPEN = (Stage.WAITING, Stage.SKIPPED)
 
 
 class Queued(Parameters):
-    """A queued test: a protocol, its parameters and options. The bench is that of the program that runs the queue."""
+    """A queued test: a protocol with its parameters and options. The program that runs the queue determines the
+    bench.
+    """
 
-    protocol: str = quantity(..., "", "protocol, by its name on the command line")
-    parameters: dict[str, Any] = quantity({}, "", "its parameters, as in a protocol file; defaults may be omitted")
-    out: str | None = quantity(None, "", "folder for the results; absent: a new one, named at the start of the test")
+    protocol: str = quantity(..., "", "protocol, by its command-line name")
+    parameters: dict[str, Any] = quantity(
+        {}, "", "parameters of the protocol, as in a protocol file; defaults may be omitted"
+    )
+    out: str | None = quantity(None, "", "folder for the results; if absent, a new one is named when the test starts")
     operator: str = quantity("", "", "name of the operator")
     note: str = quantity("", "", "note for the data file")
     realtime: bool = quantity(False, "", "whether the simulated bench runs in real time")
-    ask: bool = quantity(False, "", "whether a person confirms tasks even if the bench performs them itself")
-    unattended: bool = quantity(False, "", "whether every question is answered with yes, as with --yes")
+    ask: bool = quantity(False, "", "whether a person confirms tasks even if the bench can perform them")
+    unattended: bool = quantity(False, "", "whether every question is answered yes, as with --yes")
     keep_going: bool = quantity(False, "", "whether the test continues to its end if the window closes")
     stage: Stage = quantity(Stage.WAITING, "", "status")
     told: str = quantity("", "", "outcome of the test, or reason for its refusal")
 
     @property
     def about(self) -> dict[str, str]:
-        """Notes for the data file, without effect on the run."""
+        """Notes for the data file, which do not affect the run."""
         return {name: text for name, text in (("operator", self.operator), ("notes", self.note)) if text}
 
 
@@ -65,8 +69,9 @@ def _forget(tests: Sequence[Queued]) -> None: ...
 
 
 class Queue:
-    """Tests in the order of execution. Each change except an end is passed to `keep` before it takes effect: an
-    exception of `keep` is propagated and leaves the queue unchanged. Indices count from 0, numbers in messages from 1.
+    """Tests in the order of execution. Each change, except the end of a test, is passed to `keep` before it takes
+    effect; an exception in `keep` is propagated and leaves the queue unchanged. Indices count from 0, numbers in
+    messages from 1.
     """
 
     def __init__(self, tests: Iterable[Queued] = (), keep: Keep = _forget) -> None:
@@ -104,11 +109,13 @@ class Queue:
     def remove(self, index: int) -> None:
         """Remove any test except the running one."""
         if self._tests[index].stage is Stage.RUNNING:
-            raise _refused(index, self._tests[index], "it is running: stop it first")
+            raise _refused(index, self._tests[index], "the test is running: stop it first")
         self._change([*self._tests[:index], *self._tests[index + 1 :]])
 
     def move(self, index: int, by: int) -> int:
-        """Move a pending test down by `by` places (up if negative), at most to an end; returns its new index."""
+        """Move a pending test down by `by` places (up if negative), at most to the end of the list; returns its new
+        index.
+        """
         test = self._open(index, "moved")
         rest = [*self._tests[:index], *self._tests[index + 1 :]]
         place = min(max(index + by, 0), len(rest))
@@ -123,7 +130,7 @@ class Queue:
     def repeat(self, index: int, times: int = 1) -> None:
         """Insert copies below a test of any status; each is pending and has its own folder."""
         if not 1 <= times <= MOST_COPIES:
-            raise InvalidInput("times", times, f"a whole number from 1 to {MOST_COPIES}")
+            raise InvalidInput("times", times, f"an integer from 1 to {MOST_COPIES}")
         original, folders = self._tests[index], {test.out for test in self._tests}
         copies: list[Queued] = []
         for _ in range(times):
@@ -147,7 +154,7 @@ class Queue:
     def _open(self, index: int, what: str) -> Queued:
         test = self._tests[index]
         if test.stage not in OPEN:
-            raise _refused(index, test, f"it can no longer be {what}; repeat it to add a pending copy")
+            raise _refused(index, test, f"the test can no longer be {what}; repeat it to add a pending copy")
         return test
 
     def _set(self, index: int, test: Queued, **changed: Any) -> None:
@@ -163,7 +170,7 @@ def _refused(index: int, test: Queued, allowed: str) -> InvalidInput:
 
 
 def _another(folder: str | None, taken: set[str | None]) -> str | None:
-    """A folder next to `folder` that no other test has: `name-2`, `name-3`, ..."""
+    """A folder next to `folder` that no other test uses: `name-2`, `name-3`, ..."""
     if folder is None:
         return None
     number = 2
@@ -181,7 +188,7 @@ class Ready:
 
 
 def queued(protocol: "Protocol[Any]", parameters: Parameters, out: Path | None, **how: object) -> Queued:
-    """A pending test with these parameters; `how` are other fields of `Queued`."""
+    """A pending test with these parameters; `how` holds other fields of `Queued`."""
     fields = {"protocol": protocol.name, "parameters": parameters.model_dump(mode="json"), **how}
     return Queued.model_validate({**fields, "out": None if out is None else str(out)})
 
@@ -200,8 +207,8 @@ def ready(test: Queued, number: int, configuration: "BenchConfiguration") -> Rea
 
 
 def all_ready(tests: Sequence[Queued], configuration: "BenchConfiguration") -> Mapping[int, Ready]:
-    """Every pending test, by its index. Raises InvalidInput for the first that cannot run, and for a folder used by two
-    tests.
+    """All pending tests, checked, by index. Raises InvalidInput for the first that cannot run, and for a folder used by
+    two tests.
     """
     found: dict[int, Ready] = {}
     folders: dict[Path, int] = {}
@@ -210,24 +217,24 @@ def all_ready(tests: Sequence[Queued], configuration: "BenchConfiguration") -> M
             continue
         found[index] = ready(test, index + 1, configuration)
         if test.out is not None and (first := folders.setdefault(Path(test.out).absolute(), index)) != index:
-            allowed = f"test {first + 1} has the same folder; give each test its own"
+            allowed = f"test {first + 1} has the same folder; give each test a separate folder"
             raise InvalidInput(f"test {index + 1}: out", test.out, allowed)
     return found
 
 
 def room_refusal(found: Iterable["DiskSpace | None"]) -> InvalidInput | None:
-    """Why the tests together do not fit on the disk, or None. They are assumed to share one disk."""
+    """Reason why the tests together do not fit on the disk, which they are assumed to share, or None."""
     rooms = [room for room in found if room is not None]
     needed, free = sum(room.needed for room in rooms), min((room.free for room in rooms), default=0)
     if needed <= free:
         return None
-    allowed = f"together the tests may need {needed / 1e9:.2f} GB, {free / 1e9:.2f} GB are free; free disk space"
+    allowed = f"together the tests may need {needed / 1e9:.2f} GB, but {free / 1e9:.2f} GB are free; free disk space"
     return InvalidInput("queue", len(rooms), allowed)
 
 
 def own_folder(test: Queued, moment: datetime, tests: Iterable[Queued] = ()) -> Path:
-    """Folder for the results of a test that begins now: the specified one, or a new one, created here, that none of the
-    other `tests` has. Raises InvalidInput when none can be created.
+    """Folder for the results of a test that begins now: the specified one, or a newly created one that none of the
+    other `tests` uses. Raises InvalidInput if none can be created.
     """
     if test.out is not None:
         return Path(test.out)

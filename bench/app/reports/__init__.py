@@ -1,1 +1,1 @@
-"""Reports: of a campaign from its data file, and of the paper from simulation."""
+"""Reports: on a campaign from its data file, and on the paper from simulation."""

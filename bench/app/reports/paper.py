@@ -1,4 +1,4 @@
-"""The paper from simulation alone: its figures, and its eight statements checked one by one."""
+"""The paper reproduced from simulation alone: its figures, and its eight statements checked one by one."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -29,15 +29,15 @@ Named = tuple[str, Statement]
 
 
 def verdicts_table(named: Sequence[Named]) -> Table:
-    """Table of the verdicts, one row per statement."""
+    """Table of verdicts, one row per statement."""
     columns = [Column("statement", words=True), Column("of what", words=True), Column("verdict", words=True)]
     rows = [[number, each.title, str(each.verdict)] for number, each in named]
-    caption = "Verdicts. As expected: it is known and documented that the model does not reproduce the paper here"
+    caption = "Verdicts. As expected: a known and documented deviation of the model from the paper"
     return Table(caption, columns, rows)
 
 
 def statement_table(named: Sequence[Named]) -> Table:
-    """Table of every claim with the result of the model."""
+    """Table of all claims with the model's results."""
     columns = [
         Column("statement", words=True),
         Column("claim", words=True),
@@ -45,7 +45,7 @@ def statement_table(named: Sequence[Named]) -> Table:
         Column("verdict", words=True),
     ]
     rows = [[number, check.claim, check.found, str(check.verdict)] for number, each in named for check in each.checks]
-    return Table("The claims behind the verdicts, and the results of the model", columns, rows)
+    return Table("The claims behind the verdicts, and the model's results", columns, rows)
 
 
 PARTS = ("statements", "modes", "map", "histories", "spectra", "records", "seismic")
@@ -56,8 +56,8 @@ MODES_BETAS = (0.25, 0.40, 0.64, 0.97)
 
 @dataclass(frozen=True, eq=False)
 class PaperRequest:
-    """The requested `parts`, for the paper's specimen or another, under the given records. `band` [Hz], LOW:HIGH, is
-    that of the table; gains are predicted for the unfiltered records and within the band.
+    """The requested `parts`, for the paper's or another specimen, under the given records. `band` [Hz], LOW:HIGH, is
+    the table's; gains are predicted for unfiltered records and for records limited to the band.
     """
 
     specimen: Specimen
@@ -95,9 +95,9 @@ class _Paper:
         self.named = [(str(each.number), each) for each in found]
         self.named += [(f"8, records {words}", each) for words, each in seismic.items()]
         parts: list[Part] = [
-            "Each statement of the paper is expressed as falsifiable claims with tolerances, and checked with the "
-            "model: periodic orbits under a sine, motions from rest under records. Numbers are those of the model "
-            "with the nominal specimen; they are exact to the digits shown.",
+            "Each statement of the paper is expressed as falsifiable claims with tolerances, and checked with "
+            "the model: periodic orbits under a sine, motions from rest under records. The numbers are the "
+            "model's for the nominal specimen and are exact to the digits shown.",
             verdicts_table(self.named),
         ]
         return Section("statements", "The eight statements of the paper", [*parts, statement_table(self.named)])
@@ -119,8 +119,9 @@ class _Paper:
         )
         picture = Picture(
             history_figure([Motion(each.omega, each.beta, each.motion, each.status, each.values) for each in made]),
-            f"Steady motions {', '.join(POINTS)}: drift of the coupled and the bare frame, u₁ and ϑ (predicted). ϑ is "
-            "positive when the top of the block moves towards the frame, u₁ when the storey moves towards the block.",
+            f"Steady motions at {', '.join(POINTS)}: drift of the coupled and the bare frame, u₁ and ϑ "
+            "(predicted). ϑ is positive when the top of the block moves towards the frame, u₁ when the storey "
+            "moves towards the block.",
             "Curves of drift, first storey displacement and rocking angle over three periods of the drive.",
         )
         return Section("histories", "Time histories at A, B and C (as Fig. 5 of the paper)", [text, picture])
@@ -133,8 +134,8 @@ class _Paper:
             "spectra",
             "Gain spectra (as Fig. 6 of the paper)",
             [
-                "Sections S1, S2 and S3 of the map, with the stability of the motions; the paper's experiments are "
-                "not drawn, because their values are not published.",
+                "Sections S1, S2 and S3 of the map, with the stability of the motions. The paper's experiments are "
+                "not drawn because their values are not published.",
                 Picture(
                     figure,
                     "Gain spectra at β = 0.25, 0.64 and 0.97 (predicted).",
@@ -151,9 +152,9 @@ class _Paper:
         peak = 1.2 * self._specimen.uplift_acceleration
         parts: list[Part] = [
             *_of_what(self._request.records),
-            f"Every record is scaled to a peak of {peak:.4g} m/s² (1.2 g/λ), at its own time scale, both unfiltered "
-            f"and limited to the band of a long-stroke shaker, {self._band}. "
-            "Motions start at rest; a block that topples has no gain. Statement 8 is checked on both.",
+            f"Every record is scaled to a peak of {peak:.4g} m/s² (1.2 g/λ), at its own time scale, both "
+            f"unfiltered and limited to the band of a long-stroke shaker, {self._band}. Motions start from rest; "
+            "a block that topples has no gain. Statement 8 is checked on both.",
         ]
         parts.append(motions_table([curve for curves in self._curves.values() for curve in curves]))
         for words, curves in self._curves.items():
@@ -177,9 +178,10 @@ def paper_report(request: PaperRequest, progress: Progress = silent) -> tuple[Do
     sections.append(specimen_section(request.specimen, None))
     sections.append(_provenance(request))
     summary: list[Part] = [
-        "Rigid block coupled with a 2 d.o.f. system: its figures and statements, recomputed from the equations of "
-        "motion by one command, without a bench. Frame, block and springs are those of Tables 1 to 3 unless said "
-        f"otherwise; the sine has an amplitude of {AMPLITUDE_FACTOR:g} g/λ (Eq. 11)."
+        "The figures and statements of the paper on the rigid block coupled with a 2 d.o.f. system, "
+        "recomputed from the equations of motion by one command, without a bench. Frame, block and springs "
+        f"are those of Tables 1 to 3 unless said otherwise; the sine has an amplitude of {AMPLITUDE_FACTOR:g} "
+        "g/λ (Eq. 11)."
     ]
     return Document("The paper reproduced by simulation", summary, sections, provenance_line()), paper.named
 
@@ -187,9 +189,9 @@ def paper_report(request: PaperRequest, progress: Progress = silent) -> tuple[Do
 def _of_what(records: Sequence[Accelerogram]) -> list[Part]:
     if all(record.synthetic for record in records):
         text = (
-            "The motions are SYNTHETIC, not measured: they have the main characteristics of the paper's seven "
-            "records (peak, duration, band, pulse). Their gains are not those of the actual records, which require "
-            "the record files."
+            "The ground motions are SYNTHETIC, not measured: they have the main characteristics of the paper's "
+            "seven records (peak, duration, band, pulse). Their gains are not those of the actual records, which "
+            "require the record files."
         )
         return [Notice(text)]
     made = [record.name for record in records if record.synthetic]

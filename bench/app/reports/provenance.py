@@ -15,19 +15,19 @@ from sim.parameters import Parameters
 NAME = "rocking-bench"
 
 SHORT = 10
-"""Digits of the git hash below the title; the section has the full hash."""
+"""Number of digits of the git hash below the title; the section has the full hash."""
 
 UNKNOWN = "unknown"
 
 EXACT = 10
-"""Significant digits of a parameter, enough to show it as typed."""
+"""Significant digits of a parameter, enough to reproduce it as typed."""
 
 _DEVICES = {"backend": "kind of bench", "seed": "seed of every random number"}
 """Entries of a bench description that are not devices."""
 
 
 def provenance_section(campaign: Campaign) -> Section:
-    """Report section: file, hash, times, people, versions, bench, parameters."""
+    """Report section on file, hash, times, people, versions, bench and parameters."""
     parts: list[Part] = [
         facts_table("Provenance of the numbers in this report", {**_file(campaign), **_made_with(campaign)}),
         parameters_table("Parameters of the protocol", campaign.parameters_type, campaign.parameters),
@@ -47,7 +47,7 @@ def provenance_line() -> str:
 
 
 def program(version: str, git: str, digits: int = 40) -> str:
-    """The version of the program with `digits` of its git hash; "+" marks files changed since the commit."""
+    """The program's version with `digits` digits of its git hash; "+" marks files changed since the commit."""
     changed = ", files changed since" if git.endswith("+") else ""
     return f"{NAME} {version}, git {git.removesuffix('+')[:digits]}{changed}"
 
@@ -69,7 +69,7 @@ def _file(campaign: Campaign) -> dict[str, str]:
         "operator": metadata.get("operator") or "not stated",
         "notes": metadata.get("notes") or "none",
         "begun": moment(record.start_time),
-        "ended": moment(record.end_time) or "none: the file is still being written, or its writer was killed",
+        "ended": moment(record.end_time) or "none: the file is being written, or its writer was killed",
         "status": typeset(": ".join(filter(None, (record.status, record.summary)))),
         "samples": f"{record.rows} of each channel at {record.sample_rate:g} samples/s",
     }
@@ -122,14 +122,14 @@ def _clocks(campaign: Campaign) -> list[Part]:
 
 
 def facts_table(caption: str, facts: Mapping[str, str]) -> Table:
-    """Names and texts."""
+    """Table of names and texts."""
     rows = [[name, value] for name, value in facts.items()]
     return Table(caption, [Column("item", words=True), Column("value", words=True)], rows)
 
 
 def parameters_table(caption: str, kind: type[Parameters] | None, values: Mapping[str, Any]) -> Table:
-    """Parameters with description, name, value and unit. Undeclared parameters of another version follow with their
-    names only.
+    """Parameters with description, name, value and unit. Parameters of another version that are not declared here
+    follow by name only.
     """
     rows = list(_declared_rows(kind, values, "")) if kind is not None else []
     known = {row[1] for row in rows}
@@ -144,7 +144,7 @@ def parameters_table(caption: str, kind: type[Parameters] | None, values: Mappin
 
 
 def flat(values: Mapping[str, Any]) -> dict[str, str]:
-    """Nested values as texts, names joined by dots."""
+    """Nested values as strings, with names joined by dots."""
     found: dict[str, str] = {}
     for name, value in values.items():
         if isinstance(value, dict):

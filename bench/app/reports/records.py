@@ -40,13 +40,13 @@ def record_pictures(records: Sequence[Accelerogram]) -> Iterator[Picture]:
         names = listed([record.name for record in some])
         yield Picture(
             record_figure(drawn),
-            f"{names}: acceleration, velocity and displacement of the ground, and pseudo-acceleration spectrum.",
+            f"{names}: ground acceleration, velocity and displacement, and pseudo-acceleration spectrum.",
             "Three histories and a response spectrum for each record; the peak of each history is marked.",
         )
 
 
 def gains_picture(curves: Sequence[SeismicCurve], words: str) -> Picture:
-    """Figure of alpha_2 and alpha_1 against stiffness; `words` describe the band of the records."""
+    """Figure of alpha_2 and alpha_1 against stiffness; `words` describes the band of the records."""
 
     def known(gains: Sequence[float | None]) -> NDArray[np.float64]:
         return np.array([np.nan if gain is None else gain for gain in gains])
@@ -65,19 +65,19 @@ def gains_picture(curves: Sequence[SeismicCurve], words: str) -> Picture:
     limits = "none, whole records" if band is None else f"{band[0]:g} to {band[1]:g} Hz"
     return Picture(
         seismic_figure(drawn, limits),
-        f"Gains over the stiffness ratio, records {words} (predicted). Crosses below: the block topples.",
-        "Curves of alpha 2 and alpha 1 over the stiffness ratio, one for each record.",
+        f"Gains over the stiffness ratio, records {words} (predicted). Crosses at the bottom: the block topples.",
+        "Curves of alpha 2 and alpha 1 against the stiffness ratio, one for each record.",
     )
 
 
 def motions_table(curves: Sequence[SeismicCurve]) -> Table:
-    """Table of the motions of the table under every record, and of the gains."""
+    """Text table of the shake table's motion and the gains under every record."""
     columns = [
         Column("record", words=True),
         Column("band", "Hz", words=True),
         Column("scale", "1"),
         Column("peak", "m/s²"),
-        Column("table moves", "mm"),
+        Column("table displacement", "mm"),
         Column("least α₂", "1"),
         Column("largest α₂", "1"),
         Column("topples", "%"),
@@ -99,7 +99,9 @@ def motions_table(curves: Sequence[SeismicCurve]) -> Table:
                 f"{100.0 * fallen:.0f}",
             ]
         )
-    return Table("Motions of the table and their gains; topples: share of the stiffnesses", columns, rows)
+    return Table(
+        "Table motions and their gains; topples: fraction of stiffnesses at which the block topples", columns, rows
+    )
 
 
 def drift_picture(specimen: Specimen, curves: Sequence[SeismicCurve], beta: float) -> Picture:
@@ -121,5 +123,5 @@ def drift_picture(specimen: Specimen, curves: Sequence[SeismicCurve], beta: floa
     return Picture(
         model_drift_figure(drawn),
         f"Drift of the bare and of the coupled frame (β = {beta:g}), records {words} (predicted).",
-        "Drift over time, a row for each record; the curve of a block that topples ends there.",
+        "Drift against time, one row per record; if the block topples, the curve ends there.",
     )

@@ -1,4 +1,4 @@
-"""Report of a campaign from its data file: sections of its protocol, then sections common to all campaigns."""
+"""Report on a campaign from its data file: the protocol's sections, followed by those common to all campaigns."""
 
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
@@ -33,7 +33,7 @@ MOST_CELLS = 60
 
 
 def points_section(campaign: Campaign) -> Section | None:
-    """Report section with a row for each result; None without results."""
+    """Report section with a row for each result; None if there are no results."""
     results = campaign.record.results
     if not campaign.points:
         return None
@@ -43,7 +43,7 @@ def points_section(campaign: Campaign) -> Section | None:
     rows = [[_cell(each, row) for each in results.values()] for row in range(min(len(campaign.points), MOST_CELLS))]
     parts: list[Part] = [Table(f"Results of the protocol {campaign.protocol}", columns, rows)]
     if len(campaign.points) > MOST_CELLS:
-        parts.append(f"The file has {len(campaign.points) - MOST_CELLS} more.")
+        parts.append(f"The file contains {len(campaign.points) - MOST_CELLS} more.")
     meanings = [f"{_heading(name)}: {first_words(each.description)}" for name, each in results.items()]
     return Section("points", "Results", [*parts, Listing(meanings)])
 
@@ -66,7 +66,7 @@ COVERAGE = 2.0
 
 
 def fits_section(campaign: Campaign) -> Section | None:
-    """Report section with a table and a figure for each fit; None without fits."""
+    """Report section with a table and a figure for each fit; None if there are no fits."""
     fits = campaign.record.fits
     if not fits:
         return None
@@ -76,7 +76,11 @@ def fits_section(campaign: Campaign) -> Section | None:
         parts += [_parameters(fit)] if fit.parameters else []
         meanings = ", ".join(f"{_words(name)}: {typeset(each.description)}" for name, each in fit.columns.items())
         parts.append(
-            Picture(fit_figure(fit), f"Fit {fit.name}. {meanings}.", "Measured and fitted values over the axis.")
+            Picture(
+                fit_figure(fit),
+                f"Fit {fit.name}. {meanings}.",
+                "Measured and fitted values against the axis of the fit.",
+            )
         )
     return Section("fits", "Fitted models", parts)
 
@@ -104,7 +108,7 @@ SHORT = 60
 
 
 def limits_section(campaign: Campaign) -> Section:
-    """Damage, warnings, limits of model and measurement, margins."""
+    """Report section on damage, warnings, limits of model and measurement, and margins."""
     record, damaged = campaign.record, campaign.integrity.failing
     parts: list[Part] = []
     if damaged:
@@ -118,13 +122,14 @@ def limits_section(campaign: Campaign) -> Section:
             Listing(warnings[:MOST_LISTED]),
         ]
         if len(warnings) > MOST_LISTED:
-            parts.append(f"The file has {len(warnings) - MOST_LISTED} more.")
+            parts.append(f"The file contains {len(warnings) - MOST_LISTED} more.")
     else:
-        parts.append("No warning was given and no limit was exceeded.")
+        parts.append("No warning was issued and no limit was exceeded.")
     parts.append(
-        "Limits of the model: a rigid block that neither slides nor flies free, Housner's impact, a shear frame with "
-        f"linear springs and dashpots{', a pure sine' if campaign.harmonic_points else ''}. Limits of the measurement: "
-        "the motion of the block is not measured; it is known only from the model and from the first storey."
+        "Limits of the model: a rigid block that neither slides nor leaves the table, Housner's impact law, "
+        "a shear frame with linear springs and "
+        f"dashpots{', a pure sine' if campaign.harmonic_points else ''}. Limits of the measurement: the "
+        "motion of the block is not measured; it is known only from the model and from the first storey."
     )
     parts += list(_margins(campaign))
     if campaign.configuration is not None:
@@ -133,7 +138,7 @@ def limits_section(campaign: Campaign) -> Section:
 
 
 def damage_notice(campaign: Campaign) -> list[Notice]:
-    """The first notice of a report: datasets that do not match their checksum, or have none."""
+    """The first notice of a report, on datasets that do not match their checksum or have none."""
     found = campaign.integrity
     if found.failing:
         what = counted(len(found.failing), "dataset")
@@ -202,7 +207,7 @@ MOST_MODES = 4
 
 
 def campaign_report(campaign: Campaign, protocol: Protocol[Any] | None = None, progress: Progress = silent) -> Document:
-    """The whole report. Raises InvalidInput for a file without a usable specimen."""
+    """The complete report. Raises InvalidInput for a file without a usable specimen."""
     load_model(progress)
     makers: list[Callable[[], Sequence[Section | None]]] = [
         lambda: _results(campaign, protocol),
@@ -223,7 +228,7 @@ def campaign_report(campaign: Campaign, protocol: Protocol[Any] | None = None, p
 
 
 def _results(campaign: Campaign, protocol: Protocol[Any] | None) -> list[Section | None]:
-    """The sections of the protocol; if they contain no table, also the points field by field."""
+    """The protocol's sections; if they contain no table, followed by the points field by field."""
     own: Sequence[Section] = [] if protocol is None or protocol.report is None else protocol.report(campaign)
     tabulated = any(isinstance(part, Table) for section in own for part in section.parts)
     return [*own, None if tabulated else points_section(campaign)]

@@ -35,7 +35,7 @@ _SHOWN = 5e-3
 def specimen_section(
     specimen: Specimen, uncertainty: SpecimenUncertainty | None, identified: Identified | None = None
 ) -> Section:
-    """Parameters of frame, block and spring, and the identified ones; exact without `uncertainty`."""
+    """Parameters of frame, block and spring, and the identified properties; treated as exact without `uncertainty`."""
     text = (
         "A two-storey shear frame, with its first storey coupled by a spring to a rigid block that rocks on its base. "
         "Every prediction in this report was computed from these values."
@@ -50,13 +50,13 @@ def specimen_section(
 
 
 def identified_section(campaign: Campaign) -> Section | None:
-    """Report section on findings and correlations; None without findings."""
+    """Report section on findings and correlations; None if there are no findings."""
     identified = campaign.record.identified
     if identified is None:
         return None
     text = (
-        "Known properties of the specimen after this campaign, as in its specimen file: its own findings, and "
-        "earlier ones that it did not replace."
+        "Known properties of the specimen after this campaign, as in its specimen file: the campaign's "
+        "findings, and earlier ones that it did not replace."
     )
     parts: list[Part] = [text, findings_table(identified, "Known properties of the specimen")]
     correlated = [name for name in identified.names if any(name in one.pair for one in identified.correlations)]
@@ -72,7 +72,7 @@ def identified_section(campaign: Campaign) -> Section | None:
 
 
 def modes_section(specimen: Specimen, betas: Sequence[float]) -> Section:
-    """Frequencies and shapes, as a figure and as a table."""
+    """Report section on the modes: frequencies and shapes, as a figure and as a table."""
     table = modes_table(specimen, betas)
     rows = [
         [
@@ -194,7 +194,7 @@ def _derived(specimen: Specimen) -> Table:
         ("λ", "slenderness of the block, h_b/b", plain(block.slenderness, 4), "1"),
         (
             "r",
-            "restitution: angular velocity after an impact relative to that before",
+            "restitution: ratio of the angular velocities after and before an impact",
             plain(block.restitution, 6),
             "1",
         ),

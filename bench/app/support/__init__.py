@@ -1,1 +1,1 @@
-"""Support of an installation: checks of the machine, and the collection of a fault report."""
+"""Support of an installation: checks of the machine, and collection of fault reports."""

@@ -1,4 +1,4 @@
-"""Collection of a fault report from a data file: log, configuration, versions and the last data, in one archive."""
+"""Collection of a fault report from a data file: log, configuration, versions and the latest data in one archive."""
 
 import io
 import json
@@ -18,18 +18,18 @@ from bench.results import SUMMARY
 from bench.unfinished import write_new
 
 LAST = 60.0
-"""Length of the data at the end of the file [s]."""
+"""Duration of the data taken from the end of the file [s]."""
 PERSONAL = ("operator", "notes", "file", "journal")
-"""Keys whose texts name people or places."""
+"""Keys whose values name people or places."""
 REMOVED = "(removed)"
 _PATH = re.compile(r"(?:[A-Za-z]:\\|\\\\|/)[^\s\"',;:*?<>|]+")
 
 
 def write_bundle(path: Path, target: Path, *, anonymous: bool) -> tuple[str, ...]:
-    """Write the archive `target` on the data file `path`; returns the names of its parts.
+    """Write the archive `target` for the data file `path`; returns the names of its parts.
 
-    `anonymous`: without names of people, notes and paths. A part that cannot be read is replaced by the reason. Raises
-    InvalidInput when `target` exists.
+    `anonymous` omits names of people, notes and paths. A part that cannot be read is replaced by the reason. Raises
+    InvalidInput if `target` exists.
     """
     parts: dict[str, Callable[[], str]] = {
         "overview.json": lambda: _json(overview(path)),
@@ -55,7 +55,7 @@ def write_bundle(path: Path, target: Path, *, anonymous: bool) -> tuple[str, ...
 
 
 def anonymised(text: str, names: tuple[str, ...]) -> str:
-    """The text without `names`, paths, and the values of PERSONAL keys."""
+    """The text without `names`, paths and the values of PERSONAL keys."""
     for key in PERSONAL:
         text = re.sub(rf'("{key}":\s*)"(?:[^"\\]|\\.)*"', rf'\1"{REMOVED}"', text)
     for name in names:
@@ -67,7 +67,7 @@ def _text(part: Callable[[], str]) -> str:
     try:
         return part()
     except Exception as error:
-        # the report of a fault must not fail for a damaged part
+        # a fault report must not fail because of a damaged part
         return f"not available: {type(error).__name__}: {shown(str(error))}\n"
 
 

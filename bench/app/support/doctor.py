@@ -1,4 +1,4 @@
-"""Checks of the machine on which a bench is to run, each with what to do."""
+"""Checks of the machine on which a bench is to run, each with a remedy."""
 
 import importlib.util
 import os
@@ -17,15 +17,15 @@ from bench.provenance import software
 
 OLDEST = (3, 11)
 RESOLUTION = 1e-4
-"""Coarsest step of the machine's clock [s]."""
+"""Coarsest acceptable step of the machine's clock [s]."""
 LATE = 0.005
-"""Largest delay of a sleep of 1 ms that a block of samples bears [s]."""
+"""Largest acceptable delay of a sleep of 1 ms, given the length of a block of samples [s]."""
 SPEED = 20e6
-"""Least speed of the disk [B/s]: many times that of a run."""
+"""Minimum write speed of the disk [B/s]: many times that required by a run."""
 ROOM = 5e9
-"""Free space for a day of runs [B]."""
+"""Free space required for a day of runs [B]."""
 LATENCY = 1
-"""Latency timer of a serial adapter [ms]; the default of 16 delays the values of a laser."""
+"""Required latency timer of a serial adapter [ms]; the default of 16 ms delays the values of a laser."""
 
 
 class Health(StrEnum):
@@ -39,7 +39,7 @@ class Health(StrEnum):
 
 @dataclass(frozen=True)
 class Finding:
-    """One line of the report: the checked item, its health, what was found, and what to do."""
+    """A line of the report: the checked item, its health, the finding and the remedy."""
 
     item: str
     health: Health
@@ -48,9 +48,9 @@ class Finding:
 
 
 def examine(folder: Path, port: str | None = None) -> Iterator[Finding]:
-    """Check the machine, with results in `folder`; `port` is the address host:port of a device server.
+    """Check the machine, for results in `folder`; `port` is the address host:port of a device server.
 
-    A check that fails itself is reported as unknown.
+    A check that cannot be carried out is reported as unknown.
     """
     checks: dict[str, Callable[[], Finding]] = {
         "versions": versions,
@@ -71,15 +71,15 @@ def examine(folder: Path, port: str | None = None) -> Iterator[Finding]:
 
 
 def versions() -> Finding:
-    """Python and the libraries."""
+    """Check Python and the libraries."""
     told = ", ".join(f"{name} {version}" for name, version in software().items())
     good = sys.version_info[:2] >= OLDEST and sys.maxsize > 2**32
-    remedy = "" if good else f"install a Python of 64 bits, {OLDEST[0]}.{OLDEST[1]} or newer"
+    remedy = "" if good else f"install a 64-bit Python, {OLDEST[0]}.{OLDEST[1]} or newer"
     return Finding("versions", Health.GOOD if good else Health.BAD, f"{told}, {platform.system()}", remedy)
 
 
 def clock() -> Finding:
-    """Resolution of the clock that paces a run."""
+    """Check the resolution of the clock that paces a run."""
     step = time.get_clock_info("perf_counter").resolution
     good = step <= RESOLUTION
     remedy = "" if good else "enable the high-precision timer in the firmware of the computer"
@@ -87,7 +87,7 @@ def clock() -> Finding:
 
 
 def timer() -> Finding:
-    """Delay of short sleeps, the largest of twenty."""
+    """Check the largest delay of twenty short sleeps."""
     delays: list[float] = []
     for _ in range(20):
         begin = time.perf_counter()
@@ -101,16 +101,16 @@ def timer() -> Finding:
 
 
 def disk_space(folder: Path) -> Finding:
-    """Free space for results."""
+    """Check the free space for results."""
     free = shutil.disk_usage(folder).free
-    remedy = "" if free >= ROOM else "free disk space, or give --out on another disk"
+    remedy = "" if free >= ROOM else "free disk space, or set --out to another disk"
     return Finding(
         "disk space", Health.GOOD if free >= ROOM else Health.BAD, f"{free / 1e9:.3g} GB free in {folder}", remedy
     )
 
 
 def disk_speed(folder: Path) -> Finding:
-    """Speed of writing, with the data on the disk."""
+    """Check the write speed, including the flush to the disk."""
     size = 2**24
     with tempfile.TemporaryFile(dir=folder, prefix=".speed-") as file:
         begin = time.perf_counter()
@@ -118,25 +118,25 @@ def disk_speed(folder: Path) -> Finding:
         file.flush()
         os.fsync(file.fileno())
         speed = size / (time.perf_counter() - begin)
-    remedy = "" if speed >= SPEED else "give --out on a local disk, not on a network share"
+    remedy = "" if speed >= SPEED else "set --out to a local disk, not a network share"
     return Finding(
         "disk speed", Health.GOOD if speed >= SPEED else Health.BAD, f"{speed / 1e6:.3g} MB/s in {folder}", remedy
     )
 
 
 def power(governor: Path = Path("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor")) -> Finding:
-    """Whether the processor is slowed down to save power."""
+    """Check whether the processor is throttled to save power."""
     item = "power settings"
     if not governor.is_file():
-        return Finding(item, Health.UNKNOWN, "not determined", "switch sleep and USB suspend off for the time of a run")
+        return Finding(item, Health.UNKNOWN, "not determined", "switch off sleep and USB suspend during runs")
     mode = governor.read_text(encoding="utf-8").strip()
     if mode in ("powersave", "conservative"):
-        return Finding(item, Health.NOTICE, f"governor {mode}", "choose the governor performance")
+        return Finding(item, Health.NOTICE, f"governor {mode}", "select the performance governor")
     return Finding(item, Health.GOOD, f"governor {mode}")
 
 
 def serial_ports(adapters: Path = Path("/sys/bus/usb-serial/devices"), devices: Path = Path("/dev")) -> Finding:
-    """Latency timers of serial adapters, and permission to open their ports."""
+    """Check the latency timers of serial adapters, and the permission to open their ports."""
     item, found = "serial ports", sorted(adapters.glob("*")) if adapters.is_dir() else []
     if not found:
         return Finding(item, Health.GOOD, "no serial adapter")
@@ -151,22 +151,24 @@ def serial_ports(adapters: Path = Path("/sys/bus/usb-serial/devices"), devices: 
 
 
 def opengl(cards: Path = Path("/dev/dri")) -> Finding:
-    """Whether the window can draw."""
+    """Check the graphics for the window."""
     if importlib.util.find_spec("PySide6") is None:
-        return Finding("OpenGL", Health.NOTICE, "the window is not installed", "install the extra gui for the window")
+        return Finding(
+            "OpenGL", Health.NOTICE, "the window is not installed", "to use the window, install the extra gui"
+        )
     if sys.platform == "linux" and not cards.is_dir():
         return Finding(
-            "OpenGL", Health.NOTICE, "no graphics card", "the window draws in software: LIBGL_ALWAYS_SOFTWARE=1"
+            "OpenGL", Health.NOTICE, "no graphics card", "let the window render in software: LIBGL_ALWAYS_SOFTWARE=1"
         )
     return Finding("OpenGL", Health.GOOD, "graphics card found")
 
 
 def device_server(address: str) -> Finding:
-    """Whether the port of a device server answers through the firewall."""
+    """Check whether the port of a device server responds through the firewall."""
     host, _, port = address.rpartition(":")
     try:
         with socket.create_connection((host, int(port)), timeout=2.0):
             return Finding("device server", Health.GOOD, f"{address} answers")
     except (OSError, ValueError, OverflowError) as error:
-        remedy = "start the device server there, and open its port in the firewall"
-        return Finding("device server", Health.BAD, f"{address} does not answer ({error})", remedy)
+        remedy = "start the device server on that machine, and open its port in the firewall"
+        return Finding("device server", Health.BAD, f"{address} does not respond ({error})", remedy)

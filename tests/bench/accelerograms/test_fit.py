@@ -91,7 +91,7 @@ def test_similitude_keeps_the_acceleration_and_shortens_the_time(capsys: pytest.
     assert small["before"]["peak_m_s2"] == whole["before"]["peak_m_s2"]
     moved = small["before"]["peak_displacement_m"], whole["before"]["peak_displacement_m"]
     assert moved[0] == pytest.approx(0.04 * moved[1], rel=1e-9)
-    assert "similitude: length x 0.04, time x 0.2, acceleration kept" in small["before"]["steps"]
+    assert "similitude: length x 0.04, time x 0.2, acceleration unchanged" in small["before"]["steps"]
 
 
 def test_the_bench_is_the_configured_one(capsys: pytest.CaptureFixture[str]) -> None:

@@ -104,7 +104,7 @@ def test_numbers_follow_the_first_name_and_leave_out_what_is_taken(tmp_path: Pat
 
 def test_what_stands_in_the_way_is_named(tmp_path: Path) -> None:
     (tmp_path / "runs").touch()
-    with pytest.raises(InvalidInput, match="runs is a file; give a folder"):
+    with pytest.raises(InvalidInput, match="runs is a file; choose a folder"):
         make_folder(tmp_path / "runs" / "check")
 
 

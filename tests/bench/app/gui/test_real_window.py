@@ -108,4 +108,4 @@ def test_a_run_whose_window_is_killed_ramps_out(screen: Screen, tmp_path: Path) 
         window.kill()
         status, why = _ended(tmp_path)
     assert status == "stopped"
-    assert why == "the client is gone, and the run was not set to continue without it"
+    assert why == "the client is gone, and the run was not set to continue without a client"

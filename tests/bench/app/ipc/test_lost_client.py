@@ -82,7 +82,7 @@ def test_a_run_without_its_client_ramps_out(sent: signal.Signals, why: str, tmp_
     assert verify(tmp_path / "run" / FILE).problems == ()
     with open_datafile(tmp_path / "run" / FILE) as record:
         assert record.status == "stopped"
-        assert record.summary == f"{why}, and the run was not set to continue without it"
+        assert record.summary == f"{why}, and the run was not set to continue without a client"
         assert record.end_time
         ramped_out(record)
     assert (tmp_path / "run" / "summary.json").exists()
