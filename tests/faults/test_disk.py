@@ -78,7 +78,7 @@ def test_nobody_waits_for_ever(end: Callable[[Recorder], None], hung: tuple[Reco
     recorder, disk = hung
     recorder(Warned("one event", time=0.0))
     begin = monotonic()
-    with pytest.raises(DataFileError, match="has not answered"):
+    with pytest.raises(DataFileError, match="has not responded"):
         end(recorder)
     assert monotonic() - begin < SOON
     _finish_after_closing(recorder, disk)

@@ -52,7 +52,7 @@ def test_bad_flags(
         ("[simulation.bench.filter_unit]\ncutoff = 5000.0\n", ("cutoff", "5000")),
         ("[specimen\n", ("line 1",)),
         ("[specimen.frame]\nk1 = 1e300\n", ("k1", "1e+300", "rad/s")),
-        ("[specimen.frame]\nh1 = 0.6\n", ("h1", "0.6", "below the second")),
+        ("[specimen.frame]\nh1 = 0.6\n", ("h1", "0.6", "height of the second storey")),
         ("[specimen.block]\nrestitution_factor = 1.5\n", ("restitution_factor", "1.5", "outside 0 to 1")),
         ("[specimen]\nbeta = 3.0\n", ("specimen.beta", "protocol")),
         ("[simulation.specimen]\nbeta = 3.0\n", ("simulation.specimen.beta", "spring_factor")),

@@ -85,7 +85,7 @@ def test_a_file_that_was_cut_off(refuse: Refuse, name: str) -> None:
     lines, start = block_start(name)
     message = refuse(lines[: start + 2])
     assert f"line {start + 2} =" in message
-    assert "cut off" in message
+    assert "truncated" in message
 
 
 @pytest.mark.parametrize("name", COUNTED)
@@ -115,7 +115,7 @@ def test_a_count_that_would_fit_numbers_cut_in_two(refuse: Refuse) -> None:
     # twice as many: at half the width "0.1234" and "5678" are numbers as well
     block = Block([writers.fixed(0.12345678, 12, 8)] * 20, 5)
     lines = [line.replace("NPTS=  20", "NPTS=  40") for line in writers.peer(block, ".01000")]
-    assert "cut off" in refuse(lines)
+    assert "truncated" in refuse(lines)
 
 
 def test_a_row_too_short_in_the_middle_and_one_too_long_later(refuse: Refuse) -> None:

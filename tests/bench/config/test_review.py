@@ -128,13 +128,13 @@ def test_what_physics_decides_is_refused(text: str, item: str) -> None:
 @pytest.mark.parametrize(
     ("configuration", "notice"),
     [
-        (lambda: BenchConfiguration(limits=Limits(stuck=50.0)), r"limits\.stuck = 50 s lies above the usual"),
+        (lambda: BenchConfiguration(limits=Limits(stuck=50.0)), r"limits\.stuck = 50 s is above the usual"),
         (
             lambda: BenchConfiguration(limits=Limits(debounce=Debounce(drift=0.5))),
-            r"limits\.debounce\.drift = 0\.5 s lies above the usual 0\.001 to 0\.05 s",
+            r"limits\.debounce\.drift = 0\.5 s is above the usual 0\.001 to 0\.05 s",
         ),
-        (lambda: _specimen(xi1=0.35), r"specimen\.frame\.xi1 = 0\.35 lies above the usual 0\.001 to 0\.15"),
-        (lambda: _specimen(k1=0.21344, k2=0.05645), r"specimen\.frame\.k1 = 0\.21344 N/m lies below the usual"),
+        (lambda: _specimen(xi1=0.35), r"specimen\.frame\.xi1 = 0\.35 is above the usual 0\.001 to 0\.15"),
+        (lambda: _specimen(k1=0.21344, k2=0.05645), r"specimen\.frame\.k1 = 0\.21344 N/m is below the usual"),
         (
             lambda: _specimen(xi1=0.02, xi2=0.01),
             r"specimen\.frame\.xi1 = 0\.02, xi2 = 0\.01 .* dashpot c1 = -0\.5\d* N s/m",
@@ -157,10 +157,10 @@ def _specimen(**frame: float) -> BenchConfiguration:
 
 def test_a_frequency_in_hertz_typed_for_one_in_radians_a_second_is_noticed() -> None:
     (notice,) = notices_of(HarmonicParameters(omega=(2.5, 16.0)), Specimen())
-    assert notice.startswith("omega[0] = 2.5 rad/s = 0.40 Hz lies far below the modes of the bare frame, 6.32 and 16.4")
+    assert notice.startswith("omega[0] = 2.5 rad/s = 0.40 Hz is far below the modes of the bare frame, 6.32 and 16.4")
     assert "if Hz is intended" in notice
     (notice,) = notices_of(SineRequest(omega=(2.5 * (2.0 * pi) ** 2,)), Specimen())
-    assert "lies far above" in notice
+    assert "is far above" in notice
     assert notices_of(HarmonicParameters(), Specimen()) == ()
 
 
@@ -172,4 +172,4 @@ def test_a_plan_states_its_frequencies_in_hertz_beside_the_modes() -> None:
 
 def test_a_prediction_warns_and_goes_on(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["predict", "modes", "--beta", "25", "--json"]) == 0
-    assert "warning: beta[0] = 25 lies above the usual 0.02 to 5" in capsys.readouterr().err
+    assert "warning: beta[0] = 25 is above the usual 0.02 to 5" in capsys.readouterr().err

@@ -54,17 +54,17 @@ def test_a_file_is_never_overwritten(kept: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (lambda text: text[:-20], "it is not JSON"),
+        (lambda text: text[:-20], "not valid JSON"),
         (lambda _: "[1, 2]", "it is not a specimen file"),
         (lambda text: text.replace("rocking-bench specimen", "table model"), "it is not a specimen file"),
-        (lambda text: text.replace('"format_version": 1', '"format_version": 2'), "the file has 2: use a newer"),
+        (lambda text: text.replace('"format_version": 1', '"format_version": 2'), "the file has 2: update this"),
         (lambda text: text.replace('"software"', '"colour"'), "colour = .* there is no such key"),
         (lambda text: text.replace('"k1"', '"k3"'), r"findings\[0\].name = 'k3' .* no such quantity"),
         (lambda text: text.replace('"N/m"', '"kN/m"', 1), r"findings\[0\].unit = 'kN/m' .* k1 is \"N/m\""),
         (lambda text: text.replace('"unit": "1",', ""), r"findings\[1\].unit = None .* convert"),
         (lambda text: text.replace("210.0", "-210.0"), r"findings\[0\].value = -210"),
         (lambda text: text.replace("210.0", "NaN"), r"findings\[0\].value"),
-        (lambda text: text.replace('"k1"', '"k2"', 1), "correlations = 'k1' .* there is no such finding"),
+        (lambda text: text.replace('"k1"', '"k2"', 1), "correlations = 'k1' .* no such finding"),
         (lambda text: text.replace('"date"', '"data"', 1), r"findings\[0\].date = None .* it is required"),
         (lambda text: text.replace("09:30:00Z", "09:30:00", 1), r"findings\[0\].date .* ISO 8601 with time zone, such"),
         (
@@ -121,7 +121,7 @@ def test_a_file_that_cannot_be_used_is_found_by_the_check_of_a_configuration(kep
     assert "there is no such file" in str(problem)
     bench.write_text('specimen_file = "specimen.json"\n[identified]\nfindings = []\n', encoding="utf-8")
     (problem,) = problems_of(bench)
-    assert "identified is present too" in str(problem)
+    assert "identified is also present" in str(problem)
     kept.write_text(kept.read_text(encoding="utf-8").replace("0.992", "1.2"), encoding="utf-8")
     bench.write_text('specimen_file = "specimen.json"\n', encoding="utf-8")
     (problem,) = problems_of(bench)

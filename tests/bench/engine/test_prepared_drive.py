@@ -253,7 +253,7 @@ def test_nothing_else_is_driven_after_a_fall_before_the_ramp(then: Step) -> None
     ending, outcomes = bench.run(mount, Arm(0.2), Calibrate(DriveCalibration.flat(1.0)), Play(burst(3001)), then)
     assert isinstance(outcomes[-1], Fallen)
     assert ending.status == "failed"
-    assert "ramp it out first" in ending.reason
+    assert "ramp the prepared drive out first" in ending.reason
     assert State.ABORTING in [event.after for event in bench.events if isinstance(event, StateChanged)]
 
 

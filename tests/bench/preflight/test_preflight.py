@@ -134,7 +134,7 @@ def test_a_record_that_does_not_fit_is_refused(tmp_path: Path, monkeypatch: pyte
     assert refused is not None
     assert seen[0] == tmp_path
     assert (refused.item, refused.value) == ("--out", str(folder))
-    assert "may need 79.2 MB, 5.0 MB are free" in str(refused)
+    assert "may need 79.2 MB, but 5.0 MB are free" in str(refused)
     assert disk_space(CONFIGURATION, 50.0, folder).refusal() is None
 
 

@@ -175,7 +175,7 @@ def test_a_file_is_read_as_it_was_written_and_is_part_of_the_configuration(tmp_p
     ("change", "words"),
     [
         ({"format": "other"}, "it is not a laser calibration"),
-        ({"format_version": 9}, "use a newer program"),
+        ({"format_version": 9}, "update this program"),
         ({"valid_days": -1.0}, "lasers.json: valid_days"),
         ({"date": "yesterday"}, "lasers.json: date"),
         ({"strange": 1}, "there is no such key"),

@@ -115,7 +115,7 @@ def test_help_and_version_are_an_end_in_themselves(capsys: pytest.CaptureFixture
         ("--protocol-file absent.toml", "--protocol-file = 'absent.toml' is refused: there is no such file"),
         ("--protocol-file negative.toml", "negative.toml: specimen = 'a table' is refused"),
         ("--yes --ask", "give only one of them"),
-        ("--out results", "--out = 'results' is refused: it contains campaign.h5 already"),
+        ("--out results", "--out = 'results' is refused: it already contains campaign.h5"),
         ("--out syntax.toml", "is a file"),
         ("--out syntax.toml/below", "is a file"),
     ],
@@ -147,7 +147,7 @@ def test_no_result_is_overwritten(tmp_path: Path, name: str):
     check_folder(tmp_path, RESULTS)
     check_folder(tmp_path / "a" / "b", RESULTS)
     (tmp_path / name).touch()
-    with pytest.raises(InvalidInput, match=f"contains {name} already"):
+    with pytest.raises(InvalidInput, match=f"already contains {name}"):
         check_folder(tmp_path, RESULTS)
     assert [path.name for path in tmp_path.iterdir()] == [name]
 

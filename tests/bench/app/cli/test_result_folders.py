@@ -73,7 +73,7 @@ def test_a_folder_that_was_named_is_never_exchanged_for_another(tmp_path: Path) 
     (tmp_path / "mine" / "campaign.h5").write_text("older")
     for code, errors in together(tmp_path, "--out", "mine"):
         assert code == 2
-        assert "it contains campaign.h5 already" in errors
+        assert "it already contains campaign.h5" in errors
     assert sorted(path.name for path in tmp_path.iterdir()) == ["mine"]
     assert (tmp_path / "mine" / "campaign.h5").read_text() == "older"
 

@@ -191,7 +191,7 @@ def test_a_limit_beyond_what_it_can_measure_is_refused(tmp_path: Path) -> None:
     # the converter of this bench reaches less far than the sensor
     half = {"simulation": {"bench": {"converter": {"range": 5.0}}}}
     narrow = BenchConfiguration.model_validate(_configuration(tmp_path, limit=15.0).model_dump() | half)
-    with pytest.raises(InvalidInput, match=rf"channels.{NAME}.limit = 15.0 .* measures up to"):
+    with pytest.raises(InvalidInput, match=rf"channels.{NAME}.limit = 15.0 .* measures only up to"):
         _run(tmp_path / "campaign.h5", narrow)
 
 

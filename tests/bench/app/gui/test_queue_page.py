@@ -348,7 +348,7 @@ def test_tests_that_share_a_folder_or_do_not_fit_together_are_found_before_the_f
     big = PlanChecked((), None, (), 60.0, 0.4e9, 1e9, "hash", {})
     _start(filled, spoken, qtbot, big, big, big)
     assert _stages(filled) == [Stage.WAITING] * 3
-    assert "may need 1.20 GB, 1.00 GB are free" in filled.queue.status.text()
+    assert "may need 1.20 GB, but 1.00 GB are free" in filled.queue.status.text()
     runner.queue.add(Queued(protocol="shaking", out=str(tmp_path / "first")))
     link = spoken.latest
     runner.start()
@@ -418,7 +418,7 @@ def test_a_queue_that_cannot_be_kept_says_so_and_pauses(
     _start(window, spoken, qtbot)
     assert not window.runner.going
     assert window.trouble.isVisible()
-    assert "another program has changed it" in window.trouble.answers[0].text()
+    assert "another program has changed the file" in window.trouble.answers[0].text()
     assert _stages(window) == [Stage.WAITING]
     window.leave()
 
@@ -450,7 +450,7 @@ def test_a_file_that_cannot_be_read_is_left_alone(qtbot: QtBot, tmp_path: Path) 
     path.write_text("{", encoding="utf-8")
     window = _window(qtbot, path)
     assert window.trouble.isVisible()
-    assert "it is not JSON" in window.trouble.answers[0].text()
+    assert "not valid JSON" in window.trouble.answers[0].text()
     window.runner.do(lambda: window.runner.queue.add(Queued(protocol="shaking")))
     assert path.read_text(encoding="utf-8") == "{"
     window.leave()

@@ -103,7 +103,7 @@ def test_a_change_that_cannot_be_kept_is_not_made(tmp_path: Path) -> None:
     queue.add(Queued(protocol="one"))
     other = QueueFile(store.path)
     Queue(other.read(), other.write).add(Queued(protocol="another's"))
-    with pytest.raises(InvalidInput, match="another program has changed it"):
+    with pytest.raises(InvalidInput, match="another program has changed the file"):
         queue.add(Queued(protocol="two"))
     assert [test.protocol for test in queue.tests] == ["one"]
     assert [test.protocol for test in other.read()] == ["one", "another's"]
@@ -113,7 +113,7 @@ def test_a_change_that_cannot_be_kept_is_not_made(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("{", "it is not JSON"),
+        ("{", "not valid JSON"),
         ("[]", '"format"'),
         ('{"format": "rocking-bench queue", "format_version": 9}', '"format_version": 1'),
         ('{"tests": [{"protocol": "harmonic"}]}', '"format"'),
@@ -233,7 +233,7 @@ def test_what_waits_goes_on_waiting_after_a_test_that_did_not_end_well(
         ({"protocol": "harmonics"}, "test 2: protocol = 'harmonics' is refused: one of check, "),
         ({"protocol": "harmonic", "parameters": {"omega": [99.0]}}, "test 2: omega[0] = 99.0"),
         ({"protocol": "check", "parameters": {"velocity": 0.5}}, "test 2: omega = "),
-        ({"protocol": "harmonic", "out": "full"}, "test 2: --out = 'full' is refused: it contains campaign.h5 already"),
+        ({"protocol": "harmonic", "out": "full"}, "test 2: --out = 'full' is refused: it already contains campaign.h5"),
         ({"protocol": "harmonic", "out": "./one"}, "test 2: out = './one' is refused: test 1 has the same folder"),
     ],
 )
@@ -257,7 +257,7 @@ def test_tests_that_fit_one_by_one_must_fit_together(
     monkeypatch.setattr("bench.app.preflight.compile_run", lambda *_asked: big)
     _write({"protocol": "harmonic"}, {"protocol": "harmonic"})
     assert _queue(session) == 2
-    assert "may need 1.20 GB, 1.00 GB are free" in capsys.readouterr().err
+    assert "may need 1.20 GB, but 1.00 GB are free" in capsys.readouterr().err
 
 
 def test_a_dry_run_tells_of_every_plan_and_runs_none(
