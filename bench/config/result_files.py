@@ -48,7 +48,7 @@ class KeptFile:
         except OSError as error:
             raise InvalidInput(self.item, str(path), f"the file cannot be read: {error.strerror}") from None
         except (ValueError, RecursionError) as error:
-            raise InvalidInput(self.item, str(path), f"it is not JSON: {error}") from None
+            raise InvalidInput(self.item, str(path), f"it is not valid JSON: {error}") from None
         content = cast(dict[str, Any], data) if isinstance(data, dict) else {}
         if content.get("format") != self.format:
             allowed = f'it is not a {self.item}: its "format" is not "{self.format}"; {self.remedy}'

@@ -26,7 +26,7 @@ DWELLING = next(place for place in PLACES if place.name == "dwelling")
         ("stop asked for", 0, ""),
         ("abort asked for", 130, "the run was aborted: abort requested"),
         ("halt asked for", 130, "the run was halted: halt requested"),
-        ("laser_1 invalid", 1, "the run was aborted: time without a valid sample of laser_1"),
+        ("laser_1 invalid", 1, "the run was aborted: time without a valid sample from laser_1"),
         ("table_displacement invalid", 1, "the run was halted: table displacement inf m exceeds"),
         ("emergency stop opens", 1, "the run was halted: emergency stop opened"),
         ("ConnectionLost in read", 1, "the run was failed: the device is gone"),

@@ -107,7 +107,7 @@ def emulate(
         print_warning(notice)
     errors = None if clock_error is None else _ratios(clock_error)
     if write is not None and write.exists():
-        raise InvalidInput("--write", str(write), "it exists and is never overwritten; choose another name")
+        raise InvalidInput("--write", str(write), "the file exists and is never overwritten; choose another name")
     from bench.app.preflight import load_bench
     from drivers.emulation.laboratory import ClockErrors, Laboratory
 

@@ -127,7 +127,7 @@ def check_files(options: "ResultOptions") -> None:
     seen: dict[Path, str] = {}
     for item, path in wanted.items():
         if path.exists():
-            raise InvalidInput(item, str(path), "it exists and is never overwritten; choose another name")
+            raise InvalidInput(item, str(path), "the file exists and is never overwritten; choose another name")
         if not path.parent.is_dir():
             raise InvalidInput(item, str(path), "its folder does not exist; create it first")
         other = seen.setdefault(path.resolve(), item)

@@ -296,7 +296,7 @@ def test_a_limit_that_is_exceeded_in_the_fast_ramp_of_a_test_ends_the_campaign()
     bench = Bench(LoopbackRig({**LoopbackRig().response, "laser_2": laser}), subscriber=listener, limits=limits)
     ending = bench.run(_plan(*RUN[:5], RampOut(fast=True), *RUN))
     assert ending.status == "aborted"
-    assert "valid sample of laser_2" in ending.reason
+    assert "valid sample from laser_2" in ending.reason
     assert sum(isinstance(event, LimitExceeded) for event in bench.events) == 1
 
 

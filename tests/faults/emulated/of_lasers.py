@@ -49,7 +49,7 @@ def _driven(place: Place, bench: object) -> bool:  # noqa: ARG001 - the signatur
 def lasers() -> list[WiredFault]:
     """Unplugged, silent, out of range, frozen, with another zero, with garbage on the line."""
     fault = partial(WiredFault, connection="serial", reach=while_read)
-    invalid = partial(fault, status="aborted", says="valid sample of laser_", must=stays, may=True)
+    invalid = partial(fault, status="aborted", says="valid sample from laser_", must=stays, may=True)
     borne = partial(fault, status="completed", says="", must=never)
     return [
         fault("laser unplugged", _does(EmulatedLaser.unplug), "failed", "laser_1", on),
