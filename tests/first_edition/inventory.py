@@ -81,7 +81,9 @@ def configuration() -> dict[str, Any]:
             continue
         if match := re.match(r"(#?)([\w.]+) = (.*)$", line):
             described, default = above.removeprefix("# "), match[3]
-        elif match := re.match(r"(#) ([\w.]+), (?:which a run writes|written by a run|not to be (?:given|set) here): (.*)$", line):
+        elif match := re.match(
+            r"(#) ([\w.]+), (?:which a run writes|written by a run|not to be (?:given|set) here): (.*)$", line
+        ):
             described, default = match[3], "# example"
         else:
             continue

@@ -48,7 +48,9 @@ def test_a_written_file_holds_every_key_with_unit_and_limits_above_it(tmp_path: 
     path = tmp_path / "rockbench.toml"
     write_template(path)
     lines = path.read_text(encoding="utf-8").splitlines()
-    names = [match[1] for line in lines if (match := re.match(r"#? ?([\w.]+)(?: = |, written by a run|, not to be)", line))]
+    names = [
+        match[1] for line in lines if (match := re.match(r"#? ?([\w.]+)(?: = |, written by a run|, not to be)", line))
+    ]
     assert sorted(name.rpartition(".")[2] for name in names) == sorted(
         key.rpartition(".")[2] for key in keys(BenchConfiguration)
     )

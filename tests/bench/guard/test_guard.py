@@ -184,7 +184,9 @@ def test_velocity_is_seen_through_missing_samples() -> None:
 
 
 def test_a_limit_that_a_channel_cannot_measure_is_refused() -> None:
-    with pytest.raises(InvalidInput, match=r"limits\.acceleration = 40\.0 .* table_acceleration measures only up to 32\.77"):
+    with pytest.raises(
+        InvalidInput, match=r"limits\.acceleration = 40\.0 .* table_acceleration measures only up to 32\.77"
+    ):
         Guard(LoopbackRig(), Limits(acceleration=40.0), RAMPS)
 
 
