@@ -43,15 +43,16 @@ NEWTON, CORRECTIONS = 20, 12
 @dataclass(frozen=True, eq=False)
 class TableOrbit:
     """Steady rocking on the table. `start`, shape (8,), is the state [x, v, u1, u2, v1, v2, theta, omega] at the start
-    of the period, where the base's sine has the `phase` [rad]; `drive`, shape (H,), are the complex harmonics of the
-    amplifier's command [V or A], and `multipliers`, complex, shape (8,), the Floquet multipliers of table and specimen
-    together.
+    of the period, where the base's sine has the `phase` [rad]; `drive` and `acceleration`, shape (H,), are the
+    complex harmonics of the amplifier's command [V or A] and of the table's acceleration [m/s2], and `multipliers`,
+    complex, shape (8,), the Floquet multipliers of table and specimen together.
     """
 
     omega: float
     phase: float
     start: Array
     drive: NDArray[np.complex128]
+    acceleration: NDArray[np.complex128]
     multipliers: NDArray[np.complex128]
     drift: float
 
@@ -84,20 +85,33 @@ def table_orbit(fixed: Orbit, shaker: Shaker, harmonics: int = 5) -> TableOrbit:
     for _ in range(CORRECTIONS):
         start = period.closed(start, drive)
         _, samples = period.run(start, drive)
-        found = 2.0 * np.fft.rfft(samples[:, -1])[1 : harmonics + 1] / TICKS
-        # the samples are means over a tick: their phase is that of its middle
-        found *= np.exp(-1j * np.pi * orders / TICKS)
+        found = harmonics_of(samples[:, -1], harmonics)
         error = wanted - found
         if float(np.abs(error).max()) <= PURE * fixed.amplitude:
             jacobian = period.jacobian(start, drive)
             drift = float(np.abs(samples[:, 3] - samples[:, 2]).max())
             multipliers = np.linalg.eigvals(jacobian).astype(np.complex128)
-            return TableOrbit(fixed.omega, phase, start, drive, multipliers, drift)
+            return TableOrbit(fixed.omega, phase, start, drive, found, multipliers, drift)
         drive = drive + error * response
     raise NoOrbit(
         f"no drive was found that keeps the table's motion sinusoidal at omega = {fixed.omega:g} rad/s "
         "while the block rocks"
     )
+
+
+def harmonics_of(accelerations: Array, harmonics: int) -> NDArray[np.complex128]:
+    """Harmonics 1 to `harmonics` of an acceleration given by its means over the ticks of a period."""
+    orders = np.arange(1.0, harmonics + 1.0)
+    found = 2.0 * np.fft.rfft(accelerations)[1 : harmonics + 1] / accelerations.size
+    # a mean over a tick has the phase of its middle
+    return found * np.exp(-1j * np.pi * orders / accelerations.size)
+
+
+def corner(state: Array) -> int:
+    """Mode of a rocking block in `state`."""
+    from sim.kernel.plant import ROCK_A, ROCK_B
+
+    return ROCK_A if state[6] > 0.0 else ROCK_B
 
 
 def _widest(fixed: Orbit) -> tuple[float, Array]:
@@ -115,37 +129,50 @@ def _widest(fixed: Orbit) -> tuple[float, Array]:
 
 
 class TablePeriod:
-    """One period of table and specimen under a periodic drive."""
+    """One period of table and specimen under a periodic drive, held constant in each of `ticks` intervals."""
 
-    def __init__(self, specimen: Specimen, shaker: Shaker, omega: float) -> None:
+    def __init__(
+        self, specimen: Specimen, shaker: Shaker, omega: float, ticks: int = TICKS, substeps: int = SUBSTEPS
+    ) -> None:
         from sim.kernel import table
 
-        self._stream = table.stream
+        self._stream, self._substeps = table.stream, substeps
         self._plant = plant_of(specimen, shaker, catch_angle=np.pi / 2)
-        self._omega, self._tick = omega, tau / omega / TICKS
+        self._omega, self._tick = omega, tau / omega / ticks
+        # each command is held for a tick: its phase is that of the middle of the tick
+        self._phase = np.asarray((np.arange(ticks) + 0.5) * (tau / ticks), dtype=np.float64)
         self._step: Array | None = None
 
-    def run(self, start: Array, drive: NDArray[np.complex128], change: Array | None = None) -> tuple[Array, Array]:
-        """State after one period, and the samples, shape (TICKS, 9), with the mean acceleration after each of them.
-
-        `change`, shape (TICKS,), is added to the commands of the period. Raises NoOrbit if the block does not rock on
-        the corner of the start at its end.
-        """
-        from sim.kernel.plant import ROCK_A, ROCK_B
-
-        # each command is held for a tick: its phase is that of the middle of the tick
-        phase = (np.arange(TICKS) + 0.5) * (tau / TICKS)
+    def commands(self, drive: NDArray[np.complex128]) -> Array:
+        """The command in each tick, shape (ticks,), of the complex harmonics `drive`, shape (H,)."""
         orders = np.arange(1, drive.size + 1)
-        requests = np.ascontiguousarray((np.exp(1j * np.outer(phase, orders)) @ drive).real)
-        if change is not None:
-            requests += change
-        y, carried, samples = start.copy(), np.array([requests[-1], 0.0]), np.empty((TICKS, 9))
-        mode = ROCK_A if y[6] > 0.0 else ROCK_B
-        after = self._stream(self._plant, self._tick, SUBSTEPS, requests, np.zeros(TICKS), mode, y, carried, samples)
-        if after != mode:
-            raise NoOrbit(f"the block does not rock with the period of the drive at omega = {self._omega:g} rad/s")
+        return np.ascontiguousarray((np.exp(1j * np.outer(self._phase, orders)) @ drive).real)
+
+    def advance(self, mode: int, y: Array, carried: Array, commands: Array) -> tuple[int, Array]:
+        """Mode after a period, and the samples, shape (ticks, 9), with the mean acceleration after each of them.
+
+        Updates the state `y`, shape (8,), and `carried`, see `sim.kernel.table.stream`.
+        """
+        samples = np.empty((commands.size, 9))
+        after = self._stream(
+            self._plant, self._tick, self._substeps, commands, np.zeros(commands.size), mode, y, carried, samples
+        )
         samples[:-1, -1] = samples[1:, -1]
         samples[-1, -1] = carried[1]
+        return after, samples
+
+    def run(self, start: Array, drive: NDArray[np.complex128], change: Array | None = None) -> tuple[Array, Array]:
+        """State after one period, and the samples, see `advance`.
+
+        `change`, shape (ticks,), is added to the commands of the period. Raises NoOrbit if the block does not rock on
+        the corner of the start at its end.
+        """
+        commands, y, mode = self.commands(drive), start.copy(), corner(start)
+        if change is not None:
+            commands += change
+        after, samples = self.advance(mode, y, np.array([commands[-1], 0.0]), commands)
+        if after != mode:
+            raise NoOrbit(f"the block does not rock with the period of the drive at omega = {self._omega:g} rad/s")
         return y, samples
 
     def closed(self, start: Array, drive: NDArray[np.complex128]) -> Array:

@@ -72,6 +72,7 @@ COMMANDS = (
     Command("predict history", f"predict history {_POINT}", 3.0),
     Command("predict seismic", "predict seismic synthetic:kobe --beta 0.4", 8.0),
     Command("predict stability", "predict stability", 6.0),
+    Command("predict attractor", "predict attractor", 8.0),
     Command("predict modes", "predict modes", 1.5),
     Command("paper", "paper --html NEW.html", 18.0),
     Command("benchmark", "benchmark --quick", 40.0),

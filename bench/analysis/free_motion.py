@@ -15,20 +15,13 @@ from numpy.typing import NDArray
 from bench.analysis.cycles import Cycle
 from bench.analysis.gain import SteadyPeak, steady_peak
 from bench.analysis.signals import DRIFT, LASER_1, LASER_2, U1
-
-LONGEST_PERIOD = 24
-"""Longest period in the search [cycles]."""
+from sim.attractor import LONGEST_PERIOD, period_of
 
 CYCLES = 4 * LONGEST_PERIOD
 """Largest number of cycles, counted from the end, from which peaks and period are determined."""
 
 KEPT = 1000
 """Largest number of cycles from which the rate is computed."""
-
-REPEATED, ALIKE = 0.01, 0.05
-"""Largest change of a peak after a period of a periodic motion, relative to the largest peak and to the range of the
-peaks, since a slow spiral also returns close to its past.
-"""
 
 LINEAR = 0.98
 """Smallest share of the changes from cycle to cycle explained by one pair of multipliers for which a rate is stated."""
@@ -86,7 +79,7 @@ def free_motion(cycles: Sequence[Cycle]) -> FreeMotion:
         least=float(extremes[:, 1].min()),
         mean=float(extremes[:, 1].mean()),
         greatest=float(extremes[:, 1].max()),
-        repeats=_period(extremes),
+        repeats=period_of(extremes),
         rate=_rate(np.array([cycle.fundamental[[LASER_1, LASER_2]] for cycle in cycles])),
         cycles=extremes.shape[0],
     )
@@ -103,15 +96,6 @@ def orbit_peak(cycles: Sequence[Cycle], motion: FreeMotion, omega: float) -> Ste
     if rate is None or deviation > SMALL or rate.uncertainty > KNOWN or rate.angle * motion.cycles < TURNS * tau:
         return None
     return steady_peak(cycles[-CYCLES:], omega, deviation**2)
-
-
-def _period(peaks: NDArray[np.float64]) -> int:
-    """Smallest number of cycles after which all peaks, shape (n, 2), repeat, over at least two periods."""
-    allowed = np.minimum(REPEATED * peaks.max(axis=0), ALIKE * np.ptp(peaks, axis=0))
-    for period in range(1, min(LONGEST_PERIOD, peaks.shape[0] // 2) + 1):
-        if bool(np.all(np.abs(peaks[period:] - peaks[:-period]) <= allowed)):
-            return period
-    return 0
 
 
 def _rate(amplitudes: NDArray[np.complex128]) -> Rate | None:

@@ -98,11 +98,9 @@ class MapRequest(GainRequest):
     )
 
 
-class StabilityRequest(OrbitsRequest):
-    """Stability of the rocking orbits, on fixed ground and on a table that the block pushes."""
+class OnTableRequest(OrbitsRequest):
+    """Points at which steady motions on a table that the block pushes are computed."""
 
-    omega: tuple[Frequency, ...] = _frequencies(spaced("12", "16", 41), least=2)
-    beta: tuple[Stiffness, ...] = _stiffnesses((0.64, 0.97))
     table_mass: float | None = quantity(
         None,
         "kg",
@@ -113,6 +111,24 @@ class StabilityRequest(OrbitsRequest):
     )
     harmonics: int = quantity(
         10, "1", "highest controlled harmonic of the table's acceleration, as in a harmonic run", ge=1, le=10
+    )
+
+
+class StabilityRequest(OnTableRequest):
+    """Stability of the rocking orbits, on fixed ground and on a table that the block pushes."""
+
+    omega: tuple[Frequency, ...] = _frequencies(spaced("12", "16", 41), least=2)
+    beta: tuple[Stiffness, ...] = _stiffnesses((0.64, 0.97))
+
+
+class AttractorRequest(OnTableRequest):
+    """Long-term motions on a table that the block pushes, where the rocking orbit is unstable."""
+
+    omega: tuple[Frequency, ...] = _frequencies((12.5, 15.0))
+    beta: tuple[Stiffness, ...] = _stiffnesses((0.64, 0.97))
+    cycles: int = quantity(1500, "1", "cycles before the motion is described, and its peaks taken", ge=300, le=100_000)
+    members: int = quantity(
+        16, "1", "specimens drawn for the range of the greatest peak and the share of falls", ge=0, le=10_000
     )
 
 

@@ -42,13 +42,20 @@ class Picture:
 
 def _figure(name: str, *arguments: str) -> Callable[[Path], Path]:
     """A figure that a run leaves in its folder."""
+    return _made_by(f"run/{name}", "run", *arguments, "--yes", "--out", "run")
 
+
+def _plot(name: str, *arguments: str) -> Callable[[Path], Path]:
+    """The figure of a prediction."""
+    return _made_by(name, "predict", *arguments, "--plot", name)
+
+
+def _made_by(path: str, *arguments: str) -> Callable[[Path], Path]:
     def make(folder: Path) -> Path:
-        command = [sys.executable, "-m", "bench", "run", *arguments, "--yes", "--out", "run"]
-        done = process(command, folder)
+        done = process([sys.executable, "-m", "bench", *arguments], folder)
         if done.returncode != 0:
             raise RuntimeError(done.stderr.strip().splitlines()[-1])
-        return folder / "run" / name
+        return folder / path
 
     return make
 
@@ -69,6 +76,11 @@ PICTURES = (
     Picture("README.md", "docs/images/gain_spectra.png", _figure("gain_spectra.png", "harmonic")),
     Picture("docs/identify.md", "docs/images/table_response.png", _figure("table_response.png", "identify")),
     Picture("docs/free-rocking.md", "docs/images/free_rocking.png", _figure("free_rocking.png", "free-rocking")),
+    Picture(
+        "docs/predict.md",
+        "docs/images/attractor.png",
+        _plot("attractor.png", "attractor", "--omega", "14:15.6:65", "--beta", "0.97", "--members", "0"),
+    ),
     *(
         Picture("docs/window.md", f"docs/images/{name}", _window(name), repeats=False)
         for name in ("window-run.png", "window-queue.png", "window-compare.png")

@@ -83,6 +83,11 @@ COMMANDS = {
         "Boundaries of stability of the rocking motions over frequency, on fixed ground and on a table.",
         "--beta 0.64 0.97 --plot stability.png",
     ),
+    "predict attractor": (
+        "predict:attractor",
+        "Long-term motions on a table, where the periodic rocking motion is unstable: period, peaks, falls.",
+        "--omega 14:15.6:33 --beta 0.97 --plot attractor.png",
+    ),
     "predict map": (
         "predict:gain_map",
         "Gain maps: alpha_1 and alpha_2 over frequency and stiffness, both branches, with stability.",

@@ -18,10 +18,12 @@ from bench.app.cli.inputs import (
 from bench.app.cli.options import BenchFile, Handed, ResultOptions, SpecimenOptions, with_flags
 from bench.app.cli.output import check_files, deliver
 from bench.prediction.requests import (
+    AttractorRequest,
     BandStudyRequest,
     HistoryRequest,
     MapRequest,
     ModesRequest,
+    OnTableRequest,
     RecordsRequest,
     SeismicRequest,
     SineRequest,
@@ -70,7 +72,7 @@ class Subject:
 
 
 def _sine(
-    request_type: type[ModesRequest | SineRequest | StabilityRequest],
+    request_type: type[ModesRequest | SineRequest | OnTableRequest],
     function: str,
     documentation: str,
     drawable: int | None = None,
@@ -189,6 +191,14 @@ stability = _sine(
     "The block pushes the table, which changes how a disturbance grows or decays: a motion may be stable on the table "
     "and unstable on fixed ground. The motion of the table is a sine up to --harmonics, under a drive that does not "
     "react within a period. Lists the boundaries; --csv, --json and --plot have the multipliers of every point.",
+)
+attractor = _sine(
+    AttractorRequest,
+    "attractor",
+    "Long-term motions on a table, where the periodic rocking motion is unstable: period, peaks, falls.\n\n"
+    "From the disturbed orbit the motion is followed for --cycles, under a drive that keeps the mean of the table's "
+    "harmonics. It repeats after several cycles, does not repeat, or ends with a fall. The range of the greatest peak "
+    "and the share of falls are those of drawn specimens. With many frequencies the figure is a bifurcation diagram.",
 )
 seismic = _under_records(
     SeismicRequest,

@@ -14,10 +14,12 @@ from bench.figures.text_table import TextColumn, text_table
 from bench.prediction.files import plain, provenance, rows_of
 from bench.prediction.history import History, histories, history_table, runs_table
 from bench.prediction.requests import (
+    AttractorRequest,
     GainRequest,
     HistoryRequest,
     MapRequest,
     ModesRequest,
+    OnTableRequest,
     SpectrumRequest,
     StabilityRequest,
     SteadyRequest,
@@ -28,6 +30,7 @@ from sim.errors import RockbenchError
 from sim.extras import require
 from sim.gain import GainPrediction
 from sim.loading import load_model
+from sim.shaker import Shaker
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -82,6 +85,19 @@ _BOUNDARIES = {
     "omega_rad_s": "boundary at omega",
     "kind": "kind",
     "argument_rad": "argument",
+}
+
+_ATTRACTORS = {
+    "omega_rad_s": "omega",
+    "beta": "beta",
+    "alpha_2": "alpha_2 of the orbit",
+    "stable": "stable",
+    "repeats_cycles": "repeats after",
+    "alpha_2_least": "least peak",
+    "alpha_2_greatest": "greatest",
+    "greatest_low": "from",
+    "greatest_high": "to",
+    "falls": "falls",
 }
 
 
@@ -152,9 +168,7 @@ def stability(request: StabilityRequest, subject: Subject, progress: Progress) -
     from bench.prediction.stability import boundaries_table, multipliers_table
 
     load_model(progress)
-    shaker = subject.configuration.simulation.bench.shaker
-    if request.table_mass is not None:
-        shaker = shaker.model_copy(update={"moving_mass": request.table_mass})
+    shaker = _shaker(request, subject)
     points = multipliers_table(subject.specimen, shaker, request, progress)
     _print_lost(len(request.omega) * len(request.beta) - points["beta"].values.size)
     if missing := int(np.isnan(points["table_modulus"].values).sum()):
@@ -181,6 +195,39 @@ def stability(request: StabilityRequest, subject: Subject, progress: Progress) -
         metadata=provenance(request, subject.specimen),
         figure=figure,
     )
+
+
+def attractor(request: AttractorRequest, subject: Subject, progress: Progress) -> Result:
+    """Long-term motions where the rocking orbits are unstable on the table."""
+    from bench.prediction.attractors import attractors_table, long_terms
+
+    load_model(progress)
+    found = long_terms(subject.specimen, subject.known, _shaker(request, subject), request, progress)
+    if lost := len(request.omega) * len(request.beta) - len(found):
+        print(f"rockbench: no rocking orbit on the table was found at {lost} point{'s' * (lost > 1)}", file=sys.stderr)
+    table = attractors_table(found)
+
+    def figure() -> "Figure":
+        from bench.figures.attractor_figure import attractor_figure
+
+        if not found:
+            raise RockbenchError("no rocking motion was found, so there is nothing to draw: choose other points")
+        return attractor_figure(found)
+
+    return Result(
+        title="long-term motions on the table",
+        tables={"points": table},
+        content=lambda: {"points": rows_of(table)},
+        text=lambda: columns_text(table, _ATTRACTORS) if found else "no rocking motion was found",
+        metadata=provenance(request, subject.specimen, subject.known),
+        figure=figure,
+    )
+
+
+def _shaker(request: OnTableRequest, subject: Subject) -> Shaker:
+    """Shaker of the simulated bench, with the requested mass."""
+    shaker = subject.configuration.simulation.bench.shaker
+    return shaker if request.table_mass is None else shaker.model_copy(update={"moving_mass": request.table_mass})
 
 
 def gain_map(request: MapRequest, subject: Subject, progress: Progress) -> Result:

@@ -1,0 +1,134 @@
+"""Long-term motions of the coupled specimen on the table, where the periodic rocking motion is unstable."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import nan
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.datafile.tables import Column, Table
+from bench.prediction.requests import AttractorRequest
+from bench.prediction.steady import predict_spectra
+from bench.progress import Progress, counting, silent
+from sim.attractor import attractor, period_of
+from sim.gain import Layer
+from sim.knowledge import SpecimenKnowledge
+from sim.linear import steady_peaks
+from sim.shaker import Shaker
+from sim.specimen import Specimen
+from sim.steady import NoOrbit
+from sim.sweep import in_threads
+from sim.table_orbit import table_orbit
+
+SEED = 1
+"""Seed of the drawn specimens: a prediction is the same every time."""
+
+RANGE = (0.025, 0.975)
+"""Quantiles of the greatest peaks of the drawn specimens that enclose 95 % of them."""
+
+CYCLES, MEMBERS = 1500, 16
+
+
+@dataclass(frozen=True, eq=False)
+class LongTerm:
+    """Long-term motion with the spring `beta` at `omega` [rad/s], beside the rocking orbit with the gain `orbit`.
+
+    Where the orbit on the table is `stable`, the motion is the orbit. `gains`, shape (n,), are the gains of the peaks
+    of the last cycles; it is empty if the block falls, after `fallen` cycles. `low` and `high` enclose the greatest
+    peaks of 95 % of the drawn specimens that do not fall, and `falls` is the share of those that do; NaN without drawn
+    specimens.
+    """
+
+    omega: float
+    beta: float
+    orbit: float
+    stable: bool
+    gains: NDArray[np.float64]
+    fallen: int | None = None
+    low: float = nan
+    high: float = nan
+    falls: float = nan
+
+    @property
+    def repeats(self) -> int:
+        """Number of cycles after which the motion repeats, 0 where it does not."""
+        return 1 if self.stable else period_of(self.gains[:, None])
+
+    def gain(self, of: Callable[[NDArray[np.float64]], np.float64]) -> float:
+        """A statistic of the gains; NaN after a fall."""
+        return float(of(self.gains)) if self.gains.size else nan
+
+
+def long_term(
+    layer: Layer,
+    known: SpecimenKnowledge,
+    shaker: Shaker,
+    harmonics: int,
+    *,
+    cycles: int = CYCLES,
+    members: int = MEMBERS,
+) -> LongTerm:
+    """Long-term motion beside the rocking orbit of `layer`, after `cycles`, with `members` specimens from `known`.
+
+    The amplitude and the harmonics up to `harmonics` of the table's acceleration are those of the orbit. Raises NoOrbit
+    when there is no such orbit on the table.
+    """
+    fixed = layer.orbit
+    orbit, beta = table_orbit(fixed, shaker, harmonics), fixed.specimen.label or 0.0
+    if orbit.stable:
+        return LongTerm(fixed.omega, beta, layer.alpha_2, True, np.array([layer.alpha_2]))
+
+    def gains(specimen: Specimen) -> tuple[NDArray[np.float64], int | None]:
+        found = attractor(specimen, shaker, orbit, cycles)
+        return found.peaks[:, 1] / steady_peaks(specimen.bare(), fixed.omega, fixed.amplitude).drift, found.fallen
+
+    drawn = known.draws(fixed.specimen, members, np.random.default_rng(SEED))
+    (own, fallen), *others = in_threads(gains, [fixed.specimen, *drawn])
+    greatest = [float(each.max()) for each, fell in others if fell is None]
+    low, high = np.quantile(greatest, RANGE).tolist() if greatest else (nan, nan)
+    falls = 1.0 - len(greatest) / len(others) if others else nan
+    return LongTerm(fixed.omega, beta, layer.alpha_2, False, own, fallen, low, high, falls)
+
+
+def long_terms(
+    specimen: Specimen,
+    known: SpecimenKnowledge,
+    shaker: Shaker,
+    request: AttractorRequest,
+    progress: Progress = silent,
+) -> list[LongTerm]:
+    """The long-term motion at every requested point at which there is a rocking orbit on the table."""
+    layers = [each.rocking for each in predict_spectra(specimen, request, progress) if each.rocking is not None]
+    done = counting(progress, "following the motions")
+    found: list[LongTerm] = []
+    for layer in layers:
+        done(len(found), len(layers))
+        try:
+            motion = long_term(layer, known, shaker, request.harmonics, cycles=request.cycles, members=request.members)
+        except NoOrbit:
+            continue
+        found.append(motion)
+    return found
+
+
+def attractors_table(found: Sequence[LongTerm]) -> Table:
+    """One row per long-term motion."""
+
+    def numbers(values: Sequence[float], unit: str, description: str) -> Column:
+        return Column(np.array(values, dtype=np.float64), unit, description)
+
+    repeats = "cycles after which the motion repeats, 0: it does not repeat, or the block falls"
+    return {
+        "beta": numbers([each.beta for each in found], "1", "stiffness ratio k_C/k1 of the coupling spring"),
+        "omega_rad_s": numbers([each.omega for each in found], "rad/s", "circular frequency of the base motion"),
+        "alpha_2": numbers([each.orbit for each in found], "1", "gain of the peak drift on the orbit"),
+        "stable": Column(np.array([each.stable for each in found], dtype=bool), "", "the orbit on the table is stable"),
+        "repeats_cycles": Column(np.array([each.repeats for each in found], dtype=np.int64), "1", repeats),
+        "alpha_2_least": numbers([each.gain(np.min) for each in found], "1", "gain of the least peak of a cycle"),
+        "alpha_2_mean": numbers([each.gain(np.mean) for each in found], "1", "mean gain of the peaks of the cycles"),
+        "alpha_2_greatest": numbers([each.gain(np.max) for each in found], "1", "gain of the greatest peak"),
+        "greatest_low": numbers([each.low for each in found], "1", "lower end of the range of 95 % of the specimens"),
+        "greatest_high": numbers([each.high for each in found], "1", "upper end of the range of 95 % of the specimens"),
+        "falls": numbers([each.falls for each in found], "1", "share of the drawn specimens whose block falls"),
+    }

@@ -1,0 +1,95 @@
+"""Long-term motion on the table of a bench, to which its free motion tends: a periodic orbit, a torus, or a fall.
+
+Where the orbit of one period is unstable, disturbances grow until the motion repeats after several periods, does not
+repeat at all, or the block falls. The motion is integrated from a disturbed orbit under a drive that keeps the mean of
+the table's harmonics at their requested values, as a slow amplitude control does.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.shaker import Shaker
+from sim.specimen import Specimen
+from sim.table_orbit import TablePeriod, TableOrbit, corner, harmonics_of
+
+Array = NDArray[np.float64]
+
+TICKS, SUBSTEPS = 200, 1
+"""Intervals of a constant drive per period, and Runge-Kutta steps in each: peaks are those of 600 with two, within 2e-4
+where the motion is periodic.
+"""
+
+LONGEST_PERIOD = 24
+"""Longest period in the search [cycles]."""
+
+KEPT = 10 * LONGEST_PERIOD
+"""Number of last cycles that describe the long-term motion."""
+
+DISTURBANCE = 0.1
+"""Relative disturbance of the block's angle at the start."""
+
+CONTROLLED, SHARE = 36, 0.5
+"""Cycles between corrections of the drive, and the share of the error of the table's mean harmonics that is corrected.
+"""
+
+REPEATED, ALIKE = 0.01, 0.05
+"""Largest change of a peak after a period of a periodic motion, relative to the largest peak and to the range of the
+peaks, since a slow spiral also returns close to its past.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Attractor:
+    """Peaks of u1 and drift [m] in the last `KEPT` cycles, shape (KEPT, 2). `fallen` is the number of cycles before the
+    block fell, and then `peaks` has no rows; None where it did not.
+    """
+
+    peaks: Array
+    fallen: int | None = None
+
+    @property
+    def repeats(self) -> int:
+        """Number of cycles after which the motion repeats, up to `LONGEST_PERIOD`; 0 where it does not, or falls."""
+        return period_of(self.peaks)
+
+
+def attractor(specimen: Specimen, shaker: Shaker, orbit: TableOrbit, cycles: int = 1500) -> Attractor:
+    """Long-term motion of `specimen` on the table of `shaker`, after `cycles` from the disturbed `orbit`.
+
+    The drive begins as that of the orbit, which may be that of a similar specimen, and keeps the table's mean harmonics
+    at those of the orbit.
+    """
+    from sim.kernel.plant import FALLEN
+
+    period = TablePeriod(specimen, shaker, orbit.omega, TICKS, SUBSTEPS)
+    drive = orbit.drive
+    orders = np.arange(1.0, drive.size + 1.0)
+    response = shaker.gain / shaker.frequency_response(orders * orbit.omega, specimen.mass)
+    y, mode = orbit.start.copy(), corner(orbit.start)
+    y[6] *= 1.0 + DISTURBANCE
+    commands = period.commands(drive)
+    carried, mean = np.array([commands[-1], 0.0]), np.zeros(drive.size, dtype=np.complex128)
+    peaks = np.empty((cycles, 2))
+    for cycle in range(cycles):
+        mode, samples = period.advance(mode, y, carried, commands)
+        if mode == FALLEN:
+            return Attractor(np.empty((0, 2)), cycle)
+        peaks[cycle] = np.abs(samples[:, 2]).max(), np.abs(samples[:, 3] - samples[:, 2]).max()
+        mean += harmonics_of(samples[:, -1], drive.size) / CONTROLLED
+        if (cycle + 1) % CONTROLLED == 0:
+            drive = drive + SHARE * (orbit.acceleration - mean) * response
+            commands, mean = period.commands(drive), np.zeros(drive.size, dtype=np.complex128)
+    return Attractor(peaks[-KEPT:])
+
+
+def period_of(peaks: Array) -> int:
+    """Smallest number of cycles after which all peaks, shape (n, k), repeat, over at least two periods; 0 if none."""
+    if not peaks.size:
+        return 0
+    allowed = np.minimum(REPEATED * peaks.max(axis=0), ALIKE * np.ptp(peaks, axis=0))
+    for period in range(1, min(LONGEST_PERIOD, peaks.shape[0] // 2) + 1):
+        if bool(np.all(np.abs(peaks[period:] - peaks[:-period]) <= allowed)):
+            return period
+    return 0

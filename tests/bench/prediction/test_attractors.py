@@ -1,0 +1,42 @@
+"""Long-term motions as predictions: drawn specimens, and the command."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bench.app.cli.main import main
+from bench.prediction.attractors import long_term
+from sim.gain import predict_gain
+from sim.knowledge import SpecimenKnowledge
+from sim.shaker import Shaker
+from sim.specimen import Specimen
+
+SPECIMEN = Specimen().coupled(0.97)
+
+
+def test_the_range_is_that_of_the_drawn_specimens() -> None:
+    layer = predict_gain(SPECIMEN, 15.0, 1.01 * Specimen().uplift_acceleration).rocking
+    assert layer is not None
+    exact = SpecimenKnowledge(stiffness=0.0, damping=0.0, restitution=0.0, spring=0.0)
+    certain, drawn = (
+        long_term(layer, known, Shaker(), 5, cycles=400, members=4)
+        for known in (exact, SpecimenKnowledge(stiffness=0.005, damping=0.05, restitution=0.002, spring=0.005))
+    )
+    assert certain.low == certain.high == pytest.approx(certain.gains.max(), rel=1e-12)
+    assert certain.falls == 0.0
+    assert drawn.low < drawn.high
+    assert np.array_equal(drawn.gains, certain.gains)
+
+
+def test_the_command_lists_both_kinds_of_motion(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    flags = ["--omega", "15", "--beta", "0.4", "0.97", "--cycles", "400", "--members", "2", "--json"]
+    assert main(["predict", "attractor", *flags, "--plot", str(tmp_path / "attractor.png")]) == 0
+    stable, unstable = json.loads(capsys.readouterr().out)["points"]
+    assert stable["stable"]
+    assert stable["repeats_cycles"] == 1
+    assert stable["alpha_2_greatest"] == stable["alpha_2"]
+    assert not unstable["stable"]
+    assert unstable["alpha_2_least"] < unstable["alpha_2_mean"] < unstable["alpha_2_greatest"]
+    assert (tmp_path / "attractor.png").stat().st_size > 0
