@@ -86,7 +86,7 @@ COMMANDS = {
     "predict attractor": (
         "predict:attractor",
         "Long-term motions on a table, where the periodic rocking motion is unstable: period, peaks, falls.",
-        "--omega 14:15.6:33 --beta 0.97 --plot attractor.png",
+        "--omega 15 --beta 0.64 0.97",
     ),
     "predict map": (
         "predict:gain_map",
