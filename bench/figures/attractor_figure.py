@@ -1,13 +1,13 @@
 # pyright: reportUnknownMemberType=false
 """Peaks of the cycles of long-term motions over the frequency: a panel for each stiffness."""
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bench.figures.style import BLACK, BLUE, GREY, VERMILLION, add_legend, new_figure, set_grid
-from bench.prediction.attractors import LongTerm
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -16,31 +16,28 @@ if TYPE_CHECKING:
 COLUMNS = 2
 
 
-def attractor_figure(found: Sequence[LongTerm]) -> "Figure":
-    """A dot for the peak of each cycle; the line is the orbit, with a gap where it is unstable on the table."""
-    betas = sorted({each.beta for each in found})
-    across = min(COLUMNS, len(betas))
-    down = -(-len(betas) // across)
+def attractor_figure(points: Mapping[str, NDArray[Any]], gains: Sequence[NDArray[np.float64]]) -> "Figure":
+    """Arrays of the table of `bench.prediction.attractors`, and the gains of the last cycles at each of its rows, empty
+    after a fall. A dot is the peak of a cycle; the line is the orbit, dashed where it is unstable on the table.
+    """
+    betas = np.unique(points["beta"])
+    across = min(COLUMNS, betas.size)
+    down = -(-betas.size // across)
     figure = new_figure(max(1.4, across) * 3.6, down * 2.8 + 0.5)
-    panels: list[Axes] = [figure.add_subplot(down, across, k + 1) for k in range(len(betas))]
+    panels: list[Axes] = [figure.add_subplot(down, across, k + 1) for k in range(betas.size)]
     for k, (panel, beta) in enumerate(zip(panels, betas, strict=True)):
-        here = sorted((each for each in found if each.beta == beta), key=lambda each: each.omega)
-        omega = np.array([each.omega for each in here])
-        orbit = np.array([each.orbit for each in here])
-        stable = np.array([each.stable for each in here])
+        rows = np.flatnonzero(points["beta"] == beta)
+        rows = rows[np.argsort(points["omega_rad_s"][rows])]
+        omega, orbit, stable = (points[name][rows] for name in ("omega_rad_s", "alpha_2", "stable"))
         panel.plot(omega, orbit, color=GREY, linestyle=(0, (3, 2)), linewidth=1.0, label="unstable orbit")
         panel.plot(omega, np.where(stable, orbit, np.nan), color=BLUE, linewidth=1.5, label="stable orbit")
-        moving = [each for each in here if not each.stable and each.gains.size]
-        places = np.concatenate([np.full(each.gains.size, each.omega) for each in moving] or [np.empty(0)])
-        peaks = np.concatenate([each.gains for each in moving] or [np.empty(0)])
+        moving = [row for row in rows if not points["stable"][row]]
+        places = np.repeat(points["omega_rad_s"][moving], [gains[row].size for row in moving])
+        peaks = np.concatenate([gains[row] for row in moving] or [np.empty(0)])
         panel.plot(places, peaks, ".", color=BLACK, markersize=1.5, label="peak of a cycle")
-        fallen = [each for each in here if each.fallen is not None]
+        fallen = [row for row in moving if not gains[row].size]
         panel.plot(
-            [each.omega for each in fallen],
-            [each.orbit for each in fallen],
-            "x",
-            color=VERMILLION,
-            label="the block falls",
+            points["omega_rad_s"][fallen], points["alpha_2"][fallen], "x", color=VERMILLION, label="the block falls"
         )
         panel.set_title(rf"$\beta$ = {beta:g}")
         panel.set_xlabel(r"$\Omega$  [rad/s]")

@@ -212,7 +212,7 @@ def attractor(request: AttractorRequest, subject: Subject, progress: Progress) -
 
         if not found:
             raise RockbenchError("no rocking motion was found, so there is nothing to draw: choose other points")
-        return attractor_figure(found)
+        return attractor_figure(arrays(table), [each.gains for each in found])
 
     return Result(
         title="long-term motions on the table",
