@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from sim.shaker import Shaker
 from sim.specimen import Specimen
-from sim.table_orbit import TablePeriod, TableOrbit, corner, harmonics_of
+from sim.table_orbit import TableOrbit, TablePeriod, corner, harmonics_of
 
 Array = NDArray[np.float64]
 
