@@ -26,8 +26,8 @@ def attractor_figure(points: Mapping[str, NDArray[Any]], gains: Sequence[NDArray
     figure = new_figure(max(1.4, across) * 3.6, down * 2.8 + 0.5)
     panels: list[Axes] = [figure.add_subplot(down, across, k + 1) for k in range(betas.size)]
     for k, (panel, beta) in enumerate(zip(panels, betas, strict=True)):
-        rows = np.flatnonzero(points["beta"] == beta)
-        rows = rows[np.argsort(points["omega_rad_s"][rows])]
+        here: list[int] = np.flatnonzero(points["beta"] == beta).tolist()
+        rows = sorted(here, key=lambda row: float(points["omega_rad_s"][row]))
         omega, orbit, stable = (points[name][rows] for name in ("omega_rad_s", "alpha_2", "stable"))
         panel.plot(omega, orbit, color=GREY, linestyle=(0, (3, 2)), linewidth=1.0, label="unstable orbit")
         panel.plot(omega, np.where(stable, orbit, np.nan), color=BLUE, linewidth=1.5, label="stable orbit")
