@@ -3,6 +3,8 @@
 import time
 from typing import Protocol
 
+from sim import waiting
+
 
 def now() -> float:
     """Machine's clock [s since an arbitrary origin]: never decreases, resolution better than a microsecond.
@@ -46,4 +48,4 @@ class WallClock:
 
     def wait_until(self, instant: float) -> None:
         while (remaining := instant - now()) > 0:
-            time.sleep(remaining)
+            waiting.sleep(remaining)

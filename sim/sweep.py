@@ -11,15 +11,13 @@ from typing import Any, TypeVar
 
 from sim.errors import InvalidInput, RockbenchError
 from sim.extras import require
+from sim.waiting import STEP
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 PATIENCE = 10.0
 """Time-out for a scheduler's answer [s]."""
-
-STEP = 0.2
-"""Longest single wait for a thread [s]: on Windows, before Python 3.14, signals do not interrupt a wait."""
 
 Done = Callable[[int, int], None]
 """Called with the number of items done and the total."""

@@ -20,6 +20,7 @@ from bench.datafile.tables import Table
 from bench.datafile.writer import DataFileWriter
 from bench.events import Acquired, Event, PointFinished, Progress, StateChanged
 from drivers.rig import Channel, Counts
+from sim import waiting
 from sim.errors import InvalidInput
 from sim.parameters import Parameters
 
@@ -121,7 +122,7 @@ class Recorder:
         """Wait until all queued events are in the file. Raises DataFileError, once, when they could not be written."""
         if not self._closed:
             marker = _Sync(threading.Event())
-            if not (self._put(marker, PATIENCE) and marker.done.wait(PATIENCE)):
+            if not (self._put(marker, PATIENCE) and waiting.wait(marker.done, PATIENCE)):
                 self._fall_behind(f"has not responded for {PATIENCE:g} s")
         self._raise_failure()
 
@@ -140,8 +141,7 @@ class Recorder:
         self._end = _End(Status(status), summary)
         # wakes a waiting thread; a busy one checks for the end itself
         self._put(_Sync(threading.Event()), 0.0)
-        self._thread.join(PATIENCE)
-        if self._thread.is_alive():
+        if not waiting.join(self._thread, PATIENCE):
             self._fall_behind(f"has not responded for {PATIENCE:g} s")
         self._raise_failure()
 
@@ -152,11 +152,7 @@ class Recorder:
 
     def _put(self, item: _Block | Event | _Sync, patience: float) -> bool:
         """Queue an item if space becomes free within `patience` seconds."""
-        try:
-            self._queue.put(item, block=patience > 0.0, timeout=patience)
-        except queue.Full:
-            return False
-        return True
+        return waiting.put(self._queue, item, patience)
 
     def _fall_behind(self, how: str) -> None:
         """Record the failure of a slow disk: pending data are still written if it recovers, new data are ignored."""

@@ -1,6 +1,5 @@
 """Replay of a recorded campaign with the engine, guard and analysis of live runs."""
 
-import time
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,6 +23,7 @@ from bench.replay.recording import DataFileRecording, RecordedCourse
 from bench.twin.live import live_twin
 from drivers.clock import Clock, now
 from drivers.replay import ReplayRig
+from sim import waiting
 from sim.parameters import Parameters
 
 LONGEST_WAIT = 1.0
@@ -54,7 +54,7 @@ class PacedClock:
         # delays by slow computations are not made up for
         self._due = max(self._due + min(ahead, LONGEST_WAIT) / self._speed, now())
         while (remaining := self._due - now()) > 0.0:
-            time.sleep(remaining)
+            waiting.sleep(remaining)
 
 
 class RequestReplay:

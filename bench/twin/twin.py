@@ -29,6 +29,7 @@ from bench.events import (
 from bench.twin.ensemble import Measured, Members, draw_members
 from bench.twin.estimator import Estimator, Limit, Setting, laser_lag
 from drivers.rig import OperatorTask
+from sim import waiting
 from sim.errors import CauseCode
 from sim.specimen import Specimen
 
@@ -187,7 +188,7 @@ class Twin:
         """Publish the finished estimates in order. Returns whether the model continues."""
         while run.waiting and (self._patient or run.waiting[0].done()):
             try:
-                estimate = run.waiting.popleft().result()
+                estimate = waiting.result(run.waiting.popleft())
             except Exception as error:
                 # an error in the twin must not end a test
                 self._give_up(now, f"the twin is off until the rig is armed again: {error}")

@@ -1,11 +1,13 @@
 """Connection to the driver: on this PC, or on a controller behind a gRPC device server."""
 
+import threading
 from typing import Any, cast
 
 from nidaqmx.grpc_session_options import GrpcSessionOptions, SessionInitializationBehavior
 
 from drivers.daqmx.library import Options
 from drivers.errors import DeviceNotFound
+from sim import waiting
 from sim.errors import InvalidInput
 
 _READY = 2.0
@@ -74,8 +76,11 @@ class Connection:
         library = cast(Any, grpc)
         self._channel = library.insecure_channel(server, options=channel_options)
         ready = library.channel_ready_future(self._channel)
+        settled = threading.Event()
+        ready.add_done_callback(lambda _: settled.set())
         try:
-            ready.result(timeout=_READY)
+            waiting.wait(settled, _READY)
+            ready.result(timeout=0.0)
         except library.FutureTimeoutError as error:
             ready.cancel()
             self._channel.close()

@@ -12,6 +12,7 @@ from drivers.emulation.plant import History, Output
 from drivers.errors import RigError
 from drivers.rig import OperatorTask
 from drivers.specimen_handling import SpecimenHandling
+from sim import waiting
 from sim.channel import Channel, Counts
 from sim.specimen import Specimen
 from sim.virtual_bench import VirtualBench, VirtualBenchParameters
@@ -69,7 +70,7 @@ class EmulatedBench:
         """Stop the thread. Allowed any number of times."""
         self._over.set()
         if self._thread.is_alive():
-            self._thread.join()
+            waiting.join(self._thread)
 
     @property
     def channels(self) -> tuple[Channel, ...]:

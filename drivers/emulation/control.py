@@ -13,6 +13,7 @@ from contextlib import suppress
 from typing import Any, BinaryIO, cast
 
 from drivers.errors import ConnectionLost, DeviceTimeout, RigError
+from sim import waiting
 from sim.errors import InvalidInput, RockbenchError
 
 Handler = Callable[[dict[str, Any]], object]
@@ -49,11 +50,11 @@ class ControlServer:
         if first:
             # closing a socket does not wake the thread in accept(), a connection does
             with socket.create_connection(self._listening.getsockname()):
-                self._accepting.join()
+                waiting.join(self._accepting)
             self._listening.close()
         for connection, thread in served:
             _hang_up(connection)
-            thread.join()
+            waiting.join(thread)
 
     def _accept(self) -> None:
         while True:
@@ -164,8 +165,12 @@ def _line(connection: socket.socket, deadline: float) -> bytes:
     while not received.endswith(b"\n"):
         if (left := deadline - time.monotonic()) <= 0.0:
             raise TimeoutError
-        connection.settimeout(left)
-        if not (part := connection.recv(65536)):
+        connection.settimeout(min(left, waiting.STEP))
+        try:
+            part = connection.recv(65536)
+        except TimeoutError:
+            continue
+        if not part:
             raise ConnectionResetError("it closed the connection without an answer")
         received += part
     return received

@@ -13,6 +13,7 @@ from drivers.errors import ConnectionLost
 from drivers.optoncdt.codec import Decoder
 from drivers.optoncdt.dialogue import USUAL, Dialogue, Reply
 from drivers.optoncdt.frames import Assembler, Frames, Layout
+from sim import waiting
 
 _PACE = 0.0025
 """Pause between two reads of the line [s]: the cost of a read does not depend on the number of bytes.
@@ -72,7 +73,7 @@ class Stream:
         try:
             self._dialogue.send(command)
             with self._changed:
-                self._changed.wait_for(lambda: reply.complete or self._failure is not None, timeout)
+                waiting.wait_for(self._changed, lambda: reply.complete or self._failure is not None, timeout)
         finally:
             with self._changed:
                 self._reply = None
@@ -97,12 +98,12 @@ class Stream:
     def wait(self, timeout: float) -> bool:
         """Wait until `take` has values or an error; False after `timeout` [s]."""
         with self._changed:
-            return self._changed.wait_for(lambda: self._holding > 0 or self._failure is not None, timeout)
+            return waiting.wait_for(self._changed, lambda: self._holding > 0 or self._failure is not None, timeout)
 
     def end(self) -> None:
         """Stop reading; no thread remains. Allowed any number of times."""
         self._over = True
-        self._thread.join()
+        waiting.join(self._thread)
 
     def _run(self) -> None:
         port = self._dialogue.port

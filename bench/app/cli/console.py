@@ -15,6 +15,7 @@ from rich.text import Text
 from bench.app.formatting import ABSENT, clock
 from bench.app.run_display import NOTICES, Notice, RunDisplay
 from bench.events import Acquired, Event, OperatorAsked, State
+from sim import waiting
 
 REDRAW_INTERVAL = 0.125
 """Minimum interval between redraws [s]."""
@@ -49,7 +50,7 @@ class LiveConsole:
         self._closing.set()
         self._changed.set()
         try:
-            self._painter.join()
+            waiting.join(self._painter)
             self._print_grave()
         finally:
             self._hide()

@@ -16,6 +16,7 @@ from bench.app.cli.interrupt import SIGNALS
 from bench.app.cli.options import Handed, Seed
 from bench.app.cli.output import print_warning
 from bench.progress import silent
+from sim import waiting
 from sim.errors import InvalidInput
 from sim.extras import require
 
@@ -23,9 +24,6 @@ if TYPE_CHECKING:
     from bench.config.model import BenchConfiguration
     from drivers.emulation.laboratory import Laboratory
 
-
-STEP = 0.2
-"""Longest uninterruptible wait [s]."""
 
 LARGEST_CLOCK_ERROR = 0.01
 """Largest relative error of an emulated clock, as for the lasers of the virtual bench."""
@@ -128,9 +126,7 @@ def emulate(
         laboratory.start()
         with _until_asked() as over:
             _hand_out(configuration, laboratory, write)
-            # in steps: on Windows before Python 3.14, a signal does not end a wait
-            while not over.wait(STEP):
-                pass
+            waiting.wait(over)
             # under the same handler, so that a second Ctrl-C does not interrupt it
             laboratory.close()
     finally:

@@ -15,6 +15,7 @@ from bench.app.ipc.messages import Attached, Published, Run
 from bench.app.ipc.server import SessionServer
 from bench.app.ipc.sessions import RunningSession, lock_of, remove, sessions_folder
 from bench.events import Warned
+from sim import waiting
 
 
 @contextmanager
@@ -72,4 +73,4 @@ def announced(server: SessionServer, run: Run, owner: str) -> Generator[None]:
         over.set()
         with suppress(OSError, EOFError, AuthenticationError):
             Client(listener.address, authkey=key).close()
-        thread.join(1.0)
+        waiting.join(thread, 1.0)

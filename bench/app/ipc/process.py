@@ -20,6 +20,7 @@ from bench.app.session import run_session
 from bench.config.model import BenchConfiguration
 from bench.engine.interface import Requests, Unattended
 from sim.errors import CauseCode, InvalidInput, RockbenchError, cause_of
+from sim.waiting import STEP
 
 
 def main() -> None:
@@ -31,6 +32,8 @@ def main() -> None:
 
 def serve(connection: Connection) -> None:
     """Carry out the assignment received over `connection`."""
+    while not connection.poll(STEP):
+        pass
     assignment = connection.recv()
     requests = Requests()
     keep_going = isinstance(assignment, Run) and assignment.keep_going

@@ -40,6 +40,7 @@ from bench.preflight.margins import bounds, margins
 from bench.protocol import Prepared
 from drivers.clock import now
 from drivers.rig import Rig, RigError
+from sim import waiting
 
 FAREWELL = 2.0
 """Longest wait at the end for a client that does not read its messages [s]."""
@@ -136,7 +137,7 @@ class SessionServer:
         self.outbox.put(last, always=True)
         end = now() + timeout
         for sent in tuple(self._sending):
-            sent.wait(max(end - now(), 0.0))
+            waiting.wait(sent, max(end - now(), 0.0))
 
     def _serve(self, connection: Connection, queue: SendQueue, hear: Callable[[], None]) -> None:
         sent = threading.Event()

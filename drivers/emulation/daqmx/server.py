@@ -25,6 +25,7 @@ from drivers.emulation.daqmx.service.samples import ReadingService, WritingServi
 from drivers.emulation.daqmx.service.system import SystemService
 from drivers.emulation.daqmx.service.timing import TimingService
 from drivers.emulation.plant import Plant
+from sim import waiting
 from sim.errors import InvalidInput
 from sim.sensors import Converter
 
@@ -237,8 +238,10 @@ class DaqServer:
         gone = self._server.stop(None)
         # also ends waiting reads and writes
         self._driver.reset()
-        gone.wait()
-        self._pool.shutdown()
+        waiting.wait(gone)
+        ending = threading.Thread(target=self._pool.shutdown, name="emulated-daq, closing")
+        ending.start()
+        waiting.join(ending)
 
     def fail_next(self, call: str, code: int) -> None:
         """Make the next call of this name, such as "StartTask", fail with a DAQmx code and without effect."""
@@ -254,7 +257,7 @@ class DaqServer:
 
     def vanish(self) -> None:
         """Disconnect at once, like a server whose cable is pulled; the devices continue until `close`."""
-        self._server.stop(None).wait()
+        waiting.wait(self._server.stop(None))
 
     def __enter__(self) -> Self:
         self.start()

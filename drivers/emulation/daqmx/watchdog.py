@@ -9,6 +9,7 @@ from nidaqmx.error_codes import DAQmxErrors
 from drivers.emulation.daqmx.device import DeviceModel
 from drivers.emulation.daqmx.errors import DaqmxFailure
 from drivers.emulation.daqmx.lines import Lines
+from sim import waiting
 
 Expire = Callable[[Sequence[DeviceModel], dict[str, bool], dict[str, float]], None]
 """Sets the outputs of devices: levels by line, volts by analogue output."""
@@ -133,7 +134,7 @@ class Watchdog:
             self._deadline = None
             self._changed.notify()
         if self._thread is not None:
-            self._thread.join()
+            waiting.join(self._thread)
             self._thread = None
 
     def verdict(self) -> None:

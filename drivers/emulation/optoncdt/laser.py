@@ -14,6 +14,7 @@ from drivers.emulation.optoncdt.evaluation import WORD, Fault
 from drivers.emulation.optoncdt.sensor import Sensor
 from drivers.emulation.optoncdt.settings import Settings
 from drivers.emulation.plant import Sight
+from sim import waiting
 from sim.sensors import Laser
 
 Bytes = NDArray[np.uint8]
@@ -118,7 +119,7 @@ class EmulatedLaser:
         """Switch off; no thread or port remains. Allowed any number of times."""
         self.unplug()
         if self._thread.is_alive():
-            self._thread.join()
+            waiting.join(self._thread)
 
     @property
     def port(self) -> str:

@@ -1,0 +1,70 @@
+"""Waits of a main thread, in steps: on Windows before Python 3.14, Ctrl-C does not end a wait for a lock."""
+
+import time
+from collections.abc import Callable
+from concurrent.futures import Future
+from concurrent.futures import TimeoutError as NotYet
+from queue import Full, Queue
+from threading import Condition, Event, Thread
+from typing import TypeVar
+
+STEP = 0.2
+"""Longest wait during which a signal may remain unanswered [s]."""
+
+Result = TypeVar("Result")
+Item = TypeVar("Item")
+
+
+def join(thread: Thread, timeout: float = float("inf")) -> bool:
+    """Wait until a thread has ended; False after `timeout` [s]."""
+    return _repeat(lambda step: thread.join(step) or not thread.is_alive(), timeout)
+
+
+def wait(event: Event, timeout: float = float("inf")) -> bool:
+    """Wait until an event is set; False after `timeout` [s]."""
+    return _repeat(event.wait, timeout)
+
+
+def wait_for(changed: Condition, predicate: Callable[[], bool], timeout: float) -> bool:
+    """Wait until `predicate` holds, with the condition's lock held; False after `timeout` [s]."""
+    return _repeat(lambda step: changed.wait_for(predicate, step), timeout)
+
+
+def result(future: Future[Result]) -> Result:
+    """Wait for the result of a future. Raises its exception."""
+    while True:
+        try:
+            return future.result(STEP)
+        except NotYet:
+            if future.done():
+                # the exception of the work itself
+                return future.result(0.0)
+
+
+def put(queue: Queue[Item], item: Item, timeout: float) -> bool:
+    """Wait until a queue has room for `item`; False after `timeout` [s]."""
+
+    def within(step: float) -> bool:
+        try:
+            queue.put(item, block=step > 0.0, timeout=step)
+        except Full:
+            return False
+        return True
+
+    return _repeat(within, timeout)
+
+
+def sleep(seconds: float) -> None:
+    """Suspend the thread for `seconds`."""
+    _repeat(lambda step: time.sleep(step), seconds)
+
+
+def _repeat(wait_once: Callable[[float], object], timeout: float) -> bool:
+    """Call `wait_once(step)` until it is true; False after `timeout` [s]. It is called at least once."""
+    end = time.monotonic() + timeout
+    remaining = timeout
+    while True:
+        if wait_once(max(0.0, min(remaining, STEP))):
+            return True
+        if (remaining := end - time.monotonic()) <= 0.0:
+            return False
