@@ -77,7 +77,11 @@ class Connection:
         self._channel = library.insecure_channel(server, options=channel_options)
         ready = library.channel_ready_future(self._channel)
         settled = threading.Event()
-        ready.add_done_callback(lambda _: settled.set())
+
+        def settle(_: object) -> None:
+            settled.set()
+
+        ready.add_done_callback(settle)
         try:
             waiting.wait(settled, _READY)
             ready.result(timeout=0.0)
