@@ -13,7 +13,7 @@ from typing import ClassVar, TypeVar, dataclass_transform
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.rig import Alignment, Block, OperatorTask
+from drivers.rig import Alignment, Block, OperatorTask, RawValues
 from sim.identified import Identified
 from sim.parameters import Parameters, column
 from sim.specimen import Specimen
@@ -106,6 +106,14 @@ class Acquired(Event):
     block: Block
     drive: Array
     signals: Array = field(default_factory=lambda: np.empty((0, 0)))
+
+
+@event(journalled=False)
+class ValuesReceived(Event):
+    """Values of sensors with their own clocks, as received in `run` since the previous such event."""
+
+    run: int
+    raw: tuple[RawValues, ...]
 
 
 @event(table="operator_actions")

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from drivers.clock import Clock, VirtualClock, WallClock
 from drivers.errors import BackendFault
-from drivers.rig import Alignment, Block, Channel, OperatorTask, Rig
+from drivers.rig import Alignment, Block, Channel, OperatorTask, RawValues, Rig
 from sim.errors import RockbenchError
 
 MOST_CHANNELS = 256
@@ -242,6 +242,18 @@ class CheckedRig:
             self._require_storable(own)
         return Block(int(first), own)
 
+    def raw_values(self) -> tuple[RawValues, ...]:
+        """See `drivers.rig.Rig`; none of a backend without this method."""
+        if not callable(method := getattr(self._rig, "raw_values", None)):
+            return ()
+        with self._calls("raw values"):
+            given: Any = method()
+        names = [channel.name for channel in self.channels]
+        if type(given) is not tuple or not all(_is_raw(each, names) for each in cast("tuple[Any, ...]", given)):
+            self._refuse(f"returned {given!a:.80} as raw values of its sensors")
+        raw = cast("tuple[RawValues, ...]", given)
+        return tuple(RawValues(each.sensor, *(np.array(getattr(each, name)) for name in _RAW)) for each in raw)
+
     def _require_storable(self, counts: NDArray[Any]) -> None:
         """Refuse counts beyond the range of their channel's storage, which the file would alter."""
         low, high = counts.min(axis=0), counts.max(axis=0)
@@ -252,6 +264,7 @@ class CheckedRig:
                 self._refuse(f"returned counts {told}")
 
 
+_RAW = ("index", "time", "code", "arrival")
 _CALLS = ("interlocks", "arm", "write", "read", "stop", "halt", "close", "perform")
 
 
@@ -299,6 +312,16 @@ def _is_alignment(value: Any, sensors: list[str]) -> bool:
         and (_is_number(value.residual) or value.residual != value.residual)
         and _is_number(value.delay)
         and all(map(_is_count, (value.values, value.lost, value.late, value.implausible)))
+    )
+
+
+def _is_raw(value: Any, sensors: list[str]) -> bool:
+    if not isinstance(value, RawValues) or value.sensor not in sensors:
+        return False
+    columns: list[Any] = [getattr(value, name) for name in _RAW]
+    return all(
+        type(each) is np.ndarray and each.dtype == np.int64 and each.ndim == 1 and len(each) == len(columns[0])
+        for each in columns
     )
 
 

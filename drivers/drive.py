@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from drivers.clock import Clock
 from drivers.errors import DriveUnderflow, RigError
+from drivers.rig import RawValues
 from sim.errors import InvalidInput
 
 
@@ -106,6 +107,9 @@ class RigBase:
     def armed(self) -> bool:
         """Whether the rig takes drive samples."""
         return self._state in (RigState.ARMED, RigState.RUNNING)
+
+    def raw_values(self) -> tuple[RawValues, ...]:
+        return ()
 
     def interlocks(self) -> Mapping[str, bool]:
         return {}

@@ -22,6 +22,25 @@ from sim.parameters import column
 
 
 @dataclass(frozen=True)
+class RawValues:
+    """Values of a sensor with its own clock before their resampling, whole numbers of shape (n,) each.
+
+    `sensor` is the name of its channel. `index` counts the measurements, with gaps where some were lost; `time` is that
+    of the measurement on the sensor's clock [us], `code` the word of the sensor, and `arrival` the time at which it had
+    been received [us of the computer's clock since `arm()`].
+    """
+
+    sensor: str
+    index: NDArray[np.int64]
+    time: NDArray[np.int64]
+    code: NDArray[np.int64]
+    arrival: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return int(self.index.size)
+
+
+@dataclass(frozen=True)
 class Block:
     """Consecutive samples of all inputs: `counts` has shape (n_samples, n_channels).
 
@@ -132,6 +151,13 @@ class Rig(Protocol):
     @property
     def alignments(self) -> tuple[Alignment, ...]:
         """Alignments of sensors with their own clocks since `arm()`; usually none."""
+        ...
+
+    def raw_values(self) -> tuple[RawValues, ...]:
+        """Values of sensors with their own clocks received since the last call, or since `arm()`; usually none.
+
+        They remain available after `stop()` and a failure. A backend of another package may lack this method.
+        """
         ...
 
     def interlocks(self) -> Mapping[str, bool]:

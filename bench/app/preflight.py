@@ -20,6 +20,7 @@ from bench.preflight.margins import Forecast, Margin, bounds, drive_table, margi
 from bench.progress import Progress, silent
 from bench.protocol import Prepared, Protocol
 from bench.provenance import software
+from sim.channel import STOREYS
 from sim.errors import InvalidInput
 from sim.loading import BENCH, load_model
 from sim.parameters import Parameters
@@ -32,6 +33,8 @@ OVERHEAD = 1.1
 
 DRIVE_BYTES = 4
 """Bytes per drive sample in the file."""
+RAW_BYTES = 6
+"""Bytes per raw value of a serial laser in the file, compressed."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +73,10 @@ def bytes_per_second(configuration: BenchConfiguration) -> float:
     estimates = (
         8 * len(EVENT_TABLES[TwinEstimate].fields) / configuration.acquisition.block_duration if enabled else 0.0
     )
-    return configuration.sample_rate * (channels * width + DRIVE_BYTES) + estimates
+    lasers = configuration.hardware.lasers
+    is_serial = configuration.backend == "hardware" and lasers.connection == "serial"
+    raw = len(STOREYS) * lasers.rate * RAW_BYTES if is_serial else 0.0
+    return configuration.sample_rate * (channels * width + DRIVE_BYTES) + estimates + raw
 
 
 def _readable(size: int) -> str:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from bench.datafile import hdf5
 from bench.datafile.declared import TABLES, part_of
-from bench.datafile.fields import Kind, Rows
+from bench.datafile.fields import Kind, rows_of
 from bench.datafile.hdf5 import Dataset, Group
 from bench.datafile.hdf5_reading import UNREADABLE, DataFileError, reason
 from bench.datafile.opening import intact_rows, is_within
@@ -131,7 +131,7 @@ def renew_tables(entry: hdf5.Group, lost: Iterable[str]) -> None:
             parent = hdf5.group(entry, folder) if folder else entry
             if name in parent:
                 hdf5.delete(parent, name)
-            Rows(parent, name, fields)
+            rows_of(parent, name, fields)
 
 
 def cut(entry: hdf5.Group, counted: Mapping[str, int]) -> dict[str, int]:

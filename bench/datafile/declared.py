@@ -186,6 +186,20 @@ EVENTS = (
 )
 
 
+RAW_VALUES = tuple(
+    Field(name, Kind.WHOLE, unit, description, packed=True)
+    for name, unit, description in (
+        ("run", "1", "number of armings of the rig"),
+        ("sensor", "1", "number of its channel, in the order of the rig, from 0"),
+        ("index", "1", "number of the measurement, counted by the sensor; it jumps where values were lost"),
+        ("time", "us", "time of the measurement on the sensor's clock"),
+        ("code", "1", "word of the sensor"),
+        ("arrival", "us", "time of its arrival on the computer's clock since the rig was armed"),
+    )
+)
+"""Values of sensors with their own clocks as received, before their resampling."""
+
+
 @dataclass(frozen=True)
 class EventTable:
     """The table of a kind of events at `path` below /entry.
@@ -247,6 +261,7 @@ ENTRY_TABLES: Mapping[type[Event], EventTable] = {
 
 TABLES: Mapping[str, tuple[Field, ...]] = {
     "instrument/blocks": BLOCKS,
+    "instrument/raw_values": RAW_VALUES,
     "events": EVENTS,
     **{table.path: table.fields for table in EVENT_TABLES.values()},
     **FIT_TABLES,

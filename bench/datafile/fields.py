@@ -26,6 +26,7 @@ TEXT_WIDTH = 512
 """Size of a string in a row [bytes]; longer strings are truncated with an ellipsis."""
 
 ROWS_PER_CHUNK = 256
+ROWS_PER_PACKED_CHUNK = 4096
 
 
 class Kind(StrEnum):
@@ -41,7 +42,7 @@ class Kind(StrEnum):
 class Field:
     """A field. An absent number is stored as NaN, an absent switch as -1, and an absent string as empty.
 
-    If `array` is true, each element of the value is a row.
+    If `array` is true, each element of the value is a row. A `packed` field is compressed, in chunks of many rows.
     """
 
     name: str
@@ -50,6 +51,7 @@ class Field:
     description: str
     optional: bool = False
     array: bool = False
+    packed: bool = False
 
     @property
     def dtype(self) -> np.dtype[Any]:
@@ -61,7 +63,7 @@ class Field:
         return np.dtype(np.int64 if self.kind is Kind.WHOLE and not self.optional else np.float64)
 
     def create(self, parent: hdf5.Group) -> hdf5.Dataset:
-        """Create the empty dataset of this field, uncompressed, so that appending works in place."""
+        """Create the empty dataset of this field, usually uncompressed, so that appending works in place."""
         if self.kind is Kind.TEXT:
             made = hdf5.grow_texts(
                 parent, self.name, TEXT_WIDTH, description=self.description, chunk=ROWS_PER_CHUNK // 4
@@ -73,8 +75,8 @@ class Field:
                 self.dtype,
                 unit=self.unit or "1",
                 description=self.description,
-                chunk=ROWS_PER_CHUNK,
-                compress=False,
+                chunk=ROWS_PER_PACKED_CHUNK if self.packed else ROWS_PER_CHUNK,
+                compress=self.packed,
             )
         made.attrs["kind"], made.attrs["optional"] = self.kind.value, np.int8(self.optional)
         return made
@@ -277,11 +279,45 @@ class Rows:
         """Append many rows: a column per field, in order, all of equal length and without absent values."""
         self._pending += zip(*(column.tolist() for column in columns), strict=True)
 
-    def write(self) -> None:
-        """Write the buffered rows to the file."""
+    def write(self, *, partial: bool) -> None:  # noqa: ARG002 - uncompressed rows are appended in place
+        """Write the buffered rows to the file; incomplete chunks of packed fields only if `partial`."""
         if not self._pending:
             return
         for (field, stored), values in zip(self._columns, zip(*self._pending, strict=True), strict=True):
             stored.append(np.array(values, dtype=field.dtype))
         self._written += len(self._pending)
         self._pending.clear()
+
+
+class PackedRows(Rows):
+    """Rows of packed numbers, appended as arrays."""
+
+    def __init__(self, parent: hdf5.Group, name: str, fields: Sequence[Field]) -> None:
+        super().__init__(parent, name, fields)
+        self._arrays: list[tuple[NDArray[Any], ...]] = []
+        self._waiting = 0
+
+    def __len__(self) -> int:
+        return self._written + self._waiting
+
+    def extend(self, *columns: NDArray[Any]) -> None:
+        self._arrays.append(columns)
+        self._waiting += len(columns[0])
+
+    def write(self, *, partial: bool) -> None:
+        # a compressed chunk that is written again leaves its first copy as unused space
+        end = len(self) if partial else len(self) // ROWS_PER_PACKED_CHUNK * ROWS_PER_PACKED_CHUNK
+        count = end - self._written
+        if count <= 0:
+            return
+        columns = [np.concatenate(parts) for parts in zip(*self._arrays, strict=True)]
+        for (_, stored), values in zip(self._columns, columns, strict=True):
+            stored.append(values[:count])
+        self._written = end
+        self._waiting -= count
+        self._arrays = [tuple(values[count:] for values in columns)] if self._waiting else []
+
+
+def rows_of(parent: hdf5.Group, name: str, fields: Sequence[Field]) -> Rows:
+    """A new table of these fields."""
+    return (PackedRows if all(field.packed for field in fields) else Rows)(parent, name, fields)

@@ -13,7 +13,7 @@ import numpy as np
 from bench.datafile import hdf5, tables
 from bench.datafile.checksums import Checksums
 from bench.datafile.declared import COUNTED, FIXED_ENTRIES, FIXED_GROUPS, FIXED_INSTRUMENTS, TABLES
-from bench.datafile.fields import Growing, Rows, fields_of
+from bench.datafile.fields import Growing, Rows, fields_of, rows_of
 from bench.datafile.opening import FORMAT, FORMAT_VERSION, WORDING
 from bench.datafile.samples import Samples, chunk_of, companions, create_plot
 from bench.datafile.tables import Table
@@ -115,7 +115,7 @@ def build(file: hdf5.File, skeleton: Skeleton) -> Parts:
     rows = dict[str, Rows]()
     for path, fields in {**TABLES, "points": fields_of(skeleton.point_type)}.items():
         folder, _, name = path.rpartition("/")
-        rows[name] = Rows(instrument if folder else entry, name, fields)
+        rows[name] = rows_of(instrument if folder else entry, name, fields)
     replaced = create_ends(entry)
     grown = [*samples.grown, *(each for table in rows.values() for each in table.grown)]
     checksums = Checksums(entry, [*(each.path for each in grown), *(each.name for each in replaced)])

@@ -6,6 +6,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+import numpy as np
+from numpy.typing import NDArray
+
 from bench.datafile import checksums, hdf5, tables
 from bench.datafile.checksums import SMALL, Integrity, integrity
 from bench.datafile.declared import EVENT_TABLES, FINDING_TABLES, FIXED_GROUPS, TABLES, last_findings, read_fits
@@ -14,12 +17,17 @@ from bench.datafile.hdf5_reading import UNREADABLE, DataFileError, reading, reas
 from bench.datafile.opening import open_file
 from bench.datafile.samples import PLOT as PLOT
 from bench.datafile.samples import TIME
-from bench.datafile.series import SampleReader
+from bench.datafile.series import ROWS_AT_ONCE, SampleReader
 from bench.datafile.tables import Column, as_rows
 from bench.events import Event, FitFinished, SensorsAligned
-from drivers.rig import Alignment
+from drivers.optoncdt.codec import IMPLAUSIBLE, LATE, LOST, MID_RANGE, marked
+from drivers.rig import Alignment, RawValues
+from drivers.timebase.resampling import Marks, resampled
+from sim.errors import InvalidInput
 from sim.identified import Identified
 from sim.sweep import Done
+
+RAW = "instrument/raw_values"
 
 
 @dataclass(frozen=True)
@@ -203,6 +211,38 @@ class DataFile(SampleReader):
     def identified(self) -> Identified | None:
         """The last identified properties of the specimen; None if the run identified none."""
         return last_findings(*(self._rows(name) for name in FINDING_TABLES))
+
+    def raw_values(self, name: str, run: int) -> RawValues:
+        """The values of a channel's sensor with its own clock received in `run`; empty without such a sensor."""
+        sensor = [channel.name for channel in self.channels].index(self._channel_named(name).name)
+        columns = ("index", "time", "code", "arrival")
+        found = {column: [np.zeros(0, np.int64)] for column in columns}
+        if hdf5.has(self._entry, RAW):
+            table = hdf5.group(self._entry, RAW)
+            for begin in range(0, (rows := self._complete("raw_values")), ROWS_AT_ONCE):
+                part = slice(begin, min(begin + ROWS_AT_ONCE, rows))
+                chosen = hdf5.read(hdf5.dataset(table, "run"), part) == run
+                chosen &= hdf5.read(hdf5.dataset(table, "sensor"), part) == sensor
+                for column in columns if chosen.any() else ():
+                    found[column].append(hdf5.read(hdf5.dataset(table, column), part)[chosen])
+        return RawValues(name, *(np.concatenate(found[column]) for column in columns))
+
+    def resampled(self, name: str, run: int) -> NDArray[np.float64]:
+        """Values of a serial laser at the samples of `run` in its unit, from all values received in it: also from those
+        that had arrived after their block. NaN where there is none.
+
+        Raises InvalidInput for a channel without raw values in that run.
+        """
+        raw = self.raw_values(name, run)
+        alignment = next((one for one in self.alignments.get(run, ()) if one.sensor == name), None)
+        if alignment is None or not len(raw) or alignment.offset != alignment.offset:
+            has = ", ".join(sorted({one.sensor for several in self.alignments.values() for one in several})) or "none"
+            raise InvalidInput("channel", name, f"it has no raw values in run {run}; channels with them: {has}")
+        rows = next(each.rows for each in self.runs if each.number == run)
+        samples = np.rint(self.time(slice(rows.start, rows.stop)) * self.sample_rate).astype(np.int64)
+        marks = Marks(LOST, LATE, IMPLAUSIBLE)
+        counts = resampled(raw, alignment, marked, MID_RANGE, marks, samples, self.sample_rate)
+        return self._channel_named(name).to_unit(counts)
 
     @property
     def alignments(self) -> dict[int, tuple[Alignment, ...]]:

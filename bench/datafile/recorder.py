@@ -18,7 +18,7 @@ from bench.datafile.hdf5_reading import DataFileError, reason
 from bench.datafile.layout import Skeleton, Status
 from bench.datafile.tables import Table
 from bench.datafile.writer import DataFileWriter
-from bench.events import Acquired, Event, PointFinished, Progress, StateChanged
+from bench.events import Acquired, Event, PointFinished, Progress, StateChanged, ValuesReceived
 from drivers.rig import Channel, Counts
 from sim import waiting
 from sim.errors import InvalidInput
@@ -86,6 +86,7 @@ class Recorder:
         self.path = path
         self._point_type = point_type
         self._n_channels = len(channels)
+        self._numbers = {channel.name: number for number, channel in enumerate(channels)}
         self._writer = DataFileWriter(
             path, Skeleton(title, tuple(channels), sample_rate, point_type, metadata, tables or {})
         )
@@ -209,6 +210,9 @@ class Recorder:
         match item:
             case _Block():
                 self._writer.add_block(item.time, item.run, item.first, item.counts, item.drive)
+            case ValuesReceived():
+                for raw in item.raw:
+                    self._writer.add_raw(item.run, self._numbers[raw.sensor], raw)
             case Event():
                 self._writer.add_event(item)
                 self._pressing |= item.journalled

@@ -26,7 +26,7 @@ from bench.datafile.layout import (
 )
 from bench.datafile.samples import Timeline
 from bench.events import Event, FitFinished, PointFinished, SpecimenIdentified
-from drivers.rig import Counts
+from drivers.rig import Counts, RawValues
 from sim.errors import InvalidInput
 
 
@@ -212,6 +212,11 @@ class DataFileWriter:
         self._parts.rows["blocks"].add(len(self._parts.samples), run, first, time)
         self._parts.samples.add(counts, drive, self._timeline.seconds(time, run, first, len(drive)))
 
+    def add_raw(self, run: int, sensor: int, raw: RawValues) -> None:
+        """Append raw values of the sensor whose channel has the number `sensor`."""
+        of_all = (np.full(len(raw), number, np.int64) for number in (run, sensor))
+        self._parts.rows["raw_values"].extend(*of_all, raw.index, raw.time, raw.code, raw.arrival)
+
     def add_event(self, event: Event) -> None:
         """Append an event other than a block."""
         rows = self._parts.rows
@@ -247,7 +252,7 @@ class DataFileWriter:
         self._file_sync.check()
         samples.write(partial=partial)
         for rows in tables:
-            rows.write()
+            rows.write(partial=partial)
         complete = [samples.written, *(rows.written for rows in tables)]
         if complete == self._complete:
             return

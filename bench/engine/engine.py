@@ -5,6 +5,7 @@ from bench.config.model import BenchConfiguration
 from bench.engine.interface import Ended, Ending, EventStream, Operator, Requests
 from bench.engine.loop import AtRest, Loop, PreparedDrive, SineDrive
 from bench.engine.output import Output
+from bench.engine.stalls import Stalls
 from bench.engine.steps import (
     AcquireAtRest,
     Arm,
@@ -24,6 +25,7 @@ from bench.engine.steps import (
 )
 from bench.events import OperatorAnswered, OperatorAsked, SpecimenMounted, State
 from bench.guard.guard import Guard
+from drivers.clock import VirtualClock
 from drivers.rig import OperatorTask, Rig
 from sim.errors import Cause, CauseCode
 from sim.specimen import Specimen
@@ -69,7 +71,7 @@ class Engine:
         """
         ending_of = self._output.ending_of
         try:
-            ending = self._until_ended(plan)
+            ending = self._watched(plan)
             # disarm the rig after every ending
             for last in (self._rig.stop, plan.close):
                 ending = ending.then(ending_of(last))
@@ -77,6 +79,13 @@ class Engine:
         except BaseException as error:
             self._output.rescue(error, (self._rig.stop, plan.close))
             raise
+
+    def _watched(self, plan: Plan) -> Ending:
+        """Run a plan; in real time, with a watch on stalls of the program."""
+        if isinstance(self._rig.clock, VirtualClock):
+            return self._until_ended(plan)
+        with Stalls() as self._output.stalls:
+            return self._until_ended(plan)
 
     def _until_ended(self, plan: Plan) -> Ending:
         """Run a plan, ramp the output to zero if the rig still works, and return the ending."""

@@ -12,6 +12,7 @@ from bench.analysis.signals import SIGNALS, scatter
 from bench.control.oscillator import sweeps
 from bench.engine.interface import Ended, Ending, EventStream, Requests
 from bench.engine.output import Output
+from bench.engine.stalls import in_words
 from bench.engine.steps import (
     AcquireAtRest,
     Arm,
@@ -113,7 +114,9 @@ class Loop:
         self._over = over
         self._stream.publish(LimitExceeded(over.quantity, over.value, over.limit, over.unit, over.timing))
         if self.output.state is not State.ABORTING:
-            self._end(State.ABORTING, Ending("aborted", str(over), _cause(over)))
+            stalled = self.output.stalled if over.timing else 0.0
+            reason = f"{over}; {in_words(stalled)}" if stalled else str(over)
+            self._end(State.ABORTING, Ending("aborted", reason, _cause(over)))
 
     def _end(self, way: State, ending: Ending) -> Never:
         if self.output.state is not State.IDLE:

@@ -8,8 +8,10 @@ from numpy.typing import NDArray
 
 from bench.control.oscillator import Oscillator
 from bench.engine.interface import Ended, Ending, EventStream, Requests
-from bench.events import Acquired, SensorsAligned, State, StateChanged, Warned
+from bench.engine.stalls import Stalls, in_words
+from bench.events import Acquired, SensorsAligned, State, StateChanged, ValuesReceived, Warned
 from bench.guard.guard import Exchange, Guard
+from drivers.clock import now
 from drivers.rig import Rig, RigError
 from sim.errors import UNKNOWN, Cause, CauseCode, InvalidInput, RockbenchError
 
@@ -121,11 +123,17 @@ class Alignments:
         """Reset for a new run of the rig."""
         self._run = run
 
+    def publish_values(self, run: int) -> None:
+        """Publish the values of the sensors as received, if any."""
+        if raw := self._rig.raw_values():
+            self._stream.publish(ValuesReceived(run, raw))
+
     def publish(self) -> None:
         """Publish the alignments of the run once, if any. A failure of the rig to report them causes only a warning."""
         run, self._run = self._run, None
         if run is None:
             return
+        self.publish_values(run)
         try:
             alignments = self._rig.alignments
         except RockbenchError as error:
@@ -159,6 +167,11 @@ class Output:
         self.read = 0
         """Samples read since the rig was armed."""
         self._run = 0
+        self.stalls: Stalls | None = None
+        """Detects when the program did not run; None in virtual time."""
+        self.stalled = 0.0
+        """Longest time during the last exchange in which the program did not run [s]."""
+        self._exchanged = now()
         # not written to: a limit counts its addresses, and writing 32 MB takes as long as a hundred loop iterations
         self._reserve: NDArray[np.uint8] | None = np.empty(RESERVE, dtype=np.uint8)
 
@@ -182,20 +195,35 @@ class Output:
         self.source.reset()
         self.read = 0
         self._run += 1
+        self._exchanged = now()
         self.machine.go(State.ARMED, reason)
         self._guard.arm()
         self._alignments.begin(self._run)
 
     def exchange(self) -> Exchange:
         """Drive and read one block; an open safety input halts the bench."""
-        exchange = self._guard.exchange(self.source.next(self.block))
+        try:
+            exchange = self._guard.exchange(self.source.next(self.block))
+        except RigError as error:
+            if stalled := self._stall():
+                error.args = (f"{error}; before that, {in_words(stalled)}", *error.args[1:])
+            raise
+        self.stalled = self._stall()
         self.read = exchange.block.first + len(exchange.block)
         self.drive = exchange.drive
         self._stream.publish(Acquired(self._run, exchange.block, exchange.drive, exchange.signals))
+        self._alignments.publish_values(self._run)
+        if self.stalled:
+            self._stream.publish(Warned(in_words(self.stalled), realtime=True))
         if exchange.opened:
             opened = ", ".join(exchange.opened)
             raise Ended(self.cut(Ending("halted", f"{opened} opened", Cause(CauseCode.SAFETY_INPUT, opened))))
         return exchange
+
+    def _stall(self) -> float:
+        """Longest time since the previous exchange in which the program did not run [s]; 0 if there was none."""
+        before, self._exchanged = self._exchanged, now()
+        return 0.0 if self.stalls is None else self.stalls.since(before)
 
     def rest(self) -> None:
         """Stop the rig, whose output is at zero."""

@@ -17,7 +17,7 @@ from drivers.further import FurtherChannel
 from drivers.hardware.channels import analogue_channels, require_input_range
 from drivers.hardware.parameters import Hardware
 from drivers.hardware.tracks import Tracks, open_serial_lasers
-from drivers.rig import Alignment, Block, Channel, Counts, OperatorTask
+from drivers.rig import Alignment, Block, Channel, Counts, OperatorTask, RawValues
 from drivers.timebase.deskew import Deskew
 
 _FIRST_READINGS = 20
@@ -73,6 +73,9 @@ class HardwareRig(RigBase):
     @property
     def alignments(self) -> tuple[Alignment, ...]:
         return self._tracks.alignments if self._tracks is not None else ()
+
+    def raw_values(self) -> tuple[RawValues, ...]:
+        return self._tracks.raw() if self._tracks is not None else ()
 
     def interlocks(self) -> Mapping[str, bool]:
         with self._ending_on_failure():

@@ -1,7 +1,7 @@
 """Instruments with their own clocks, resampled as tracks on the sample clock."""
 
 from collections.abc import Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -14,9 +14,10 @@ from drivers.hardware.channels import serial_laser
 from drivers.hardware.parameters import Hardware, LaserInput, Lasers
 from drivers.optoncdt.codec import IMPLAUSIBLE, LATE, LOST, MEANINGS, MID_RANGE, count_size, marked
 from drivers.optoncdt.sensor import SerialLaser
-from drivers.rig import Alignment, Channel
+from drivers.rig import Alignment, Channel, RawValues
 from drivers.timebase.clocks import SampleClock
-from drivers.timebase.sensor_track import Marks, SensorTrack
+from drivers.timebase.resampling import Marks
+from drivers.timebase.sensor_track import SensorTrack
 from sim.errors import InvalidInput
 
 _PATIENCE = 0.05
@@ -109,14 +110,18 @@ class Tracks:
         self._known_from = now() + max((track.observation_time for track in self._tracks), default=0.0)
         self._sample_rate = 0.0
         self._clock: SampleClock | None = None
+        self._armed = 0.0
+        self._raw: list[list[Readings]] = [[] for _ in self._tracks]
         self.channels: tuple[Channel, ...] = tuple(track.channel for track in self._tracks)
 
     def begin(self, sample_rate: float, clock: Clock) -> None:
         """Begin a run with a new sample clock; the history of the sensors' clocks is kept."""
         clock.wait_until(self._known_from)
         self._take()
-        for track in self._tracks:
+        for track, raw in zip(self._tracks, self._raw, strict=True):
             track.placing.begin()
+            raw.clear()
+        self._armed = now()
         self._sample_rate = sample_rate
         self._clock = SampleClock(sample_rate)
 
@@ -144,6 +149,18 @@ class Tracks:
         placed = [track.placing.counts(self._running, first, n, self._sample_rate) for track in self._tracks]
         return np.column_stack(placed)
 
+    def raw(self) -> tuple[RawValues, ...]:
+        """The values received since the last call, or since the run began, as sent by the sensors."""
+        # of a sensor that has failed, those before
+        with suppress(RigError):
+            self._take()
+        taken, self._raw = self._raw, [[] for _ in self._tracks]
+        return tuple(
+            self._raw_values(track.channel.name, readings)
+            for track, readings in zip(self._tracks, taken, strict=True)
+            if readings
+        )
+
     @property
     def alignments(self) -> tuple[Alignment, ...]:
         """Alignments of the sensors in this run; empty before the first run."""
@@ -160,9 +177,19 @@ class Tracks:
             raise RigError("no sample clock is available for sensors with their own clocks: arm the rig first")
         return self._clock
 
+    def _raw_values(self, sensor: str, readings: Sequence[Readings]) -> RawValues:
+        index, code = (np.concatenate([getattr(one, name) for one in readings]) for name in ("index", "code"))
+        time = np.concatenate([one.time for one in readings])
+        arrival = np.concatenate([one.arrival for one in readings]) - self._armed
+        microseconds = (np.rint(1e6 * seconds).astype(np.int64) for seconds in (time, arrival))
+        time, arrival = microseconds
+        return RawValues(sensor, index.astype(np.int64), time, code.astype(np.int64), arrival)
+
     def _take(self) -> None:
-        for track in self._tracks:
+        for track, raw in zip(self._tracks, self._raw, strict=True):
             readings = track.sensor.take()
+            if readings.index.size:
+                raw.append(readings)
             track.placing.add(readings.index, readings.time, readings.code, readings.arrival)
 
 

@@ -8,7 +8,9 @@ from drivers.clock import now
 from drivers.errors import ConnectionLost, DeviceNotFound, DeviceTimeout, RigError
 from drivers.optoncdt.dialogue import SLOW, CommandRefused, Dialogue
 from drivers.optoncdt.frames import Layout, layout_in, wanted
-from drivers.optoncdt.search import BAUDS, SensorInfo, open_port, silenced
+from drivers.optoncdt.line import Line
+from drivers.optoncdt.port import open_port
+from drivers.optoncdt.search import BAUDS, SensorInfo, silenced
 from drivers.optoncdt.stream import Readings, Stream
 from sim.errors import InvalidInput
 
@@ -134,7 +136,9 @@ class SerialLaser:
         self.name = name
         self._who = f"{name} on {port}"
         self._rate = rate
+        self._port_name = port
         self._port = open_port(name, port, baud or BAUDS[0])
+        self._is_closed = False
         self._dialogue = Dialogue(self._who, self._port)
         self._stream: Stream | None = None
         self._streaming = False
@@ -169,7 +173,12 @@ class SerialLaser:
         if self._streaming:
             raise RigError(f"start is refused: {self._who} is streaming; stop it first")
         self._dialogue.ask("RESETCNT TIMESTAMP MEASCNT")
-        self._stream = Stream(self._dialogue, self._layout, self._rate)
+        self._port.close()
+        try:
+            self._stream = Stream(self._dialogue, Line(self._who, self._port_name, self.baud), self._layout, self._rate)
+        except BaseException:
+            self._reopen()
+            raise
         self._streaming = True
         try:
             self._stream.ask("OUTPUT RS422")
@@ -212,12 +221,15 @@ class SerialLaser:
             self._stream.ask("OUTPUT NONE")
         self._streaming = False
         self._stream.end()
-        with suppress(ConnectionLost):
-            self._dialogue.drain(_QUIET, _DRAINED)
+        self._reopen()
+        if self._port.is_open:
+            with suppress(ConnectionLost):
+                self._dialogue.drain(_QUIET, _DRAINED)
 
     def close(self) -> None:
         """Switch the stream off and release the port. Allowed any number of times, never raises."""
         self.stop()
+        self._is_closed = True
         with suppress(OSError):
             self._port.close()
 
@@ -242,6 +254,12 @@ class SerialLaser:
         if not isclose(actual, self._rate, rel_tol=_COUNTED):
             raise InvalidInput(_RATE, self._rate, f"{self._who} sends {actual:.0f} 1/s instead; {_RATES}")
 
+    def _reopen(self) -> None:
+        """Take the port back from the process that read it; it may have disappeared."""
+        with suppress(RigError):
+            self._port = open_port(self.name, self._port_name, self.baud)
+        self._dialogue = Dialogue(self._who, self._port)
+
     def _require_open(self, what: str) -> None:
-        if not self._port.is_open:
+        if self._is_closed:
             raise RigError(f"{what} is refused: {self._who} is closed; reopen it")

@@ -1,6 +1,5 @@
-"""Buffered stream of a sensor's measurements, with a thread that reads the port."""
+"""Buffered stream of a sensor's measurements, with a thread that takes them from the process that reads the port."""
 
-import time
 from collections import deque
 from dataclasses import dataclass
 from threading import Condition, Thread
@@ -13,13 +12,9 @@ from drivers.errors import ConnectionLost
 from drivers.optoncdt.codec import Decoder
 from drivers.optoncdt.dialogue import USUAL, Dialogue, Reply
 from drivers.optoncdt.frames import Assembler, Frames, Layout
+from drivers.optoncdt.line import Line
 from sim import waiting
 
-_PACE = 0.0025
-"""Pause between two reads of the line [s]: the cost of a read does not depend on the number of bytes.
-
-More frequent reads more often coincide with an arrival, which identifies the sensor's clock better.
-"""
 _KEPT = 60.0
 """Length of the buffer of unread values [s]."""
 
@@ -43,10 +38,10 @@ class Readings:
 
 
 class Stream:
-    """Reads the port of `dialogue` until `end`. All methods may be called from any thread."""
+    """Values of the sensor of `dialogue` on `line` until `end`. All methods may be called from any thread."""
 
-    def __init__(self, dialogue: Dialogue, layout: Layout, rate: float) -> None:
-        self._dialogue = dialogue
+    def __init__(self, dialogue: Dialogue, line: Line, layout: Layout, rate: float) -> None:
+        self._dialogue, self._line = dialogue, line
         self._decoder = Decoder()
         self._assembler = Assembler(dialogue.who, layout, rate)
         self._most = round(_KEPT * rate)
@@ -71,7 +66,7 @@ class Stream:
         with self._changed:
             self._reply = reply
         try:
-            self._dialogue.send(command)
+            self._send(command)
             with self._changed:
                 waiting.wait_for(self._changed, lambda: reply.complete or self._failure is not None, timeout)
         finally:
@@ -101,24 +96,28 @@ class Stream:
             return waiting.wait_for(self._changed, lambda: self._holding > 0 or self._failure is not None, timeout)
 
     def end(self) -> None:
-        """Stop reading; no thread remains. Allowed any number of times."""
+        """Stop reading; no thread or process remains. Allowed any number of times."""
         self._over = True
+        self._line.close()
         waiting.join(self._thread)
+        self._line.release()
+
+    def _send(self, command: str) -> None:
+        try:
+            self._line.write(command.encode("ascii") + b"\r\n")
+        except (OSError, ValueError) as error:
+            raise self._failure or self._dialogue.gone(error) from error
 
     def _run(self) -> None:
-        port = self._dialogue.port
         try:
-            while not self._over:
-                time.sleep(_PACE)
-                # bytes already received may be old; the arrival time of the next byte is known
-                chunk = port.read(port.in_waiting) + port.read(1)
-                chunk += port.read(port.in_waiting)
-                if chunk:
-                    self._accept(chunk, now())
+            for chunk, arrival in self._line.chunks():
+                self._accept(chunk, arrival)
+            if not self._over:
+                self._fail(self._dialogue.gone(ConnectionLost("the process that reads its port has ended")))
         except ConnectionLost as error:
             self._fail(error)
         except Exception as error:
-            # the library raises various errors when a port disappears; end reading after any of them
+            # end reading after any error of the decoding
             self._fail(self._dialogue.gone(error))
 
     def _accept(self, chunk: bytes, arrival: float) -> None:

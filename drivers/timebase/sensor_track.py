@@ -8,62 +8,7 @@ from numpy.typing import NDArray
 
 from drivers.rig import Alignment
 from drivers.timebase.clocks import SampleClock, SensorClock
-
-
-class Resampler:
-    """Interpolates about the last `capacity` readings: index, second of the sensor's clock, counts or fault mark.
-
-    Counts beyond +-`largest` are fault marks, `lost_mark` is that of missing values.
-    """
-
-    def __init__(self, capacity: int, largest: int, lost_mark: int, late_mark: int) -> None:
-        self._capacity, self._largest, self._lost_mark, self._late_mark = capacity, largest, lost_mark, late_mark
-        self._index = np.zeros(2 * capacity, dtype=np.int64)
-        self._time = np.zeros(2 * capacity)
-        self._counts = np.zeros(2 * capacity, dtype=np.int16)
-        self._end = 0
-
-    @property
-    def last(self) -> tuple[int, float] | None:
-        """Index and time of the newest reading."""
-        return (int(self._index[self._end - 1]), float(self._time[self._end - 1])) if self._end else None
-
-    def clear(self) -> None:
-        """Discard all readings."""
-        self._end = 0
-
-    def add(self, index: NDArray[np.int64], time: NDArray[np.float64], counts: NDArray[np.int16]) -> None:
-        """Append readings, shape (n,) each, with ascending times later than all previous ones."""
-        index, time, counts = index[-self._capacity :], time[-self._capacity :], counts[-self._capacity :]
-        if self._end + time.size > self._time.size:
-            begin, end = self._end - self._capacity + time.size, self._end
-            for kept in (self._index, self._time, self._counts):
-                kept[: end - begin] = kept[begin:end]
-            self._end = end - begin
-        new = slice(self._end, self._end + time.size)
-        self._index[new], self._time[new], self._counts[new] = index, time, counts
-        self._end = new.stop
-
-    def at(self, times: NDArray[np.float64]) -> NDArray[np.int16]:
-        """Counts at sensor times, shape (n,), by linear interpolation between readings.
-
-        The fault mark where one of the two is not a distance, the mark of lost values where one of the two is missing.
-        """
-        seen = np.full(times.shape, self._late_mark, dtype=np.int16)
-        if self._end < 2:
-            return seen
-        time, counts = self._time[: self._end], self._counts[: self._end]
-        seen[times <= time[-1]] = self._lost_mark
-        inside = np.flatnonzero((times >= time[0]) & (times <= time[-1]))
-        before = np.clip(np.searchsorted(time, times[inside], side="right") - 1, 0, self._end - 2)
-        whole = self._index[before + 1] - self._index[before] == 1
-        inside, before = inside[whole], before[whole]
-        first, second = counts[before], counts[before + 1]
-        place = (times[inside] - time[before]) / (time[before + 1] - time[before])
-        between = np.rint(first + place * (second - first.astype(np.float64))).astype(np.int16)
-        values = np.where(np.abs(second.astype(np.int32)) > self._largest, second, between)
-        seen[inside] = np.where(np.abs(first.astype(np.int32)) > self._largest, first, values)
-        return seen
+from drivers.timebase.resampling import Marks, Plausibility, Resampler
 
 
 @dataclass(frozen=True)
@@ -146,21 +91,8 @@ _KEPT = 10.0
 """Length of the buffer of values [s]."""
 _LEAST_HISTORY = 1.0
 """Shortest history of a clock for placing values [s]."""
-RARE, RECOVERY = 3.0, 0.05
-"""Number of implausible values within a short time above which they are no faults of single values, and the decrease of
-that number with each plausible one.
-"""
 _BACK = 0.25
 """Age relative to the newest value [s] above which a value is no repetition: the sensor's clock was restarted."""
-
-
-@dataclass(frozen=True)
-class Marks:
-    """Counts of samples without a value: lost between two values, not arrived in time, implausible."""
-
-    lost: int
-    late: int
-    implausible: int
 
 
 class SensorTrack:
@@ -183,18 +115,18 @@ class SensorTrack:
     ) -> None:
         self._name, self._rate, self._delay, self._marked = name, rate, delay, marked
         self._resampler = Resampler(round(_KEPT * rate), largest, marks.lost, marks.late)
-        self._largest, self._marks, self._largest_step = largest, marks, largest_step
-        self._before: tuple[int, int] | None = None
-        self._doubt = 0.0
+        self._plausibility = Plausibility(largest, largest_step, marks.implausible)
+        self._marks = marks
         self._sensor = SensorClock()
         self._course = Course()
-        self._values = self._lost = self._late = self._implausible = 0
+        self._values = self._lost = self._late = 0
         self._asked = 0.0
 
     def begin(self) -> None:
         """Begin a run: restart the count of values, keep the history of the sensor's clock."""
         self._course = Course()
-        self._values = self._lost = self._late = self._implausible = 0
+        self._values = self._lost = self._late = 0
+        self._plausibility.count = 0
         self._asked = 0.0
 
     def add(
@@ -244,7 +176,7 @@ class SensorTrack:
             values=self._values,
             lost=self._lost + (int(behind * self._rate) if behind > 0.0 else 0),
             late=self._late,
-            implausible=self._implausible,
+            implausible=self._plausibility.count,
         )
 
     def _add(
@@ -260,7 +192,7 @@ class SensorTrack:
         last = self._resampler.last
         if last is not None and time[0] < last[1] - _BACK:
             self._resampler.clear()
-            self._before, self._doubt = None, 0.0
+            self._plausibility.restart()
             self._sensor, self._course = SensorClock(), Course()
             last = None
         newest = np.maximum.accumulate(np.concatenate(([-np.inf if last is None else last[1]], time[:-1])))
@@ -271,41 +203,8 @@ class SensorTrack:
         missing = np.diff(index, prepend=index[0] - 1 if last is None else last[0]) - 1
         self._lost += int(missing[missing > 0].sum())
         self._values += fresh.size
-        self._resampler.add(index, time, self._plausible(index, self._marked(code[fresh])))
+        self._resampler.add(index, time, self._plausibility.marked(index, self._marked(code[fresh])))
         self._sensor.add(time, arrival)
-
-    def _plausible(self, index: NDArray[np.int64], counts: NDArray[np.int16]) -> NDArray[np.int16]:
-        """The counts, with the mark of implausible values where they are farther from the last plausible one than the
-        largest step allows in the time between them: a flipped bit gives a valid distance elsewhere. Only rare single
-        values are marked.
-        """
-        is_value = np.abs(counts.astype(np.int32)) <= self._largest
-        places, values = index[is_value], counts[is_value].astype(np.int64)
-        if not values.size or not np.isfinite(self._largest_step):
-            return counts
-        before, value = self._before or (int(places[0]), int(values[0]))
-        gaps = np.diff(places, prepend=before)
-        if (np.abs(np.diff(values, prepend=value)) <= self._largest_step * np.maximum(gaps, 1)).all():
-            self._before = int(places[-1]), int(values[-1])
-            self._doubt = max(self._doubt - RECOVERY * values.size, 0.0)
-            return counts
-        good = np.ones(values.size, dtype=np.bool_)
-        for k, (place, one) in enumerate(zip(places.tolist(), values.tolist(), strict=True)):
-            if abs(one - value) <= self._largest_step * max(place - before, 1):
-                before, value = place, one
-                self._doubt = max(self._doubt - RECOVERY, 0.0)
-            elif self._doubt >= RARE:
-                # jumps that are frequent, or that last, are a motion, which the guard must judge
-                before, value = place, one
-                self._doubt = RARE + 1.0
-            else:
-                good[k] = False
-                self._doubt += 1.0
-        self._before = before, value
-        self._implausible += int(np.count_nonzero(~good))
-        marked = counts.copy()
-        marked[np.flatnonzero(is_value)[~good]] = self._marks.implausible
-        return marked
 
     def _line(self, clock: SampleClock) -> Line | None:
         """Time on the sample clock [s] as a function of the sensor's, delay included; None while either is unknown."""

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import Clock
-from drivers.rig import Alignment, Block, Channel, OperatorTask, Rig, RigError
+from drivers.rig import Alignment, Block, Channel, OperatorTask, RawValues, Rig, RigError
 from drivers.simulated import SimulatedRig
 
 Array = NDArray[np.float64]
@@ -120,6 +120,9 @@ class FaultyRig:
         except RigError:
             return False
         return True
+
+    def raw_values(self) -> tuple[RawValues, ...]:
+        return self.inner.raw_values()
 
     def interlocks(self) -> Mapping[str, bool]:
         self._fail("interlocks")

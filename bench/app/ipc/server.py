@@ -35,7 +35,7 @@ from bench.app.ipc.messages import (
 )
 from bench.app.session import SessionResult
 from bench.engine.interface import Requests
-from bench.events import Acquired, Event, State, StateChanged, Warned
+from bench.events import Acquired, Event, State, StateChanged, ValuesReceived, Warned
 from bench.preflight.margins import bounds, margins
 from bench.protocol import Prepared
 from drivers.clock import now
@@ -270,7 +270,7 @@ class Publisher:
             if self._reduction is not None and self._host.outbox.heard:
                 self._trace(self._reduction, event)
             self._host.inputs.look_driven(event.time)
-        else:
+        elif not isinstance(event, ValuesReceived):
             self._host.outbox.put(Published(event))
             if isinstance(event, StateChanged):
                 self._host.inputs.look(event.time, at_once=True)

@@ -3,7 +3,8 @@
 import pytest
 
 from drivers.optoncdt import search
-from drivers.optoncdt.search import find_lasers, open_port
+from drivers.optoncdt.port import open_port
+from drivers.optoncdt.search import find_lasers
 from tests.drivers.optoncdt.peer import Peer, no_thread_left
 from tests.drivers.optoncdt.script import INFO, Script, measurements
 

@@ -6,9 +6,10 @@ import pytest
 from serial import SerialException
 
 from drivers.errors import ConnectionLost, DeviceNotFound, DeviceTimeout, RigError
-from drivers.optoncdt import search
+from drivers.optoncdt import port
 from drivers.optoncdt.dialogue import CommandRefused, Dialogue
-from drivers.optoncdt.search import open_port
+from drivers.optoncdt.port import has_baud, open_port
+from drivers.optoncdt.search import BAUDS
 from drivers.optoncdt.sensor import SerialLaser
 from sim.errors import InvalidInput
 from tests.drivers.optoncdt.peer import Peer, no_thread_left
@@ -140,14 +141,14 @@ def test_another_sensor_of_the_same_range_is_refused_by_its_serial_number() -> N
 def test_a_line_without_a_sensor_is_refused_after_all_baud_rates(noise: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("drivers.optoncdt.search._PROBE", 0.05)
     asked: list[int] = []
-    monkeypatch.setattr("drivers.optoncdt.search.has_baud", lambda _, baud: asked.append(baud) or True)
+    monkeypatch.setattr("drivers.optoncdt.has_baud", lambda _, baud: asked.append(baud) or True)
     with (
         Peer([], baud=38_400, noise=noise) as peer,
         pytest.raises(DeviceNotFound, match=r"does not answer at any baud rate: .* pairs"),
     ):
         opened(peer.path, baud=115_200)
     assert asked[0] == 115_200
-    assert sorted(asked) == sorted(search.BAUDS)
+    assert sorted(asked) == sorted(BAUDS)
 
 
 @pytest.mark.parametrize("noise", [b"", b"\xfe\xff\x80"])
@@ -169,10 +170,10 @@ def test_a_baud_rate_that_no_sensor_has_is_refused_before_anything_is_opened() -
         opened("/dev/nothing", baud=57_600)
 
 
-@pytest.mark.parametrize("baud", search.BAUDS)
+@pytest.mark.parametrize("baud", BAUDS)
 def test_every_baud_rate_of_the_sensor_can_be_set(baud: int) -> None:
     with Peer([]) as peer, open_port("laser_1", peer.path, 9600) as line:
-        assert search.has_baud(line, baud)
+        assert has_baud(line, baud)
 
 
 def test_a_port_in_use_is_refused() -> None:
@@ -185,7 +186,7 @@ def test_a_port_in_use_is_refused() -> None:
 
 
 def test_an_absent_port_is_refused_with_those_there_are(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(search, "listed_ports", lambda: ["/dev/ttyUSB7"])
+    monkeypatch.setattr(port, "listed_ports", lambda: ["/dev/ttyUSB7"])
     with pytest.raises(DeviceNotFound, match=r"there is no port /dev/nothing; .*/dev/ttyUSB7"):
         opened("/dev/nothing")
 
@@ -216,7 +217,7 @@ def test_what_the_system_says_of_a_port_is_told(error: Exception, text: str, mon
     def fail(*_: object, **__: object) -> None:
         raise error
 
-    monkeypatch.setattr(search, "Serial", fail)
+    monkeypatch.setattr(port, "Serial", fail)
     with pytest.raises(DeviceNotFound, match=f"laser_1 cannot be opened: {text}"):
         opened("COM5")
 

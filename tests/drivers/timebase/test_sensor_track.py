@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from drivers.timebase.clocks import SampleClock
-from drivers.timebase.sensor_track import Marks, SensorTrack
+from drivers.timebase.resampling import Marks
+from drivers.timebase.sensor_track import SensorTrack
 from tests.drivers.timebase.made_clocks import FLOOR, SWITCHED_ON, Daq, Stream, stream
 
 LOST, NO_PEAK, OFF = -32768, -32767, -32762

@@ -1,0 +1,57 @@
+"""Stalls of the program: times in which the operating system did not run it."""
+
+import threading
+from collections import deque
+from typing import Self
+
+from drivers.clock import now
+
+LONGEST = 0.1
+"""Shortest time without running that is noted [s]: the default lead of the drive."""
+_PERIOD = 0.02
+_KEPT = 16
+
+
+class Stalls:
+    """Notes, in a thread while it is entered, when the program did not run: its short sleeps end much too late.
+
+    A slow call, a slow disk or a long computation in another thread does not delay this thread; a stopped or suspended
+    process, a computer without free processors and an exhausted memory do.
+    """
+
+    def __init__(self) -> None:
+        self._found: deque[tuple[float, float]] = deque(maxlen=_KEPT)
+        self._woken = now()
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._watch, name="stalls", daemon=True)
+
+    def __enter__(self) -> Self:
+        self._woken = now()
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._over.set()
+        self._thread.join()
+
+    def since(self, instant: float) -> float:
+        """The longest stall that ended after `instant` of the machine's clock [s]; 0 if there was none."""
+        # the thread itself may not have been woken yet
+        running = now() - self._woken - _PERIOD
+        found = [length for end, length in tuple(self._found) if end > instant]
+        return max([*found, running if running > LONGEST else 0.0])
+
+    def _watch(self) -> None:
+        while not self._over.wait(_PERIOD):
+            late = (woken := now()) - self._woken - _PERIOD
+            if late > LONGEST:
+                self._found.append((woken, late))
+            self._woken = woken
+
+
+def in_words(seconds: float) -> str:
+    """A stall as the cause of what followed, with the remedy."""
+    return (
+        f"the operating system did not run this program for {seconds:.2f} s (process stopped, computer suspended or"
+        " overloaded): close other programs, and disable power saving"
+    )

@@ -1,0 +1,147 @@
+"""Line of a streaming sensor, read by a process of its own.
+
+A port keeps some thousand bytes, a tenth of a second at full rate. The process stamps the bytes on arrival and keeps
+them while this program does not run, so that no stall of it loses a value.
+
+Frames from the process: time of arrival on the machine's clock [s] (float64), number of bytes (uint32), the bytes. A
+frame without a time has the text of the error that ended the process; one without bytes reports the open port.
+"""
+
+import queue
+import signal
+import struct
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from math import isnan, nan
+from typing import IO
+
+from serial import Serial
+
+from drivers.clock import now
+from drivers.errors import ConnectionLost, DeviceNotFound
+from drivers.optoncdt.port import open_port
+
+_HEAD = struct.Struct("<dI")
+_PACE = 0.0025
+"""Pause between two reads of the line [s]: the cost of a read does not depend on the number of bytes.
+
+More frequent reads more often coincide with an arrival, which identifies the sensor's clock better.
+"""
+_ENDING = 2.0
+"""Longest wait for the end of the process [s]."""
+
+
+class Line:
+    """The process that reads `port` at `baud`; the port must be closed here. Methods may be called from any thread.
+
+    Raises DeviceNotFound when the port cannot be opened.
+    """
+
+    def __init__(self, who: str, port: str, baud: int) -> None:
+        self._who = who
+        command = [sys.executable, "-m", "drivers.optoncdt.line", who, port, str(baud)]
+        self._process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+        )
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._input, self._output = self._process.stdin, self._process.stdout
+        try:
+            next(self._frames())
+        except (ConnectionLost, StopIteration) as error:
+            self.close()
+            self.release()
+            raise DeviceNotFound(str(error) or f"{who}: the process that reads its port ended at once") from error
+        except BaseException:
+            self.close()
+            self.release()
+            raise
+
+    def write(self, sent: bytes) -> None:
+        """Send bytes to the sensor. Raises OSError when the process has ended."""
+        self._input.write(sent)
+        self._input.flush()
+
+    def chunks(self) -> Iterator[tuple[bytes, float]]:
+        """Received bytes and their arrival [s], until `close`. Raises ConnectionLost when the port has disappeared."""
+        return self._frames()
+
+    def close(self) -> None:
+        """End the process and release the port; allowed any number of times."""
+        with suppress(OSError):
+            self._input.close()
+        try:
+            self._process.wait(_ENDING)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+    def release(self) -> None:
+        """Close the pipe from the process, after the last use of `chunks`."""
+        with suppress(OSError):
+            self._output.close()
+
+    def _frames(self) -> Iterator[tuple[bytes, float]]:
+        while len(head := self._output.read(_HEAD.size)) == _HEAD.size:
+            arrival, size = _HEAD.unpack(head)
+            content = self._output.read(size)
+            if isnan(arrival):
+                raise ConnectionLost(content.decode(errors="replace"))
+            yield content, arrival
+
+
+def _serve(who: str, name: str, baud: int, commands: IO[bytes], frames: IO[bytes]) -> None:
+    """Read the port until `commands` ends; write frames in another thread, so that a full pipe never delays a read."""
+    waiting: queue.SimpleQueue[tuple[bytes, float] | None] = queue.SimpleQueue()
+    writer = threading.Thread(target=_write, args=(waiting, frames))
+    writer.start()
+    over = threading.Event()
+    try:
+        with open_port(who, name, baud) as port:
+            waiting.put((b"", now()))
+            threading.Thread(target=_forward, args=(commands, port, over), daemon=True).start()
+            while not over.is_set():
+                time.sleep(_PACE)
+                # bytes already received may be old; the arrival time of the next byte is known
+                chunk = port.read(port.in_waiting) + port.read(1)
+                chunk += port.read(port.in_waiting)
+                if chunk:
+                    waiting.put((chunk, now()))
+    except DeviceNotFound as error:
+        waiting.put((str(error).encode(), nan))
+    except Exception as error:
+        # the library raises various errors when a port disappears
+        told = f"{who} was disconnected ({error}); plug it in, check its power, and reopen it"
+        waiting.put((told.encode(), nan))
+    finally:
+        waiting.put(None)
+        writer.join()
+
+
+def _write(waiting: "queue.SimpleQueue[tuple[bytes, float] | None]", frames: IO[bytes]) -> None:
+    # the program may have ended
+    with suppress(OSError):
+        while (one := waiting.get()) is not None:
+            chunk, arrival = one
+            frames.write(_HEAD.pack(arrival, len(chunk)) + chunk)
+            frames.flush()
+
+
+def _forward(commands: IO[bytes], port: Serial, over: threading.Event) -> None:
+    """Pass commands on to the port, until the program closes the pipe or ends."""
+    with suppress(OSError, ValueError):
+        while command := commands.readline():
+            port.write(command)
+    over.set()
+
+
+if __name__ == "__main__":
+    # requests of the operator go to the program, which ends this process when the output is at zero
+    for name in ("SIGINT", "SIGHUP", "SIGBREAK"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
+    _serve(sys.argv[1], sys.argv[2], int(sys.argv[3]), sys.stdin.buffer, sys.stdout.buffer)
