@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.datafile.hdf5_reading import DataFileError, reason
+from bench.datafile.held import in_use, is_held
 from bench.datafile.layout import Skeleton, Status
 from bench.datafile.tables import Table
 from bench.datafile.writer import DataFileWriter
@@ -197,8 +198,9 @@ class Recorder:
             work()
         except Exception as error:
             # any failure must end the run: an unrecorded campaign is worthless
+            told = in_use(error) if is_held(error) else reason(error)
             failure = DataFileError(
-                f"{self.path} cannot be written any further ({reason(error)}): check the disk, then start a new run"
+                f"{self.path} cannot be written any further ({told}): check the disk, then start a new run"
             )
             failure.__cause__ = error
             self._failure = failure

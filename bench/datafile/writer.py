@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from bench.datafile import hdf5
 from bench.datafile.declared import COUNTED, EVENT_TABLES, add_findings, add_fit, add_fit_views
 from bench.datafile.hdf5_reading import DataFileError, reason
+from bench.datafile.held import keep_lockers_out, wait_until_free
 from bench.datafile.layout import (
     STATUS_WIDTH,
     SUMMARY_WIDTH,
@@ -39,6 +40,7 @@ class FileSync:
         self._path = path
         self._handle = os.open(path, os.O_RDWR)
         self._size = 0
+        wait_until_free(lambda: keep_lockers_out(self._handle))
         # on some network shares a file's identity changes with every query
         self._identified = os.path.samestat(os.fstat(self._handle), path.stat())
         sync_folder(path.parent)
@@ -48,6 +50,13 @@ class FileSync:
         os.fsync(self._handle)
         self.check()
         self._size = os.fstat(self._handle).st_size
+
+    def touch(self) -> None:
+        """Write the first byte again. Raises PermissionError while another program's lock forbids writing."""
+        os.lseek(self._handle, 0, os.SEEK_SET)
+        first = os.read(self._handle, 1)
+        os.lseek(self._handle, 0, os.SEEK_SET)
+        os.write(self._handle, first)
 
     def check(self) -> None:
         """Raise DataFileError if another program has truncated, renamed, replaced or deleted the file.
@@ -250,6 +259,7 @@ class DataFileWriter:
         """Write pending rows to the disk, visible to readers; incomplete chunks of samples only if `partial`."""
         samples, tables = self._parts.samples, self._tables
         self._file_sync.check()
+        wait_until_free(self._file_sync.touch)
         samples.write(partial=partial)
         for rows in tables:
             rows.write(partial=partial)
@@ -272,6 +282,7 @@ class DataFileWriter:
         hdf5.replace_text(self._parts.status, status, STATUS_WIDTH)
         self._parts.checksums.seal({grown.path: grown.checksum for grown in self._parts.grown})
         self._flush()
+        wait_until_free(self._file_sync.touch)
         self._file.close()
         if whole := len(self._parts.rows["fits"]):
             # the data are complete without them; if another program holds the file now, recovery adds them later
