@@ -98,13 +98,15 @@ def write_under_readers(
         stderr=subprocess.PIPE,
         text=True,
     )
-    assert writer.stdin is not None and writer.stdout is not None
+    assert writer.stdin is not None
+    assert writer.stdout is not None
     assert writer.stdout.readline() == "begun\n"
     command = [sys.executable, "-c", READER, str(path), str(hold)]
     reading = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(readers)]
     try:
         for each in reading:
-            assert each.stdout is not None and each.stdout.readline() == "ready\n"
+            assert each.stdout is not None
+            assert each.stdout.readline() == "ready\n"
         told, errors = writer.communicate("go\n", timeout=600.0)
     finally:
         for each in reading:
