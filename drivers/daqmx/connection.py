@@ -1,11 +1,12 @@
 """Connection to the driver: on this PC, or on a controller behind a gRPC device server."""
 
 import threading
-from typing import Any, cast
+from typing import Any, Self, cast
 
 from nidaqmx.grpc_session_options import GrpcSessionOptions, SessionInitializationBehavior
 
 from drivers.daqmx.library import Options
+from drivers.daqmx.parameters import Daq
 from drivers.errors import DeviceNotFound
 from sim import waiting
 from sim.errors import InvalidInput
@@ -29,6 +30,11 @@ class Connection:
         self._calls: Any = None
         if server is not None:
             self._connect(server, patience)
+
+    @classmethod
+    def of(cls, daq: Daq) -> Self:
+        """The connection that the parameters describe."""
+        return cls(daq.server, daq.timeout_margin)
 
     @property
     def late(self) -> bool:

@@ -52,7 +52,7 @@ class DaqSession:
         self._at_rest = True
         self._cut = False
         self._lost = False
-        self._connection = Connection(daq.server, daq.timeout_margin)
+        self._connection = Connection.of(daq)
         try:
             # before any check: an earlier program may have crashed with the shaker enabled
             terminals = (daq.output, *daq.digital_lines.values(), *(given.terminal for given in inputs))

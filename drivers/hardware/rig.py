@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import WallClock, now
+from drivers.daqmx.clock_watch import ClockWatch
 from drivers.daqmx.delays import InputDelay
+from drivers.daqmx.inputs import NAME as INPUT_TASK
 from drivers.daqmx.session import DaqSession
 from drivers.drive import REARM, RigBase, RigState, require_block
 from drivers.emulation.control import ask, place_of
@@ -59,6 +61,11 @@ class HardwareRig(RigBase):
             self._tracks = Tracks(tracks) if tracks else None
             if self._tracks is not None:
                 opened.callback(self._tracks.close)
+            self._watch: ClockWatch | None = None
+            if self._tracks is not None and hardware.daq.server is not None:
+                self._watch = ClockWatch(hardware.daq, INPUT_TASK, hardware.sample_rate)
+                opened.callback(self._watch.close)
+            self._started = 0.0
             self.channels = analogue if self._tracks is None else (*analogue, *self._tracks.channels)
             self._opened = opened.pop_all()
         self.sample_rate = self._daq.sample_rate
@@ -139,16 +146,25 @@ class HardwareRig(RigBase):
 
     def _start(self) -> None:
         self._daq.start()
+        self._started = now()
         self._state = RigState.RUNNING
         if self._tracks is not None:
             self._observe_clock(self._tracks, _FIRST_READINGS)
 
     def _observe_clock(self, tracks: Tracks, times: int) -> None:
-        """Bound the sample clock between two readings of the machine's clock.
+        """Bound the sample clock between two readings of the machine's clock, made by the process that watches it, or
+        here without one.
 
         The readings are spread over the sample period: right after a block all would have the same phase, and the
         bounds would be no tighter than a period.
         """
+        watched = [] if self._watch is None else self._watch.take()
+        for before, count, after in watched:
+            # an earlier reading may have the count of the last run
+            if before > self._started:
+                tracks.observe(before, count, after)
+        if self._watch is not None and self._watch.alive and (watched or times == _FIRST_READINGS):
+            return
         for _ in range(times):
             self._phase = (self._phase + _GOLDEN) % 1.0
             self.clock.wait_until(now() + self._phase / self.sample_rate)

@@ -88,6 +88,28 @@ class TestSerialClocks(Wired):
     def test_blocks_are_contiguous_and_clocks_right(self, make_rig: RigFactory) -> None:
         RigConformance().test_blocks_are_contiguous_counted_from_arm_and_wide_enough_for_their_channels(make_rig)
 
+    def test_the_sample_clock_is_read_by_a_process_of_its_own_and_not_in_the_loop(
+        self, emulated: Laboratory, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        calls: list[float] = []
+        acquired = DaqSession.acquired
+        monkeypatch.setattr(DaqSession, "acquired", lambda session: calls.append(0.0) or acquired(session))
+        with HardwareRig(emulated.hardware, lead=LONG_LEAD) as rig:
+            watch = rig._watch
+            assert watch is not None
+            rig.arm()
+            rig.write(np.zeros(LONG_LEAD))
+
+            def a_block_without_calls() -> bool:
+                calls.clear()
+                play(rig, np.zeros(200), 200)
+                return not calls and all(np.isfinite(one.offset) for one in rig.alignments)
+
+            # its first readings may come some blocks after the start
+            eventually(a_block_without_calls)
+            assert watch.alive
+        assert not watch.alive
+
 
 class TestAnalogue(Wired):
     """The part of the suite that the way of reading the lasers makes a difference to."""

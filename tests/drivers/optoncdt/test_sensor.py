@@ -141,7 +141,7 @@ def test_another_sensor_of_the_same_range_is_refused_by_its_serial_number() -> N
 def test_a_line_without_a_sensor_is_refused_after_all_baud_rates(noise: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("drivers.optoncdt.search._PROBE", 0.05)
     asked: list[int] = []
-    monkeypatch.setattr("drivers.optoncdt.has_baud", lambda _, baud: asked.append(baud) or True)
+    monkeypatch.setattr("drivers.optoncdt.search.has_baud", lambda _, baud: asked.append(baud) or True)
     with (
         Peer([], baud=38_400, noise=noise) as peer,
         pytest.raises(DeviceNotFound, match=r"does not answer at any baud rate: .* pairs"),

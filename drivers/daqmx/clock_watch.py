@@ -1,0 +1,126 @@
+"""Readings of the sample clock by a process of its own, through its own connection to a gRPC device server.
+
+The acquisition loop is not delayed by them, and they take the same time whatever it does: half the difference between
+the two ways of a call shifts every time found from it, and is the same in a check as in a run.
+"""
+
+import struct
+import subprocess
+import sys
+import threading
+import time
+from collections import deque
+from contextlib import suppress
+from typing import IO
+
+from drivers.clock import now
+from drivers.daqmx.parameters import Daq
+
+_READING = struct.Struct("<dqd")
+_PACE = 0.01
+"""Pause between two readings [s]."""
+_GOLDEN = 0.6180339887498949
+"""Phase step between two readings, whose multiples are evenly distributed over a period."""
+_IDLE = 0.02
+_ENDING = 2.0
+_MOST = 10_000
+
+Reading = tuple[float, int, float]
+"""Time before [s of the machine's clock], samples acquired, time after [s]."""
+
+
+class ClockWatch:
+    """The process that reads the sample clock of the task `name` at `rate` [1/s], from `daq.server`."""
+
+    def __init__(self, daq: Daq, name: str, rate: float) -> None:
+        command = [sys.executable, "-m", "drivers.daqmx.clock_watch", name, repr(rate)]
+        self._process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+        )
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._input, self._output = self._process.stdin, self._process.stdout
+        self._found: deque[Reading] = deque(maxlen=_MOST)
+        self._thread = threading.Thread(target=self._collect, name="clock watch", daemon=True)
+        self._thread.start()
+        with suppress(OSError):
+            self._input.write(daq.model_dump_json().encode() + b"\n")
+            self._input.flush()
+
+    @property
+    def alive(self) -> bool:
+        """Whether readings may arrive."""
+        return self._thread.is_alive()
+
+    def take(self) -> list[Reading]:
+        """The readings since the last call."""
+        return [self._found.popleft() for _ in range(len(self._found))]
+
+    def close(self) -> None:
+        """End the process; allowed any number of times."""
+        with suppress(OSError):
+            self._input.close()
+        try:
+            self._process.wait(_ENDING)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        self._thread.join()
+        self._output.close()
+
+    def _collect(self) -> None:
+        while len(read := self._output.read(_READING.size)) == _READING.size:
+            self._found.append(_READING.unpack(read))
+
+
+def _serve(name: str, rate: float, daq: Daq, readings: IO[bytes]) -> None:
+    """Write readings until the server is gone."""
+    from nidaqmx.errors import DaqError
+
+    from drivers.daqmx import library
+    from drivers.daqmx.connection import Connection
+
+    connection = Connection.of(daq)
+    # never closed: that would clear the task of the program
+    stream = library.task(name, connection.attaching(name)).in_stream
+    phase = 0.0
+    while True:
+        phase = (phase + _GOLDEN) % 1.0
+        time.sleep(_PACE)
+        deadline = now() + phase / rate
+        while now() < deadline:
+            pass
+        before = now()
+        try:
+            count = int(stream.total_samp_per_chan_acquired)
+        except DaqError:
+            # the task is not running
+            time.sleep(_IDLE)
+            continue
+        after = now()
+        if count > 0:
+            readings.write(_READING.pack(before, count, after))
+            readings.flush()
+
+
+if __name__ == "__main__":
+    import os
+    import signal
+
+    # requests of the operator go to the program, which ends this process
+    for each in ("SIGINT", "SIGHUP", "SIGBREAK"):
+        if hasattr(signal, each):
+            signal.signal(getattr(signal, each), signal.SIG_IGN)
+
+    def await_end() -> None:
+        sys.stdin.buffer.read()
+        # without ending the tasks of the program, as nidaqmx would
+        os._exit(0)
+
+    given = Daq.model_validate_json(sys.stdin.buffer.readline())
+    threading.Thread(target=await_end, daemon=True).start()
+    try:
+        _serve(sys.argv[1], float(sys.argv[2]), given, sys.stdout.buffer)
+    except Exception:
+        # the program reads the clock itself then
+        os._exit(1)
