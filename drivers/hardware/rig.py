@@ -17,6 +17,7 @@ from drivers.emulation.control import ask, place_of
 from drivers.errors import RigError
 from drivers.further import FurtherChannel
 from drivers.hardware.channels import analogue_channels, require_input_range
+from drivers.hardware.ownership import devices_of, owned
 from drivers.hardware.parameters import Hardware
 from drivers.hardware.tracks import Tracks, open_serial_lasers
 from drivers.rig import Alignment, Block, Channel, Counts, OperatorTask, RawValues
@@ -42,6 +43,7 @@ class HardwareRig(RigBase):
     def __init__(self, hardware: Hardware, *, lead: int, further: Sequence[FurtherChannel] = ()) -> None:
         inputs = [*(one for _, one in (*hardware.transducers, *hardware.analogue_lasers)), *further]
         with ExitStack() as opened:
+            opened.enter_context(owned(devices_of(hardware)))
             # the DAQ first: opening it makes the bench safe after any earlier program
             self._daq = DaqSession(hardware.daq, inputs, hardware.sample_rate, lead)
             opened.callback(self._daq.close)
