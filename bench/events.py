@@ -192,6 +192,18 @@ class Estimate(Event):
     predicted: float = column("1", "predicted alpha_2")
 
 
+@event(table="hold_cycles", journalled=False)
+class HoldCycle(Event):
+    """A cycle while a stabiliser holds an unstable motion; NaN for a cycle that could not be measured."""
+
+    omega: float = column("rad/s", "circular frequency of the base motion")
+    beta: float | None = column("1", "stiffness ratio of the coupling spring")
+    cycle: int = column("1", "number of the cycle since the beginning of the hold")
+    drift_peak: float = column("m", "peak drift in the cycle")
+    deviation: float = column("1", "estimated deviation from the periodic motion, relative to it")
+    control: float = column("1", "magnitude of the control in the cycle, relative to the table's amplitude")
+
+
 @event(table="running_gains", journalled=False)
 class RunningGain(Event):
     """Gain under a record during its first `seconds`: ratio of the peak drifts so far, measured and predicted.

@@ -39,6 +39,12 @@ class Sine:
         asked = complex(cycle.harmonics(_DRIVE)[0] * self.calibration.at(np.array(self.omega)))
         return asked / abs(asked)
 
+    def fundamentals(self, cycle: Cycle, turn: complex) -> tuple[complex, complex]:
+        """Shares of the fundamental in one cycle: played by the drive, achieved by the table's acceleration."""
+        unit = self.amplitude * turn
+        played = cycle.harmonics(_DRIVE)[0] * self.calibration.at(np.array(self.omega)) / unit
+        return complex(played), complex(cycle.harmonics(ACCELERATION)[0] / unit)
+
 
 @dataclass(frozen=True)
 class SineResponse:

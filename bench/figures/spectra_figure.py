@@ -19,7 +19,13 @@ PANEL = (3.6, 3.3)
 MARGIN = 1.1
 """Width and height of a panel, height of title and legend [inch]."""
 
-MARKERS = {"steady": ("o", VERMILLION), "modulated": ("D", PURPLE), "resting": ("s", GREEN), "overturned": ("X", BLACK)}
+MARKERS = {
+    "steady": ("o", VERMILLION),
+    "held": ("^", VERMILLION),
+    "modulated": ("D", PURPLE),
+    "resting": ("s", GREEN),
+    "overturned": ("X", BLACK),
+}
 
 BAND = "from the uncertainty of the specimen (k = 2)"
 BAND_SHADE = 0.18

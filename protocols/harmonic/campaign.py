@@ -245,7 +245,7 @@ def _cells(row: dict[str, Any]) -> list[str]:
 
     measured, predicted = row.get("alpha_2"), row.get("alpha_2_predicted")
     # a motion that is not steady is not on the predicted orbit
-    compared = row.get("status") in ("steady", "resting")
+    compared = row.get("status") in ("steady", "resting", "held")
     return [
         number("beta", ".3f"),
         number("omega_rad_s", ".3f"),

@@ -24,9 +24,11 @@ from bench.preflight.margins import Forecast, Stage, bounds
 from bench.progress import Progress, counting, silent
 from bench.result_cache import cached
 from protocols.common.calibrate import CHANGE_TIME, MEASURED, PROBE, SETTLING, harmonic_frequencies
+from protocols.harmonic.holding import PATIENCE, SLOW
 from protocols.harmonic.plan import BARE_CHANGE, Pace, spring_calibration
 from protocols.harmonic.protocol import HarmonicParameters
 from sim.channel import STOREYS
+from sim.gain import predict_gain
 from sim.specimen import Specimen
 from sim.sweep import Done, in_threads
 
@@ -42,7 +44,8 @@ class Trial:
     """A simulated stage: the segments `before` it, which are not evaluated, the stage, and its last sine, held.
 
     The sine is simulated for `hold` [s] and may last `longest` [s]. `beta` is the stiffness ratio with which the block
-    rocks, None if it rests. `steady` is the frequency [rad/s] whose steady state is also evaluated.
+    rocks, None if it rests. `steady` is the frequency [rad/s] whose steady state is also evaluated. `control` is the
+    largest control of a motion that is held on its orbit after the stage, relative to the amplitude.
     """
 
     stage: Stage
@@ -52,6 +55,7 @@ class Trial:
     longest: float = 0.0
     beta: float | None = None
     steady: float | None = None
+    control: float = 0.0
 
     @property
     def legs(self) -> tuple[Leg, ...]:
@@ -86,10 +90,19 @@ def trials(
         legs = _calibration_legs([(omega, level) for omega in wanted])
         yield Trial(Stage(f"calibration of the drive with beta = {beta:g}", legs), coupled)
         for omega, planned in plans.items():
+            held = parameters.hold and _slow(parameters, coupled, omega)
+            extra = 2.0 * PATIENCE * tau / omega if held else 0.0
+            control = parameters.hold_authority if held else 0.0
             for number, start in enumerate(planned, 1):
                 name = f"start {number} of beta = {beta:g} at omega = {omega:g} rad/s"
                 stage = Stage(name, start.legs, start.chance)
-                yield Trial(stage, coupled, hold=HOLD, longest=longest, beta=beta, steady=omega)
+                yield Trial(stage, coupled, (), HOLD, longest + extra, beta, omega, control)
+
+
+def _slow(parameters: HarmonicParameters, specimen: Specimen, omega: float) -> bool:
+    """Whether a hold is expected: disturbances of the rocking orbit at `omega` [rad/s] hardly decay, or grow."""
+    layer = predict_gain(specimen, omega, parameters.amplitude_factor * specimen.uplift_acceleration).rocking
+    return layer is not None and layer.multiplier > SLOW
 
 
 def _bare_calibration(parameters: HarmonicParameters, specimen: Specimen, response: TableResponse | None) -> Trial:
@@ -254,12 +267,17 @@ def _asked(
         quantity: factors * value * (1.0 + (IMPACTS if quantity in raised else RIPPLE))
         for quantity, value in loads.items()
     }
+    values = {quantity: (1.0 + trial.control) * value for quantity, value in values.items()}
     # a simulation of limited length may not reach the steady state
     steady = steady or Travel(0.0, 0.0, 0.0)
     halves = configuration.laser_half_ranges
+    storeys = [
+        np.array([max(getattr(each, name), getattr(steady, name)) for each in travels]) * (1.0 + trial.control)
+        for name in ("storey_1", "storey_2", "drift")
+    ]
     values |= {
-        STOREYS[0]: np.array([max(each.storey_1, steady.storey_1) for each in travels]) / halves[0] + OFF_MIDDLE,
-        STOREYS[1]: np.array([max(each.storey_2, steady.storey_2) for each in travels]) / halves[1] + OFF_MIDDLE,
-        "drift": np.array([max(each.drift, steady.drift) for each in travels]),
+        STOREYS[0]: storeys[0] / halves[0] + OFF_MIDDLE,
+        STOREYS[1]: storeys[1] / halves[1] + OFF_MIDDLE,
+        "drift": storeys[2],
     }
     return StageDemands(trial.stage.name, values)

@@ -35,10 +35,22 @@ AIM = 0.5
 
 
 @dataclass(frozen=True)
+class TableState:
+    """Sine of the table at the end of a dwell: `turn` (see `Sine.turn`), the `shares` of its drive, and the `answer` of
+    its fundamental per share.
+    """
+
+    turn: complex
+    shares: tuple[complex, ...]
+    answer: complex
+
+
+@dataclass(frozen=True)
 class Settled:
     """A measured dwell: its peak, its steadiness, and its settling time [s]. `amplitude_error` (relative) and
     `phase_error` [rad] are those of the table, after `updates` corrections of its drive. `motion` describes one that is
-    not steady, and `orbit` is the peak of its mean cycle where it turns about a periodic motion.
+    not steady, and `orbit` is the peak of its mean cycle where it turns about a periodic motion. `table` is the state
+    in which the dwell leaves the table; None where it is not known.
     """
 
     peak: SteadyPeak
@@ -49,6 +61,25 @@ class Settled:
     updates: int
     motion: FreeMotion | None = None
     orbit: SteadyPeak | None = None
+    table: TableState | None = None
+
+
+@dataclass(frozen=True)
+class Held:
+    """Result of a hold: the peak of the held motion, errors of the table as in `Settled`, after `updates` corrections.
+
+    `control` is the rms of the control over the measured cycles, as a share of the amplitude, and `captured` the number
+    of cycles until the capture. `peak` is None where the hold was released for a `reason`.
+    """
+
+    peak: SteadyPeak | None
+    reason: str = ""
+    amplitude_error: float = 0.0
+    phase_error: float = 0.0
+    updates: int = 0
+    control: float = 0.0
+    captured: int | None = None
+    cycles: int = 0
 
 
 JUDGED = (ACCELERATION, DISPLACEMENT, LASER_1, LASER_2)
@@ -86,7 +117,7 @@ def settle_and_measure(
         ),
     )
     turn: complex | None = None
-    updates = 0
+    updates, drive = 0, (1.0 + 0.0j,)
     recent: deque[Cycle] = deque(maxlen=WINDOW)
     constant: deque[Cycle] = deque(maxlen=KEPT)
     measured = max(parameters.measured_cycles, 2 * WINDOW)
@@ -117,8 +148,9 @@ def settle_and_measure(
                     kept = list(constant)
                     peak, motion = modulated_peak(kept[-CYCLES:], sine.omega), free_motion(kept)
                     orbit = orbit_peak(kept, motion, sine.omega)
+                state = TableState(turn, drive, complex(table.achieved[0] / table.played[0]))
                 return Settled(
-                    peak, steadiness, waited, table.amplitude_error, table.phase_error, updates, motion, orbit
+                    peak, steadiness, waited, table.amplitude_error, table.phase_error, updates, motion, orbit, state
                 )
         recent.extend(outcome.cycles)
         yield from report(list(recent))
@@ -126,6 +158,7 @@ def settle_and_measure(
         shares = control.next(SineResponse.of(outcome.cycles[TRANSIENT:], sine, turn))
         if shares is not None and not over:
             yield SetHarmonics(shares)
+            drive = shares
             updates += 1
             detector.restart()
             constant.clear()
@@ -153,13 +186,15 @@ def judge(
     starts: int,
     shaker: Shaker | None = None,
     harmonics: int = 1,
+    held: Held | None = None,
 ) -> HarmonicPoint:
     """Point of a dwell, compared with the branch with the nearest peaks of drift and u1.
 
     `reference` is the bare frame's dwell at the same frequency, `known` the uncertainty of the `specimen`. The gains
     agree when they differ by no more than their combined expanded uncertainty, |E_n| <= 1 of ISO 13528. Where the
     motion is not steady, or the orbit is unstable, its stability is predicted on the table of `shaker` too, which is
-    controlled up to the harmonic `harmonics`.
+    controlled up to the harmonic `harmonics`. If the motion was then `held` on the rocking orbit, gain and comparison
+    are those of the held motion, and the free one is described beside them.
     """
     peak, bare = settled.peak, reference.peak
     layers = predict_gain(specimen, omega, peak.amplitude, bare.amplitude).layers
@@ -177,7 +212,7 @@ def judge(
     if steady and reference.steadiness.steady and layer and uncertainty is not None:
         agrees = abs(measured.alpha_2 - layer.alpha_2) <= hypot(measured.uncertainty, uncertainty)
     orbit = _orbit_fields(settled, reference, sensors, slope, layer, uncertainty)
-    return HarmonicPoint(
+    point = HarmonicPoint(
         omega_rad_s=omega,
         beta=specimen.label or 0.0,
         status=status,
@@ -203,6 +238,59 @@ def judge(
         table_updates=settled.updates,
         reason="; ".join(_reasons(settled, reference, name, layers, agrees, on_table, orbit)),
     )
+    return point if held is None else _held_point(point, held, reference, specimen, known, sensors)
+
+
+def _held_point(
+    free: HarmonicPoint,
+    held: Held,
+    reference: Settled,
+    specimen: Specimen,
+    known: SpecimenKnowledge,
+    sensors: SensorUncertainty,
+) -> HarmonicPoint:
+    """The point of a free motion that was then held; unchanged but for its reason if the hold was released."""
+    peak, bare, omega = held.peak, reference.peak, free.omega_rad_s
+    if peak is None:
+        text = f"the motion was to be held on its orbit, and released after {held.cycles} cycles: {held.reason}"
+        return free.model_copy(update={"reason": "; ".join((free.reason, text)).removeprefix("; ")})
+    layers = predict_gain(specimen, omega, peak.amplitude, bare.amplitude).layers
+    if _nearest(layers, peak) != _ROCKING or _ROCKING not in layers:
+        text = "the motion on which the hold came to rest is not the rocking orbit"
+        return free.model_copy(update={"reason": "; ".join((free.reason, text)).removeprefix("; ")})
+    layer = layers[_ROCKING]
+    measured = gain(peak, bare, sensors, _amplitude_slope(specimen, omega, peak.amplitude, _ROCKING))
+    prediction, agrees = predicted_fields(_ROCKING, layer, known), None
+    uncertainty = prediction["alpha_2_predicted_uncertainty"]
+    if reference.steadiness.steady and uncertainty is not None:
+        agrees = abs(measured.alpha_2 - layer.alpha_2) <= hypot(measured.uncertainty, uncertainty)
+    remarks = [f"free: {free.reason}"] if free.reason else []
+    remarks.append(f"held after {held.captured} cycles with a control of {100.0 * held.control:.2g} % of the amplitude")
+    if abs(held.amplitude_error) > AMPLITUDE_NOTE:
+        remarks.append(f"the table's amplitude has an error of {100.0 * held.amplitude_error:+.2f} %")
+    if agrees is False:
+        remarks.append("differs from the prediction by more than the uncertainty of both")
+    return free.model_copy(
+        update={
+            "status": PointStatus.HELD,
+            "alpha_2": measured.alpha_2,
+            "alpha_2_uncertainty": measured.uncertainty,
+            "dominating": measured.budget.dominating,
+            "uncertainty_parts": measured.budget.as_json,
+            **prediction,
+            "agrees": agrees,
+            "control_share": held.control,
+            "captured_cycles": held.captured,
+            "drift_peak_m": peak.drift,
+            "amplitude_m_s2": peak.amplitude,
+            "amplitude_error": held.amplitude_error,
+            "phase_error_rad": held.phase_error,
+            "table_harmonics": peak.harmonics,
+            "table_updates": free.table_updates + held.updates,
+            "cycles_measured": peak.cycles,
+            "reason": "; ".join(remarks),
+        }
+    )
 
 
 def _table_multiplier(layer: Layer, shaker: Shaker, harmonics: int) -> float | None:
@@ -219,6 +307,7 @@ def _free_fields(motion: FreeMotion | None, bare: float) -> dict[str, Any]:
         return {}
     found = {
         "alpha_2_least": motion.least / bare,
+        "alpha_2_greatest": motion.greatest / bare,
         "alpha_2_mean": motion.mean / bare,
         "repeats_cycles": motion.repeats or None,
     }

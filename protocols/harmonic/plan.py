@@ -16,16 +16,19 @@ from bench.analysis.gain import gain, shared_draws, steady_peak
 from bench.config.model import BenchConfiguration
 from bench.control.oscillator import DriveCalibration, Leg
 from bench.control.sine import Sine
+from bench.control.stabiliser import GROWTH
 from bench.control.starts import Start
 from bench.engine.steps import Arm, Calibrate, Fallen, OperatorAction, Outcome, Publish, RampOut, Step, Sweep
 from bench.events import Estimate, PointFinished, Progress, StepStarted, Warned
 from drivers.rig import OperatorTask, RigError
 from protocols.common.calibrate import calibrate_drive, harmonic_frequencies
-from protocols.harmonic.measurement import Settled, judge, predicted_fields, settle_and_measure
+from protocols.harmonic.holding import SLOW, hold, prepared
+from protocols.harmonic.measurement import Held, Report, Settled, judge, predicted_fields, settle_and_measure
 from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, PointStatus
+from sim.cycle_map import CycleMap
 from sim.gain import predict_gain
 from sim.specimen import Specimen
-from sim.steady import resting_level
+from sim.steady import Orbit, resting_level
 
 REST = 2.0
 """Time at rest before a test, for the zero of the signals [s]."""
@@ -147,6 +150,9 @@ class HarmonicPlan:
         """Try the planned starts. Returns the first steady rocking motion, else the first motion without a fall."""
         found: HarmonicPoint | None = None
         falls = 0
+        orbit = self._orbit(specimen, omega)
+        slow = orbit is not None and orbit.multiplier > SLOW
+        held_by = self._prepared(orbit) if slow else None
         for tried, start in enumerate(starts, 1):
             where = f"beta = {specimen.label:g} at {omega:g} rad/s, start {tried} of {len(starts)}: {start.name}"
             yield Publish(StepStarted(f"{where}, chance {start.chance:.0%}"))
@@ -155,19 +161,28 @@ class HarmonicPlan:
             settled: Settled | Fallen | None = None
             if not isinstance((yield Sweep(start.legs)), Fallen):
                 settled = yield from self._settle(omega, specimen, calibration)
+            held: Held | Fallen | None = None
+            if isinstance(settled, Settled) and held_by is not None and _to_be_held(settled, held_by):
+                yield Publish(StepStarted(f"{where}: holding the motion on its orbit"))
+                held = yield from self._hold(specimen, omega, calibration, settled, held_by)
             if not isinstance(settled, Settled):
                 falls += 1
                 yield from self._end_test(specimen, fast=True)
                 continue
-            yield from self._end_test(specimen, fast=False)
+            yield from self._end_test(specimen, fast=isinstance(held, Fallen))
+            if isinstance(held, Fallen):
+                held = Held(None, "the block fell")
             known, sensors = self._configuration.known_on_table, self._configuration.sensors
             shaker, harmonics = self._configuration.simulated_shaker, self._parameters.harmonics
             bare = self._bare[omega]
-            point = judge(settled, bare, omega, specimen, known, sensors, tried, shaker, harmonics)
+            point = judge(settled, bare, omega, specimen, known, sensors, tried, shaker, harmonics, held)
             point = point.model_copy(update={"start_chance": start.chance})
-            if point.status is PointStatus.STEADY or not point.predicted_stable:
+            if point.status in (PointStatus.STEADY, PointStatus.HELD) or not point.predicted_stable:
                 return point
             found = found or point
+            if held_by is None and not settled.steadiness.steady:
+                # the next start is held if its motion does not become steady either
+                held_by = self._prepared(orbit)
         if found is not None:
             return found.model_copy(update={"starts_tried": len(starts)})
         return self._overturned(specimen, omega, falls, starts[0].chance)
@@ -194,10 +209,47 @@ class HarmonicPlan:
             reason=f"the block fell in each of {falls} starts; the predicted orbit is {kind}",
         )
 
+    def _orbit(self, specimen: Specimen, omega: float) -> Orbit | None:
+        layer = predict_gain(specimen, omega, self._amplitude).rocking
+        return layer.orbit if layer else None
+
+    def _prepared(self, orbit: Orbit | None) -> CycleMap | None:
+        if not self._parameters.hold:
+            return None
+        return prepared(orbit, self._configuration.simulated_shaker, self._parameters.harmonics)
+
+    def _hold(
+        self, specimen: Specimen, omega: float, calibration: DriveCalibration, settled: Settled, found: CycleMap
+    ) -> Generator[Step, Outcome, Held | Fallen]:
+        """Hold the present motion on its orbit, and measure it."""
+        if settled.table is None:
+            return Held(None, "the table's sine is not known")
+        sine = Sine(omega, self._amplitude, calibration)
+        free = settled.peak.drift if settled.motion is None else settled.motion.greatest
+        report = self._report(omega, specimen)
+        return (
+            yield from hold(
+                sine,
+                settled.table,
+                found,
+                specimen.label,
+                GROWTH * free,
+                self._parameters,
+                self._configuration.analysis,
+                report,
+            )
+        )
+
     def _settle(
         self, omega: float, specimen: Specimen | None, calibration: DriveCalibration
     ) -> Generator[Step, Outcome, Settled | Fallen]:
         """Settle and measure; publishes the running alpha_2 with the predicted one."""
+        sine = Sine(omega, self._amplitude, calibration)
+        report = self._report(omega, specimen)
+        return settle_and_measure(sine, self._parameters, self._configuration.analysis, report)
+
+    def _report(self, omega: float, specimen: Specimen | None) -> Report:
+        """Callback that publishes the running gain."""
         evaluated = 0
         reference = self._bare.get(omega)
         bare = reference.peak if reference else None
@@ -218,8 +270,12 @@ class HarmonicPlan:
             yield Publish(Estimate(omega, beta, evaluated, peak.drift, alpha_2, uncertainty, predicted))
             yield Publish(self._pace.progress(f"settling at {omega:g} rad/s", omega, evaluated))
 
-        sine = Sine(omega, self._amplitude, calibration)
-        return settle_and_measure(sine, self._parameters, self._configuration.analysis, report)
+        return report
+
+
+def _to_be_held(settled: Settled, found: CycleMap) -> bool:
+    """Whether a motion is held: it is not steady, or its orbit is unstable on the table."""
+    return not settled.steadiness.steady or abs(found.slowest) > 1.0
 
 
 def spring_calibration(

@@ -55,12 +55,19 @@ class HarmonicParameters(Parameters):
     settle_limit: float = quantity(240.0, "s", "longest wait for the steady state", gt=0, le=3600)
     measured_cycles: int = quantity(24, "1", "measured cycles of a steady point", ge=4, le=1000)
     starts: int = quantity(6, "1", "number of starts before a point is abandoned", ge=1, le=32)
+    hold: bool = quantity(
+        True, "", "whether a motion that is unstable or does not become steady is held on its orbit and measured again"
+    )
+    hold_authority: float = quantity(
+        0.1, "1", "largest control of a held motion, relative to the amplitude of the table", gt=0, le=0.2
+    )
 
 
 class PointStatus(StrEnum):
     """Motion of the coupled system at a point."""
 
     STEADY = "steady"
+    HELD = "held"
     MODULATED = "modulated"
     RESTING = "resting"
     OVERTURNED = "overturned"
@@ -79,8 +86,19 @@ class HarmonicPoint(Parameters):
     layer: str = quantity(..., "", "predicted branch: rocking or resting")
     alpha_2: float | None = quantity(None, "1", "measured gain of the peak drift, coupled over bare")
     alpha_2_uncertainty: float | None = quantity(None, "1", "expanded uncertainty of alpha_2 (k = 2)")
+    control_share: float | None = quantity(
+        None, "1", "rms of the control over the measured cycles of a held motion, relative to the table's amplitude"
+    )
+    captured_cycles: int | None = quantity(
+        None, "1", "number of cycles from the beginning of the hold to the capture of the motion"
+    )
     alpha_2_least: float | None = quantity(
-        None, "1", "gain of the smallest peak of a cycle, for an unsteady motion; alpha_2 is that of the largest"
+        None, "1", "gain of the smallest peak of a cycle, for an unsteady free motion"
+    )
+    alpha_2_greatest: float | None = quantity(
+        None,
+        "1",
+        "gain of the largest peak of a cycle, for an unsteady free motion; it is alpha_2 unless the point was held",
     )
     alpha_2_mean: float | None = quantity(None, "1", "gain of the mean peak of a cycle, for an unsteady motion")
     alpha_2_orbit: float | None = quantity(

@@ -17,14 +17,16 @@ from bench.control.sine import Sine, SineResponse
 from bench.datafile.reader import DataFile
 from bench.engine.steps import Arm, Calibrate, Dwell, Measured, Outcome, Publish, SetHarmonics, Step, Sweep
 from bench.events import Acquired, Estimate, Event, PointFinished
-from protocols.harmonic.measurement import JUDGED, LASERS, REMAINING, TRANSIENT, Settled, judge, predicted_fields
+from protocols.harmonic.measurement import JUDGED, LASERS, REMAINING, TRANSIENT, Held, Settled, judge, predicted_fields
 from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, HarmonicSettings, PointStatus
 from sim.gain import predict_gain
 
 
 @dataclass
 class _Series:
-    """Consecutive dwells at one frequency. `recent` are the cycles since the last change of the drive."""
+    """Consecutive dwells at one frequency. `recent` are the cycles since the last change of the drive; of a `hold`, in
+    which the drive changes in every cycle, all. `held` is the hold of the same motion.
+    """
 
     sine: Sine
     analyser: CycleAnalyser
@@ -36,6 +38,8 @@ class _Series:
     recent: list[Cycle] = field(default_factory=list[Cycle])
     trimmed: bool = False
     measured: tuple[Cycle, ...] = ()
+    hold: bool = False
+    held: "_Series | None" = None
 
 
 class HarmonicFollower:
@@ -69,16 +73,21 @@ class HarmonicFollower:
         """Start a new series at its first dwell."""
         match step:
             case Arm() | Sweep():
-                self._end_series()
+                self._end_series(self._series)
                 self._last = step if isinstance(step, Sweep) else None
             case Calibrate():
                 self._calibration = step.calibration
             case Dwell() if self._last is not None:
-                if self._series is None:
+                if step.phase is not None or self._series is None:
+                    free = self._series
                     leg = self._last.legs[-1]
                     sine = Sine(leg.omega, leg.amplitude, self._calibration)
                     analyser = CycleAnalyser(leg.omega, self._rate, self._read, self._settings.harmonics)
                     self._series = _Series(sine, analyser)
+                    if free is not None:
+                        self._end_series(free)
+                        self._series.hold, self._series.turn = True, free.turn
+                        free.held = self._series
                 self._dwelling = True
             case _:
                 pass
@@ -91,14 +100,14 @@ class HarmonicFollower:
                 self._dwelling = False
                 series.waited += step.cycles * tau / series.sine.omega
                 series.measured = outcome.cycles if isinstance(outcome, Measured) else ()
-            case SetHarmonics() if series is not None:
+            case SetHarmonics() if series is not None and not series.hold:
                 series.updates += 1
                 series.recent.clear()
                 series.trimmed = True
             case Publish(event=Estimate(beta=beta)) if series is not None:
                 series.tested, series.beta = True, beta
             case Publish(event=PointFinished(point=HarmonicPoint() as point)):
-                self._end_series()
+                self._end_series(self._series)
                 self._points.append(self._recomputed(point))
                 self._tries.clear()
             case _:
@@ -116,9 +125,10 @@ class HarmonicFollower:
             series.turn = series.sine.turn(cycles[0])
         series.recent += cycles
 
-    def _end_series(self) -> None:
-        series, self._series = self._series, None
-        if series is None or not series.tested or not series.measured:
+    def _end_series(self, series: _Series | None) -> None:
+        if series is self._series:
+            self._series = None
+        if series is None or series.hold or not series.tested or not series.measured:
             return
         if series.beta is None:
             self._bare[series.sine.omega] = self._settled(series)
@@ -135,16 +145,39 @@ class HarmonicFollower:
             layer = predict_gain(specimen, omega, asked, bare.peak.amplitude).rocking
             peaks = {"bare_drift_peak_m": bare.peak.drift, "bare_amplitude_m_s2": bare.peak.amplitude}
             return point.model_copy(update=predicted_fields("rocking", layer, known) | peaks)
-        settled = self._settled(min(self._tries, key=lambda series: self._unlike(series, point)))
         sensors, shaker = self._configuration.sensors, self._configuration.simulated_shaker
         harmonics = self._parameters.harmonics
-        found = judge(settled, bare, omega, specimen, known, sensors, point.starts_tried, shaker, harmonics)
+        tried = min(self._tries, key=lambda series: self._unlike(series, point))
+        settled = self._settled(tried)
+        held = None if tried.held is None else self._held(tried.held, point)
+        found = judge(settled, bare, omega, specimen, known, sensors, point.starts_tried, shaker, harmonics, held)
         return found.model_copy(update={"start_chance": point.start_chance})
 
     def _unlike(self, series: _Series, point: HarmonicPoint) -> float:
         """Difference between the table amplitudes of a dwell and the point [m/s2], to find the dwell of the point."""
-        used = series.measured[-self._parameters.measured_cycles :]
+        if point.status is PointStatus.HELD:
+            # the amplitude is that of the hold
+            series = series.held or series
+        cycles = series.recent if series.hold else series.measured
+        used = cycles[-self._parameters.measured_cycles :]
         return abs(mean_amplitude(used, ACCELERATION) - (point.amplitude_m_s2 or 0.0))
+
+    def _held(self, series: _Series, point: HarmonicPoint) -> Held:
+        """The hold of a point: its last cycles, with control and capture as recorded."""
+        if point.status is not PointStatus.HELD:
+            return Held(None, "as recorded", cycles=len(series.recent))
+        omega, used = series.sine.omega, series.recent[-self._cycles :]
+        table = SineResponse.of(used, series.sine, series.turn or 1.0 + 0.0j)
+        return Held(
+            peak=modulated_peak(used, omega)
+            if self._settings.peak == "largest"
+            else steady_peak(used, omega, REMAINING * self._tolerance),
+            amplitude_error=table.amplitude_error,
+            phase_error=table.phase_error,
+            control=point.control_share or 0.0,
+            captured=point.captured_cycles,
+            cycles=len(series.recent),
+        )
 
     def _settled(self, series: _Series) -> Settled:
         omega = series.sine.omega

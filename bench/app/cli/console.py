@@ -120,6 +120,7 @@ _STATE_STYLES = {
 }
 _WORD_STYLES = {
     "steady": "green",
+    "held": "green",
     "yes": "green",
     "NO": "bold red",
     "overturned": "bold red",

@@ -13,7 +13,7 @@ from bench.datafile.tables import Column
 from bench.document.typography import first_words
 
 _UNCERTAINTY, _PREDICTED = "_uncertainty", ("_predicted", "_nominal")
-_GOOD = ("", "steady", "measured", "resting")
+_GOOD = ("", "steady", "held", "measured", "resting")
 """States of a point that are not displayed beside its verdict."""
 
 

@@ -1,0 +1,177 @@
+"""Hold of an unstable rocking motion: capture from the free motion, correction of the table, measurement, release."""
+
+from collections import deque
+from collections.abc import Generator
+from math import nan, sqrt
+
+import numpy as np
+
+from bench.analysis.cycles import Cycle
+from bench.analysis.gain import SensorAccuracy, steady_peak
+from bench.analysis.signals import DRIFT
+from bench.analysis.steady import WINDOW, SteadyDetector
+from bench.control.sine import Sine, SineControl, SineResponse, Tolerance
+from bench.control.stabiliser import BLEND, DELAY, HoldMonitor, Stabiliser, observed
+from bench.engine.steps import Dwell, Fallen, Measured, Outcome, Publish, SetHarmonics, Step
+from bench.events import HoldCycle
+from protocols.harmonic.measurement import (
+    AIM,
+    INTERVAL,
+    JUDGED,
+    LASERS,
+    REMAINING,
+    TRANSIENT,
+    Held,
+    Report,
+    TableState,
+)
+from protocols.harmonic.protocol import HarmonicParameters
+from sim.cycle_map import CycleMap, cycle_map
+from sim.shaker import Shaker
+from sim.steady import NoOrbit, Orbit
+
+PATIENCE = 200
+"""Cycles within which a motion must be captured, and then as many for the correction of the table and the measurement.
+"""
+
+SLOW = 0.985
+"""Modulus of the slowest multiplier on fixed ground above which a hold is prepared before the test."""
+
+UPDATES = 8
+"""Largest number of corrections of the table while a motion is held."""
+
+
+def prepared(orbit: Orbit | None, shaker: Shaker | None, harmonics: int) -> CycleMap | None:
+    """Cycle map for the stabiliser; None without an orbit on the table."""
+    if orbit is None:
+        return None
+    try:
+        return cycle_map(orbit, shaker, harmonics, BLEND)
+    except NoOrbit:
+        return None
+
+
+def hold(
+    sine: Sine,
+    table: TableState,
+    found: CycleMap,
+    beta: float | None,
+    largest: float,
+    parameters: HarmonicParameters,
+    accuracy: SensorAccuracy,
+    report: Report,
+) -> Generator[Step, Outcome, Held | Fallen]:
+    """Capture the orbit of `found` from the present motion, hold it, and measure it.
+
+    `largest` [m] is the greatest peak drift allowed. While the motion is being captured the amplitude control is
+    frozen; then it corrects the shares to which the control is added.
+    """
+    run = _Hold(sine, table, found, largest, parameters, accuracy)
+    phase: float | None = found.phase
+    while True:
+        outcome = yield Dwell(1, phase)
+        phase = None
+        if not isinstance(outcome, Measured):
+            return Fallen()
+        for cycle in outcome.cycles or (None,):
+            reason = run.push(cycle)
+            yield Publish(HoldCycle(sine.omega, beta, run.monitor.cycles, *run.last))
+            if reason is not None:
+                yield SetHarmonics(run.shares)
+                return Held(None, reason, captured=run.monitor.captured_after, cycles=run.monitor.cycles)
+            yield SetHarmonics(run.command, run.monitor.cycles - 1 + DELAY, BLEND)
+        if run.monitor.cycles % INTERVAL == 0 and run.recent:
+            yield from report(list(run.recent))
+        if (held := run.measured()) is not None:
+            yield SetHarmonics(run.shares)
+            return held
+
+
+class _Hold:
+    """State of a hold between its cycles."""
+
+    def __init__(
+        self,
+        sine: Sine,
+        table: TableState,
+        found: CycleMap,
+        largest: float,
+        parameters: HarmonicParameters,
+        accuracy: SensorAccuracy,
+    ) -> None:
+        self._sine, self._table, self._parameters = sine, table, parameters
+        self._stabiliser = Stabiliser(found, parameters.hold_authority)
+        self.monitor = HoldMonitor(parameters.hold_authority, PATIENCE, largest, table.answer)
+        tolerances = (parameters.amplitude_tolerance, parameters.phase_tolerance, parameters.distortion_tolerance)
+        self._control = SineControl(parameters.harmonics, Tolerance(*(AIM * each for each in tolerances)))
+        jitter = sine.omega * accuracy.laser_timing
+        self._detector = SteadyDetector(parameters.settle_tolerance, JUDGED, LASERS, jitter)
+        self._wanted = max(parameters.measured_cycles, 2 * WINDOW)
+        self._controls: deque[complex] = deque([0j] * (DELAY + 1), maxlen=DELAY + 1)
+        self._used: deque[tuple[Cycle, float]] = deque(maxlen=self._wanted)
+        self._since = 0
+        self._updates = 0
+        self.shares = table.shares
+        self.recent: deque[Cycle] = deque(maxlen=WINDOW)
+        self.last = (nan, nan, nan)
+
+    @property
+    def command(self) -> tuple[complex, ...]:
+        """Shares of the drive with the latest control."""
+        first, *others = self.shares
+        return (first + self._controls[-1] / self._table.answer, *others)
+
+    def push(self, cycle: Cycle | None) -> str | None:
+        """Determine the next control from a cycle, None if it was lost. Returns the reason to release, if any."""
+        y = None if cycle is None else observed(cycle, self._table.turn)
+        self._controls.append(self._stabiliser.next(y))
+        control = self._controls[0]
+        if cycle is None:
+            self.last = (nan, nan, abs(control))
+            return self.monitor.missed()
+        drift = float(cycle.extreme[DRIFT])
+        self.last = (drift, self._stabiliser.deviation, abs(control))
+        self.recent.append(cycle)
+        reason = self.monitor.push(control, drift, *self._sine.fundamentals(cycle, self._table.turn))
+        if reason is None and self.monitor.captured_after is not None:
+            reason = self._settle(cycle, abs(control))
+        return reason
+
+    def _settle(self, cycle: Cycle, control: float) -> str | None:
+        """Correct the table until it is a sine, then collect cycles."""
+        if self.monitor.cycles > 2 * PATIENCE:
+            return f"the held motion was not steady within {2 * PATIENCE} cycles"
+        self._since += 1
+        if self._since <= TRANSIENT:
+            return None
+        self._used.append((cycle, control))
+        self._detector.push(cycle)
+        if self._since == INTERVAL and self._updates < UPDATES:
+            response = SineResponse.of([each for each, _ in self._used], self._sine, self._table.turn)
+            shares = self._control.next(response)
+            if shares is not None:
+                self.shares = shares
+                self._updates += 1
+                self._since = -DELAY
+                self._used.clear()
+                self._detector.restart()
+        return None
+
+    def measured(self) -> Held | None:
+        """The held motion, once its table is a sine and enough of its cycles are steady."""
+        if len(self._used) < self._wanted:
+            return None
+        if not self._detector.judge(allowance=2.0).steady:
+            return None
+        used = [cycle for cycle, _ in self._used][-self._parameters.measured_cycles :]
+        table = SineResponse.of(used, self._sine, self._table.turn)
+        controls = np.array([control for _, control in self._used])[-self._parameters.measured_cycles :]
+        return Held(
+            peak=steady_peak(used, self._sine.omega, REMAINING * self._parameters.settle_tolerance),
+            amplitude_error=table.amplitude_error,
+            phase_error=table.phase_error,
+            updates=self._updates,
+            control=sqrt(float(np.mean(controls**2))),
+            captured=self.monitor.captured_after,
+            cycles=self.monitor.cycles,
+        )

@@ -1,0 +1,74 @@
+"""Holds of unstable points on the simulated bench, through engine, guard and sensors, in virtual time."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bench.app.cli.main import main
+from bench.datafile.reader import open_datafile
+from bench.events import HoldCycle
+
+QUICK = ["--settle-limit", "30", "--ramp-time", "4", "--harmonics", "5", "--starts", "2"]
+
+
+def point(folder: Path, *options: str) -> dict[str, Any]:
+    command = ["run", "harmonic", "--yes", "--json", "--omega", "15", "--beta", "0.97", "--out", str(folder)]
+    assert main([*command, *QUICK, *options]) == 0
+    (found,) = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["points"]
+    return found
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("hold") / "run"
+
+
+@pytest.fixture(scope="module")
+def held(folder: Path) -> dict[str, Any]:
+    return point(folder, "--seed", "7")
+
+
+def test_the_unstable_orbit_is_held_and_its_gain_agrees(held: dict[str, Any]) -> None:
+    assert held["status"] == "held", held["reason"]
+    assert held["agrees"] is True
+    assert held["alpha_2"] == pytest.approx(held["alpha_2_predicted"], rel=0.01)
+    assert held["control_share"] < 1e-3
+    assert held["captured_cycles"] < 200
+    assert held["predicted_stable"] is False
+
+
+def test_the_spread_of_the_free_motion_is_stated_beside_it(held: dict[str, Any]) -> None:
+    assert held["alpha_2"] < 0.1 < held["alpha_2_least"] < held["alpha_2_mean"] < held["alpha_2_greatest"]
+    assert "free: not steady" in held["reason"]
+
+
+def test_the_file_has_every_cycle_of_the_hold(held: dict[str, Any], folder: Path) -> None:
+    with open_datafile(folder / "campaign.h5") as record:
+        cycles = record.columns_of(HoldCycle)
+    assert list(cycles["cycle"]) == list(range(1, len(cycles["cycle"]) + 1))
+    controls, peaks = np.array(cycles["control"]), np.array(cycles["drift_peak"])
+    assert controls.max() == pytest.approx(0.1, rel=1e-6)
+    assert np.sqrt(np.mean(controls[-24:] ** 2)) == pytest.approx(held["control_share"], rel=1e-6)
+    assert peaks[-24:].mean() < 0.2 * peaks[:12].max()
+
+
+def test_the_file_replays_to_the_last_bit_and_its_hold_is_analysed_again(
+    held: dict[str, Any], folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = str(folder / "campaign.h5")
+    assert main(["replay", file]) == 0
+    assert "Identical to the file in every bit" in "".join(capsys.readouterr())
+    assert main(["analyse", file, "--json"]) == 0
+    (again,) = json.loads(capsys.readouterr().out)["points"]
+    assert again["status"] == "held"
+    assert again["alpha_2"] == pytest.approx(held["alpha_2"], rel=2e-3)
+
+
+def test_without_a_hold_only_the_free_motion_is_measured(tmp_path: Path) -> None:
+    free = point(tmp_path / "run", "--seed", "7", "--no-hold")
+    assert free["status"] == "modulated"
+    assert free["control_share"] is None
+    assert free["alpha_2"] == free["alpha_2_greatest"]
