@@ -131,7 +131,7 @@ def _of_json(content: Mapping[str, Any]) -> str:
 
 
 def _attributes(owner: hdf5.Group | hdf5.Dataset) -> dict[str, Any]:
-    return {name: _plain(owner.attrs[name]) for name in owner.attrs}
+    return {name: _plain(value) for name, value in hdf5.attributes(owner).items()}
 
 
 def _plain(value: Any) -> Any:

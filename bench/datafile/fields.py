@@ -78,7 +78,8 @@ class Field:
                 chunk=ROWS_PER_PACKED_CHUNK if self.packed else ROWS_PER_CHUNK,
                 compress=self.packed,
             )
-        made.attrs["kind"], made.attrs["optional"] = self.kind.value, np.int8(self.optional)
+        hdf5.describe(made, kind=self.kind.value)
+        made.attrs["optional"] = np.int8(self.optional)
         return made
 
     def encode(self, value: Any) -> Any:

@@ -17,6 +17,8 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from bench.datafile.access import VERSIONS, locking, open_living, open_to_write
+from bench.datafile.hdf5_objects import attributes as attributes
+from bench.datafile.hdf5_objects import describe as describe
 from bench.datafile.hdf5_reading import Dataset as Dataset
 from bench.datafile.hdf5_reading import File as File
 from bench.datafile.hdf5_reading import Group as Group
@@ -100,7 +102,7 @@ def is_hdf5(path: Path) -> bool:
 def create_group(parent: Group, name: str, nx_class: str) -> Group:
     """Create a group of a NeXus class; its members keep their order of creation."""
     made = parent.create_group(name, track_order=True)
-    made.attrs["NX_class"] = nx_class
+    describe(made, NX_class=nx_class)
     return made
 
 
@@ -124,7 +126,7 @@ def view(parent: Group, name: str, source: Dataset, part: slice) -> Dataset:
 def write_numbers(parent: Group, name: str, values: object, *, unit: str, description: str) -> Dataset:
     """Create a dataset with all its numbers; a scalar dataset if `values` is a scalar."""
     made = parent.create_dataset(name, data=np.asarray(values))
-    made.attrs["units"], made.attrs["description"] = unit, description
+    describe(made, units=unit, description=description)
     return made
 
 
@@ -134,7 +136,7 @@ def grow_numbers(
     """Create an empty, growing dataset of numbers."""
     filters = FILTERS if compress else {}
     made = parent.create_dataset(name, shape=(0,), maxshape=(None,), dtype=dtype, chunks=(chunk,), **filters)
-    made.attrs["units"], made.attrs["description"] = unit, description
+    describe(made, units=unit, description=description)
     return made
 
 
@@ -150,7 +152,7 @@ def grow_texts(parent: Group, name: str, width: int, *, description: str, chunk:
     the other; therefore all strings have a fixed length.
     """
     made = parent.create_dataset(name, shape=(0,), maxshape=(None,), dtype=text_type(width), chunks=(chunk,))
-    made.attrs["description"] = description
+    describe(made, description=description)
     return made
 
 
@@ -160,7 +162,7 @@ def write_text(parent: Group, name: str, text: str, *, width: int = 0, descripti
     kind = text_type(max(width, len(stored), 1))
     made = parent.create_dataset(name, data=np.array(stored, dtype=kind), dtype=kind)
     if description:
-        made.attrs["description"] = description
+        describe(made, description=description)
     return made
 
 
@@ -169,7 +171,7 @@ def write_texts(parent: Group, name: str, texts: Iterable[str], *, description: 
     stored = [text.encode() for text in texts]
     kind = text_type(max([1, *map(len, stored)]))
     made = parent.create_dataset(name, data=np.array(stored, dtype=kind), dtype=kind)
-    made.attrs["description"] = description
+    describe(made, description=description)
     return made
 
 

@@ -10,6 +10,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.datafile.hdf5_objects import is_hard_link, stored_member
 from sim.errors import RockbenchError
 
 
@@ -118,13 +119,12 @@ def members(parent: Group, lost: dict[str, str] | None = None) -> Iterator[tuple
     For unreadable members the reason is added to `lost` by path; without `lost`, DataFileError is raised.
     """
     try:
-        names = list(parent)
+        names, read_only = list(parent), _is_read_only(parent)
     except UNREADABLE as error:
-        names = _give_up(parent.name, error, lost)
+        names, read_only = _give_up(parent.name, error, lost), False
     for name in names:
         try:
-            found = cast(object, cast(h5py.Group, parent).get(name, getlink=True))
-            member = found.path if isinstance(found, h5py.SoftLink) else cast("Dataset | Group", parent[name])
+            member = _member_or_target(parent, name, read_only)
         except UNREADABLE as error:
             _give_up(f"{parent.name.rstrip('/')}/{name}", error, lost)
         else:
@@ -218,6 +218,18 @@ def read_texts(stored: NDArray[Any]) -> list[str]:
     return [bytes(text).decode() for text in stored]
 
 
+def _is_read_only(parent: Group) -> bool:
+    return cast(h5py.Group, parent).file.mode == "r"
+
+
+def _member_or_target(parent: Group, name: str, read_only: bool = False) -> "Dataset | Group | str":
+    """A member; of a soft link, its target. Raises KeyError for a link without one."""
+    if is_hard_link(parent, name):
+        return cast("Dataset | Group", stored_member(parent, name, read_only=read_only))
+    found = cast(object, cast(h5py.Group, parent).get(name, getlink=True))
+    return found.path if isinstance(found, h5py.SoftLink) else cast("Dataset | Group", parent[name])
+
+
 def _give_up(path: str, error: BaseException, lost: dict[str, str] | None) -> list[str]:
     told = f"{path} cannot be read ({reason(error)})"
     if lost is None:
@@ -229,8 +241,12 @@ def _give_up(path: str, error: BaseException, lost: dict[str, str] | None) -> li
 def _member(parent: Group, path: str, kind: type) -> object:
     name = f"{parent.name.rstrip('/')}/{path.lstrip('/')}"
     with reading(name):
-        there = path in parent
-        found = parent[path] if there else None
+        try:
+            found = parent[path]
+        except KeyError:
+            if path in parent:
+                raise
+            found = None
     if not isinstance(found, kind):
         raise DataFileError(f"the file has no {kind.__name__.lower()} {name}: it is damaged")
     return found

@@ -16,6 +16,7 @@ import h5py.h5g
 import h5py.h5s
 
 from bench.datafile.declared import FIT_VIEWS
+from bench.datafile.hdf5_objects import is_hard_link, stored_member
 from bench.datafile.hdf5_reading import UNREADABLE, DataFileError, File
 
 MOST_OBJECTS = 20_000
@@ -64,14 +65,14 @@ class _Judge:
                 continue
 
     def _member(self, group: Any, name: str, path: str, depth: int) -> None:
-        link = group.get(name, getlink=True)
-        if isinstance(link, h5py.SoftLink):
+        if not is_hard_link(group, name):
+            link = group.get(name, getlink=True)
+            if not isinstance(link, h5py.SoftLink):
+                raise DataFileError(f"{path} is a link to another file; such links are never followed")
             if not link.path.startswith("/entry/") or "/data/" in link.path:
                 raise DataFileError(f"{path} is a link to {link.path!a:.80}, which is not a dataset of the campaign")
             return
-        if not isinstance(link, h5py.HardLink):
-            raise DataFileError(f"{path} is a link to another file; such links are never followed")
-        member = group[name]
+        member = stored_member(group, name)
         if isinstance(member, h5py.Group):
             self.group(member, depth + 1)
         elif isinstance(member, h5py.Dataset):
@@ -129,12 +130,12 @@ class _Judge:
 
 def check_attributes(owner: Any, path: str) -> None:
     """Raise DataFileError if there are more or larger attributes than this program writes."""
-    if (count := len(owner.attrs)) > MOST_ATTRIBUTES:
+    if (count := h5py.h5a.get_num_attrs(owner.id)) > MOST_ATTRIBUTES:
         raise DataFileError(f"{path} has {count} attributes; at most {MOST_ATTRIBUTES} are allowed")
-    for name in owner.attrs:
-        size = h5py.h5a.open(owner.id, name.encode()).get_storage_size()
-        if size > LARGEST_ATTRIBUTE:
-            raise DataFileError(f"the attribute {name} of {path} has {size} bytes")
+    for number in range(count):
+        stored = h5py.h5a.open(owner.id, index=number)
+        if (size := stored.get_storage_size()) > LARGEST_ATTRIBUTE:
+            raise DataFileError(f"the attribute {stored.name.decode(errors='replace')} of {path} has {size} bytes")
 
 
 def check_structure(file: File, path: Path) -> None:

@@ -1,0 +1,62 @@
+# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
+# pyright: reportUnknownArgumentType=false
+"""Members and attributes through the lower level of h5py, in a third of the time of its dictionaries.
+
+A file has some 200 objects and 600 attributes, which are created before a run starts and read whenever it is opened.
+"""
+
+from typing import Any
+
+import h5py
+import h5py.h5a
+import h5py.h5d
+import h5py.h5g
+import h5py.h5l
+import h5py.h5o
+import h5py.h5s
+import h5py.h5t
+import numpy as np
+
+_TEXT = h5py.string_dtype()
+_TEXT_STORED, _SCALAR = h5py.h5t.py_create(_TEXT, logical=True), h5py.h5s.create(h5py.h5s.SCALAR)
+
+
+def is_hard_link(parent: Any, name: str) -> bool:
+    """Whether the member `name` is stored in the file, rather than named by a link. Raises KeyError without one."""
+    return parent.id.links.get_info(_encoded(name)).type == h5py.h5l.TYPE_HARD
+
+
+def stored_member(parent: Any, name: str, *, read_only: bool = False) -> Any:
+    """The member `name`, as `parent[name]`, which asks for the mode of the file each time.
+
+    In a `read_only` file, a dataset keeps its shape in memory.
+    """
+    found = h5py.h5o.open(parent.id, _encoded(name))
+    if isinstance(found, h5py.h5g.GroupID):
+        return h5py.Group(found)
+    return h5py.Dataset(found, readonly=read_only) if isinstance(found, h5py.h5d.DatasetID) else parent[name]
+
+
+def attributes(owner: Any) -> dict[str, Any]:
+    """All attributes by name, with the values of `owner.attrs`."""
+    found: dict[str, Any] = {}
+    for number in range(h5py.h5a.get_num_attrs(owner.id)):
+        stored: Any = h5py.h5a.open(owner.id, index=number)
+        name, kind = stored.name.decode("utf-8", "surrogateescape"), stored.dtype
+        if stored.shape == () and (text := h5py.check_string_dtype(kind)) is not None and text.length is None:
+            value: Any = np.empty((), kind)
+            stored.read(value)
+            found[name] = value[()].decode("utf-8", "surrogateescape")
+        else:
+            found[name] = owner.attrs[name]
+    return found
+
+
+def describe(owner: Any, **texts: str) -> None:
+    """Give a new object attributes that are texts, as `owner.attrs` would."""
+    for name, text in texts.items():
+        h5py.h5a.create(owner.id, name.encode(), _TEXT_STORED, _SCALAR).write(np.array(text, dtype=_TEXT))
+
+
+def _encoded(name: str) -> bytes:
+    return name.encode("utf-8", "surrogateescape")
