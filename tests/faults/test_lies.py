@@ -14,17 +14,22 @@ from bench.app.cli.main import main
 from bench.config import backend as backends
 from bench.config.backend import RigBackend
 from bench.config.model import BenchConfiguration
+from bench.control.oscillator import DriveCalibration, Leg
 from bench.datafile.inspection import verify
 from bench.datafile.reader import open_datafile
+from bench.engine.steps import Arm, Calibrate, Dwell, OperatorAction, RampOut, Sweep
 from bench.rigs import open_rig
 from bench.testing.loopback import LoopbackBench
 from drivers.errors import BackendFault
-from drivers.rig import Rig
+from drivers.rig import OperatorTask, Rig
+from sim.specimen import Specimen
 from tests.faults import lies
 from tests.faults.lies import Lie, LyingRig
 from tests.installed import example
 
 IN_RUN = [*lies.blocks(), *lies.safety(), *lies.clocks(), *lies.calls()]
+IN_PLAN = [lie for lie in IN_RUN if not lie.name.startswith("close ")]
+"""Those that an engine meets; it is the session that closes the rig."""
 AT_OPENING = [*lies.channels(), *lies.numbers()]
 ENDED = ("failed", "halted")
 """The rig is stopped with its output cut."""
@@ -64,6 +69,14 @@ def _each(lies: list[Lie]) -> Any:
     return pytest.mark.parametrize("lie", lies, ids=lambda lie: lie.name)
 
 
+def _sessions(every: int) -> list[Any]:
+    """One lie in `every`, and those that only a session meets; the others when long tests are asked for."""
+    return [
+        pytest.param(lie, id=lie.name, marks=() if number % every == 0 or lie not in IN_PLAN else pytest.mark.soak)
+        for number, lie in enumerate(IN_RUN)
+    ]
+
+
 def test_there_are_at_least_sixty() -> None:
     assert len({lie.name for lie in [*IN_RUN, *AT_OPENING]}) >= 60
 
@@ -74,9 +87,26 @@ def test_a_rig_that_tells_the_truth_completes_the_same_run(tmp_path: Path, monke
         assert _tone_sweep(tmp_path / "run") == 0
 
 
+@_each(IN_PLAN)
+def test_a_lie_ends_the_run_with_the_backend_named(lie: Lie) -> None:
+    rig = lie.make()
+    bench = LoopbackBench(rig)  # type: ignore[arg-type]
+    ending = bench.run_steps(
+        OperatorAction(OperatorTask.MOUNT_SPRING, Specimen().coupled(0.4), "a spring"),
+        Arm(0.5),
+        Calibrate(DriveCalibration.flat(1.0)),
+        Sweep((Leg(0.5, 0.5, 16.0),)),
+        Dwell(2),
+        RampOut(fast=False),
+    )
+    assert ending.status in ENDED
+    assert lie.says in ending.reason
+    assert not rig.inner.armed
+
+
 @pytest.mark.usefixtures("plugged")
-@_each(IN_RUN)
-def test_a_lie_ends_the_run_with_the_backend_named_and_the_file_whole(
+@pytest.mark.parametrize("lie", _sessions(every=5))
+def test_a_lie_ends_a_session_with_the_backend_named_and_the_file_whole(
     lie: Lie, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "run"
