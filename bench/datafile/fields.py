@@ -280,7 +280,7 @@ class Rows:
         """Append many rows: a column per field, in order, all of equal length and without absent values."""
         self._pending += zip(*(column.tolist() for column in columns), strict=True)
 
-    def write(self, *, partial: bool) -> None:  # noqa: ARG002 - uncompressed rows are appended in place
+    def write(self, *, partial: bool = True) -> None:  # noqa: ARG002 - uncompressed rows are appended in place
         """Write the buffered rows to the file; incomplete chunks of packed fields only if `partial`."""
         if not self._pending:
             return
@@ -305,7 +305,7 @@ class PackedRows(Rows):
         self._arrays.append(columns)
         self._waiting += len(columns[0])
 
-    def write(self, *, partial: bool) -> None:
+    def write(self, *, partial: bool = True) -> None:
         # a compressed chunk that is written again leaves its first copy as unused space
         end = len(self) if partial else len(self) // ROWS_PER_PACKED_CHUNK * ROWS_PER_PACKED_CHUNK
         count = end - self._written

@@ -5,14 +5,16 @@ from typing import Any, Self, cast
 
 from nidaqmx.grpc_session_options import GrpcSessionOptions, SessionInitializationBehavior
 
+from drivers.daqmx.encryption import credentials, require_private
 from drivers.daqmx.library import Options
-from drivers.daqmx.parameters import Daq
+from drivers.daqmx.parameters import Daq, Tls
 from drivers.errors import DeviceNotFound
 from sim import waiting
 from sim.errors import InvalidInput
 
 _READY = 2.0
 """Time-out for a server's first answer [s]."""
+_ENCRYPTED = ", and server_cert and server_key there; check the certificates and hardware.daq.tls.server_name"
 _PORT = 31763
 """Default port of NI gRPC Device Server (its README)."""
 
@@ -20,21 +22,23 @@ _PORT = 31763
 class Connection:
     """Options for new tasks: the only difference between this PC and a server.
 
-    Raises DeviceNotFound when no server answers within 2 s, InvalidInput for an address without port.
+    Encrypted with `tls`; a `plain` connection may leave private networks. Raises DeviceNotFound when no server answers
+    within 2 s, InvalidInput for an address without port, for a plain connection to a public network, and for
+    certificates that cannot be read.
     """
 
-    def __init__(self, server: str | None, patience: float) -> None:
+    def __init__(self, server: str | None, patience: float, tls: Tls | None = None, *, plain: bool = False) -> None:
         self.server = server
         self._deadline: Any = None
         self._channel: Any = None
         self._calls: Any = None
         if server is not None:
-            self._connect(server, patience)
+            self._connect(server, patience, tls, plain=plain)
 
     @classmethod
     def of(cls, daq: Daq) -> Self:
         """The connection that the parameters describe."""
-        return cls(daq.server, daq.timeout_margin)
+        return cls(daq.server, daq.timeout_margin, daq.tls, plain=daq.plain_connection)
 
     @property
     def late(self) -> bool:
@@ -59,16 +63,18 @@ class Connection:
             return None
         return GrpcSessionOptions(self._calls, name, initialization_behavior=behavior)
 
-    def _connect(self, server: str, patience: float) -> None:
+    def _connect(self, server: str, patience: float, tls: Tls | None, *, plain: bool) -> None:
         if not server.rpartition(":")[2].isdigit():
             raise InvalidInput("hardware.daq.server", server, f"it must be host:port, such as crio.local:{_PORT}")
+        if tls is None and not plain:
+            require_private(server)
         # a PC with a local driver does not need gRPC, which takes half a second to import
         import grpc
 
         from drivers.daqmx.deadline import Deadline
 
         gone = round(1000.0 * max(1.0, patience / 2.0))
-        channel_options = [
+        channel_options: list[tuple[str, int | str]] = [
             ("grpc.max_receive_message_length", -1),
             ("grpc.max_send_message_length", -1),
             # do not use the internet proxy for a device in the laboratory
@@ -80,7 +86,12 @@ class Connection:
             ("grpc.http2.ping_timeout_ms", gone),
         ]
         library = cast(Any, grpc)
-        self._channel = library.insecure_channel(server, options=channel_options)
+        if tls is None:
+            self._channel = library.insecure_channel(server, options=channel_options)
+        else:
+            if tls.server_name is not None:
+                channel_options.append(("grpc.ssl_target_name_override", tls.server_name))
+            self._channel = library.secure_channel(server, credentials(tls), options=channel_options)
         ready = library.channel_ready_future(self._channel)
         settled = threading.Event()
 
@@ -98,6 +109,7 @@ class Connection:
                 f"no gRPC device server responds at {server}: start ni_grpc_device_server there and check the port"
                 f" ({_PORT} unless changed); to be reached from another machine it needs"
                 ' "address": "[::]" in its server_config.json'
+                f"{_ENCRYPTED if tls is not None else ''}"
             ) from error
         except BaseException:
             ready.cancel()

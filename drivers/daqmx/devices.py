@@ -11,7 +11,7 @@ from drivers.daqmx import library
 from drivers.daqmx.connection import Connection
 from drivers.daqmx.errors import is_unsupported, translated
 from drivers.daqmx.inputs import TERMINAL_CONFIGURATIONS
-from drivers.daqmx.parameters import AnalogInput, Daq, device_name
+from drivers.daqmx.parameters import AnalogInput, Daq, Tls, device_name
 from sim.errors import InvalidInput
 
 _PATIENCE = 5.0
@@ -57,12 +57,12 @@ class FoundDevice:
         return min(self.input_rate, self.total_input_rate / channels)
 
 
-def find_devices(server: str | None) -> list[FoundDevice]:
-    """The devices of this PC, or of the gRPC device server at `server` (host:port).
+def find_devices(server: str | None, tls: Tls | None = None, *, plain: bool = False) -> list[FoundDevice]:
+    """The devices of this PC, or of the gRPC device server at `server` (host:port); see `Connection`.
 
     Raises DeviceNotFound when there is no driver or no server.
     """
-    connection = Connection(server, _PATIENCE)
+    connection = Connection(server, _PATIENCE, tls, plain=plain)
     try:
         with translated("looking for devices"):
             return [described(device) for device in library.system(connection.options()).devices]

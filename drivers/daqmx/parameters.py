@@ -68,6 +68,29 @@ class Heartbeat(Parameters):
     timeout: float = quantity(1.0, "s", "time after the last rising edge at which its relay opens", ge=0.1, le=10)
 
 
+class Tls(Parameters):
+    """Encrypted connection to the gRPC device server, which has certificates in its server_config.json."""
+
+    root_certificate: str = quantity(
+        "server_self_signed_crt.pem",
+        "",
+        "PEM file of the server's certificate, or of the authority that signed it",
+        min_length=1,
+    )
+    client_certificate: str | None = quantity(
+        None,
+        "",
+        "PEM file of this client's certificate, for a server with root_cert (mutual TLS); absent: none",
+        example="client_self_signed_crt.pem",
+    )
+    client_key: str | None = quantity(
+        None, "", "PEM file of the private key of that certificate", example="client_privatekey.pem"
+    )
+    server_name: str | None = quantity(
+        None, "", "name in the server's certificate; absent: that of the server's address", example="crio.local"
+    )
+
+
 class Daq(Parameters):
     """The DAQ device: location of its driver, drive output, enable line, safety inputs."""
 
@@ -76,6 +99,10 @@ class Daq(Parameters):
         "",
         "host:port of the gRPC device server on the controller; absent: the NI-DAQmx driver of this PC",
         example="crio.local:31763",
+    )
+    tls: Tls | None = quantity(None, "", "encryption of the connection to that server; absent: plain")
+    plain_connection: bool = quantity(
+        False, "", "whether a plain connection may leave this computer and private networks, which is refused otherwise"
     )
     output: str = quantity("Dev1/ao0", "", "physical channel of the drive output")
     output_range: float = quantity(10.0, "V", "largest magnitude of the drive output", gt=0, le=10, usual=(1.0, 10.0))

@@ -16,6 +16,7 @@ from sim.extras import MissingExtra, require
 
 if TYPE_CHECKING:
     from drivers.daqmx.devices import FoundDevice
+    from drivers.daqmx.parameters import Tls
     from drivers.hardware.parameters import Hardware
     from drivers.optoncdt.search import FoundLaser
 
@@ -53,7 +54,8 @@ def devices(
         require("serial", "--port")
     hardware = None if config is None else configuration_from(config, None).hardware
     server = server if server is not None or hardware is None else hardware.daq.server
-    found, missing = _daq(server)
+    daq = None if hardware is None else hardware.daq
+    found, missing = _daq(server, None if daq is None else daq.tls, plain=daq is not None and daq.plain_connection)
     progress("querying the serial ports, about 4 s")
     lasers, no_ports = _lasers(port or _configured(hardware))
     backends, failed = all_backends()
@@ -72,13 +74,13 @@ def devices(
     return 0
 
 
-def _daq(server: str | None) -> "tuple[list[FoundDevice], str | None]":
+def _daq(server: str | None, tls: "Tls | None", *, plain: bool) -> "tuple[list[FoundDevice], str | None]":
     """The NI devices; an empty list and the reason when the search failed."""
     try:
         require("ni", "the search for NI devices")
         from drivers.daqmx.devices import find_devices
 
-        return find_devices(server), None
+        return find_devices(server, tls, plain=plain), None
     except (MissingExtra, RigError) as error:
         return [], str(error)
 

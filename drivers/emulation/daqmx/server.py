@@ -166,7 +166,8 @@ class DaqServer:
 
     `drive` is the analogue output that drives the plant and `enable_line` the digital line of its enable relay; by
     default the first of the devices. `wires` replaces the wiring of the digital lines when more than the relay is
-    connected. `converter` is that of the plant's counts. `output_clock_error` is the relative excess rate of an output
+    connected. `converter` is that of the plant's counts. `credentials` are those of an encrypted server; without
+    any it is plain. `output_clock_error` is the relative excess rate of an output
     that does not follow the inputs' sample clock; the inputs' sample counter advances in steps of `packet`, as with
     packet transfer. Raises InvalidInput when the address is not available.
     """
@@ -182,6 +183,7 @@ class DaqServer:
         enable_line: str | None = None,
         wires: Wires | None = None,
         output_clock_error: float = 0.0,
+        credentials: Any = None,
         packet: int = 1,
     ) -> None:
         self._plant = plant
@@ -211,7 +213,11 @@ class DaqServer:
         add_SessionUtilitiesServicer_to_server(utilities, self._server)
         host = address.rpartition(":")[0]
         try:
-            port = int(self._server.add_insecure_port(address))
+            port = int(
+                self._server.add_insecure_port(address)
+                if credentials is None
+                else self._server.add_secure_port(address, credentials)
+            )
         except RuntimeError as error:
             self._pool.shutdown()
             raise InvalidInput("address", address, "it is in use already, or there is no such address") from error

@@ -1,0 +1,60 @@
+"""Encryption of the connection to a gRPC device server, as the server offers it: TLS, and mutual TLS with a client's
+certificate (wiki of NI's grpc-device, "Server Security Support"). The server knows no other credentials.
+"""
+
+import socket
+from ipaddress import ip_address
+from pathlib import Path
+from typing import Any, cast
+
+from drivers.daqmx.parameters import Tls
+from sim.errors import InvalidInput
+
+_REMEDY = (
+    "it is neither this computer nor in a private network, and over a plain connection others may read it and drive the"
+    " shaker: set hardware.daq.tls with the server's certificate, or hardware.daq.plain_connection = true"
+)
+
+
+def require_private(server: str) -> None:
+    """Raise InvalidInput for a server outside loopback, link-local and private networks. A name that is unknown passes:
+    nothing can be connected to.
+    """
+    host = server.rpartition(":")[0].strip("[]")
+    try:
+        found = socket.getaddrinfo(host, None)
+    except (OSError, UnicodeError):
+        return
+    for *_, place in found:
+        # a zone may follow an IPv6 address
+        if ip_address(str(place[0]).partition("%")[0]).is_global:
+            raise InvalidInput("hardware.daq.server", server, _REMEDY)
+
+
+def credentials(tls: Tls) -> Any:
+    """Credentials of a channel. Raises InvalidInput for a file that cannot be read or is no PEM file, and for one of
+    certificate and key without the other.
+    """
+    import grpc
+
+    if (tls.client_certificate is None) != (tls.client_key is None):
+        item = "hardware.daq.tls.client_key"
+        raise InvalidInput(item, tls.client_key, "give client_certificate and client_key, or neither")
+    names = ("root_certificate", "client_key", "client_certificate")
+    given = {name: _content(name, getattr(tls, name)) for name in names}
+    return cast(Any, grpc).ssl_channel_credentials(
+        given["root_certificate"], given["client_key"], given["client_certificate"]
+    )
+
+
+def _content(name: str, path: str | None) -> bytes | None:
+    if path is None:
+        return None
+    item = f"hardware.daq.tls.{name}"
+    try:
+        content = Path(path).read_bytes()
+    except OSError as error:
+        raise InvalidInput(item, path, f"it cannot be read: {error.strerror}") from None
+    if b"-----BEGIN " not in content:
+        raise InvalidInput(item, path, "it is no PEM file: convert it with `openssl x509` or `openssl pkey`")
+    return content
