@@ -5,6 +5,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as NotYet
 from queue import Full, Queue
+from subprocess import Popen, TimeoutExpired
 from threading import Condition, Event, Thread
 from typing import TypeVar
 
@@ -52,6 +53,21 @@ def put(queue: Queue[Item], item: Item, timeout: float) -> bool:
         return True
 
     return _repeat(within, timeout)
+
+
+def end(process: "Popen[bytes]", timeout: float) -> None:
+    """Wait until a process has ended; kills it after `timeout` [s]."""
+
+    def ended(step: float) -> bool:
+        try:
+            process.wait(step)
+        except TimeoutExpired:
+            return False
+        return True
+
+    if not _repeat(ended, timeout):
+        process.kill()
+        _repeat(ended, float("inf"))
 
 
 def sleep(seconds: float) -> None:

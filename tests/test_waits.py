@@ -5,6 +5,7 @@ Every wait in the sources is listed here with the reason why a signal need not e
 
 import ast
 import queue
+import subprocess
 import sys
 import threading
 import time
@@ -30,6 +31,7 @@ THREAD = "in a thread of its own, which no signal concerns"
 SHORT = "shorter than a step"
 NOT_LONG = "does not wait"
 CHILD = "for a child process of the same console, which the same Ctrl-C ends"
+OWN = "in a process of its own, which its parent ends"
 ASKS = "for a person's answer: the console ends it at Ctrl-C"
 
 LISTED = {
@@ -63,6 +65,8 @@ LISTED = {
     "bench/datafile/fields.py self._pool.shutdown": NOT_LONG,
     "bench/datafile/opening.py time.sleep": SHORT,
     "bench/datafile/recorder.py self._queue.get": THREAD,
+    "bench/datafile/held.py time.sleep": THREAD,
+    "bench/engine/stalls.py self._over.wait": THREAD,
     "bench/figures/text_table.py captured.get": NOT_LONG,
     "bench/provenance.py subprocess.run": CHILD,
     "bench/testing/resources.py time.sleep": SHORT,
@@ -72,6 +76,8 @@ LISTED = {
     "bench/twin/twin.py self._worker.shutdown": NOT_LONG,
     "bench/unfinished.py time.sleep": SHORT,
     "drivers/daqmx/connection.py ready.result": NOT_LONG,
+    "drivers/daqmx/clock_watch.py sys.stdin.buffer.readline": OWN,
+    "drivers/daqmx/clock_watch.py time.sleep": OWN,
     "drivers/emulation/bench.py self._over.wait": THREAD,
     "drivers/emulation/control.py lines.readline": THREAD,
     "drivers/emulation/control.py connection.shutdown": NOT_LONG,
@@ -82,10 +88,15 @@ LISTED = {
     "drivers/emulation/daqmx/timing.py changed.wait": THREAD,
     "drivers/emulation/daqmx/watchdog.py self._changed.wait": THREAD,
     "drivers/emulation/optoncdt/laser.py time.sleep": THREAD,
+    "drivers/hardware/ownership.py lock.acquire": NOT_LONG,
+    "drivers/hardware/ownership.py time.sleep": SHORT,
     "drivers/hardware/tracks.py sensor.wait": "waits in steps, in `drivers.optoncdt.stream`",
     "drivers/optoncdt/sensor.py self._stream.wait": "waits in steps, in `drivers.optoncdt.stream`",
     "drivers/optoncdt/sensor.py stream.wait": "waits in steps, in `drivers.optoncdt.stream`",
-    "drivers/optoncdt/stream.py time.sleep": THREAD,
+    "drivers/optoncdt/line.py commands.readline": OWN,
+    "drivers/optoncdt/line.py pending.get": OWN,
+    "drivers/optoncdt/line.py time.sleep": OWN,
+    "drivers/optoncdt/line.py writer.join": OWN,
     "sim/sweep.py future.result": "the futures are finished",
     "sim/sweep.py pool.shutdown": NOT_LONG,
 }
@@ -200,24 +211,31 @@ def _frozen_console(frozen: threading.Event) -> bool:
 
 def _frozen_port(frozen: threading.Event) -> bool:
     """The serial port does not return from a read."""
-    from drivers.optoncdt.dialogue import Dialogue
     from drivers.optoncdt.stream import Stream
 
-    class Port:
-        in_waiting = 0
+    class Line:
+        def chunks(self) -> Iterator[tuple[bytes, float]]:
+            frozen.wait(5.0)
+            yield from ()
 
-        def read(self, count: int) -> bytes:
-            if count:
-                frozen.wait(5.0)
-            return b""
+        def close(self) -> None: ...
+
+        def release(self) -> None: ...
 
     stream = Stream.__new__(Stream)
-    stream._over, stream._dialogue = False, Dialogue("laser", Port())  # type: ignore[arg-type]
+    stream._over, stream._line = True, Line()  # type: ignore[assignment]
     stream._thread = threading.Thread(target=stream._run)
     stream._thread.start()
-    time.sleep(0.01)
     stream.end()
     return True
+
+
+def _frozen_process(frozen: threading.Event) -> bool:
+    """A child process that hangs is killed."""
+    process = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"], stdin=subprocess.PIPE)
+    with process:
+        waiting.end(process, 0.3)
+    return waiting.wait(frozen, 1.0)
 
 
 def _frozen_disk(frozen: threading.Event, end: Callable[[Any], object], tmp_path: Path) -> bool:
@@ -255,6 +273,7 @@ FREEZES: dict[str, Callable[[threading.Event], bool]] = {
     "queue": _full_queue,
     "console": _frozen_console,
     "serial port": _frozen_port,
+    "child process": _frozen_process,
     "laboratory": _frozen_request,
 }
 

@@ -5,6 +5,7 @@ from collections import deque
 from typing import Self
 
 from drivers.clock import now
+from sim import waiting
 
 LONGEST = 0.1
 """Shortest time without running that is noted [s]: the default lead of the drive."""
@@ -32,7 +33,7 @@ class Stalls:
 
     def __exit__(self, *_: object) -> None:
         self._over.set()
-        self._thread.join()
+        waiting.join(self._thread)
 
     def since(self, instant: float) -> float:
         """The longest stall that ended after `instant` of the machine's clock [s]; 0 if there was none."""

@@ -15,6 +15,7 @@ from typing import IO
 
 from drivers.clock import now
 from drivers.daqmx.parameters import Daq
+from sim import waiting
 
 _READING = struct.Struct("<dqd")
 _PACE = 0.01
@@ -60,12 +61,8 @@ class ClockWatch:
         """End the process; allowed any number of times."""
         with suppress(OSError):
             self._input.close()
-        try:
-            self._process.wait(_ENDING)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
-        self._thread.join()
+        waiting.end(self._process, _ENDING)
+        waiting.join(self._thread)
         self._output.close()
 
     def _collect(self) -> None:

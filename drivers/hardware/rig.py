@@ -43,7 +43,8 @@ class HardwareRig(RigBase):
     def __init__(self, hardware: Hardware, *, lead: int, further: Sequence[FurtherChannel] = ()) -> None:
         inputs = [*(one for _, one in (*hardware.transducers, *hardware.analogue_lasers)), *further]
         with ExitStack() as opened:
-            opened.enter_context(owned(devices_of(hardware)))
+            self._ownership = opened.enter_context(ExitStack())
+            self._ownership.enter_context(owned(devices_of(hardware)))
             # the DAQ first: opening it makes the bench safe after any earlier program
             self._daq = DaqSession(hardware.daq, inputs, hardware.sample_rate, lead)
             opened.callback(self._daq.close)

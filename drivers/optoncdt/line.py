@@ -24,6 +24,7 @@ from serial import Serial
 from drivers.clock import now
 from drivers.errors import ConnectionLost, DeviceNotFound
 from drivers.optoncdt.port import open_port
+from sim import waiting
 
 _HEAD = struct.Struct("<dI")
 _PACE = 0.0025
@@ -74,11 +75,7 @@ class Line:
         """End the process and release the port; allowed any number of times."""
         with suppress(OSError):
             self._input.close()
-        try:
-            self._process.wait(_ENDING)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+        waiting.end(self._process, _ENDING)
 
     def release(self) -> None:
         """Close the pipe from the process, after the last use of `chunks`."""
@@ -96,13 +93,13 @@ class Line:
 
 def _serve(who: str, name: str, baud: int, commands: IO[bytes], frames: IO[bytes]) -> None:
     """Read the port until `commands` ends; write frames in another thread, so that a full pipe never delays a read."""
-    waiting: queue.SimpleQueue[tuple[bytes, float] | None] = queue.SimpleQueue()
-    writer = threading.Thread(target=_write, args=(waiting, frames))
+    pending: queue.SimpleQueue[tuple[bytes, float] | None] = queue.SimpleQueue()
+    writer = threading.Thread(target=_write, args=(pending, frames))
     writer.start()
     over = threading.Event()
     try:
         with open_port(who, name, baud) as port:
-            waiting.put((b"", now()))
+            pending.put((b"", now()))
             threading.Thread(target=_forward, args=(commands, port, over), daemon=True).start()
             while not over.is_set():
                 time.sleep(_PACE)
@@ -110,22 +107,22 @@ def _serve(who: str, name: str, baud: int, commands: IO[bytes], frames: IO[bytes
                 chunk = port.read(port.in_waiting) + port.read(1)
                 chunk += port.read(port.in_waiting)
                 if chunk:
-                    waiting.put((chunk, now()))
+                    pending.put((chunk, now()))
     except DeviceNotFound as error:
-        waiting.put((str(error).encode(), nan))
+        pending.put((str(error).encode(), nan))
     except Exception as error:
         # the library raises various errors when a port disappears
         told = f"{who} was disconnected ({error}); plug it in, check its power, and reopen it"
-        waiting.put((told.encode(), nan))
+        pending.put((told.encode(), nan))
     finally:
-        waiting.put(None)
+        pending.put(None)
         writer.join()
 
 
-def _write(waiting: "queue.SimpleQueue[tuple[bytes, float] | None]", frames: IO[bytes]) -> None:
+def _write(pending: "queue.SimpleQueue[tuple[bytes, float] | None]", frames: IO[bytes]) -> None:
     # the program may have ended
     with suppress(OSError):
-        while (one := waiting.get()) is not None:
+        while (one := pending.get()) is not None:
             chunk, arrival = one
             frames.write(_HEAD.pack(arrival, len(chunk)) + chunk)
             frames.flush()

@@ -313,6 +313,8 @@ class TestADeadClient:
         assert "none" in rig.description["watchdog"]
         play(started(rig), np.full(1000, 2.0), 200)
         rig._daq._connection.close()
+        # the system releases the locks of a process that has ended
+        rig._ownership.close()
         return rig
 
     @pytest.mark.parametrize(
