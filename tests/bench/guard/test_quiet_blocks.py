@@ -128,9 +128,16 @@ def _decisions(bench: Bench, *, short: bool) -> list[tuple[list[Violation], list
     return found
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(benches())
 def test_decisions_are_those_of_the_comparison_of_every_sample(bench: Bench) -> None:
+    assert _decisions(bench, short=True) == _decisions(bench, short=False)
+
+
+@pytest.mark.soak
+@settings(max_examples=2000, deadline=None)
+@given(benches())
+def test_decisions_are_those_of_the_comparison_of_every_sample_on_many_benches(bench: Bench) -> None:
     assert _decisions(bench, short=True) == _decisions(bench, short=False)
 
 
@@ -173,7 +180,7 @@ def test_the_heating_of_blocks_passed_over_is_made_up_for_bit_for_bit() -> None:
             skipping.skip(values, skipping.bounds(values, extremes))
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(benches())
 def test_all_channels_at_once_have_the_values_of_each(bench: Bench) -> None:
     conversion = Conversion(bench.channels)

@@ -16,7 +16,7 @@ MEMORY = 200_000
 """Largest growth of the memory [kB]."""
 COMMANDS = ("file info", "file verify", "file recover", "export", "report", "replay", "analyse")
 KINDS = kinds()
-SOME = KINDS[:60] + KINDS[60::7]
+SOME = KINDS[:60] + KINDS[60::18]
 
 
 @pytest.fixture(scope="module")
