@@ -24,8 +24,8 @@ DELAY = 2
 """Number of cycles from a measured cycle to the one in which its correction begins."""
 
 BLEND = 0.5
-"""Part of a cycle in which a correction blends in. A whole cycle weakens it by 20 to 30 %, as successive corrections have
-nearly opposite signs.
+"""Part of a cycle in which a correction blends in. A whole cycle weakens it by 20 to 30 %, as successive corrections
+have nearly opposite signs.
 """
 
 COST = 100.0
