@@ -3,11 +3,13 @@
 import json
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from bench.app.preflight import compile_run
+from bench.app.support.awake import awake
 from bench.config.model import BenchConfiguration
 from bench.datafile.recorder import PATIENCE, Recorder
 from bench.engine.engine import configured_engine
@@ -83,7 +85,10 @@ def run_session(
     if requests.strongest is not None:
         raise KeyboardInterrupt
     rig = open_rig(configuration, realtime=realtime)
+    held = ExitStack()
     try:
+        if not isinstance(rig.clock, VirtualClock):
+            held.enter_context(awake())
         # opening takes a long time: an end requested meanwhile leaves neither folder nor file
         if requests.strongest is not None:
             raise KeyboardInterrupt
@@ -116,6 +121,7 @@ def run_session(
             recorder.close(status, reason)
     finally:
         _closing(rig)
+        held.close()
     with plugin_code(name):
         result = result_of(engine.returned, prepared, stream.points)
     figures = [out / file for file in protocol.figures if file in result.figures]

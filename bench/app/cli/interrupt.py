@@ -15,6 +15,7 @@ from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import TYPE_CHECKING, NoReturn
 
+from bench.app.cli.closing import watch_console
 from bench.app.cli.output import print_error, report_error
 from bench.unfinished import completed, remove_unfinished
 
@@ -197,6 +198,7 @@ def handle_signals(interrupts: Interrupts) -> None:
     sys.unraisablehook = unraisable
     _watch = Watch()
     _watch.start()
+    watch_console()
     for number in SIGNALS:
         # a program started with nohup must continue
         if number.name != "SIGHUP" or signal.getsignal(number) is not signal.SIG_IGN:

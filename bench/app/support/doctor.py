@@ -5,6 +5,7 @@ import os
 import platform
 import shutil
 import socket
+import subprocess
 import sys
 import tempfile
 import time
@@ -59,6 +60,8 @@ def examine(folder: Path, port: str | None = None) -> Iterator[Finding]:
         "disk space": lambda: disk_space(folder),
         "disk speed": lambda: disk_speed(folder),
         "power settings": power,
+        "sleep": sleep,
+        "USB suspend": usb_suspend,
         "serial ports": serial_ports,
         "OpenGL": opengl,
         **({} if port is None else {"device server": lambda: device_server(port)}),
@@ -133,6 +136,64 @@ def power(governor: Path = Path("/sys/devices/system/cpu/cpu0/cpufreq/scaling_go
     if mode in ("powersave", "conservative"):
         return Finding(item, Health.NOTICE, f"governor {mode}", "select the performance governor")
     return Finding(item, Health.GOOD, f"governor {mode}")
+
+
+def sleep(which: Callable[[str], str | None] = shutil.which, system: str = sys.platform) -> Finding:
+    """Check whether a run can keep the computer from falling asleep."""
+    item = "sleep"
+    if system == "win32":
+        return Finding(item, Health.GOOD, "a run keeps the computer awake; closing the lid still suspends it")
+    program = {"linux": "systemd-inhibit", "darwin": "caffeinate"}.get(system)
+    if program is not None and which(program) is not None:
+        return Finding(item, Health.GOOD, f"a run keeps the computer awake ({program})")
+    remedy = "switch off sleep in the power settings of this computer"
+    return Finding(item, Health.NOTICE, "a run cannot keep the computer awake", remedy)
+
+
+def usb_suspend(devices: Path = Path("/sys/bus/usb/devices"), system: str = sys.platform) -> Finding:
+    """Check whether USB devices are suspended when idle: NI's devices, and serial adapters."""
+    item = "USB suspend"
+    if system == "win32":
+        return _usb_suspend_of_windows(_answer("powercfg", "/query", "SCHEME_CURRENT", "SUB_USB", _SELECTIVE))
+    suspended = [path.parent.parent for path in sorted(devices.glob("*/power/control")) if _read(path) == "auto"]
+    ours = [device.name for device in suspended if _read(device / "idVendor") in _VENDORS]
+    if not ours:
+        return Finding(item, Health.GOOD, "no device of NI and no serial adapter is suspended")
+    remedy = f"write on to power/control of each in {devices}, or a rule of udev that does"
+    return Finding(item, Health.BAD, f"may be suspended: {', '.join(ours)}", remedy)
+
+
+_SELECTIVE = "48e6b7a6-50f5-4782-a5d4-53bb8f07e226"
+"""Identifier of the setting "USB selective suspend" (Microsoft's documentation of power settings)."""
+_VENDORS = {"3923": "NI", "0403": "FTDI", "10c4": "Silicon Labs", "067b": "Prolific", "1a86": "WCH"}
+"""Makers of USB devices of a bench, by identifier."""
+
+
+def _usb_suspend_of_windows(told: str) -> Finding:
+    """Judge the answer of powercfg: the last number is the setting on batteries, the one before that on mains power."""
+    item = "USB suspend"
+    found = [word for word in told.split() if word.startswith("0x")]
+    if len(found) < 2:
+        return Finding(item, Health.UNKNOWN, "not determined", "switch off USB selective suspend in the power plan")
+    if any(int(each, 16) for each in found[-2:]):
+        remedy = "switch it off: Power Options, advanced settings, USB settings"
+        return Finding(item, Health.BAD, "USB selective suspend is on", remedy)
+    return Finding(item, Health.GOOD, "USB selective suspend is off")
+
+
+def _answer(*command: str) -> str:
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, errors="replace", timeout=10.0, check=False)
+    except subprocess.TimeoutExpired:
+        return ""
+    return done.stdout
+
+
+def _read(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8").strip()
+    except OSError:
+        return ""
 
 
 def serial_ports(adapters: Path = Path("/sys/bus/usb-serial/devices"), devices: Path = Path("/dev")) -> Finding:

@@ -1,0 +1,47 @@
+"""A console that is closed on Windows, where no signal states it: the run ends as after Ctrl-C.
+
+Windows ends the process as soon as the handler returns, and after 5 s in any case: the handler waits for the end of the
+run, whose fast ramp and file need about a second.
+"""
+
+import signal
+import sys
+import threading
+from _thread import interrupt_main
+from collections.abc import Callable
+from typing import Any
+
+CLOSED = (2, 5, 6)
+"""Console events: the window was closed, the user logs off, the computer shuts down."""
+GRANTED = 4.5
+"""Longest wait for the end of the process [s]."""
+
+_kept: list[Any] = []
+"""The registered handler; Windows does not keep it alive."""
+
+
+def handler(interrupt: Callable[[int], object], number: int) -> Callable[[int], bool]:
+    """The console's handler, called in a thread of its own: `interrupt(number)` for a console that goes away, then it
+    waits for the end of the process. Other events are left to Python.
+    """
+
+    def handle(event: int) -> bool:
+        if event not in CLOSED:
+            return False
+        interrupt(number)
+        threading.Event().wait(GRANTED)
+        return True
+
+    return handle
+
+
+def watch_console() -> None:
+    """Handle a console that is closed as SIGBREAK; no effect on other systems, which send SIGHUP."""
+    if sys.platform != "win32":
+        return
+    import ctypes
+    from ctypes import wintypes
+
+    made = ctypes.WINFUNCTYPE(wintypes.BOOL, wintypes.DWORD)(handler(interrupt_main, signal.SIGBREAK))
+    if ctypes.windll.kernel32.SetConsoleCtrlHandler(made, True):
+        _kept.append(made)

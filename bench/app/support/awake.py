@@ -1,0 +1,75 @@
+"""Keeps the computer awake during a run in real time: sleep would end it, with the drive at its last value.
+
+Suspension of USB devices cannot be inhibited by a program: `rockbench doctor` checks its settings.
+"""
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Generator
+from contextlib import contextmanager, suppress
+
+from sim import waiting
+
+CONTINUOUS, SYSTEM_REQUIRED = 0x80000000, 0x00000001
+"""Flags of SetThreadExecutionState: until changed, and no sleep."""
+ENDING = 1.0
+"""Longest wait for the end of the inhibiting program [s]."""
+
+COMMANDS = {
+    "linux": (
+        *("systemd-inhibit", "--what=sleep:idle", "--who=rockbench", "--why=a run is under way", "--mode=block"),
+        *(sys.executable, "-c", "import sys; sys.stdin.read()"),
+    ),
+    "darwin": ("caffeinate", "-i", "-w", str(os.getpid())),
+}
+"""Programs that keep the computer awake until their standard input ends, or this process does."""
+
+
+@contextmanager
+def awake(system: str = sys.platform) -> Generator[bool]:
+    """Context manager in which the computer does not fall asleep by itself. Yields whether this was possible."""
+    if system == "win32":
+        with _thread_required(_windows_state()) as required:
+            yield required
+        return
+    command = COMMANDS.get(system)
+    process = None
+    if command is not None:
+        with suppress(OSError):
+            # a session of its own: Ctrl-C is for this program alone
+            process = subprocess.Popen(
+                command,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                start_new_session=True,
+            )
+    try:
+        yield process is not None
+    finally:
+        if process is not None:
+            with suppress(OSError):
+                assert process.stdin is not None
+                process.stdin.close()
+            if system == "darwin":
+                process.terminate()
+            waiting.end(process, ENDING)
+
+
+@contextmanager
+def _thread_required(set_state: Callable[[int], int]) -> Generator[bool]:
+    """Request a running system for this thread, and withdraw the request; `set_state` returns 0 when it fails."""
+    required = set_state(CONTINUOUS | SYSTEM_REQUIRED) != 0
+    try:
+        yield required
+    finally:
+        set_state(CONTINUOUS)
+
+
+def _windows_state() -> Callable[[int], int]:
+    if sys.platform != "win32":
+        return lambda _: 0
+    import ctypes
+
+    return ctypes.windll.kernel32.SetThreadExecutionState
