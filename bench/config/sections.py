@@ -14,7 +14,7 @@ class Acquisition(Parameters):
         0.1,
         "s",
         "length of a block of samples: one iteration of the acquisition loop",
-        ge=0.01,
+        ge=0.005,
         le=0.2,
     )
 
@@ -25,6 +25,19 @@ class Acquisition(Parameters):
         ge=0.0,
         le=2.0,
     )
+
+
+Profile = Literal["fast", "steady"]
+"""Reaction profiles: the shortest blocks and lead that a device sustains, or those of a busy computer."""
+FAST, FAST_OVER_NETWORK, STEADY = (0.005, 0.01), (0.01, 0.02), (0.1, 0.1)
+"""Block duration and lead [s]: with inputs at this computer, behind a gRPC server, and the defaults."""
+
+
+def acquisition_of(profile: Profile, *, networked: bool) -> Acquisition:
+    """The timing of a reaction profile; `networked`: each call to the device takes most of a millisecond."""
+    fast = FAST_OVER_NETWORK if networked else FAST
+    block, lead = fast if profile == "fast" else STEADY
+    return Acquisition(block_duration=block, lead=lead)
 
 
 class Simulation(Parameters):

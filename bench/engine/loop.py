@@ -65,6 +65,8 @@ class Loop:
                 Warned(f"{near.quantity} {near.value:.4g} {near.unit} approaches its limit {near.limit:.4g}")
             )
         self._runaway = exchange.runaway
+        if exchange.violation is not None and exchange.violation.cuts:
+            self._cut(exchange.violation)
         if exchange.violation is not None and self._over is None:
             self._exceeded(exchange.violation)
         self.check_requests()
@@ -117,6 +119,12 @@ class Loop:
             stalled = self.output.stalled if over.timing else 0.0
             reason = f"{over}; {in_words(stalled)}" if stalled else str(over)
             self._end(State.ABORTING, Ending("aborted", reason, _cause(over)))
+
+    def _cut(self, over: Violation) -> Never:
+        """Cut the enable line now, also during a ramp: the samples queued in the device are not waited for."""
+        self._over = over
+        self._stream.publish(LimitExceeded(over.quantity, over.value, over.limit, over.unit, over.timing))
+        raise Ended(self.output.cut(Ending("halted", f"{over}: the enable line was cut", _cause(over))))
 
     def _end(self, way: State, ending: Ending) -> Never:
         if self.output.state is not State.IDLE:

@@ -131,7 +131,7 @@ class Guard:
         exceeded, near = self._motion.check(block.first, values, signals, extremes)
         exceeded += self._sensors.check(block.first, block.counts, values, played, extremes)
         exceeded += self._time.check(self._rig.clock.now(), self._expected)
-        exceeded.sort(key=lambda violation: violation.sample)
+        exceeded.sort(key=lambda violation: (not violation.cuts, violation.sample))
         seen = exceeded[0] if exceeded else None
         if seen is not None:
             self.abort()
@@ -139,7 +139,16 @@ class Guard:
         if opened:
             self._cut_because(opened)
         runaway = next((violation for violation in exceeded if violation.of_table), None)
-        return Exchange(block, values, signals, played, refused or seen, tuple(near), opened, runaway)
+        return Exchange(
+            block,
+            values,
+            signals,
+            played,
+            seen if seen is not None and seen.cuts else refused or seen,
+            tuple(near),
+            opened,
+            runaway,
+        )
 
     def refusal(self, volts: NDArray[np.float64]) -> Violation | None:
         """Limit that commands [V], shape (n,), would exceed if sent now, or None."""

@@ -90,6 +90,13 @@ class Limits(Parameters):
     confirmed: tuple[Confirmable, ...] = quantity(
         (), "", "keys of limits intentionally set beyond the range of this bench; every run reports them"
     )
+    cut: tuple[Literal["displacement", "force"], ...] = quantity(
+        (),
+        "",
+        "limits that cut the enable line in one call instead of ramping the drive through the queued samples: sooner by"
+        " acquisition.lead, but the amplifier then brakes the table harder than limits.acceleration",
+        example=["displacement"],
+    )
     warning: Warnings = Warnings()
     debounce: Debounce = Debounce()
 
@@ -127,7 +134,7 @@ class Violation:
     """Exceeded limit: `quantity` reached `value` beyond `limit`, in `unit`, at this sample index since arming.
 
     `of_table`: the limit concerns motion or load of the table, not a sensor, a clock or the specimen. `timing`: the
-    limit concerns the arrival times of blocks, which the samples do not contain.
+    limit concerns the arrival times of blocks, which the samples do not contain. `cuts`: it cuts the enable line.
     """
 
     quantity: str
@@ -137,6 +144,7 @@ class Violation:
     sample: int
     of_table: bool = False
     timing: bool = False
+    cuts: bool = False
 
     def __str__(self) -> str:
         return f"{self.quantity} {self.value:.4g} {self.unit} exceeds {self.limit:.4g} {self.unit}"

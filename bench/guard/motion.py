@@ -83,6 +83,7 @@ class MotionWatch:
             self._names[each.name] = each.name, each.unit
             self._limits[each.name], self._warn_at[each.name] = each.limit, each.warning * each.limit
             debounce[each.name] = round(each.debounce * sample_rate)
+        self._cut = frozenset[str](limits.cut)
         self._over = {key: Persistence(samples) for key, samples in debounce.items()}
         self._near = {key: Persistence(samples) for key, samples in debounce.items()}
         self._quiet_below = {key: min(limit, self._warn_at[key]) for key, limit in self._limits.items()}
@@ -141,7 +142,7 @@ class MotionWatch:
 
     def _violation(self, key: str, size: NDArray[np.float64], limit: float, first: int, at: int) -> Violation:
         name, unit = self._names[key]
-        return Violation(name, float(size[at]), limit, unit, first + at, key in _OF_TABLE)
+        return Violation(name, float(size[at]), limit, unit, first + at, key in _OF_TABLE, cuts=key in self._cut)
 
 
 def _check_reach(channels: tuple[Channel, ...], limits: Limits, further: Sequence[ChannelLimit]) -> None:

@@ -4,6 +4,7 @@ reacts.
     python -m tests.benchmarks.faults                     all of it, half an hour on two cores
     python -m tests.benchmarks.faults --bench simulated   the virtual bench only, three minutes
     python -m tests.benchmarks.faults --only laser        faults whose name contains a text
+    python -m tests.benchmarks.faults --trips 1000        1000 reactions of the profile fast at random phases
     python -m tests.benchmarks.faults --reaction          the table of reaction times only
 
 Prints, for every fault and for every state of the engine, at how many places it was put in, how often it struck, how
@@ -26,6 +27,7 @@ from time import perf_counter
 
 import numpy as np
 
+from bench.config.sections import FAST
 from bench.engine.interface import SEVERITY
 from tests.faults.audit import Verdict, judge
 from tests.faults.catalogue import catalogue
@@ -85,6 +87,10 @@ def report(bench: str, found: list[Verdict]) -> bool:
     return bool(found) and not offenders
 
 
+FASTEST = 20.0
+"""Longest reaction of the profile fast [ms]."""
+
+
 def matrix(bench: str, only: str) -> bool:
     """Put all that goes wrong into one bench; whether all was as it should be."""
     return report(bench, list({"simulated": simulated, "emulated": emulated}[bench](only)))
@@ -109,13 +115,31 @@ def reaction_table(found: list[list[Reaction]]) -> str:
     return "\n".join(lines)
 
 
+def trips(count: int) -> bool:
+    """Reactions of the profile fast at random phases, with their histogram; whether all are as promised and in 20 ms."""
+    block, lead = (round(seconds * RATE) for seconds in FAST)
+    random = np.random.default_rng(1)
+    found = [react(block, lead, float(phase)) for phase in random.uniform(size=count)]
+    times = np.array([one.measured for one in found]) * 1e3 / RATE
+    print(f"{count} trips in the profile fast, promised {1e3 * found[0].promised / RATE:.1f} ms:")
+    for low in np.arange(np.floor(times.min()), times.max() + 1e-9):
+        number = int(np.count_nonzero((times >= low) & (times < low + 1.0)))
+        print(f"{low:5.0f} ms {number:5d} {'#' * round(60 * number / count)}")
+    within = bool(times.max() <= FASTEST) and all(one.measured <= one.promised for one in found)
+    print(f"worst {times.max():.1f} ms, allowed {FASTEST:.0f} ms: {'met' if within else 'NOT MET'}")
+    return within
+
+
 def main() -> int:
     """Command line; returns the exit status."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--only", default="")
     parser.add_argument("--reaction", action="store_true")
     parser.add_argument("--bench", choices=("simulated", "emulated", "both"), default="both")
+    parser.add_argument("--trips", type=int, default=0, help="reactions at so many random phases, and nothing else")
     options = parser.parse_args()
+    if options.trips:
+        return int(not trips(options.trips))
     begin = perf_counter()
     both = ("simulated", "emulated") if os.name == "posix" else ("simulated",)
     benches = both if options.bench == "both" else (options.bench,)

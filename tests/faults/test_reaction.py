@@ -2,7 +2,8 @@
 
 import pytest
 
-from tests.faults.reaction import react
+from bench.config.sections import FAST
+from tests.faults.reaction import RATE, react
 
 
 @pytest.mark.parametrize(("block", "lead"), [(20, 0), (100, 100), (200, 200), (400, 100)])
@@ -10,3 +11,10 @@ from tests.faults.reaction import react
 def test_one_block_and_the_lead(block: int, lead: int, phase: float) -> None:
     reaction = react(block, lead, phase)
     assert lead <= reaction.measured <= reaction.promised
+
+
+@pytest.mark.parametrize("phase", [0.05, 0.35, 0.65, 0.95])
+def test_the_profile_fast_reacts_within_20_ms(phase: float) -> None:
+    block, lead = (round(seconds * RATE) for seconds in FAST)
+    reaction = react(block, lead, phase)
+    assert reaction.measured <= reaction.promised <= 0.020 * RATE

@@ -36,6 +36,8 @@ CHANGED: dict[str, Any] = {
     ),
     # so are rig backends: those of other packages have names of their own
     "configuration: backend: allowed": "a text",
+    # the profile fast has blocks of 5 ms
+    "configuration: acquisition.block_duration: allowed": "a number at least 0.005 and at most 0.2",
 }
 """What another value is meant for today, as "part: name: what" (such as "options: run harmonic --starts: default") to
 that value, each with the reason beside it.

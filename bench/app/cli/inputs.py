@@ -15,6 +15,7 @@ from sim.parameters import Parameters
 if TYPE_CHECKING:
     from bench.accelerograms.accelerogram import Accelerogram
     from bench.config.model import BenchConfiguration
+    from bench.config.sections import Profile
     from sim.knowledge import SpecimenKnowledge
     from sim.specimen import Specimen
 
@@ -73,6 +74,19 @@ def configuration_from(file: Path | None, seed: str | None, specimen: Path | Non
     wanted = read_fields(Simulation, {"seed": seed})
     simulation = configuration.simulation.model_dump(mode="json") | wanted
     return configuration.model_copy(update={"simulation": validated(Simulation, simulation, lambda _path: "--seed")})
+
+
+def with_profile(configuration: "BenchConfiguration", profile: "Profile | None") -> "BenchConfiguration":
+    """The configuration with the timing of a profile. Raises InvalidInput where its devices do not allow it."""
+    if profile is None:
+        return configuration
+    from bench.config.model import BenchConfiguration
+    from bench.config.sections import acquisition_of
+
+    networked = configuration.backend == "hardware" and configuration.hardware.daq.server is not None
+    timing = acquisition_of(profile, networked=networked)
+    data = configuration.model_dump(mode="json") | {"acquisition": timing.model_dump(mode="json")}
+    return validated(BenchConfiguration, data, lambda path: f"--profile {profile}: {dotted(path)}")
 
 
 def request_from(model: type[P], arguments: Mapping[str, Any]) -> P:

@@ -9,7 +9,7 @@ from inspect import Parameter as Argument
 from inspect import Signature, signature
 from math import isclose
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from cyclopts import Group, Parameter
 
@@ -166,6 +166,14 @@ class RunOptions:
         ),
     ] = None
     seed: Seed = None
+    profile: Annotated[
+        Literal["fast", "steady"] | None,
+        Parameter(
+            help="Timing of the acquisition, in place of block_duration and lead of [acquisition]: fast reacts to a "
+            "limit within 20 ms (35 ms behind a gRPC server, without serial lasers) and needs an idle computer; steady "
+            "within 0.2 s.",
+        ),
+    ] = None
     operator: Annotated[str, Parameter(metavar="NAME", help="Name of the operator, stored in the data file.")] = ""
     note: Annotated[
         tuple[str, ...],

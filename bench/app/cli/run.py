@@ -76,12 +76,13 @@ def command_of(protocol: "Protocol[Any]") -> Callable[..., int]:
 
 def _run(protocol: "Protocol[Any]", typed: Mapping[str, Any], options: RunOptions, progress: Progress) -> int:
     progress("reading protocol and bench")
-    from bench.app.cli.inputs import configuration_from, parameters_from
+    from bench.app.cli.inputs import configuration_from, parameters_from, with_profile
     from bench.app.cli.terminal import choose
     from bench.app.folders import check_folder, default_folder, make_folder, remove_unused, result_names
 
     parameters = parameters_from(protocol.parameters, typed, options.protocol_file)
     configuration = configuration_from(options.config, options.seed, options.specimen)
+    configuration = with_profile(configuration, options.profile)
     out = options.out or default_folder(protocol.name, datetime.now())
     check_folder(out, result_names(protocol))
     if options.queue is not None:

@@ -318,3 +318,22 @@ def test_a_key_with_both_names_is_refused(file: Callable[[str], Path]):
 
 def test_a_refused_value_of_a_former_name_is_named_as_it_is_called_now(file: Callable[[str], Path]):
     assert "hardware.daq.timeout_margin = 0" in refusal(file("[hardware.daq]\npatience = 0.0\n"))
+
+
+def test_a_profile_sets_block_and_lead_and_is_refused_where_the_devices_are_too_slow():
+    from bench.app.cli.inputs import with_profile
+
+    here = BenchConfiguration(backend="hardware", hardware=Hardware(lasers=Lasers(connection="analogue")))
+    networked = here.model_copy(
+        update={"hardware": here.hardware.model_copy(update={"daq": Daq(server="crio.local:31763")})}
+    )
+    assert with_profile(here, None) is here
+    for configuration, profile, block, lead in (
+        (here, "fast", 0.005, 0.01),
+        (networked, "fast", 0.01, 0.02),
+        (here, "steady", 0.1, 0.1),
+    ):
+        found = with_profile(configuration, profile).acquisition
+        assert (found.block_duration, found.lead) == (block, lead)
+    with pytest.raises(InvalidInput, match=r"--profile fast.*acquisition\.block_duration.*analogue lasers"):
+        with_profile(BenchConfiguration(backend="hardware"), "fast")

@@ -471,3 +471,17 @@ def test_the_cause_of_a_limit_is_its_quantity_and_of_a_safety_input_its_name() -
     opened = Bench()
     opened.rig.safety = {"emergency stop": False}
     assert opened.run(_plan(*RUN)).cause == Cause("safety_input", "emergency stop")
+
+
+def test_a_limit_that_cuts_opens_the_enable_line_without_a_ramp() -> None:
+    ramped = Bench(limits=Limits(displacement=0.001))
+    cut = Bench(limits=Limits(displacement=0.001, cut=("displacement",)))
+    assert ramped.run(_plan(*RUN)).status == "aborted"
+    ending = cut.run(_plan(*RUN))
+    assert (ending.status, ending.cause) == ("halted", Cause("limit", "table displacement"))
+    assert ending.reason.endswith("the enable line was cut")
+    assert cut.rig.halted
+    assert not ramped.rig.halted
+    assert cut.rig.played.size < ramped.rig.played.size
+    assert sum(isinstance(event, LimitExceeded) for event in cut.events) == 1
+    assert cut.states()[-2:] == [State.HALTED, State.CLOSED]
