@@ -116,7 +116,7 @@ def reaction_table(found: list[list[Reaction]]) -> str:
 
 
 def trips(count: int) -> bool:
-    """Reactions of the profile fast at random phases, with their histogram; whether all are as promised and in 20 ms."""
+    """Print a histogram of reactions in the profile fast at random phases; whether all are as promised, in 20 ms."""
     block, lead = (round(seconds * RATE) for seconds in FAST)
     random = np.random.default_rng(1)
     found = [react(block, lead, float(phase)) for phase in random.uniform(size=count)]
