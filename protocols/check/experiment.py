@@ -59,7 +59,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 REST = 2.0
-"""Time at rest before the table moves, for the zero of the signals [s]."""
+"""Time at rest before the table moves, in which the signals are zeroed [s]."""
 
 WIDTH = 118
 """Width of a text line in characters."""
@@ -68,7 +68,7 @@ _OUTSIDE = 1.5
 """Position at which values far beyond their limits are drawn."""
 
 _DRIVE = len(SIGNALS)
-_FALLEN = "storey 1 has a permanent offset although no block is on the table: check lasers and specimen"
+_FALLEN = "storey 1 has a permanent offset although there is no block on the table: check lasers and specimen"
 
 _CLAMP = (
     "Remove spring and block from the table and clamp both storeys to it. Keep clear: the amplifier will be enabled."
@@ -91,10 +91,10 @@ class LoopCheck(Prepared[CheckParameters]):
         if velocity > limits.velocity:
             raise InvalidInput("velocity", velocity, f"limits.velocity = {limits.velocity:g} m/s")
         if velocity / slow > reach:
-            needs = f"{velocity:g} m/s needs {1e3 * velocity / slow:.1f} mm there, the bench allows"
+            needs = f"at this frequency {velocity:g} m/s needs {1e3 * velocity / slow:.1f} mm, but the bench allows"
             raise InvalidInput("omega", slow, f"{needs} {1e3 * reach:.1f} mm")
         if velocity * fast > limits.acceleration:
-            needs = f"{velocity:g} m/s needs {velocity * fast:.3g} m/s2 there, limits.acceleration ="
+            needs = f"at this frequency {velocity:g} m/s needs {velocity * fast:.3g} m/s2, but limits.acceleration ="
             raise InvalidInput("omega", fast, f"{needs} {limits.acceleration:g} m/s2")
 
     @cached_property
@@ -122,7 +122,7 @@ class LoopCheck(Prepared[CheckParameters]):
 
 
 def _steps(parameters: CheckParameters, configuration: BenchConfiguration) -> Generator[Step, Outcome, None]:
-    """Steps of the check; each line is published as a point when it is measured."""
+    """Steps of the check; each line is published as a point when it has been measured."""
     bare = configuration.known_specimen.bare()
     yield OperatorAction(OperatorTask.LOCK_FRAME, bare, _CLAMP)
     yield Publish(StepStarted("acquire at rest"))
@@ -132,7 +132,7 @@ def _steps(parameters: CheckParameters, configuration: BenchConfiguration) -> Ge
     yield from _publish(safety_lines(configuration))
     resting = list(resting_lines(heard, parameters, configuration.analysis))
     if heard.violation is not None and all(line.verdict is not Verdict.FAILED for line in resting):
-        resting.append(failed("table", "rest", f"{heard.violation} without drive: check amplifier and limits"))
+        resting.append(failed("table", "rest", f"{heard.violation} at zero drive: check amplifier and limits"))
     yield from _publish(resting)
     yield from _publish(input_lines(heard.channels))
     if any(line.verdict is Verdict.FAILED for line in resting):
@@ -169,7 +169,9 @@ def _publish(lines: Iterable[CheckLine]) -> Generator[Step, Outcome, None]:
 
 
 def _measured_sines(parameters: CheckParameters) -> Generator[Step, Outcome, Sines]:
-    """Calibrate the drive carefully, then drive and measure. Raises Unmeasurable if the response is insufficient."""
+    """Calibrate the drive in small steps, then drive the table and measure. Raises Unmeasurable if the response is
+    insufficient.
+    """
     omegas = sorted(parameters.omega)
     yield Publish(StepStarted("calibrate the drive"))
     # the travel of the table is smallest at the highest frequency
@@ -189,7 +191,7 @@ def _measured_sines(parameters: CheckParameters) -> Generator[Step, Outcome, Sin
         cycles = outcome.cycles[SETTLING:]
         need_cycles(cycles, parameters.cycles)
         found.append(np.mean([cycle.fundamental for cycle in cycles], axis=0))
-    yield Publish(Progress(1.0, 0.0, "finished the common motion"))
+    yield Publish(Progress(1.0, 0.0, "common motion finished"))
     columns = np.array(found).T
     return Sines(
         omega=np.array(omegas),
@@ -220,7 +222,7 @@ _COLUMNS = (
 
 
 def _table(lines: Sequence[CheckLine]) -> str:
-    """Table with a row for each line, its remedy below, and the number of lines by verdict."""
+    """Table with a row for each line, the remedies below, and the number of lines by verdict."""
     title, rule, *rows = text_table(_COLUMNS, map(_cells, lines)).splitlines()
     text = [title, rule]
     for line, row in zip(lines, rows, strict=True):

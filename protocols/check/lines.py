@@ -27,8 +27,8 @@ Amplitudes = NDArray[np.complex128]
 class Sines:
     """Complex amplitudes c at `omega` [rad/s], shape (n,) each, with signal = Re(c exp(-i omega t)).
 
-    The four sensors measure a common motion; amplitudes are displacements [m], for the accelerometer acceleration over
-    -omega^2. `drive` is in volts, `acceleration` in m/s2.
+    The four sensors measure a common motion; amplitudes are displacements [m], for the accelerometer computed as
+    acceleration / -omega^2. `drive` is in volts, `acceleration` in m/s2.
     """
 
     omega: NDArray[np.float64]
@@ -46,7 +46,7 @@ class Sines:
 
 @dataclass(frozen=True)
 class Sensor:
-    """Sensor under comparison: field of its amplitudes in `Sines`, configuration keys of its polarity and scale."""
+    """A compared sensor: field of its amplitudes in `Sines`, and configuration keys for its polarity and scale."""
 
     signal: str
     polarity: str
@@ -64,32 +64,32 @@ LASERS = {
 SENSORS = TABLE | LASERS
 
 _STUCK = 0.01
-"""Scatter [counts] below which a channel is stuck; one differing sample in ten thousand exceeds it."""
+"""Scatter [counts] below which a channel counts as stuck; one differing sample in ten thousand exceeds it."""
 
 _FINEST = 1e-5
 """Step of the search for the dead time [s]."""
 
-_SIGN = "reverse the sign of {}, or the sensor: it moves against {}"
+_SIGN = "reverse the sign of {}, or the sensor: it moves opposite to {}"
 _SCALE = "check {} and the calibration: it differs from {}"
-_OWN_LATENCY = "this is the latency of the laser itself: raise its measuring rate, and disable its averaging"
+_OWN_LATENCY = "this is the laser's internal latency: raise its measuring rate, and disable its averaging"
 _SKEW = (
-    "the two sensors show one motion at different times: connect both to inputs of one module, or see the input delays"
-    " in the description of the bench"
+    "the two sensors show the same motion at different times: connect both to inputs of one module, or "
+    "see the input delays in the bench description"
 )
-_UNKNOWN = "the program does not know the delay of this module: compare the delay lines, or use a module that it knows"
+_UNKNOWN = "the delay of this module is unknown: compare the delay lines, or use a supported module"
 _OF_THE_LINE = {
     LATE: "the computer was busy, or the sensor is silent: close other programs, increase acquisition.block_duration,"
     " or check the sensor's power and port",
     LOST: "check the cable, the RS422 adapter and its latency timer",
     IMPLAUSIBLE: "bits were changed on the line: check the cable, its shield and the RS422 adapter",
 }
-"""Remedies for values that the sensor measured but that did not arrive."""
-_MISSING = "the program does not read this input: make sure that it opens the enable chain by itself"
+"""Remedies for values that a sensor measured but that did not arrive."""
+_MISSING = "the program does not read this input: make sure that the input itself opens the enable chain"
 _ALONE = "nothing opens the enable relay if the program crashes: wire a heartbeat relay, or set a watchdog"
 
 
 def resting_lines(heard: RestSamples, parameters: CheckParameters, accuracy: SensorAccuracy) -> Iterator[CheckLine]:
-    """Two lines for each channel: share of valid samples, and noise if enough of them are valid. The noise of a
+    """Two lines for each channel: fraction of valid samples, and noise if enough samples are valid. The noise of a
     laser may be one step of its output; larger noise originates in the target or the bench.
     """
     limits = {
@@ -110,7 +110,7 @@ def resting_lines(heard: RestSamples, parameters: CheckParameters, accuracy: Sen
 def safety_lines(configuration: BenchConfiguration) -> Iterator[CheckLine]:
     """One line for each safety input after the acquisition at rest; none for a simulated bench.
 
-    They always pass: an open input would have prevented arming or ended the check.
+    They always pass, since an open input would have prevented arming or ended the check.
     """
     if configuration.backend != "hardware":
         return
@@ -124,12 +124,12 @@ def safety_lines(configuration: BenchConfiguration) -> Iterator[CheckLine]:
 
 
 def input_lines(channels: Sequence[Channel]) -> Iterator[CheckLine]:
-    """A line for each input with a delay that was removed from its samples, or whose delay is not known."""
+    """A line for each input whose delay was removed from its samples or is unknown."""
     for channel in channels:
         if isinf(channel.delay_uncertainty):
-            yield untested(channel.name, "delay of its input", _UNKNOWN)
+            yield untested(channel.name, "input delay", _UNKNOWN)
         elif channel.delay:
-            what = "removed delay of its input"
+            what = "removed input delay"
             yield stated(channel.name, what, channel.delay, "s", uncertainty=COVERAGE * channel.delay_uncertainty)
 
 
@@ -139,8 +139,8 @@ def table_delay_lines(
     """A line for the accelerometer against the table's displacement sensor.
 
     If their delays differ, also a line for each laser on the ground against the accelerometer, to find which of the two
-    differs from the others. Otherwise these pairs follow from the lasers' delays against the displacement. An
-    acceleration that follows each step of the held output lags by half a sample.
+    differs from the others. Otherwise the delays of these pairs follow from the lasers' delays against the
+    displacement. An acceleration that follows each step of the held output lags by half a sample.
     """
     if parameters.delay_tolerance is None:
         return
@@ -149,7 +149,7 @@ def table_delay_lines(
     storeys = dict(zip(STOREYS, (sines.storey_1, sines.storey_2), strict=True)) if lasers else {}
     against = {name: _delay_between(sines.omega, sines.accelerometer, seen) for name, seen in storeys.items()}
     middle = float(np.mean([one.delay for one in against.values()])) if against else np.nan
-    # the lasers lag behind both by their own latency, the smaller of the two differences
+    # the lasers lag behind both by their latency, the smaller of the two differences
     alone = TABLE_ACCELERATION if abs(middle + pair.delay) < abs(middle) else TABLE_DISPLACEMENT
     odd = f"{alone} differs from the lasers: " if lasers else ""
     yield judged(
@@ -175,15 +175,15 @@ def _delay_between(omega: NDArray[np.float64], first: Amplitudes, second: Amplit
 
 
 def drive_lines(sines: Sines, parameters: CheckParameters, configuration: BenchConfiguration) -> Iterator[CheckLine]:
-    """Dead time, and drive at each frequency, with limits if the shaker is known."""
+    """Lines for the dead time and for the drive at each frequency, with limits if the shaker is known."""
     yield judged(
         "drive",
         "dead time to table_acceleration",
         dead_time(sines.omega, sines.drive, sines.acceleration, parameters.latency),
         (0.0, parameters.latency),
         "s",
-        "inputs and output do not share clock and trigger, or the delay of the input is not known: see hardware.daq and"
-        " the input delays in the description of the bench",
+        "inputs and output do not share clock and trigger, or the input delay is unknown: see hardware.daq "
+        "and the input delays in the bench description",
     )
     expected = expected_drive(sines.omega, configuration)
     for index, omega in enumerate(sines.omega):
@@ -229,7 +229,7 @@ def scale_lines(sines: Sines, parameters: CheckParameters, *, lasers: bool) -> I
     """Two lines for each sensor except the reference.
 
     The reference is the table's displacement sensor, unless the accelerometer contradicts it and the lasers agree with
-    the accelerometer. `lasers` on the ground are compared too.
+    the accelerometer. `lasers` mounted on the ground are compared as well.
     """
     sensors = SENSORS if lasers else TABLE
     seen: dict[str, Amplitudes] = {name: getattr(sines, sensor.signal) for name, sensor in sensors.items()}
@@ -254,7 +254,8 @@ def scale_lines(sines: Sines, parameters: CheckParameters, *, lasers: bool) -> I
             abs(scale),
             allowed,
             "1",
-            "the drift is their difference: check the measuring range and the load of the one with the wrong scale",
+            "the drift is their difference: check the measuring range and the load resistor of the laser with "
+            "the wrong scale",
             expected=1.0,
             uncertainty=COVERAGE * uncertainty,
         )
@@ -291,7 +292,7 @@ def delay_lines(sines: Sines, parameters: CheckParameters, configuration: BenchC
         second - first,
         (-between, between),
         "s",
-        "set both lasers to the same rate, averaging and output; check that neither loses values",
+        "set both lasers to the same rate, averaging and output; check that neither of them loses values",
         expected=0.0,
         uncertainty=COVERAGE * float(np.hypot(u_1, u_2)),
     )
@@ -313,7 +314,7 @@ def signed_scale(omega: NDArray[np.float64], amplitudes: Amplitudes, reference: 
     solution = covariance @ (basis.T @ magnitude)
     residual = magnitude - basis @ solution
     spread = float(residual @ residual) / (omega.size - 2)
-    # at the lowest frequency a delay rotates the ratio by less than a right angle
+    # at the lowest frequency, a delay rotates the ratio by less than a right angle
     sign = 1.0 if ratio[np.argmin(omega)].real >= 0.0 else -1.0
     return sign * float(solution[0]), float(np.sqrt(spread * covariance[0, 0]))
 
@@ -333,7 +334,7 @@ def _noise(channel: Channel, counts: Counts, limit: float | None) -> CheckLine:
     if limit is None and noise >= least:
         return stated(channel.name, "noise at rest", noise, channel.unit)
     if noise < least:
-        remedy = "its reading is constant: check connection and power of the sensor, and the terminal"
+        remedy = "the reading is constant: check connection and power of the sensor, and the terminal"
     else:
         remedy = "let the bench come to rest, then check cable, shield and ground, and the sensor's target"
     allowed = least, np.inf if limit is None else limit
@@ -341,7 +342,7 @@ def _noise(channel: Channel, counts: Counts, limit: float | None) -> CheckLine:
 
 
 def _reason(channel: Channel, invalid: Counts) -> str:
-    """Cause of invalid samples, by the most frequent count."""
+    """Cause of invalid samples, inferred from the most frequent count."""
     if invalid.size == 0:
         return ""
     values, numbers = np.unique(invalid, return_counts=True)

@@ -12,7 +12,7 @@ Frequency = Annotated[float, Field(gt=0, le=60)]
 
 
 class CheckParameters(Parameters):
-    """Loop check: the bench at rest, then sines of equal velocity with the frame locked to the table."""
+    """Loop check: first at rest, then with sines of equal velocity and the frame locked to the table."""
 
     omega: tuple[Frequency, ...] = quantity(
         (8.0, 12.0, 18.0, 27.0, 40.0), "rad/s", "circular frequencies of the sines", min_length=4
@@ -23,8 +23,8 @@ class CheckParameters(Parameters):
     velocity: float = quantity(
         0.06, "m/s", "amplitude of the table's velocity: the same at every frequency", gt=0, le=0.5
     )
-    cycles: int = quantity(8, "1", "measured cycles at each frequency", ge=4, le=200)
-    rest: float = quantity(2.0, "s", "time at rest for noise and valid samples", ge=0.5, le=60)
+    cycles: int = quantity(8, "1", "number of cycles measured at each frequency", ge=4, le=200)
+    rest: float = quantity(2.0, "s", "time at rest in which noise and valid samples are evaluated", ge=0.5, le=60)
     displacement_noise: float = quantity(
         1e-4, "m", "largest standard deviation of the table's displacement at rest", gt=0
     )
@@ -39,8 +39,8 @@ class CheckParameters(Parameters):
     delay_tolerance: float | None = quantity(
         2e-4,
         "s",
-        "largest difference between the delays of the table's two sensors, without the hold of the output; absent: not"
-        " compared",
+        "largest difference between the delays of the table's two sensors, excluding the hold of the output; "
+        "if absent, they are not compared",
         gt=0,
         le=0.1,
     )
@@ -54,7 +54,7 @@ MARKS = {Verdict.PASSED: "passed", Verdict.FAILED: "FAILED", Verdict.STATED: "st
 
 
 def log_line(line: CheckLine) -> str:
-    """Log line of a check line."""
+    """Log entry for a check line."""
     text = f"{MARKS[line.verdict]}: {line.subject}, {line.what}"
     if line.measured is not None:
         unit = "" if line.unit == "1" else f" {line.unit}"
@@ -83,8 +83,9 @@ PROTOCOL = Protocol(
     name="check",
     summary="Check the loop of the configured bench at low level, line by line: passed or failed, with the remedy.",
     details=(
-        "Records every channel at rest, then drives sines of equal velocity with the frame locked to the table, and "
-        "checks polarity, scale and delay of all sensors, and the drive. The exit code is also 1 when a line failed."
+        "Records every channel at rest, then drives sines of equal velocity with the frame locked to the "
+        "table, and checks polarity, scale and delay of all sensors, and the drive. The exit code is also 1 "
+        "if a line failed."
     ),
     example="--config bench.toml",
     parameters=CheckParameters,

@@ -19,18 +19,18 @@ CHANGE_TIME = 1.0
 """Duration of the sweep from one calibration point to the next [s]."""
 
 SETTLING, MEASURED = 2, 4
-"""Number of discarded and of used cycles at each point."""
+"""Numbers of discarded and of used cycles at each point."""
 
 ENOUGH = 0.75
-"""Minimum share of cycles with nearly complete samples."""
+"""Minimum fraction of cycles with nearly complete samples."""
 
 AUDIBLE = 5.0
-"""Least response of the table's acceleration to the drive, in standard uncertainties; the probability that noise
-exceeds it is 1e-5.
+"""Smallest significant response of the table's acceleration to the drive, in standard uncertainties; noise exceeds it
+with a probability of 1e-5.
 """
 
 _PROBED = 8
-"""Cycles of each probe: the noise is estimated from their scatter."""
+"""Number of cycles in each probe; the noise is estimated from their scatter."""
 
 _DRIVE = len(SIGNALS)
 """Column of the drive in a cycle's arrays."""
@@ -62,7 +62,7 @@ def calibrate_drive(
             return response
         points[omega] = response
         if not known:
-            # starts from rest, so that the drive does not jump
+            # it starts from rest, so that the drive does not jump
             outcome = yield Sweep((Leg(CHANGE_TIME, 0.0, omega),))
             if isinstance(outcome, Fallen):
                 return outcome
@@ -72,7 +72,7 @@ def calibrate_drive(
 
 
 def probed_drive(omega: float) -> Generator[Step, Outcome, DriveCalibration]:
-    """Gain of the drive at `omega` [rad/s], from two commands too small to cause damage.
+    """Gain of the drive at `omega` [rad/s], measured with two commands too small to cause damage.
 
     The mean over cycles is compared with their scatter, which separates a response from noise of any spectrum. Raises
     Unmeasurable if the table does not respond.
@@ -139,9 +139,9 @@ def need_cycles(cycles: Sequence[Cycle], asked: int) -> None:
     """Raise Unmeasurable if too many cycles have missing samples."""
     if len(cycles) < ENOUGH * asked:
         raise Unmeasurable(
-            f"{asked - len(cycles)} of {asked} cycles have missing samples: a sensor leaves its range, or its values "
-            "are late; the file states the reason of each sample. Move the sensor, reduce the motion, or close other "
-            "programs"
+            f"{asked - len(cycles)} of {asked} cycles have missing samples: a sensor leaves its range, or its "
+            "values are late; the file states the reason for each sample. Move the sensor, reduce the motion, or "
+            "close other programs"
         )
 
 

@@ -19,7 +19,7 @@ from bench.guard.limits import Limits
 Array = NDArray[np.float64]
 
 REST = 2.0
-"""Time at rest before each pass, for the zero of the signals [s]."""
+"""Time at rest before each pass, in which the signals are zeroed [s]."""
 
 
 Ending = Status | Literal["samples lost"]
@@ -29,11 +29,11 @@ Ending = Status | Literal["samples lost"]
 class Replicated:
     """Result of a replication: the best `drive` [V] and its table acceleration [m/s2], both of the target's shape.
 
-    `acceleration` is that measured in the last accepted pass; None without one. `repeatable` is the rms error of the
-    best drive without its noise, 1 without a pass; `spectrum_error` the largest deviation of the response spectrum that
-    noise does not explain, and its period [s].
+    `acceleration` was measured in the last accepted pass; None if there is none. `repeatable` is the rms error of the
+    best drive, excluding noise (1 without a pass); `spectrum_error` is the largest deviation of the response spectrum
+    that noise does not explain, with its period [s].
 
-    `status` and `reason` are those of the end of the passes. The status is "running" if the block `fell` before: it
+    `status` and `reason` describe the end of the passes. The status is "running" if the block `fell` before the end: it
     then lies in its catch, and the caller must have it set upright.
     """
 
@@ -55,12 +55,12 @@ def replicate(
     name: str,
     progress: Callable[[], Event] | None = None,
 ) -> Generator[Step, Outcome, Replicated]:
-    """Find the drive that makes the table follow `target`; `name` is that of the motion.
+    """Find the drive that makes the table follow `target`; `name` is the motion's name.
 
     The event from `progress` is published after each pass. A pass with lost samples of the table's sensors is repeated;
-    after a second loss the result is the best drive so far. The rig must not be armed before, and is not armed
-    afterwards. Raises InvalidInput if the model does not cover the target, or if the first drive exceeds a limit and
-    must not be scaled.
+    after a second loss the result is the best drive so far. The rig must not be armed on entry, and is not armed on
+    return. Raises InvalidInput if the model does not cover the target, or if the first drive exceeds a limit and must
+    not be scaled.
     """
     replication = Replication(target, model, limits, parameters)
     achieved: Array | None = None
@@ -77,7 +77,7 @@ def replicate(
         if lost:
             if again or fell:
                 return _replicated(replication, achieved, fell=fell, lost=lost)
-            yield Publish(Warned(f"{name}: {lost} samples of the table's motion are missing, the pass is repeated"))
+            yield Publish(Warned(f"{name}: {lost} samples of the table's motion are missing; the pass is repeated"))
             continue
         report = replication.learn(moved[:, 0], moved[:, 1])
         if report.accepted:
@@ -96,7 +96,8 @@ def _replicated(replication: Replication, achieved: Array | None, *, fell: bool,
         "converged": "the tolerances are met",
         "out of passes": f"the limit of {replication.parameters.passes} passes was reached",
         "limited": f"the next correction is not played: {replication.verdict}",
-        "samples lost": f"{lost} samples of the table's motion were missing, in both attempts at the pass",
+        "samples lost": f"samples of the table's motion were missing in both attempts at the pass ({lost} in the "
+        "second)",
     }
     status: Ending = "samples lost" if lost and not fell else replication.status
     return Replicated(

@@ -1,8 +1,8 @@
 """Identification of the stiffness of mounted springs, written to a specimen file for other runs.
 
-1. The bare frame: decays after pulses, unless a previous identification is used.
-2. Each spring: it is mounted with the block clamped to the table, and decays are measured again.
-3. The stiffness of the spring is the difference of the first storey's stiffnesses.
+1. Decays of the bare frame are measured after pulses, unless a previous identification is used. 2. Each spring is
+mounted with the block clamped to the table, and decays are measured again. 3. The stiffness of the spring is the
+difference of the first storey's stiffnesses.
 """
 
 from collections.abc import Callable, Generator, Sequence
@@ -61,7 +61,9 @@ class CouplingStiffness(Prepared[CouplingStiffnessParameters]):
         super().__init__(parameters, configuration, stored)
         identified, known = configuration.identified, configuration.known_specimen
         if not parameters.reference and not (identified is not None and {"k1", "k2"} <= set(identified.names)):
-            allowed = "k1 and k2 are not identified: include the bare frame, or give a specimen file with them"
+            allowed = (
+                "k1 and k2 are not identified: include the bare frame, or specify a specimen file that contains them"
+            )
             raise InvalidInput("reference", False, allowed)
         self._specimens: dict[str, Specimen] = {BARE: known.bare()} if parameters.reference else {}
         self._specimens |= {SPRING.format(beta): known.coupled(beta) for beta in parameters.beta}
@@ -76,7 +78,7 @@ class CouplingStiffness(Prepared[CouplingStiffnessParameters]):
 
     @property
     def _duration(self) -> float:
-        """Expected length of a run [s]."""
+        """Expected duration of a run [s]."""
         return sum(pulsed_duration(self.parameters, plan.pulse) + BY_HAND for plan in self._pulses.values())
 
     @cached_property
@@ -86,7 +88,7 @@ class CouplingStiffness(Prepared[CouplingStiffnessParameters]):
 
     @cached_property
     def prediction(self) -> Table:
-        """Modes with every spring, from its nominal stiffness."""
+        """Modes with every spring, from the nominal stiffnesses."""
         known, beta = self.configuration.known_specimen, self.parameters.beta
         omega = np.array([np.sort(frequencies(known.coupled(each))) for each in beta])
         stiffness = np.array([known.coupled(each).nominal_k_c for each in beta])
@@ -129,7 +131,7 @@ class CouplingStiffness(Prepared[CouplingStiffnessParameters]):
                 yield Publish(Warned(f"the bare frame has changed since it was identified: {off}"))
             yield Publish(PointFinished(bare_point(found, 0)))
         if reference is None:
-            raise AssertionError("a run without a reference has been refused")
+            raise AssertionError("unreachable: a run without a reference is refused")
         failed: RockbenchError | None = None
         try:
             for beta in p.beta:
@@ -169,8 +171,8 @@ class CouplingStiffness(Prepared[CouplingStiffnessParameters]):
             yield Publish(
                 Warned(
                     f"{name}: k2 differs from that of the bare frame by {spring.k2_apart:+.1f} standard "
-                    "uncertainties: check whether the block, its clamp or the spring touch the second storey, or "
-                    "whether the clamp yields under the spring",
+                    "uncertainties: check whether the block, its clamp or the spring touches the second storey, or "
+                    "the clamp yields under the spring",
                 )
             )
         yield Publish(PointFinished(point(held, 0)))
@@ -183,7 +185,7 @@ class CouplingStiffness(Prepared[CouplingStiffnessParameters]):
         pace: Pace,
         point: Callable[[FrameResult, int], SpringPoint] = bare_point,
     ) -> Generator[Step, Outcome, FrameResult]:
-        """Decays of the frame as mounted, with a point for each."""
+        """Decays of the frame as mounted, with a point for each decay."""
         pace.elapsed += BY_HAND
         pulse = self._pulses[name]
         decays = yield from pulsed_decays(self.parameters, self.configuration, pulse, setting, pace, name, point)

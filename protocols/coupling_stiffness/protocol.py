@@ -12,23 +12,26 @@ Stiffness = Annotated[float, Field(gt=0, le=100)]
 
 
 class CouplingStiffnessParameters(DecayParameters):
-    """Decays of the bare frame, then of the frame with each spring mounted to the clamped block."""
+    """Decays of the bare frame, then of the frame with each spring attached to the clamped block."""
 
     beta: tuple[Stiffness, ...] = quantity(
         (0.25, 0.64, 0.97), "1", "stiffness ratios on the labels of the springs", min_length=1, usual=COUPLING
     )
-    repeats: int = quantity(3, "1", "number of combined decays of each spring and of the bare frame", ge=1, le=50)
+    repeats: int = quantity(
+        3, "1", "number of decays that are combined for each spring and for the bare frame", ge=1, le=50
+    )
     reference: bool = quantity(
         True,
         "",
-        "measure the bare frame first, so that common errors cancel; otherwise the previously identified k1 is used",
+        "whether the bare frame is measured first, so that common errors cancel; otherwise the previously "
+        "identified k1 is used",
     )
 
     _each_once = field_validator("beta")(each_once)
 
 
 class SpringPoint(Parameters):
-    """Spring, or bare frame as its reference, from one decay or from all decays."""
+    """A spring, or the bare frame as its reference, identified from one decay or from all decays."""
 
     beta: float | None = quantity(None, "1", "stiffness ratio on the label of the spring; absent for the bare frame")
     decay: int = decay_field("decay")
@@ -47,7 +50,8 @@ class SpringPoint(Parameters):
     k2_agrees: bool | None = quantity(
         None,
         "",
-        "whether k2 equals that of the bare frame within the uncertainty of the difference; absent if not compared",
+        "whether k2 agrees with that of the bare frame within the uncertainty of the difference; absent if "
+        "not compared",
     )
     k_c_parts: str = quantity("", "", "standard uncertainty of k_C by contribution, largest first, as JSON")
     xi1: float = decay_field("xi1")
@@ -67,9 +71,9 @@ PROTOCOL = Protocol(
     name="coupling-stiffness",
     summary="Stiffness of mounted springs, from the shift of the frame's modes with the block clamped.",
     details=(
-        "Decays of the bare frame, then with each spring mounted and its block clamped to the table: the spring "
-        "adds to the stiffness of the first storey. Its stiffness is the difference, which also determines beta as "
-        "mounted. Other runs load the result, specimen.json."
+        "Decays are measured with the bare frame, then with each spring mounted and the block clamped to the "
+        "table, so that the spring adds to the stiffness of the first storey. Its stiffness is the "
+        "difference, which also determines beta as mounted. Other runs load the result, specimen.json."
     ),
     example="--beta 0.4 --specimen FILE",
     parameters=CouplingStiffnessParameters,

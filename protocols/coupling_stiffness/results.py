@@ -35,7 +35,7 @@ _COLUMNS = (
 )
 
 SHOWN = 6.0
-"""Drawn time of a decay after the pulse [s], long enough to show the modes."""
+"""Time of a decay that is drawn after the pulse [s], long enough to show the modes."""
 
 
 def springs_table(points: Sequence[SpringPoint]) -> str:
@@ -48,7 +48,7 @@ def springs_table(points: Sequence[SpringPoint]) -> str:
 
 
 def springs_figure(springs: Sequence[SpringResult]) -> "Figure":
-    """Comparison of the springs, and two rows for each: decay and residual. Empty without springs."""
+    """Comparison of the springs, and two rows for each spring: decay and residual. Empty without springs."""
     figure = new_figure(9.0, 3.6 + 3.2 * len(springs))
     grid = figure.add_gridspec(1 + 2 * len(springs), 2, height_ratios=(3.4, *[2.2, 1.0] * len(springs)))
     compared, budget = figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1])
@@ -126,13 +126,13 @@ def _draw_decay(panel: "Axes", below: "Axes", spring: SpringResult) -> None:
 
 
 def springs_sections(campaign: Campaign) -> list[Section]:
-    """Report section: stiffness of the springs as mounted, decay by decay."""
+    """Report section on the stiffness of the springs as mounted, decay by decay."""
     points = campaign.points
     if not points:
         return []
     text = (
-        "With the block clamped, the spring adds to the stiffness of the first storey: k_C is the difference from the "
-        f"bare frame. {EXPANDED}"
+        "With the block clamped, the spring adds to the stiffness of the first storey; k_C is the difference "
+        f"from the bare frame. {EXPANDED}"
     )
     return [Section("springs", "Springs with the block clamped", [text, _springs(points), *_spring_pictures(points)])]
 

@@ -1,8 +1,8 @@
 """Springs from two frames: with the block clamped, spring and first storey act in parallel. k_C = k1(held) - k1(bare)
 
 Both are identified with the same masses, timebase and lasers. Masses and timebase contribute through the difference of
-their sensitivities; the linearity errors of the lasers are assumed independent, an upper bound. For a previously
-identified bare frame, its stated correlation with the masses is used, and the timebase is assumed independent.
+their sensitivities; the linearity errors of the lasers are assumed independent, an upper bound. If the bare frame was
+identified previously, its stated correlation with the masses is used, and the timebase is assumed independent.
 """
 
 from collections.abc import Sequence
@@ -81,7 +81,7 @@ def measured_reference(result: FrameResult) -> Reference:
 def identified_reference(known: Identified | None) -> Reference | None:
     """Reference from the previously identified bare frame; None if there is none.
 
-    Its sensitivity to the masses follows from its covariance with m1 and m2; zero without these.
+    Its sensitivity to the masses follows from its covariance with m1 and m2; it is zero without them.
     """
     if known is None or not {"k1", "k2"} <= set(known.names):
         return None
@@ -96,7 +96,7 @@ def identified_reference(known: Identified | None) -> Reference | None:
 
 
 def frame_change(bare: FrameResult, known: Identified | None) -> str | None:
-    """Significant differences (99 %) of k1 and k2 from the identified frame, as text; None without."""
+    """Significant differences (99 %) of k1 and k2 from the identified frame, as text; None if there are none."""
     before = identified_reference(known)
     if before is None:
         return None
@@ -106,11 +106,12 @@ def frame_change(bare: FrameResult, known: Identified | None) -> str | None:
     apart = (now.values[:2] - before.values[:2]) / np.sqrt(variance)
     if np.all(np.abs(apart) <= SIGNIFICANT):
         return None
-    return f"k1 is {apart[0]:+.1f}, k2 {apart[1]:+.1f} standard uncertainties of the difference away"
+    return f"k1 is off by {apart[0]:+.1f} and k2 by {apart[1]:+.1f} standard uncertainties of the difference"
 
 
 def replaces(bare: FrameResult, known: Identified) -> bool:
-    """Whether the frame of this run replaces the identified one: it has changed, or its uncertainty is smaller.
+    """Whether the frame of this run replaces the identified one, because the frame has changed or the new uncertainty
+    is smaller.
 
     Uncertainties are compared by the determinant of the covariance of k1, k2, xi1 and xi2.
     """
@@ -183,8 +184,8 @@ def spring_point(spring: SpringResult, nominal: float, number: int) -> SpringPoi
 def spring_findings(
     bare: FrameResult | None, springs: Sequence[SpringResult], known: Identified
 ) -> tuple[list[Finding], list[Correlation]]:
-    """Findings: the stiffness of each spring, and the bare frame if it was identified best in this run, with all
-    correlations. `known` are the previously identified quantities; those kept are correlated with the springs as well.
+    """Findings, with all correlations: the stiffness of each spring, and the bare frame if this run identified it best.
+    `known` are the previously identified quantities; those kept are correlated with the springs as well.
     """
     framed = bare is not None and replaces(bare, known)
     findings, correlations = frame_findings(bare, known) if bare is not None and framed else ([], [])
@@ -212,7 +213,9 @@ def spring_findings(
 
 
 def _with_known(spring: SpringResult, known: Identified, other: str, *, measured: bool) -> float:
-    """Covariance of k_c with an identified quantity: through the masses, and through k1 unless measured in this run."""
+    """Covariance of k_c with an identified quantity, through the masses and, unless k1 was measured in this run,
+    through k1.
+    """
     masses = known_masses(known) is not None
     if measured:
         return through_masses(spring.shift[:2], known, other) if masses else 0.0

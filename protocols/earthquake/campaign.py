@@ -55,7 +55,7 @@ class EarthquakeCampaign(Prepared[EarthquakeParameters]):
 
     @cached_property
     def left_out(self) -> LeftOut:
-        """Combinations that are not played; those of the data file, if given."""
+        """Combinations that are not played; taken from the data file, if there is one."""
         if self._stored is not None:
             return self._stored.left_out
         return beyond_limits(self.combinations, self.configuration)
@@ -113,11 +113,11 @@ BETA_STEP = 0.05
 """Step of the stiffness ratio of a curve."""
 
 BETA_MARGIN = 0.15
-"""Extension of a curve beyond the range of measured stiffnesses."""
+"""Extension of a curve beyond the measured stiffnesses."""
 
 
 def curves(parameters: EarthquakeParameters, shakings: Sequence[Shaking], specimen: Specimen) -> Curves:
-    """Gains of every record under its target motion, at the given stiffnesses and between them."""
+    """Gains for every record under its target motion, at and between the given stiffnesses."""
     first, last = max(min(parameters.beta) - BETA_MARGIN, BETA_STEP), max(parameters.beta) + BETA_MARGIN
     grid = np.linspace(first, last, round((last - first) / BETA_STEP) + 1)
     betas = sorted({*(round(float(beta), 6) for beta in grid), *parameters.beta})
@@ -168,7 +168,9 @@ _COLUMNS = (
 
 
 def earthquake_table(points: Sequence[PointLike]) -> str:
-    """Table with a row for each point, then the number of agreeing points and the remarks; absent values are "-"."""
+    """Table with a row for each point, followed by the number of agreeing points and the remarks; absent values are
+    "-".
+    """
     rows = plain(points)
     return "\n".join([text_table(_COLUMNS, map(_cells, rows)), *_remarks(rows)])
 
@@ -210,14 +212,14 @@ def _number(value: float | None) -> str:
     return ABSENT if value is None else f"{value:.4f}"
 
 
-NAME = "seismic gains below one, best around 0.5, towards one as beta grows"
+NAME = "seismic gains are below one, about 0.5 at best, and approach one as beta grows"
 
 _SOURCES = {
     "measured": ("alpha_2", "alpha_2_uncertainty"),
     "predicted for the achieved motion": ("alpha_2_predicted", None),
     "predicted for the requested motion": ("alpha_2_target", None),
 }
-"""Origins of gains, and the fields of the gain and of its uncertainty."""
+"""Sources of gains, each with the fields of the gain and of its uncertainty."""
 
 
 def check_statement(points: Sequence[PointLike], band: tuple[float, float]) -> dict[str, Any]:
@@ -284,7 +286,7 @@ def _below_one(gain: float, uncertainty: float) -> str:
 
 
 def _towards_one(known: Sequence[tuple[float, float]]) -> str:
-    """Verdict on whether the gain of the stiffest spring is nearer to one than that of the softest."""
+    """Verdict on whether the gain with the stiffest spring is closer to one than that with the softest."""
     (first, doubt), (last, other) = known[0], known[-1]
     nearer = abs(first - 1.0) - abs(last - 1.0)
     return "undecided" if abs(nearer) <= (doubt**2 + other**2) ** 0.5 else _verdict(nearer > 0.0)

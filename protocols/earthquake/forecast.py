@@ -1,4 +1,4 @@
-"""Demands of a seismic campaign: every record with every specimen, over the uncertainty of the specimen."""
+"""Demands of a seismic campaign: every record with every specimen, within the specimen's uncertainty."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -41,7 +41,7 @@ TOLERANCE = 1e-7
 
 
 def travel(specimen: Specimen, shaking: Shaking, factor: float, grounded: bool) -> Travel:
-    """Simulate the specimen from rest under `factor` times the record, until the end or the fall of the block."""
+    """Simulate the specimen from rest under `factor` times the record, until it ends or the block falls."""
     record = shaking.prepared.record
     times = np.arange(0.0, record.duration, STEP)
     motion = simulate(
@@ -65,9 +65,9 @@ def travel(specimen: Specimen, shaking: Shaking, factor: float, grounded: bool) 
 def load(
     shaking: Shaking, payload: float, configuration: BenchConfiguration, response: TableResponse | None
 ) -> dict[str, float]:
-    """Peaks of the quantities of table and shaker with a `payload` [kg]; unknown ones are absent.
+    """Peaks of the table's and the shaker's quantities with a `payload` [kg]; unknown ones are absent.
 
-    Raises InvalidInput where an identified table does not cover the record's band.
+    Raises InvalidInput if an identified table does not cover the record's band.
     """
     target = shaking.target
     velocity, displacement = integrated(target.acceleration, target.sample_rate)
@@ -85,7 +85,7 @@ def load(
 
 
 def _drive(shaking: Shaking, payload: float, response: TableResponse) -> Array:
-    """The drive [V] with which a linear table follows the record."""
+    """The drive [V] that makes a linear table follow the record."""
     target = shaking.target
     low, high = target.support
     frequency, spectrum = target.frequency, np.fft.rfft(target.acceleration)
@@ -99,10 +99,10 @@ DRAWS, SEED = 32, 8
 """Number of specimens drawn in addition to the nominal one, and their seed."""
 
 OFF = 0.03
-"""Relative error of the table's motion, and allowance of all quantities for noise and friction."""
+"""Relative error of the table's motion, and allowance for noise and friction in all quantities."""
 
 IMPACTS = 0.15
-"""Allowance of quantities that increase with the impacts of a rocking block, which the drive does not cancel."""
+"""Allowance for quantities that are increased by the impacts of a rocking block, which the drive does not cancel."""
 
 OFF_MIDDLE = 0.015
 """Largest offset of a storey at rest from the middle of the laser's range, relative to half the range."""
@@ -118,7 +118,7 @@ _UNKNOWN = {
 
 @dataclass(frozen=True)
 class Combination:
-    """Record with the bare frame (`beta` None) or with a spring, and its demands."""
+    """A record with the bare frame (`beta` None) or with a spring, and its demands."""
 
     record: str
     beta: float | None
@@ -182,7 +182,7 @@ def forecast(
     played = [each.demands for each in found if (each.record, each.beta) not in left_out]
     asked = [*_identification(table), *played]
     omitted = tuple(
-        f"{each.demands.name} is left out: {left_out[each.record, each.beta]}"
+        f"{each.demands.name} is omitted: {left_out[each.record, each.beta]}"
         for each in found
         if (each.record, each.beta) in left_out
     )
@@ -199,7 +199,7 @@ def _identification(table: TableSource) -> list[StageDemands]:
     """Demands of the identification at the start of the campaign; none with a stored model."""
     if table.plan is None:
         return []
-    # the uncertainty of the specimen is neglected: the motion is linear, and its level has a margin
+    # the specimen's uncertainty is neglected, since the motion is linear and its level has a margin
     values = {quantity: np.full(1 + DRAWS, value) for quantity, value in table.plan.asked.items()}
     return [StageDemands("the identification of the table", values, None)]
 

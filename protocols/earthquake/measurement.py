@@ -20,12 +20,12 @@ from sim.specimen import Specimen
 Array = NDArray[np.float64]
 
 QUIET = 0.5
-"""Share of the rest before a record that is used for the noise: the filters ring in the other part."""
+"""Fraction of the rest before a record that is used to determine the noise; in the remainder the filters ring."""
 
 
 @dataclass(frozen=True)
 class PeakSeen:
-    """A peak and the sensor signals at that time, positive in the direction of the peak.
+    """A peak, and the sensor signals at its time, positive in the direction of the peak.
 
     `lasers` [m] are the readings of the lasers, `speeds` [m/s] their rates of change, `swings` [m] their ranges within
     the fit window; `table` [m] is the table's displacement.
@@ -49,8 +49,8 @@ class Observed:
 
 
 def observe(signals: Array, rest: int, sample_rate: float) -> Observed:
-    """Evaluate the signals of a whole record, shape (n, len(SIGNALS)), whose first `rest` samples are at rest. Raises
-    InvalidInput.
+    """Evaluate the signals of a complete record, shape (n, len(SIGNALS)), whose first `rest` samples are at rest.
+    Raises InvalidInput.
     """
     still = signals[: round(QUIET * rest)]
     return Observed(
@@ -66,7 +66,7 @@ def _sensor_peak(signals: Array, still: Array, column: int, sample_rate: float) 
     peak = transient_peak(values, quiet[np.isfinite(quiet)], sample_rate)
     place, half = round(peak.time * sample_rate), max(round(peak.window * sample_rate), 2)
     window = signals[max(place - half, 0) : place + half + 1]
-    # values and rates are fitted over the window, so that they are insensitive to single samples
+    # values and rates are fitted over the window, which makes them insensitive to single samples
     time = (np.arange(len(window)) - min(place, half)) / sample_rate
     lines = [_line(time, window[:, each]) for each in (LASER_1, LASER_2, DISPLACEMENT)]
     (first, v1), (second, v2), (table, _) = lines
@@ -102,7 +102,9 @@ class Tracking:
 
 
 def tracking(shaking: Shaking, signals: Array) -> Tracking:
-    """Tracking errors of `signals`, shape (n, len(SIGNALS)), which start with the record's drive and may be longer."""
+    """Tracking errors of `signals`, shape (n, len(SIGNALS)), which start with the record's drive and may extend beyond
+    it.
+    """
     target = shaking.target
     moved = _table_motion(shaking, signals)
     wanted = _windowed(shaking, target.acceleration)
@@ -132,9 +134,9 @@ def overturning_time(signals: NDArray[np.float64], sample_rate: float, specimen:
     """Time of overturning since the first of `signals` [s], shape (n, len(SIGNALS)), which end soon after the fall.
 
     A fallen block displaces the storey permanently. The moving mean of u1 over a period of the frame's first mode last
-    crosses the threshold of `FallWatch` about when the block finally passes its critical angle: in ten simulated falls
-    0.12 s later on average, from 0.14 s earlier to 0.4 s later; the strap stopped the block 0.3 to 0.6 s afterwards.
-    None if no sample of u1 is valid.
+    crosses the threshold of `FallWatch` at about the time at which the block finally passes its critical angle. In ten
+    simulated falls, the difference was 0.12 s on average, ranging from 0.14 s earlier to 0.4 s later; the strap stopped
+    the block 0.3 to 0.6 s afterwards. None if no sample of u1 is valid.
     """
     span = min(round(2.0 * np.pi / specimen.frame.natural_frequencies[0] * sample_rate), len(signals))
     u1 = signals[:, U1]
@@ -158,7 +160,7 @@ STEP = 0.01
 """Step of a predicted history [s]."""
 
 AUDIBLE = 20.0
-"""Minimum running peak of the bare drift, in standard uncertainties of its peak, at which a ratio is published."""
+"""Minimum running peak of the bare drift, in standard uncertainties of that peak, at which a ratio is published."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,7 +185,7 @@ class History:
         return History(samples[:, 1] - samples[:, 0])
 
     def padded(self, size: int) -> Array:
-        """Drift [m], padded with NaN, shape (size,)."""
+        """Drift [m], padded with NaN to shape (size,)."""
         return np.append(self.drift[:size], np.full(max(size - self.drift.size, 0), np.nan))
 
 
@@ -191,7 +193,7 @@ class GainMonitor:
     """Computes a `RunningGain` from every block of signals while one record is played.
 
     `bare` is the measured drift of the bare frame at the same samples, `noise` [m] the uncertainty of its peak, and
-    `expected` are the predicted histories of the bare and the coupled frame: absent in the test of the bare frame.
+    `expected` are the predicted histories of the bare and the coupled frame, absent in the test of the bare frame.
     """
 
     def __init__(
@@ -224,7 +226,7 @@ class GainMonitor:
 
 
 def _running_gain(bare: History, coupled: History) -> Array:
-    """Running gain at each step; NaN before the first motion and after the block topples."""
+    """Running gain at each step; NaN before the first motion and after the block has toppled."""
     size = bare.drift.size
     below = running_peak(bare.drift)
     gain = np.full(size, nan)
@@ -238,7 +240,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class DriftHistory:
-    """Measured and predicted drift [m], every `STEP` seconds; the predicted one ends when the model topples."""
+    """Measured and predicted drift [m], every `STEP` seconds; the predicted history ends when the model topples."""
 
     measured: Array
     predicted: Array
@@ -246,8 +248,8 @@ class DriftHistory:
 
 @dataclass(eq=False)
 class Histories:
-    """Histories for the figures of a campaign: accelerations of the table [m/s2], and drifts by record and stiffness,
-    None for the bare frame.
+    """Histories for the figures of a campaign: accelerations of the table [m/s2], and drifts by record and stiffness
+    (None for the bare frame).
     """
 
     asked: dict[str, Array] = field(default_factory=dict[str, Array])

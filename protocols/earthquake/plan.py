@@ -1,9 +1,9 @@
 """Steps of the seismic campaign (section 5 of the paper).
 
-1. The bare frame: identify the table unless it is known, then for every record iterate the drive until the table
-   follows it, and play that drive again to measure.
-2. For each spring: mount it, and play every record with the drive from the bare frame. If the block topples, the record
-   is ended and the block set upright. The springs are the outer loop, since changing them is manual work.
+1. With the bare frame, the table is identified unless it is known. Then, for every record, the drive is iterated until
+the table follows it, and is played again for the measurement. 2. Each spring is mounted, and every record is played
+with the drive from the bare frame. If the block topples, the record is ended and the block is set upright. The springs
+are the outer loop, since changing them is manual work.
 """
 
 from collections import Counter
@@ -43,10 +43,10 @@ NO_BLOCK = "storey 1 has a permanent offset although the block was removed: chec
 
 FALLEN_REQUEST = "The block has fallen: set it upright again."
 
-OMITTED = "left out, since it would exceed a limit"
+OMITTED = "omitted, since it would exceed a limit"
 
 SEED = 5
-"""Seed of the Monte Carlo of the first point; each further point has the next."""
+"""Seed of the Monte Carlo simulation for the first point; each further point uses the next seed."""
 
 
 BETWEEN = 45.0
@@ -54,8 +54,8 @@ BETWEEN = 45.0
 
 
 class Pace:
-    """Progress of a campaign, weighted by the length of the `identification` [s] and of the records on the bench,
-    without the combinations that are `left_out`.
+    """Progress of a campaign, weighted by the durations of the `identification` [s] and of the records on the bench,
+    excluding the combinations in `left_out`.
     """
 
     def __init__(
@@ -74,12 +74,12 @@ class Pace:
         self.total = identification + sum(
             (self._bare[name] + springs[name]) * each for name, each in self._each.items()
         )
-        """Expected length of the campaign [s]."""
+        """Expected duration of the campaign [s]."""
         self._identified = 0.0
         self._played = Counter[str]()
 
     def identified(self, share: float = 1.0) -> None:
-        """Set the completed share of the table's identification."""
+        """Set the completed fraction of the table's identification."""
         self._identified = share * self._identification
 
     def played(self, record: str) -> None:
@@ -87,7 +87,7 @@ class Pace:
         self._played[record] += 1
 
     def learned(self, record: str) -> None:
-        """Finish the bare frame's part of a record; remove unused passes from the expected time."""
+        """Finish the bare-frame part of a record, and remove unused passes from the expected time."""
         self._played[record] = self._bare[record]
 
     def progress(self, activity: str) -> Progress:
@@ -119,7 +119,7 @@ class EarthquakePlan:
         self._points = 0
 
     def steps(self) -> Generator[Step, Outcome, None]:
-        """Steps of the whole campaign."""
+        """Steps of the complete campaign."""
         model = yield from table_model(self._table, self._configuration, self._pace)
         for shaking in self._shakings:
             if (omitted := self._left_out.get((shaking.name, None))) is not None:
@@ -127,12 +127,12 @@ class EarthquakePlan:
                 continue
             self._bare[shaking.name] = yield from self._bare_frame(shaking, model)
             self._pace.learned(shaking.name)
-            yield Publish(self._pace.progress(f"finished {shaking.name}, bare frame"))
+            yield Publish(self._pace.progress(f"{shaking.name} finished, bare frame"))
         for beta in self._parameters.beta:
             yield from self._spring(self._specimen.coupled(beta))
 
     def _bare_frame(self, shaking: Shaking, model: TableModel) -> Generator[Step, Outcome, BareTest | str]:
-        """Test of the bare frame, or the reason why it is missing."""
+        """Test of the bare frame, or the reason why there is none."""
         p, limits = self._parameters, self._configuration.limits
 
         def passed() -> Progress:
@@ -142,7 +142,7 @@ class EarthquakePlan:
         try:
             learned = yield from replicate(shaking.target, model, limits, self._learning(), shaking.name, passed)
         except InvalidInput as beyond:
-            # the other records are still played
+            # the other records are played nevertheless
             yield Publish(Warned(f"{shaking.name} is not played: {beyond}"))
             return f"the table cannot reproduce it: {beyond}"
         if learned.fell:
@@ -198,7 +198,7 @@ class EarthquakePlan:
                 point = unplayed_point(shaking, specimen.label or 0.0, self._target(shaking, specimen), None, bare)
             if omitted is None:
                 self._pace.played(shaking.name)
-            yield Publish(self._pace.progress(f"finished {shaking.name}, beta = {specimen.label:g}"))
+            yield Publish(self._pace.progress(f"{shaking.name} finished, beta = {specimen.label:g}"))
             yield Publish(PointFinished(point))
 
     def _point(self, shaking: Shaking, specimen: Specimen, bare: BareTest) -> Generator[Step, Outcome, EarthquakePoint]:
@@ -237,7 +237,9 @@ class EarthquakePlan:
         raise RigError("a drive was played without a result")
 
     def _running_gain(self, shaking: Shaking, specimen: Specimen, bare: BareTest) -> GainMonitor:
-        """Monitor of the running gain; its prediction is for the motion of this drive with the bare frame."""
+        """Callback that monitors the running gain; its prediction is for the motion of this drive with the bare
+        frame.
+        """
         base = bare.observed.base
         expected = (History.of(specimen.bare(), base), History.of(specimen, base))
         noise = bare.observed.drift.peak.uncertainty
@@ -246,7 +248,7 @@ class EarthquakePlan:
         )
 
     def _remarked(self, shaking: Shaking, point: EarthquakePoint) -> EarthquakePoint:
-        """Point with the shortfall of its drive added to the remarks."""
+        """The point, with the shortcomings of its drive added to the remarks."""
         said = filter(None, (point.reason, self._shortfalls.get(shaking.name)))
         return point.model_copy(update={"reason": "; ".join(said)})
 
@@ -257,7 +259,7 @@ class EarthquakePlan:
 def table_model(
     source: TableSource, configuration: BenchConfiguration, pace: Pace
 ) -> Generator[Step, Outcome, TableModel]:
-    """Stored table model, or one identified now; the bare frame is then mounted on the table."""
+    """The stored table model, or one identified now, for which the bare frame is mounted."""
     if source.model is not None or source.plan is None:
         assert source.model is not None
         bare = configuration.known_specimen.bare()
@@ -276,7 +278,7 @@ def table_model(
 
 
 def _counted(watch: Watch | None, pace: Pace) -> Watch | None:
-    """Watch of an identification, with progress converted to that of the campaign."""
+    """Callbacks of an identification, with its progress converted to that of the campaign."""
     if watch is None:
         return None
 

@@ -1,4 +1,4 @@
-"""Point of a record: measured, overturned, or not played."""
+"""Points for a record: measured, overturned, or not played."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from sim.specimen import Specimen
 Array = NDArray[np.float64]
 
 CHANCE_NOTE = 0.05
-"""Predicted probability of toppling above which a remark is added if the block stood."""
+"""Predicted probability of toppling above which a remark is added if the block stays upright."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +119,7 @@ def overturned_point(
         if time is None
         else f"{time:.2f} s after the drive began"
     )
-    said = f"the block overturned {when}; predicted chance {predicted.chance:.0%}"
+    said = f"the block overturned {when}; predicted probability {predicted.chance:.0%}"
     return EarthquakePoint.model_validate(
         {
             **shared_fields(shaking, specimen.label or 0.0, target_gain, bare),
@@ -135,7 +135,7 @@ def overturned_point(
 def unplayed_point(
     shaking: Shaking, beta: float, target_gain: float | None, bare: BareTest | None, reason: str
 ) -> EarthquakePoint:
-    """Point of a record without a test or result at this stiffness."""
+    """Point for a record without a test or result at this stiffness."""
     known = shared_fields(shaking, beta, target_gain, bare)
     return EarthquakePoint.model_validate({**known, "status": PointStatus.NOT_PLAYED, "reason": reason})
 
@@ -143,20 +143,26 @@ def unplayed_point(
 def _remarks(found: Compared, observed: Observed) -> Iterator[str]:
     """Remarks on the point."""
     if found.alpha_2_predicted is None:
-        yield "the nominal specimen topples under the achieved motion; the interval is that of the draws that stand"
+        yield (
+            "the nominal specimen topples under the achieved motion; the interval is that of the draws that do "
+            "not topple"
+        )
     elif found.chance > CHANCE_NOTE:
         yield f"the block did not topple, but {found.chance:.0%} of the draws do"
     if found.agrees is False:
-        yield "differs from the prediction by more than the uncertainty"
+        yield "the difference from the prediction exceeds the uncertainty"
     if found.chaotic:
         yield "the response is chaotic here: the contributions to the uncertainty cannot be separated"
     agreement = observed.base.agreement
     if agreement is not None and abs(agreement - 1.0) > ALIKE:
-        yield f"the table's displacement sensor measures {agreement:.3f} times the motion of its accelerometer: unused"
+        yield (
+            f"the table's displacement sensor measures {agreement:.3f} times the motion measured by its "
+            "accelerometer and is not used"
+        )
 
 
 def rejection(learned: Replicated, parameters: EarthquakeParameters) -> str | None:
-    """Reason why the best drive is not used; None if it is used."""
+    """Reason why the best drive is not used; None if it is."""
     if learned.acceleration is None:
         return f"no pass was evaluated: {learned.reason}"
     if learned.repeatable <= parameters.usable:
@@ -168,7 +174,7 @@ def rejection(learned: Replicated, parameters: EarthquakeParameters) -> str | No
 
 
 def shortfall(learned: Replicated, parameters: EarthquakeParameters, lowest: float) -> str:
-    """Tolerances missed by a used drive, as text; empty if it meets both.
+    """Tolerances that a used drive misses, as text; empty if it meets both.
 
     `lowest` [Hz] is the lower end of the record's band.
     """

@@ -17,8 +17,8 @@ class EarthquakeParameters(Parameters):
     records: tuple[str, ...] = quantity(
         (),
         "",
-        "records, before the flags: FILE, FILE@KEY=VALUE,... or synthetic:NAME[:SEED] (see `rockbench records`); "
-        "absent: the seven synthetic ones",
+        "records, before the flags: FILE, FILE@KEY=VALUE,... or synthetic:NAME[:SEED] (see `rockbench "
+        "records`); if absent, the seven synthetic ones",
     )
     beta: tuple[Stiffness, ...] = quantity(
         (0.25, 0.64, 0.97), "1", "stiffness ratios k_C/k1 of the coupling springs", min_length=1, usual=COUPLING
@@ -32,23 +32,23 @@ class EarthquakeParameters(Parameters):
     table_band: str | None = quantity(
         None,
         "",
-        "band LOW:HIGH [Hz] to which records are filtered before scaling (-6 dB, zero phase); absent: the "
+        "band LOW:HIGH [Hz] to which records are filtered before scaling (-6 dB, zero phase); if absent, the "
         "usable band of the configured table",
     )
     length_ratio: float = quantity(
         1.0,
         "1",
-        "length scale, model over prototype: time scales with its square root, acceleration is kept",
+        "length scale, model over prototype: time scales with its square root, acceleration is unchanged",
         gt=0,
         le=1,
     )
     trim: float = quantity(
-        0.0005, "1", "share of the Arias intensity removed at either end of a record; 0: none", ge=0, lt=0.1
+        0.0005, "1", "fraction of the Arias intensity removed at either end of a record; 0: none", ge=0, lt=0.1
     )
     longest: float = quantity(
         100.0,
         "s",
-        "for a longer record, the part of this length with the most Arias intensity is played",
+        "longest duration that is played; of a longer record, the part of this duration with the most Arias intensity",
         ge=5,
         le=3600,
     )
@@ -58,32 +58,33 @@ class EarthquakeParameters(Parameters):
     tolerance: float = quantity(
         0.005,
         "1",
-        "rms tracking error of the table without noise, relative to the record's rms, at which the passes end",
+        "rms tracking error of the table, excluding noise, relative to the record's rms, at which the passes end",
         gt=0,
         lt=1,
     )
     spectrum_tolerance: float = quantity(
         0.01,
         "1",
-        "error of the table's response spectrum without noise, 0.1 to 1 s and at the periods of the frame, at which "
-        "the passes also end",
+        "error of the table's response spectrum, excluding noise, from 0.1 to 1 s and at the periods of the "
+        "frame, which must also be reached for the passes to end",
         gt=0,
         lt=1,
     )
     usable: float = quantity(
         0.05,
         "1",
-        "rms error without noise, relative to the record's rms, up to which the best drive is used if the passes end "
-        "before the tolerance is met: by a limit, their number, or missing samples",
+        "rms error, excluding noise, relative to the record's rms, up to which the best drive is used if the "
+        "passes end before the tolerance is met, because of a limit, their number, or missing samples",
         gt=0,
         lt=1,
     )
-    decay: float = quantity(5.0, "s", "measured free vibration after a record", ge=0, le=120)
+    decay: float = quantity(5.0, "s", "duration of the free vibration measured after a record", ge=0, le=120)
     rest: float = quantity(2.0, "s", "time at rest before a record, after the storeys have settled", ge=0.5, le=60)
     draws: int = quantity(
         200,
         "1",
-        "Monte Carlo draws of each prediction; half as many for the bench alone, a quarter for each contribution",
+        "number of Monte Carlo draws for each prediction; half as many for the bench alone, a quarter for "
+        "each contribution",
         ge=40,
         le=5000,
     )
@@ -109,33 +110,39 @@ class EarthquakePoint(Parameters):
     status: PointStatus = quantity(..., "", "outcome of the record")
     alpha_1: float | None = quantity(None, "1", "measured gain of the peak of u1, coupled over bare")
     alpha_1_uncertainty: float | None = quantity(None, "1", "expanded uncertainty of alpha_1 (k = 2)")
-    alpha_1_predicted: float | None = quantity(None, "1", "predicted gain of u1 for the achieved motions of the table")
-    alpha_1_low: float | None = quantity(None, "1", "lower bound of the 95 % interval expected for its measured value")
-    alpha_1_high: float | None = quantity(None, "1", "upper bound of this interval")
+    alpha_1_predicted: float | None = quantity(None, "1", "predicted gain of u1 for the achieved table motions")
+    alpha_1_low: float | None = quantity(
+        None, "1", "lower bound of the 95 % interval expected for the measured alpha_1"
+    )
+    alpha_1_high: float | None = quantity(
+        None, "1", "upper bound of the 95 % interval expected for the measured alpha_1"
+    )
     alpha_1_agrees: bool | None = quantity(None, "1", "whether alpha_1 lies between alpha_1_low and alpha_1_high")
     alpha_2: float | None = quantity(None, "1", "measured gain of the peak drift, coupled over bare")
     alpha_2_uncertainty: float | None = quantity(None, "1", "expanded uncertainty of alpha_2 (k = 2)")
     alpha_2_predicted: float | None = quantity(
-        None, "1", "predicted gain for the achieved motions of the table and the known specimen"
+        None, "1", "predicted gain for the achieved table motions and the known specimen"
     )
     alpha_2_low: float | None = quantity(
-        None, "1", "lower bound of the 95 % interval expected for the measured value, by Monte Carlo"
+        None, "1", "lower bound of the 95 % interval expected for the measured alpha_2, by Monte Carlo simulation"
     )
-    alpha_2_high: float | None = quantity(None, "1", "upper bound of this interval")
+    alpha_2_high: float | None = quantity(
+        None, "1", "upper bound of the 95 % interval expected for the measured alpha_2"
+    )
     alpha_2_target: float | None = quantity(
-        None, "1", "predicted gain for the commanded motion of the table; absent where the block would topple"
+        None, "1", "predicted gain for the commanded table motion; absent if the block would topple"
     )
     alpha_2_bench_uncertainty: float | None = quantity(
         None,
         "1",
-        "half width of the 95 % interval of measured minus predicted alpha_2 for an exactly known specimen, by Monte "
-        "Carlo",
+        "half width of the 95 % interval of measured minus predicted alpha_2 for an exactly known specimen, "
+        "by Monte Carlo simulation",
     )
     agrees: bool | None = quantity(None, "1", "whether alpha_2 lies between alpha_2_low and alpha_2_high")
     dominating: str = quantity("", "", "largest contribution to the uncertainty")
     uncertainty_parts: str = quantity("", "", "standard uncertainty of alpha_2 by contribution, as JSON")
     topple_chance: float | None = quantity(
-        None, "1", "predicted probability that the block topples, over the uncertainty of specimen and motion"
+        None, "1", "predicted probability that the block topples, given the uncertainty of specimen and motion"
     )
     overturned_s: float | None = quantity(
         None, "s", "time at which the block finally passed its critical angle, to about 0.3 s"
@@ -147,30 +154,34 @@ class EarthquakePoint(Parameters):
     bare_drift_peak_m: float | None = quantity(None, "m", "peak drift of the bare frame")
     drift_peak_s: float | None = quantity(None, "s", "time of the peak of the coupled drift")
     pga_target_m_s2: float = quantity(..., "m/s2", "commanded peak acceleration of the table")
-    pga_m_s2: float | None = quantity(None, "m/s2", "achieved peak acceleration, coupled, up to 400 Hz")
+    pga_m_s2: float | None = quantity(
+        None, "m/s2", "achieved peak acceleration of the table, coupled frame, up to 400 Hz"
+    )
     tracking_error: float | None = quantity(
-        None, "1", "rms error of the table within the band relative to the record's rms, coupled"
+        None, "1", "rms error of the table within the band, relative to the record's rms, coupled frame"
     )
     spectrum_error: float | None = quantity(
-        None, "1", "largest error of the response spectrum between 0.1 and 1 s, coupled"
+        None, "1", "largest error of the response spectrum between 0.1 and 1 s, coupled frame"
     )
     motion_difference: float | None = quantity(
-        None, "1", "rms difference between the table's motions, coupled and bare, relative to the record's rms"
+        None,
+        "1",
+        "rms difference between the table motions with the coupled and the bare frame, relative to the record's rms",
     )
     bare_tracking_error: float | None = quantity(None, "1", "rms error of the table with the bare frame")
-    passes: int = quantity(0, "1", "number of passes of the replication, bare frame")
+    passes: int = quantity(0, "1", "number of passes of the replication with the bare frame")
     replication: str = quantity("", "", "outcome of the replication")
-    reason: str = quantity("", "", "reason why there is no gain, or remarks")
+    reason: str = quantity("", "", "remarks, or the reason why there is no gain")
 
 
 PROTOCOL = Protocol(
     name="earthquake",
     summary="Earthquake records on the bare and the coupled frame: gain coefficient alpha_2 against prediction.",
     details=(
-        "Each record is limited to a band, scaled, and fitted to the stroke; the drive is iterated with the bare "
-        "frame, and the record is played with every spring. The measured gain of the peak drift is compared with the "
-        "one predicted for the achieved motion of the table. Toppling of the block is a valid result. Records are "
-        "files, or synthetic:NAME."
+        "Each record is limited to a band, scaled, and fitted to the stroke; the drive is iterated with the "
+        "bare frame, and the record is played with every spring. The measured gain of the peak drift is "
+        "compared with the one predicted for the achieved motion of the table. A toppled block is a valid "
+        "result. Records are files, or synthetic:NAME."
     ),
     example="RECORD.AT2 --beta 0.25 0.64",
     parameters=EarthquakeParameters,

@@ -1,4 +1,4 @@
-"""Records of a campaign: preparation for the table, and storage in the data file with the table model."""
+"""Records of a campaign: preparation for the table, and storage in the data file together with the table model."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -32,7 +32,7 @@ OMITTED = "left_out"
 """Table of the data file with a row per combination that the plan left out; absent without one."""
 
 LeftOut = dict[tuple[str, float | None], str]
-"""Reason by record and stiffness ratio, None for the bare frame, of combinations that are not played."""
+"""Reasons why combinations are not played, by record and stiffness ratio (None for the bare frame)."""
 
 _TEXTS = {
     "name": "name of the record",
@@ -64,7 +64,7 @@ class FileSources:
 
     @staticmethod
     def stored(tables: Mapping[str, Table]) -> "FileSources | None":
-        """Sources in a data file; None for files of older versions without them."""
+        """Sources in a data file; None for files of older versions, which lack them."""
         if RECORDS not in tables or SAMPLES not in tables:
             return None
         return FileSources(_stored_records(tables), _stored_model(tables), _stored_left_out(tables))
@@ -81,13 +81,13 @@ def _records(records: Sequence[Accelerogram]) -> Table:
             for name, description in _TEXTS.items()
         },
         "header": texts(
-            [json.dumps(dict(record.header)) for record in records], "description in the file itself (JSON)"
+            [json.dumps(dict(record.header)) for record in records], "description contained in the file (JSON)"
         ),
         "synthetic": Column(
             np.array([record.synthetic for record in records]), "", "whether the record is synthetic, not measured"
         ),
         "dt": Column(np.array([record.dt for record in records]), "s", "sample interval"),
-        "samples": Column(np.array(lengths), "1", f"number of its consecutive rows in {SAMPLES}"),
+        "samples": Column(np.array(lengths), "1", f"number of consecutive rows in {SAMPLES} that belong to the record"),
     }
 
 
@@ -101,7 +101,7 @@ def _omitted(left_out: LeftOut) -> Table:
     return {
         "record": Column(np.array([record for record, _ in left_out], dtype=np.str_), "", "name of the record"),
         "beta": Column(np.array(betas), "1", "stiffness ratio of the coupling spring; NaN: bare frame"),
-        "reason": Column(np.array([*left_out.values()], dtype=np.str_), "", "limits that it would exceed"),
+        "reason": Column(np.array([*left_out.values()], dtype=np.str_), "", "limits that the combination would exceed"),
     }
 
 
@@ -154,7 +154,7 @@ def _stored_left_out(tables: Mapping[str, Table]) -> LeftOut:
 
 
 FADE = 1.0
-"""Duration of the fade-in and fade-out of a part of a record [s]."""
+"""Duration of the fade-in and of the fade-out when part of a record is played [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,7 +203,9 @@ def band_used(parameters: EarthquakeParameters, configuration: BenchConfiguratio
     low, high = configuration.table_band
     band = band_of(parameters.table_band, configuration)
     if band is None:
-        raise InvalidInput("--table-band", parameters.table_band, "records must be filtered to a band: give LOW:HIGH")
+        raise InvalidInput(
+            "--table-band", parameters.table_band, "records must be filtered to a band: specify LOW:HIGH"
+        )
     if band[0] < low or band[1] > high:
         raise InvalidInput("--table-band", parameters.table_band, f"the band of the table is {low:g} to {high:g} Hz")
     return band
@@ -212,7 +214,9 @@ def band_used(parameters: EarthquakeParameters, configuration: BenchConfiguratio
 def shakings(
     parameters: EarthquakeParameters, configuration: BenchConfiguration, sources: FileSources | None = None
 ) -> tuple[Shaking, ...]:
-    """Read and prepare every record, in the order given; `sources` are those of a data file. Raises InvalidInput."""
+    """Read and prepare every record, in the given order; `sources` are the sources stored in a data file. Raises
+    InvalidInput.
+    """
     named = parameters.records or tuple(f"synthetic:{name}" for name in NAMES)
     records = sources.records if sources else read_records([RecordReference.parse(text) for text in named])
     return tuple(_shaking(record, parameters, configuration) for record in records)

@@ -1,4 +1,4 @@
-"""Report of tests under earthquake records: gains (Fig. 8(a), 9(a)), motions (Fig. 7), drifts (Fig. 8(b), 9(b))."""
+"""Report on tests under earthquake records: gains (Fig. 8(a), 9(a)), motions (Fig. 7), drifts (Fig. 8(b), 9(b))."""
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Mapping, Sequence
@@ -25,17 +25,17 @@ from sim.errors import InvalidInput
 
 
 def seismic_sections(campaign: Campaign) -> list[Section]:
-    """Report section: measured and predicted gains for every record and stiffness."""
+    """Report section on measured and predicted gains for every record and stiffness."""
     points = campaign.seismic_points
     if not points:
         return []
     compared = [row["agrees"] for row in points if row["agrees"] is not None]
     toppled = sum(row["status"] == "overturned" for row in points)
     parts: list[Part] = [
-        f"{counted(len(points), 'test')}; {sum(compared)} of {len(compared)} measured gains lie within the prediction "
-        f"interval for the achieved motion of the table, and the block toppled in {toppled or 'none'}. Uncertainties "
-        "of measured gains are expanded (k = 2); the interval is the 95 % interval of the measured value, by Monte "
-        "Carlo over specimen and sensors.",
+        f"{counted(len(points), 'test')}; {sum(compared)} of {len(compared)} measured gains lie within the "
+        "prediction interval for the achieved motion of the table, and the block toppled in "
+        f"{toppled or 'none'}. Uncertainties of measured gains are expanded (k = 2); the interval is the 95 % "
+        "interval of the measured value, from a Monte Carlo simulation over specimen and sensors.",
         _gains(points),
         _first_storey(points),
         _conditions(points),
@@ -55,7 +55,7 @@ def seismic_sections(campaign: Campaign) -> list[Section]:
     if remarks:
         parts += ["Remarks on single tests:", Listing(remarks)]
     parts += histories_parts(campaign)
-    return [Section("seismic", "Earthquake records (as Fig. 7 to 9 of the paper)", parts)]
+    return [Section("seismic", "Earthquake records (as Figs. 7 to 9 of the paper)", parts)]
 
 
 def _gains(points: Sequence[Mapping[str, Any]]) -> Table:
@@ -66,7 +66,7 @@ def _gains(points: Sequence[Mapping[str, Any]]) -> Table:
         Column("α₂ measured", "1"),
         Column("α₂ predicted", "1"),
         Column("95 % interval", "1"),
-        Column("asked motion", "1"),
+        Column("requested motion", "1"),
         Column("topples", "%"),
         Column("agrees", words=True),
     ]
@@ -87,7 +87,7 @@ def _gains(points: Sequence[Mapping[str, Any]]) -> Table:
             ]
         )
     caption = (
-        "Gains under earthquake records, measured and predicted; topples: predicted probability that the block topples"
+        "Measured and predicted gains under earthquake records; topples: predicted probability that the block topples"
     )
     return Table(caption, columns, rows)
 
@@ -112,12 +112,15 @@ def _first_storey(points: Sequence[Mapping[str, Any]]) -> Table:
                 with_uncertainty(measured, row["alpha_1_uncertainty"]),
                 plain(predicted),
                 percent(measured / predicted - 1.0) if measured is not None and predicted else ABSENT,
-                # older files without these fields have the gain without a verdict
+                # older files lack these fields and have the gain without a verdict
                 _interval(row.get("alpha_1_low"), row.get("alpha_1_high")),
                 yes_or_no(row.get("alpha_1_agrees")),
             ]
         )
-    caption = "Gains of the first storey (k = 2), and predicted for the achieved motion; interval and verdict as for α₂"
+    caption = (
+        "Gains of the first storey, measured (k = 2) and predicted for the achieved motion; interval and "
+        "verdict as for α₂"
+    )
     return Table(caption, columns, rows)
 
 
@@ -129,8 +132,8 @@ def _conditions(points: Sequence[Mapping[str, Any]]) -> Table:
     columns = [
         Column("record", words=True),
         Column("β", "1"),
-        Column("peak asked", "m/s²"),
-        Column("peak achieved", "m/s²"),
+        Column("requested peak", "m/s²"),
+        Column("achieved peak", "m/s²"),
         Column("tracking error, coupled", "%"),
         Column("spectrum error", "%"),
         Column("coupled against bare", "%"),
@@ -178,13 +181,13 @@ def _statement(campaign: Campaign, points: Sequence[Mapping[str, Any]]) -> list[
         Column("best about 0.5", words=True),
         Column("towards 1 as β grows", words=True),
     ]
-    return [Table(f"Statement 8 of the paper, with records limited to {low:g} to {high:g} Hz", columns, rows)]
+    return [Table(f"Statement 8 of the paper, for records limited to {low:g} to {high:g} Hz", columns, rows)]
 
 
 Floats = NDArray[np.float64]
 
 QUIET = 1.5
-"""Time at the start of a run for the zero of the signals [s]; the table is at rest for 2 s."""
+"""Time at the start of a run in which the signals are zeroed [s]; the table is at rest for 2 s."""
 
 
 @dataclass(frozen=True)
@@ -215,9 +218,9 @@ def played_records(record: DataFile) -> list[Played]:
         begin = int(rows[bisect_left(runs, runs[block])])
         samples = round(seconds * record.sample_rate)
         one = Played(str(name), None if beta is None else float(beta), begin, stop - samples, stop)
-        # the gains of one played record have the same start
+        # all gains of one played record have the same start
         if found and (found[-1].run, found[-1].name, found[-1].beta) == (one.run, one.name, one.beta):
-            # the first gain is at the end of a block, which determines the start; the last one is within a block
+            # the first gain is at the end of a block, which determines the start; the last one lies within a block
             start = found.pop().start
             one = replace(one, start=start, stop=start + samples)
         found.append(one)
@@ -254,7 +257,7 @@ def histories_parts(campaign: Campaign) -> list[Part]:
     try:
         known = {shaking.name: shaking for shaking in _shakings(campaign)}
     except InvalidInput as refused:
-        return [Notice(f"Histories are not drawn, because records are missing: {refused}.")]
+        return [Notice(f"Histories are not drawn because records are missing: {refused}.")]
     every = max(round(STEP * record.sample_rate), 1)
     motions: list[MotionPicture] = []
     drifts: list[DriftPicture] = []
@@ -282,15 +285,15 @@ def histories_parts(campaign: Campaign) -> list[Part]:
         some = [drift for drift in drifts if drift.name in names[first : first + MOST]]
         if some:
             caption = (
-                "Drift of the bare frame and of the coupled one with the softest spring: measured, and predicted for "
-                "the achieved motion of the table."
+                "Drift of the bare frame and of the frame coupled by the softest spring: measured, and predicted "
+                "for the achieved table motion."
             )
             parts.append(Picture(drift_figure(some), caption, "Drift against time, one row per record."))
     return parts
 
 
 def _shakings(campaign: Campaign) -> tuple[Shaking, ...]:
-    """Records of the campaign from the data file, or read again for an older file without them.
+    """Records of the campaign from the data file; for an older file without them, they are read again.
 
     Raises InvalidInput for missing records.
     """
@@ -300,7 +303,7 @@ def _shakings(campaign: Campaign) -> tuple[Shaking, ...]:
 
 
 def _bare_and_softest(plays: Sequence[Played]) -> list[Played]:
-    """Last test of the bare frame, and last test with the softest spring."""
+    """The last test of the bare frame and the last test with the softest spring."""
     bare = [play for play in plays if play.beta is None]
     springs = sorted(
         (play for play in plays if play.beta is not None), key=lambda play: (play.beta or 0.0, -play.start)

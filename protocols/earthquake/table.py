@@ -16,7 +16,7 @@ from protocols.earthquake.records import FileSources, band_used
 from sim.errors import InvalidInput
 
 PERIOD, LONGEST = 8.0, 120.0
-"""Period of the identification, and the longest period for a low first octave [s]."""
+"""Period of the identification, and its maximum for a low first octave [s]."""
 
 OCTAVE_LINES = 4
 """Minimum number of lines in the lowest octave of the identification, which has the fewest."""
@@ -25,7 +25,7 @@ OCTAVE_LINES = 4
 def stored_table(
     parameters: EarthquakeParameters, configuration: BenchConfiguration, sources: FileSources | None = None
 ) -> TableModel | None:
-    """Configured table model; None without one.
+    """The configured table model; None if there is none.
 
     Does not check the age of a model from a data file. Raises InvalidInput if the model cannot be read, is too old, or
     does not match the sample rate or the band.
@@ -42,14 +42,14 @@ def stored_table(
     low, high = band[0] / REACH, band[1] * REACH
     if model.band[0] > low or model.band[1] < high:
         holds = f"the table model covers {model.band[0]:g} to {model.band[1]:g} Hz"
-        allowed = f"{holds}, a record in this band needs {low:g} to {high:g} Hz: identify the table in a wider band"
+        allowed = f"{holds}, but a record in this band needs {low:g} to {high:g} Hz: identify the table in a wider band"
         raise InvalidInput("--table-band", f"{band[0]:g}:{band[1]:g}", allowed)
     return model
 
 
 @dataclass(frozen=True, eq=False)
 class TableSource:
-    """Origin of the table model: a stored `model`, else an identification by `parameters`, with its `plan`."""
+    """Source of the table model: a stored `model`, or else an identification with `parameters` and its `plan`."""
 
     model: TableModel | None
     parameters: IdentifyParameters
@@ -59,7 +59,9 @@ class TableSource:
     def of(
         parameters: EarthquakeParameters, configuration: BenchConfiguration, sources: FileSources | None
     ) -> "TableSource":
-        """Source for a campaign. Raises InvalidInput for an unsuitable model, or a band that cannot be identified."""
+        """The source for a campaign. Raises InvalidInput for an unsuitable model, or a band that cannot be
+        identified.
+        """
         model = stored_table(parameters, configuration, sources)
         if model is not None:
             return TableSource(model, IdentifyParameters(), None)
@@ -68,7 +70,7 @@ class TableSource:
 
     @property
     def duration(self) -> float:
-        """Expected length of the identification [s]; zero with a stored model."""
+        """Expected duration of the identification [s]; zero with a stored model."""
         return 0.0 if self.plan is None else expected_duration(self.parameters, self.plan)
 
 
@@ -89,21 +91,21 @@ def table_warnings(
     )
     if mode * FLAT < low:
         said.append(
-            f"the frame's first mode at {mode:.3g} Hz lies below the band from {low:g} Hz on: the table's motion at "
-            "this frequency is not fully compared, and its response spectrum may have larger errors"
+            f"the frame's first mode at {mode:.3g} Hz is below the band, which starts at {low:g} Hz: the table's "
+            "motion at this frequency is not fully compared, and its response spectrum may have larger errors"
         )
     return tuple(said)
 
 
 def identification(parameters: EarthquakeParameters, configuration: BenchConfiguration) -> IdentifyParameters:
-    """Parameters of the identification without a stored model. Raises InvalidInput for too low a band."""
+    """Parameters of the identification if there is no stored model. Raises InvalidInput if the band is too low."""
     low, high = band_used(parameters, configuration)
     first = low / REACH
     period = max(PERIOD, float(ceil(OCTAVE_LINES / first)))
     if period > LONGEST:
         lowest = REACH * OCTAVE_LINES / LONGEST
-        allowed = f"the table can be identified from {lowest:.3g} Hz on: raise the lower end"
+        allowed = f"the table can be identified from {lowest:.3g} Hz upward: raise the lower end"
         raise InvalidInput(
-            "--table-band", f"{low:g}:{high:g}", f"{allowed}, or give a table_model that covers the band"
+            "--table-band", f"{low:g}:{high:g}", f"{allowed}, or specify a table_model that covers the band"
         )
     return IdentifyParameters(band_low=first, band_high=high * REACH, period=period)

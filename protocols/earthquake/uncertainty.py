@@ -1,8 +1,8 @@
 """Comparison of measured and predicted gain by Monte Carlo simulation under the achieved motions of the table.
 
 Both tests share sensors and specimen, so each draw has one specimen, one scale of the table's sensors and one pair of
-lasers for both; the noise is drawn separately. If the model holds, a draw of the measurement, coupled over bare, times
-a draw of the prediction over the predicted gain is distributed as the measured gain (GUM Supplement 1).
+lasers for both; noise is drawn separately. If the model holds, a draw of the measurement, coupled over bare, times a
+draw of the prediction over the predicted gain is distributed as the measured gain (GUM Supplement 1).
 
 A second set of draws with an exactly known specimen determines the uncertainty of the bench alone. Contributions drawn
 one by one only show which is the largest: where the response is chaotic, each alone changes the gain as much as all
@@ -38,7 +38,9 @@ HELD = 0.95
 """Coverage of an expanded uncertainty."""
 
 CHAOTIC = 2.0
-"""Ratio of the summed variances of single contributions to that of a joint draw above which they do not add up."""
+"""Ratio of the summed variances of single contributions to the variance of a joint draw above which they are considered
+not to add up.
+"""
 
 NONE = SpecimenKnowledge().only()
 """An exactly known specimen."""
@@ -76,8 +78,8 @@ class Compared:
     `alpha_1_low` and `alpha_1_high` those of alpha_1.
 
     `bench` is the 95 % quantile of |measured - predicted| alpha_2 for an exactly known specimen; None if that specimen
-    topples. `budget` has standard uncertainties of alpha_2, each drawn alone, largest first; `chaotic` is set if they
-    do not add up.
+    topples. `budget` holds the standard uncertainties of alpha_2 by contribution, each drawn alone, largest first;
+    `chaotic` is set if they do not add up.
     """
 
     alpha_1: float
@@ -97,12 +99,12 @@ class Compared:
 
     @property
     def agrees(self) -> bool | None:
-        """Whether alpha_2 is within its interval; None without an interval."""
+        """Whether alpha_2 is within its interval; None if there is no interval."""
         return _within(self.alpha_2, self.low, self.high)
 
     @property
     def alpha_1_agrees(self) -> bool | None:
-        """Whether alpha_1 is within its interval; None without an interval."""
+        """Whether alpha_1 is within its interval; None if there is no interval."""
         return _within(self.alpha_1, self.alpha_1_low, self.alpha_1_high)
 
 
@@ -148,7 +150,7 @@ def gains(specimen: Specimen, bare: SampledRecord, coupled: SampledRecord) -> tu
 def compare(
     bare: Observed, coupled: Observed, specimen: Specimen, configuration: BenchConfiguration, n: int, seed: int
 ) -> Compared:
-    """Compare the gain of two tests, bare and coupled, with that of the model."""
+    """Compare the gain from two tests, bare and coupled, with the model's."""
     sensors = configuration.sensors
     drifts, firsts = (bare.drift, coupled.drift), (bare.u1, coupled.u1)
     of_drift, of_u1, of_all, of_bench, of_parts = SeedSequence(seed).spawn(5)
@@ -200,7 +202,7 @@ def _parts(
     table_scale: float,
     seed: SeedSequence,
 ) -> dict[str, float]:
-    """Standard deviation of the predicted alpha_2 due to each contribution to the model's inputs alone."""
+    """Standard deviation of the predicted alpha_2 due to each single contribution to the model's inputs."""
     of_noise, of_scale, *streams = seed.spawn(2 + len(_KEPT))
     runs = {
         "noise of the table's motion": predicted(NONE, n, 0.0, True, of_noise),

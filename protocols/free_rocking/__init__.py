@@ -1,1 +1,1 @@
-"""Free rocking: the stand-alone block is tilted and released by hand while a laser measures its face."""
+"""Free rocking: the stand-alone block is tilted and released by hand while a laser measures the motion of its face."""

@@ -33,7 +33,7 @@ def rocking_point(
     push: float | None = None,
     remarks: str = "",
 ) -> RockingPoint:
-    """Point of `part`, a tilt or all tilts, for the block of `specimen`."""
+    """Point for `part`, a tilt or all tilts, with the block of `specimen`."""
     block, theory = specimen.block, theoretical_restitution(specimen.block)
     r, birge = found.restitution, found.motion.birge
     return RockingPoint(
@@ -86,8 +86,9 @@ def inconsistencies(combined: RockingPoint) -> list[str]:
         )
     if combined.birge is not None and combined.birge > SCATTERED:
         found.append(
-            f"the scatter of the tilts is {combined.birge:.1f} times that expected from their uncertainties, and is "
-            "included: the impacts differ. r_exp is from the amplitudes, which are less sensitive to the differences"
+            f"the scatter of the tilts is {combined.birge:.1f} times that expected from their uncertainties, and "
+            "is included: the impacts differ. r_exp is taken from the amplitudes, which are less sensitive to "
+            "the differences"
         )
     if combined.birge is None:
         found.append("a single tilt does not show the scatter of r between tilts: release the block several times")
@@ -107,14 +108,15 @@ def inconsistencies(combined: RockingPoint) -> list[str]:
     ):
         if abs(seen - sides) > uncertainty:
             found.append(
-                f"{name} is {seen:.5g} from the motion and {sides:.5g} from the sides, {100 * (seen / sides - 1):+.2g} "
-                "%: check for blunt edges, the laser's height and scale, the sides and the density"
+                f"{name} is {seen:.5g} from the motion and {sides:.5g} from the sides, a difference of "
+                f"{100 * (seen / sides - 1):+.2g} %: check for blunt edges, the laser's height and scale, the sides "
+                "and the density"
             )
     return found
 
 
 def fit_events(tilt: Tilt, alone: Findings, uncertain: Array, number: int) -> Iterator[FitFinished]:
-    """Two fit events of tilt `number`: the exact motion over time, and the impacts in order.
+    """Two fit events for tilt `number`: the exact motion against time, and the impacts in order.
 
     `alone` are the findings from this tilt alone; `uncertain`, shape (8,), the standard uncertainties of the fit.
     """
@@ -125,7 +127,7 @@ def fit_events(tilt: Tilt, alone: Findings, uncertain: Array, number: int) -> It
 def identified_specimen(found: Findings, tilts: int, block: Block, known: Identified | None) -> Identified:
     """Identified specimen with the restitution factor of `block`: measured over theoretical restitution.
 
-    The theoretical value follows from the sides of the block, so that the source of the factor states the sides and the
+    The theoretical value follows from the block's sides, so the source of the factor states both the sides and the
     restitution.
     """
     theory, r = theoretical_restitution(block), found.restitution
@@ -169,7 +171,9 @@ def _impacts(tilt: Tilt, alone: Findings, number: int) -> FitFinished:
             relation.each_uncertainty, "1", "standard uncertainty of the restitution from noise"
         ),
         "speed": Series(
-            relation.speed, "1", "angular velocity before impact relative to that of a fall from the critical angle"
+            relation.speed,
+            "1",
+            "angular velocity before the impact, relative to that of a fall from the critical angle",
         ),
         "angle_before": Series(relation.angles[:-1], "rad", "largest angle before the impact"),
         "angle_after": Series(relation.angles[1:], "rad", "largest angle after the impact"),

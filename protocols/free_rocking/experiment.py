@@ -22,7 +22,7 @@ from sim.free_rocking import FreeRocking, critical_angle, frequency_parameter
 from sim.parameters import Parameters
 
 LOWEST_CUTOFF = 1.25 / AFTER
-"""Cutoff [Hz] of a fourth-order Butterworth low-pass at which 5 % of the kink of an impact, about 2 um, remains after
+"""Cutoff [Hz] of a fourth-order Butterworth low-pass at which 5 % of the kink at an impact, about 2 um, remains after
 `AFTER`.
 """
 
@@ -30,7 +30,7 @@ _MEETS = "the beam must hit the face of the tilted block: between {:.4f} and {:.
 
 _NOT_WATCHED = "laser 2 points at the block: the drift is neither measured nor monitored"
 
-_LASER_ON_BLOCK = "Laser 2 still points at the block: turn it back to storey 2."
+_LASER_ON_BLOCK = "Laser 2 still points at the block: aim it at storey 2 again."
 
 _TABLE_LOCKED = "THE TABLE IS STILL LOCKED: remove the clamps before the table is driven."
 
@@ -122,12 +122,18 @@ class FreeRockingTest(Prepared[FreeRockingParameters]):
             share = abs(tilt.displacement) / configuration.laser_half_ranges[1]
             allowed = configuration.limits.laser_range
             if share > allowed:
-                needs = f"the face moves by {1e3 * abs(tilt.displacement):.1f} mm there, {share:.2f} of half the range"
+                needs = (
+                    f"the face moves by {1e3 * abs(tilt.displacement):.1f} mm at this height, {share:.2f} of "
+                    "half the range"
+                )
                 raise InvalidInput(
-                    "height", p.height, f"{needs} of laser 2; limits.laser_range = {allowed:g}: aim lower"
+                    "height", p.height, f"{needs} of laser 2, but limits.laser_range = {allowed:g}: aim lower"
                 )
         if configuration.backend == "simulated":
             cutoff = configuration.simulation.bench.filter_unit.cutoff
             if cutoff < LOWEST_CUTOFF:
-                allowed = f"the effect of impacts must decay within {1e3 * AFTER:.0f} ms: at least {LOWEST_CUTOFF:g} Hz"
+                allowed = (
+                    f"it must be at least {LOWEST_CUTOFF:g} Hz, so that the effect of impacts decays within "
+                    f"{1e3 * AFTER:.0f} ms"
+                )
                 raise InvalidInput("simulation.bench.filter_unit.cutoff", cutoff, allowed)

@@ -1,9 +1,9 @@
 """Steps of free rocking. The drive is zero throughout.
 
 1. The table is locked, since a moving table absorbs part of the impact. Laser 2 is aimed at the block.
-2. For each tilt, the operator holds and releases the block during the recording; a recording without free rocking is
-   repeated.
-3. The tilts are combined. The laser is aimed at storey 2 again, and the table unlocked.
+2. For each tilt, the operator holds the block and releases it during the recording; a recording without free rocking
+   is repeated.
+3. The tilts are combined. The laser is aimed at storey 2 again, and the table is unlocked.
 """
 
 from collections.abc import Callable, Generator, Sequence
@@ -48,19 +48,19 @@ UNLOCK = "Remove the clamps from the table."
 BACK = "Aim laser 2 at storey 2 again."
 
 REST = 1.0
-"""Time at the start for the zero of the signals [s], while the operator holds the block."""
+"""Time at the start, while the operator holds the block, in which the signals are zeroed [s]."""
 
 _OVERHEAD = 20.0
-"""Time for a tilt in addition to its recording: the operator tilts the block and starts the recording [s]."""
+"""Time for a tilt in addition to its recording [s], in which the operator tilts the block and starts the recording."""
 
 _LEAST_LOSS = 0.8
-"""Smallest velocity loss per impact, relative to theory, for which the recording is long enough."""
+"""Smallest velocity loss per impact, relative to the theoretical loss, for which the recording is long enough."""
 
 
 @dataclass(frozen=True)
 class PlannedTilt:
     """A tilt by `angle` [rad], positive towards the frame, recorded for `recording` [s]. `displacement` [m] is that of
-    the point of the face that the laser measures, NaN if the beam misses the face.
+    the laser spot on the face, NaN if the beam misses the face.
     """
 
     angle: float
@@ -74,12 +74,12 @@ class PlannedTilt:
 
     @property
     def duration(self) -> float:
-        """Expected time of the whole tilt, with one recording [s]."""
+        """Expected time for the complete tilt, with one recording [s]."""
         return self.recording + REST + _OVERHEAD
 
 
 def planned_tilts(parameters: FreeRockingParameters, specimen: Specimen) -> tuple[PlannedTilt, ...]:
-    """The tilts in order, smallest first, towards the frame before away from it."""
+    """The tilts in order, smallest first; those towards the frame come before those away from it."""
     signs = {"both": (1.0, -1.0), "towards": (1.0,), "away": (-1.0,)}[parameters.sides]
     alpha = critical_angle(specimen.block)
     return tuple(
@@ -94,7 +94,9 @@ def beam_heights(tilts: Sequence[PlannedTilt], specimen: Specimen) -> tuple[floa
 
 
 def _planned(parameters: FreeRockingParameters, specimen: Specimen, angle: float) -> PlannedTilt:
-    """Plan a tilt; the recording is long enough for a block released as late as allowed to come to rest."""
+    """Plan a tilt; the recording is long enough for a block to come to rest even if it is released as late as
+    allowed.
+    """
     block = specimen.block
     r = 1.0 - _LEAST_LOSS * (1.0 - theoretical_restitution(block))
     motion = FreeRocking(critical_angle(block), frequency_parameter(block, specimen.g), r, angle)
@@ -170,10 +172,10 @@ class RockingRun:
     def _request(self, number: int, tilt: PlannedTilt) -> str:
         where = "towards the frame" if tilt.angle > 0.0 else "away from the frame"
         return (
-            f"Tilt {number} of {len(self._planned)}: tilt the block {where} until its face has moved by about"
-            f" {1e3 * abs(tilt.displacement):.0f} mm at the laser beam ({degrees(abs(tilt.angle)):.1f} degrees),"
-            " and hold it still on its edge. Then answer. When the recording runs, count to three and release it at "
-            "once, without a push; then touch nothing until the block is at rest."
+            f"Tilt {number} of {len(self._planned)}: tilt the block {where} until its face has moved by about "
+            f"{1e3 * abs(tilt.displacement):.0f} mm at the laser beam ({degrees(abs(tilt.angle)):.1f} degrees), "
+            "and hold it still on its edge. Then confirm. When the recording runs, count to three and release "
+            "the block abruptly, without a push; then touch nothing until the block is at rest."
         )
 
     def _record(self, number: int, tilt: PlannedTilt) -> Generator[Step, Outcome, Played]:
@@ -182,7 +184,7 @@ class RockingRun:
         outcome = yield Play(volts, self._progress(number))
         yield RampOut()
         if not isinstance(outcome, Played):
-            raise TypeError(f"a recording without drive ended with {outcome}")
+            raise TypeError(f"a recording at zero drive ended with {outcome}")
         return outcome
 
     def _progress(self, number: int) -> Callable[[Array], Event]:
@@ -206,8 +208,9 @@ class RockingRun:
         found = analyse_tilt(seen, self._specimen, p.least_swing * abs(angle))
         if found.swings.held * angle < 0.0:
             raise NotRocking(
-                f"the laser measures {found.swings.held:+.3f} rad, {angle:+.3f} rad are requested: tilt the block to "
-                "the other side, or check hardware.laser_2.polarity: displacements towards the frame are positive"
+                f"the laser measures {found.swings.held:+.3f} rad, but {angle:+.3f} rad are requested: tilt the "
+                "block to the other side, or check hardware.laser_2.polarity: displacements towards the frame are "
+                "positive"
             )
         return found
 
@@ -244,5 +247,7 @@ class RockingRun:
 
     @property
     def _laser(self) -> LaserErrors:
-        """Laser errors from the data sheet, since a calibration applies to displacements of the storeys from rest."""
+        """Laser errors from the data sheet, since a calibration applies only to displacements of the storeys from
+        rest.
+        """
         return LaserErrors(self._configuration.sensors.accuracy, self._configuration.laser_ranges[1])

@@ -34,11 +34,11 @@ class FreeRockingParameters(Parameters):
     side_uncertainty: float = quantity(
         1e-4, "m", "standard uncertainty of the measured width and height of the block", ge=0
     )
-    least_swing: float = quantity(0.12, "1", "smallest used swing relative to the tilt", ge=0.03, le=0.5)
+    least_swing: float = quantity(0.12, "1", "smallest swing that is used, relative to the tilt", ge=0.03, le=0.5)
     release_within: float = quantity(
         8.0, "s", "time from the beginning of a recording within which the block must be released", ge=5, le=60
     )
-    attempts: int = quantity(2, "1", "recordings of a tilt before it is omitted", ge=1, le=10)
+    attempts: int = quantity(2, "1", "number of recordings of a tilt before it is omitted", ge=1, le=10)
 
 
 class RockingPoint(Parameters):
@@ -46,16 +46,16 @@ class RockingPoint(Parameters):
 
     part: str = quantity(..., "", "the tilt, or all tilts")
     tilt_rad: float | None = quantity(None, "rad", "tilt before the release, positive towards the frame")
-    impacts: int = quantity(..., "1", "number of used impacts")
-    r_exp: float = quantity(..., "1", "restitution from the better of the two estimators")
+    impacts: int = quantity(..., "1", "number of impacts used")
+    r_exp: float = quantity(..., "1", "restitution, from the better of the two estimators")
     r_exp_uncertainty: float = quantity(..., "1", f"{_EXPANDED} of r_exp")
     estimator: str = quantity(
-        "", "", "estimator of r_exp: the exact motion, or the amplitudes if the impacts differ too much for it"
+        "", "", "estimator of r_exp: the exact motion, or the amplitudes if the impacts differ too much"
     )
     r_th: float = quantity(..., "1", "theoretical restitution of the block as measured, 1 - 2 M b^2 / J")
-    r_th_uncertainty: float = quantity(..., "1", f"{_EXPANDED} of r_th, by the block's sides")
+    r_th_uncertainty: float = quantity(..., "1", f"{_EXPANDED} of r_th, due to the block's sides")
     ratio: float = quantity(..., "1", "r_exp / r_th, the restitution factor of the block as configured")
-    ratio_uncertainty: float = quantity(..., "1", f"{_EXPANDED} of the ratio, without that of r_th")
+    ratio_uncertainty: float = quantity(..., "1", f"{_EXPANDED} of the ratio, excluding that of r_th")
     r_motion: float | None = quantity(None, "1", "restitution from the fit of the exact nonlinear motion")
     r_motion_uncertainty: float | None = quantity(None, "1", f"{_EXPANDED} of r_motion")
     r_amplitudes: float = quantity(..., "1", "restitution from the amplitudes of the swings alone")
@@ -74,10 +74,12 @@ class RockingPoint(Parameters):
     p_sides_uncertainty_rad_s: float = quantity(..., "rad/s", f"{_EXPANDED} of p_sides_rad_s")
     residual_m: float = quantity(..., "m", "rms residual of the displacement")
     push: float | None = quantity(
-        None, "1", "effect of a push at the release: relative change of tilt that has the same effect without a push"
+        None,
+        "1",
+        "effect of a push at the release, expressed as the relative change of tilt that would have the same effect",
     )
     birge: float | None = quantity(
-        None, "1", "scatter of r_motion over the tilts relative to that expected from their uncertainties"
+        None, "1", "scatter of r_motion over the tilts, relative to that expected from the uncertainties"
     )
     uncertainty_parts: str = quantity("", "", "standard uncertainty of r_exp by contribution, JSON object")
     remarks: str = quantity("", "", "remarks on the tilt")
@@ -87,10 +89,11 @@ PROTOCOL = Protocol(
     name="free-rocking",
     summary="Free rocking of the block: restitution of its impacts, measured over theoretical.",
     details=(
-        "The stand-alone block on a locked table is repeatedly tilted and released by hand; a laser measures its "
-        "face. The exact nonlinear motion is fitted to each recording, and the amplitudes of the swings provide a "
-        "second estimate of the restitution, impact by impact. Other runs load the result, specimen.json. The table "
-        "is not driven. Without options: three tilts to either side, about five minutes."
+        "The stand-alone block on a locked table is repeatedly tilted and released by hand; a laser measures "
+        "its face. The exact nonlinear motion is fitted to each recording, and the amplitudes of the swings "
+        "provide a second estimate of the restitution, impact by impact. Other runs load the result, "
+        "specimen.json. The table is not driven. Without options, a run has three tilts to either side and "
+        "takes about five minutes."
     ),
     example="--config bench.toml --specimen FILE",
     parameters=FreeRockingParameters,

@@ -39,16 +39,16 @@ _COLUMNS = (
 )
 
 _FIT = "impacts of "
-"""Name prefix of the fits of single impacts."""
+"""Prefix for the names of fits of single impacts."""
 
 _MOTION = (("r_motion", "r_exp"), ("r_motion_uncertainty", "r_exp_uncertainty"))
-"""Fields of the result in older files, where it is always that of the fit, by their present names."""
+"""Fields of the result in older files, where it is always from the fit, by their present names."""
 
 
 @dataclass(frozen=True, eq=False)
 class Impacts:
     """Impacts after one tilt [rad]: `speed` relative to that of a fall from the critical angle, r and its expanded
-    uncertainty from noise, each of shape (n,).
+    uncertainty from noise, each with shape (n,).
     """
 
     tilt: float
@@ -58,7 +58,9 @@ class Impacts:
 
 
 def rocking_table(points: Sequence[RockingPoint]) -> str:
-    """Table with a row for each tilt and one for all tilts, followed by the block's parameters from its motion."""
+    """Table with a row for each tilt and one for all tilts, followed by the block's parameters as found from its
+    motion.
+    """
     if not points:
         return "No tilt was usable."
     table = text_table(_COLUMNS, map(_cells, points))
@@ -102,7 +104,7 @@ def _cells(point: RockingPoint) -> tuple[str, ...]:
 def _combined(point: RockingPoint) -> list[str]:
     trend, alpha = _pair(point.trend, point.trend_uncertainty), _pair(point.alpha_rad, point.alpha_uncertainty_rad)
     p = _pair(point.p_rad_s, point.p_uncertainty_rad_s)
-    birge = "" if point.birge is None else f"; scatter of the tilts: {point.birge:.2f} times that expected"
+    birge = "" if point.birge is None else f"; scatter of the tilts: {point.birge:.2f} times the expected scatter"
     by = f", from the {point.estimator}" if point.estimator else ""
     return [
         f"r_exp / r_th = {point.ratio:.6f} +- {point.ratio_uncertainty:.1g} (k = 2){by}, r_th = {point.r_th:.6f}"
@@ -181,7 +183,7 @@ def _draw_impacts(panel: "Axes", tilts: Sequence[Impacts], mean: float, theory: 
 
 
 def rocking_sections(campaign: Campaign) -> list[Section]:
-    """Report section: result, tilts and single impacts, as available in the file."""
+    """Report section on result, tilts and single impacts, as available in the file."""
     if not campaign.points:
         return []
     tilts = [row for row in campaign.points if row["part"] != ALL]
@@ -207,11 +209,11 @@ def _result_text(row: Mapping[str, Any]) -> str:
     ratio = with_uncertainty(row["ratio"], row["ratio_uncertainty"])
     theory = with_uncertainty(row["r_th"], row["r_th_uncertainty"])
     by = (
-        "The restitution is that from the amplitudes: the impacts differ so much that the exact nonlinear motion, "
-        "fitted from the release on, gives the worse estimate."
+        "The restitution is taken from the amplitudes, because the impacts differ so much that the exact "
+        "nonlinear motion, fitted from the release onward, gives the worse estimate."
         if row.get("estimator") == "amplitudes"
-        else "The restitution is that from the exact nonlinear motion, fitted from the release on; the "
-        "amplitudes alone are a check."
+        else "The restitution is taken from the exact nonlinear motion, fitted from the release onward; the "
+        "amplitudes alone serve as a check."
     )
     return (
         f"r_exp / r_th = {ratio}, from {row['impacts']} impacts of the stand-alone block on a table clamped to the"
@@ -239,7 +241,7 @@ def _shape_table(row: Mapping[str, Any]) -> Table:
         Column("expected"),
         Column("unit", words=True),
     ]
-    return Table("Shape of the block, and dependence of r on the speed (k = 2)", columns, rows)
+    return Table("Shape of the block, and dependence of r on the impact velocity (k = 2)", columns, rows)
 
 
 def _tilts_table(rows: list[dict[str, Any]]) -> Table:
@@ -266,7 +268,7 @@ def _tilts_table(rows: list[dict[str, Any]]) -> Table:
 
 
 def _budget(rows: list[dict[str, Any]]) -> list[Part]:
-    """Bars of the uncertainty budget of r; absent from older files."""
+    """Bar chart of the uncertainty budget of r; older files lack it."""
     known = [row for row in rows if row.get("uncertainty_parts")]
     if not known:
         return []

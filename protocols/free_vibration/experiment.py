@@ -1,8 +1,9 @@
 """Identification of stiffness and damping of the bare frame from free vibration, written to a specimen file for other
 runs.
 
-1. The block is removed. By hand: the table is locked, and storey 2 is displaced and released for each decay.
-2. By a pulse: the table is probed from a drive too small to cause damage up to the required drift.
+1. The block is removed.
+2. With release by hand, the table is locked, and storey 2 is displaced and released for each decay. With a pulse, the
+   table is probed from a drive too small to cause damage up to the required drift.
 3. Each decay is recorded, fitted, and published; an unusable decay is repeated once.
 4. The result combines all decays.
 """
@@ -54,7 +55,7 @@ from sim.parameters import Parameters
 from sim.specimen import Specimen
 
 RELEASE = 6.0
-"""Time within which the frame is released by hand [s]."""
+"""Time within which the frame must be released by hand [s]."""
 
 
 LOCK = "Clamp the table to the ground: it must not move, and it is not driven."
@@ -138,7 +139,7 @@ class FreeVibration(Prepared[FreeVibrationParameters]):
         )
 
     def _locked_decays(self, specimen: Specimen, setting: Setting, pace: Pace) -> Generator[Step, Outcome, list[Decay]]:
-        """Decays with the table clamped; requests removal of the clamp even if the decays are not usable."""
+        """Decays with the table clamped; requests removal of the clamp even if the decays are unusable."""
         self._locked = True
         yield OperatorAction(OperatorTask.LOCK_TABLE, specimen, LOCK)
         decays: list[Decay] = []
@@ -156,7 +157,7 @@ class FreeVibration(Prepared[FreeVibrationParameters]):
 
 def _check_pull(parameters: FreeVibrationParameters, configuration: BenchConfiguration) -> None:
     """Raise InvalidInput for a displacement beyond the lasers' range or the drift limit, or too small to measure."""
-    # after the release the storeys swing to the other side
+    # after the release, the storeys swing to the other side
     room = min(
         SHARE * 0.5 * configuration.limits.drift,
         *(0.5 * SHARE * min(configuration.limits.laser_range, 1.0) * half for half in configuration.laser_half_ranges),
@@ -167,8 +168,8 @@ def _check_pull(parameters: FreeVibrationParameters, configuration: BenchConfigu
 
 
 def _hand_forecast(configuration: BenchConfiguration, pull: float, duration: float) -> Forecast:
-    """Demands of releases by hand: without drive, the storeys swing to either side by up to the initial displacement of
-    storey 2.
+    """Demands of releases by hand: there is no drive, and the storeys swing to either side by up to the initial
+    displacement of storey 2.
     """
     swing = 2.0 * pull
     moved = dict.fromkeys(bounds(configuration), 0.0)
@@ -178,7 +179,7 @@ def _hand_forecast(configuration: BenchConfiguration, pull: float, duration: flo
 
 
 def _release_duration(parameters: FreeVibrationParameters, specimen: Specimen) -> float:
-    """Expected length of the decays after releases by hand [s]."""
+    """Expected duration of the decays after releases by hand [s]."""
     return parameters.repeats * (RELEASE + decay_window(parameters, specimen) + WAITING)
 
 

@@ -25,7 +25,7 @@ class FreeVibrationParameters(DecayParameters):
             value, default = getattr(self, item), FreeVibrationParameters.model_fields[item].default
             if value != default:
                 other = "pulse" if self.excitation == "hand" else "hand"
-                raise InvalidInput(item, value, f'it applies to the excitation "{other}" only; omit it')
+                raise InvalidInput(item, value, f'it applies only to the excitation "{other}"; omit it')
         return self
 
 
@@ -33,10 +33,10 @@ PROTOCOL = Protocol(
     name="free-vibration",
     summary="Free decay of the bare frame: stiffness and damping with their covariance, given the weighed masses.",
     details=(
-        "A short pulse of the table, or a release by hand on a locked table, excites the bare frame. The exact "
-        "response to the measured motion of the table is fitted to both lasers for each of several decays. Other runs "
-        "load the result, specimen.json, instead of the assumed values. Without options: five decays after pulses, "
-        "about ten minutes."
+        "A short pulse of the table, or a release by hand on a locked table, excites the bare frame. The "
+        "exact response to the measured motion of the table is fitted to both lasers for each of several "
+        "decays. Other runs load the result, specimen.json, instead of the assumed values. Without options, "
+        "a run has five decays after pulses and takes about ten minutes."
     ),
     example="--config bench.toml --operator Weber",
     parameters=FreeVibrationParameters,

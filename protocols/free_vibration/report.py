@@ -1,5 +1,5 @@
 # pyright: reportUnknownMemberType=false
-"""Report section on the free vibration of the frame: values, budgets, damping against amplitude."""
+"""Report section on the free vibration of the frame: values, budgets, and damping against amplitude."""
 
 import json
 from collections.abc import Sequence
@@ -94,8 +94,8 @@ def _damping(points: list[dict[str, Any]]) -> Table:
         Column("decay", words=True),
         Column("drift", "mm"),
         Column("residual", "µm"),
-        Column("ξ₁ over drift", "%/mm"),
-        Column("ξ₂ over drift", "%/mm"),
+        Column("slope of ξ₁ with drift", "%/mm"),
+        Column("slope of ξ₂ with drift", "%/mm"),
         Column("significant", words=True),
     ]
     rows = [

@@ -1,5 +1,5 @@
 # pyright: reportUnknownMemberType=false
-"""Results as a text table and a figure: decay, residual, spectrum, budget, damping against amplitude."""
+"""Results as a text table and a figure: decay, residual, spectrum, budget, and damping against amplitude."""
 
 from collections.abc import Sequence
 from math import tau
@@ -45,7 +45,9 @@ QUANTITIES = ("$k_1$", "$k_2$", r"$\xi_1$", r"$\xi_2$")
 
 
 def decays_table(points: Sequence[DecayPoint], result: FrameResult | None) -> str:
-    """Table with a row for each decay and one for all, with expanded uncertainties (k = 2); then correlations."""
+    """Table with a row for each decay and one for all decays, with expanded uncertainties (k = 2), followed by the
+    correlations.
+    """
     if not points:
         return "Nothing was identified."
     table = text_table(_COLUMNS, map(_cells, points))

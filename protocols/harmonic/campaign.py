@@ -44,7 +44,7 @@ class HarmonicCampaign(Prepared[HarmonicParameters]):
     """Harmonic campaign.
 
     Raises InvalidInput if closed-form or steady motions exceed table, lasers or limits of the bench. These immediate
-    checks name the parameter; the forecast simulates the whole run, including starts.
+    checks name the parameter; the forecast simulates the complete run, including starts.
     """
 
     def __init__(
@@ -61,7 +61,7 @@ class HarmonicCampaign(Prepared[HarmonicParameters]):
     def starts(self) -> Mapping[tuple[float, float], tuple[Start, ...]]:
         """Starts to try at each stiffness ratio and frequency [rad/s], best first.
 
-        Forecast and plan share them, so that none has to be planned while the bench is armed.
+        Forecast and plan share them, so that no start has to be planned while the bench is armed.
         """
         p, amplitude = self.parameters, self._amplitude
         found: dict[tuple[float, float], tuple[Start, ...]] = {}
@@ -108,9 +108,9 @@ class HarmonicCampaign(Prepared[HarmonicParameters]):
         )
 
     def _steady_motion(self, beta: float | None, omega: float) -> Travel | None:
-        """Peaks of the storeys, as measured by the lasers, and of the drift in the steady state at `omega` [rad/s].
+        """Peaks of the storeys, as the lasers measure them, and of the drift in the steady state at `omega` [rad/s].
 
-        For the bare frame if `beta` is None, else for the rocking motion; None if no orbit was found.
+        They are for the bare frame if `beta` is None, else for the rocking motion; None if no orbit was found.
         """
         if (beta, omega) not in self._motions:
             grounded = self.configuration.laser_reference == "ground"
@@ -120,12 +120,12 @@ class HarmonicCampaign(Prepared[HarmonicParameters]):
         return self._motions[beta, omega]
 
     def _check_table(self) -> None:
-        """Refuse table motions beyond limits or stroke, including the overshoot of a start (x = a / Omega^2 etc.)."""
+        """Check table motions against limits and stroke, including the overshoot of a start (x = a / Omega^2 etc.)."""
         parameters, configuration = self.parameters, self.configuration
         limits, stroke = configuration.limits, configuration.half_stroke
         peak = max(OVERSHOOTS) * self._amplitude
         if peak > limits.acceleration:
-            allowed = f"a start needs {peak:.3g} m/s2, limits.acceleration = {limits.acceleration:g} m/s2"
+            allowed = f"a start needs {peak:.3g} m/s2, but limits.acceleration = {limits.acceleration:g} m/s2"
             raise InvalidInput("amplitude_factor", parameters.amplitude_factor, allowed)
         start = f"a start of {peak:.3g} m/s2"
         reach, owner = min((stroke, "the shaker's stroke"), (limits.displacement, "limits.displacement"))
@@ -133,17 +133,19 @@ class HarmonicCampaign(Prepared[HarmonicParameters]):
             travel, speed = peak / omega**2, peak / omega
             at = f"{start} at {omega / tau:.2f} Hz"
             if travel > reach:
-                needs = f"{at} needs {1e3 * travel:.1f} mm, {owner} allows {1e3 * reach:.1f} mm"
+                needs = f"{at} needs {1e3 * travel:.1f} mm, but {owner} allows {1e3 * reach:.1f} mm"
                 raise InvalidInput("omega", omega, needs)
             if speed > limits.velocity:
-                needs = f"{at} needs {speed:.3g} m/s, limits.velocity = {limits.velocity:g} m/s"
+                needs = f"{at} needs {speed:.3g} m/s, but limits.velocity = {limits.velocity:g} m/s"
                 raise InvalidInput("omega", omega, needs)
             if parameters.settle_limit < 2 * WINDOW * tau / omega:
-                needs = f"judging a steady state at {omega:g} rad/s takes {2 * WINDOW * tau / omega:.1f} s at least"
+                needs = f"detecting a steady state at {omega:g} rad/s takes at least {2 * WINDOW * tau / omega:.1f} s"
                 raise InvalidInput("settle_limit", parameters.settle_limit, needs)
 
     def _check_storeys(self) -> None:
-        """Refuse frequencies at which a storey would leave its laser's range, bare or on the steady rocking motion."""
+        """Raise InvalidInput for a frequency at which a storey would leave its laser's range, with the bare frame or in
+        the steady rocking motion.
+        """
         halves = self.configuration.laser_half_ranges
         for omega in self.parameters.omega:
             for beta in (None, *self.parameters.beta):
@@ -152,8 +154,8 @@ class HarmonicCampaign(Prepared[HarmonicParameters]):
                 for number, (peak, half) in enumerate(zip(peaks, halves, strict=False), 1):
                     if peak > half:
                         what = "the bare frame" if beta is None else f"beta = {beta:g}"
-                        moves = f"storey {number} of {what} moves {1e3 * peak:.0f} mm there"
-                        needs = f"{moves}, its laser sees {1e3 * half:.0f} mm"
+                        moves = f"storey {number} of {what} moves by {1e3 * peak:.0f} mm at this frequency"
+                        needs = f"{moves}, but its laser measures up to {1e3 * half:.0f} mm"
                         raise InvalidInput("omega", omega, needs)
 
 
@@ -228,7 +230,7 @@ _COLUMNS = (
 
 def points_table(points: Sequence[PointLike]) -> str:
     """A table of harmonic points, at most 118 columns wide, followed by remarks on single points. Absent values are
-    "-"; a disagreement with the prediction is marked "NO <" in the last column.
+    "-"; "NO <" in the last column marks a disagreement with the prediction.
     """
     rows = plain(points)
     return "\n".join([text_table(_COLUMNS, map(_cells, rows)), *_remarks(rows)])
@@ -269,14 +271,15 @@ def _remarks(rows: list[dict[str, Any]]) -> list[str]:
     lines = ["", f"{len(compared)} of {len(rows)} points compared with the prediction, {disagreeing} disagree."]
     if orbits := [row["orbit_agrees"] for row in rows if row.get("orbit_agrees") is not None]:
         differing = len(orbits) - sum(orbits)
-        lines.append(f"{len(orbits)} more compared by the orbit about which the motion turns, {differing} disagree.")
+        lines.append(f"{len(orbits)} more compared by the orbit about which the motion revolves, {differing} disagree.")
     known = [row for row in rows if row.get("dominating") and row.get("alpha_2")]
     if known:
         shares = [100.0 * row["alpha_2_uncertainty"] / row["alpha_2"] for row in known]
         most = Counter(str(row["dominating"]) for row in known).most_common()
         named = ", ".join(f"{name} ({number})" for name, number in most)
         text = (
-            f"alpha_2 is uncertain by {min(shares):.2f} to {max(shares):.2f} % (k = 2); largest contributions: {named}."
+            f"the uncertainty of alpha_2 is {min(shares):.2f} to {max(shares):.2f} % (k = 2); largest "
+            f"contributions: {named}."
         )
         lines += textwrap.wrap(text, WIDTH)
     for row in rows:

@@ -1,4 +1,4 @@
-"""Stages of a harmonic campaign, and their demands over the uncertainty of the specimen."""
+"""Stages of a harmonic campaign, and their demands within the specimen's uncertainty."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass, replace
@@ -33,7 +33,7 @@ from sim.specimen import Specimen
 from sim.sweep import Done, in_threads
 
 HOLD, BARE_HOLD = 20.0, 40.0
-"""Simulated time of the last sine of a stage [s], longer than the transients of a rocking block."""
+"""Simulated duration of a stage's last sine [s], longer than the transients of a rocking block."""
 
 PROBES = (PROBE, 10.0 * PROBE)
 """Amplitudes [V] of the probes of an unknown table."""
@@ -41,7 +41,8 @@ PROBES = (PROBE, 10.0 * PROBE)
 
 @dataclass(frozen=True)
 class Trial:
-    """A simulated stage: the segments `before` it, which are not evaluated, the stage, and its last sine, held.
+    """A simulated stage: the segments `before` it, which are not evaluated, the stage itself, and its last sine, which
+    is held.
 
     The sine is simulated for `hold` [s] and may last `longest` [s]. `beta` is the stiffness ratio with which the block
     rocks, None if it rests. `steady` is the frequency [rad/s] whose steady state is also evaluated. `control` is the
@@ -109,7 +110,7 @@ def _bare_calibration(parameters: HarmonicParameters, specimen: Specimen, respon
     """Calibration of the bare frame: each drive follows from the response at the previous frequency, the first one from
     that of the probe.
 
-    Friction reduces the response to a small probe considerably, so that the resulting drive moves the table more than
+    Friction considerably reduces the response to a small probe, so the resulting drive moves the table more than
     intended.
     """
     level = parameters.calibration_level * parameters.amplitude_factor * specimen.uplift_acceleration
@@ -139,7 +140,7 @@ def _bare_tests(parameters: HarmonicParameters, specimen: Specimen) -> Iterator[
         stage = Stage(f"the bare frame at omega = {omega:g} rad/s", (leg,))
         longest = _longest_dwell(parameters)
         yield Trial(stage, specimen.bare(), before, hold=BARE_HOLD, longest=longest, steady=omega)
-        # the next stage starts from this motion, which the hold leaves as steady as the damping allows
+        # the next stage starts from this motion, which is as steady after the hold as the damping allows
         before = (Leg(parameters.ramp_time, amplitude, omega), replace(leg, duration=BARE_HOLD))
 
 
@@ -163,12 +164,14 @@ DRAWS = 16
 """Number of specimens drawn in addition to the nominal one; their 95 % quantile is close to the maximum."""
 
 RIPPLE = 0.03
-"""Allowance of the demands of table and drive for noise, and for friction that a calibration at half the level does not
+"""Allowance in the demands on table and drive for noise, and for friction that a calibration at half the level does not
 detect.
 """
 
 IMPACTS = 0.15
-"""Allowance with a rocking block, for quantities increased by its impacts until the table's harmonics are cancelled."""
+"""Allowance, with a rocking block, for quantities that its impacts increase until the table's harmonics are
+cancelled.
+"""
 
 OFF_MIDDLE = 0.015
 """Largest offset of a storey at rest from the middle of the laser's range, relative to half the range."""
@@ -177,8 +180,8 @@ _RAISED = ("acceleration", "force", "current", "drive_slew")
 """Quantities increased by impacts."""
 
 _UNKNOWN = {
-    "drive_voltage": "unknown table: give table_model",
-    "drive_slew": "unknown table: give table_model",
+    "drive_voltage": "unknown table: specify table_model",
+    "drive_slew": "unknown table: specify table_model",
     **UNKNOWN_SHAKER,
 }
 
@@ -193,7 +196,7 @@ def forecast(
     """Stages of the campaign with their demands.
 
     `steady` returns the steady motion at a stiffness and frequency [rad/s]. Each drawn specimen, and the error of its
-    drive, is kept throughout the campaign. Raises InvalidInput for a table model that cannot be read or does not cover
+    drive, is used throughout the campaign. Raises InvalidInput for a table model that cannot be read or does not cover
     the frequencies.
     """
     response = response_of(configuration)

@@ -28,10 +28,14 @@ INTERVAL = 6
 """Number of cycles between checks of the table's motion and of steadiness."""
 
 TRANSIENT = 2
-"""Cycles at the beginning of an interval that are discarded, in which the last correction of the drive takes effect."""
+"""Number of cycles discarded at the beginning of an interval, in which the last correction of the drive takes
+effect.
+"""
 
 AIM = 0.5
-"""Share of the tolerances aimed at; the rest allows for disturbance of the table by a block that has not settled."""
+"""Fraction of the tolerances that is aimed at; the rest allows for disturbances of the table by a block that has not
+settled.
+"""
 
 
 @dataclass(frozen=True)
@@ -105,7 +109,7 @@ def settle_and_measure(
 ) -> Generator[Step, Outcome, Settled | Fallen]:
     """Hold the table at `sine` until every signal is steady, then measure.
 
-    A motion that is not steady within the settle limit is measured as modulated.
+    A motion that does not become steady within the settle limit is measured as modulated.
     """
     detector = SteadyDetector(parameters.settle_tolerance, JUDGED, LASERS, sine.omega * accuracy.laser_timing)
     control = SineControl(
@@ -136,7 +140,7 @@ def settle_and_measure(
         # the first cycles after a correction of the drive are transient
         constant.extend(outcome.cycles if constant or not updates else outcome.cycles[TRANSIENT:])
         if ready:
-            # judge the measured cycles at twice the tolerance: at the tolerance itself, noise would decide
+            # judge the measured cycles at twice the tolerance, since at the tolerance itself noise would decide
             steadiness = detector.judge(allowance=2.0)
             if steadiness.steady or over:
                 used = outcome.cycles[-parameters.measured_cycles :]
@@ -167,13 +171,15 @@ def settle_and_measure(
 _ROCKING = "rocking"
 
 AMPLITUDE_NOTE = 0.002
-"""Relative error of the table's amplitude that causes a remark; the prediction is always for the achieved amplitude."""
+"""Relative error of the table's amplitude above which a remark is added; the prediction is always for the achieved
+amplitude.
+"""
 
 AMPLITUDE_STEP = 0.002
-"""Relative change of the amplitude for the finite difference of the sensitivity."""
+"""Relative change of the amplitude in the finite difference for the sensitivity."""
 
 HARMONICS_NOTE = 0.01
-"""Total harmonic distortion of the table that causes a remark; the prediction is for a pure sine."""
+"""Total harmonic distortion of the table above which a remark is added; the prediction is for a pure sine."""
 
 
 def judge(
@@ -294,7 +300,7 @@ def _held_point(
 
 
 def _table_multiplier(layer: Layer, shaker: Shaker, harmonics: int) -> float | None:
-    """Modulus of the slowest multiplier on the table; None where its orbit is not found."""
+    """Modulus of the slowest multiplier on the table; None if no orbit is found."""
     try:
         return abs(table_orbit(layer.orbit, shaker, harmonics).slowest)
     except NoOrbit:
@@ -324,7 +330,7 @@ def _orbit_fields(
     layer: Layer | None,
     uncertainty: float | None,
 ) -> dict[str, Any]:
-    """The fields of the orbit about which a motion turns that is not steady. The gains of both agree as for a steady
+    """Fields for the orbit about which an unsteady motion revolves. Agreement of its gains is judged as for a steady
     motion.
     """
     if settled.orbit is None:
@@ -340,7 +346,7 @@ def _orbit_fields(
 
 
 def predicted_fields(name: str, layer: Layer | None, known: SpecimenKnowledge) -> dict[str, Any]:
-    """Prediction fields of a point for the branch `name`; None if the branch does not exist."""
+    """Prediction fields of a point for the branch `name`; each is None if the branch does not exist."""
     return {
         "layer": name if layer else "none",
         "alpha_2_predicted": layer.alpha_2 if layer else None,
@@ -363,7 +369,7 @@ def _amplitude_slope(specimen: Specimen, omega: float, amplitude: float, layer: 
 
 
 def _nearest(layers: dict[str, Layer], peak: SteadyPeak) -> str:
-    """Branch with the ratios of its peaks of drift and u1 to the measured ones nearest to 1."""
+    """The branch whose peaks of drift and u1 are closest, in ratio, to the measured ones."""
 
     def distance(name: str) -> float:
         expected = layers[name].orbit.peaks
@@ -378,8 +384,8 @@ def _described(settled: Settled) -> str:
     if motion is not None and motion.rate is not None and motion.rate.decays:
         decay, doubt = 100.0 * (1.0 - motion.rate.modulus), 200.0 * motion.rate.uncertainty
         return (
-            f"the motion approaches a periodic one, the deviation decays by ({decay:.2g} +- {doubt:.1g}) % per cycle; "
-            "a longer --settle-limit may reach it"
+            f"the motion approaches a periodic one: the deviation decays by ({decay:.2g} +- {doubt:.1g}) % per "
+            "cycle; with a longer --settle-limit it may become steady"
         )
     repeats = settled.steadiness.repeats if motion is None else motion.repeats
     return f"the motion repeats every {repeats} cycles" if repeats else "the motion does not repeat"
@@ -417,12 +423,12 @@ def _reasons(
     elif name in layers and not layers[name].stable:
         yield f"steady while measured; disturbances of the predicted orbit {_growth(layers[name].multiplier, on_table)}"
     elif name != _ROCKING and _ROCKING in layers and layers[_ROCKING].stable:
-        yield "no start reached the stable rocking motion: the block rests"
+        yield "no start reached the stable rocking motion; the block rests"
     if abs(settled.amplitude_error) > AMPLITUDE_NOTE:
         yield f"the table's amplitude has an error of {100.0 * settled.amplitude_error:+.2f} %"
     if peak.harmonics > HARMONICS_NOTE:
         yield f"the table's harmonics are {100.0 * peak.harmonics:.1f} % of its fundamental"
     if not reference.steadiness.steady:
-        yield "the bare frame was not steady: its drift is not a valid reference"
+        yield "the bare frame was not steady, so its drift is not a valid reference"
     if agrees is False:
-        yield "differs from the prediction by more than the uncertainty of both"
+        yield "the difference from the prediction exceeds the combined uncertainty"

@@ -31,7 +31,7 @@ from sim.specimen import Specimen
 from sim.steady import Orbit, resting_level
 
 REST = 2.0
-"""Time at rest before a test, for the zero of the signals [s]."""
+"""Time at rest before a test, in which the signals are zeroed [s]."""
 
 BARE_CHANGE = 4.0
 """Duration of the sweep between frequencies of the bare frame [s]."""
@@ -41,14 +41,14 @@ NO_BLOCK = "storey 1 has a permanent offset although the block was removed: chec
 FALLEN_REQUEST = "The block has fallen: set it upright again."
 
 OVERHEAD = 30.0
-"""Time of a test in addition to its cycles: rest, start, ramps [s]."""
+"""Duration of a test in addition to its cycles: rest, start, ramps [s]."""
 
 CYCLES = 220
 """Typical number of cycles of a test, including settling."""
 
 
 class Pace:
-    """Progress from the expected length of the remaining tests on the bench."""
+    """Progress, computed from the expected duration of the remaining tests on the bench."""
 
     def __init__(self, omegas: tuple[float, ...], tests_per_omega: int) -> None:
         self._total = tests_per_omega * sum(self._expected(omega) for omega in omegas)
@@ -63,14 +63,14 @@ class Pace:
         self._finished += self._expected(omega)
 
     def progress(self, activity: str, omega: float | None = None, cycles: int = 0) -> Progress:
-        """Progress of the campaign, `cycles` into a test at `omega` [rad/s]."""
+        """Progress of the campaign after `cycles` cycles of a test at `omega` [rad/s]."""
         within = 0.0 if omega is None else min(cycles / CYCLES, 0.95) * self._expected(omega)
         gone = min(self._finished + within, self._total)
         return Progress(gone / self._total, self._total - gone, activity)
 
 
 class HarmonicPlan:
-    """Steps of a campaign, and the results of the bare frame required by later steps."""
+    """Steps of a campaign, and the results of the bare frame that later steps require."""
 
     def __init__(
         self,
@@ -87,7 +87,7 @@ class HarmonicPlan:
         self._draws = shared_draws()
 
     def steps(self) -> Generator[Step, Outcome, Sequence[HarmonicPoint]]:
-        """Execute the whole campaign; returns its points."""
+        """Execute the complete campaign; returns its points."""
         calibration = yield from self._bare_frame()
         for beta in self._parameters.beta:
             plans = {omega: self._starts[beta, omega] for omega in self._parameters.omega}
@@ -115,7 +115,9 @@ class HarmonicPlan:
                 raise RigError(NO_BLOCK)
             if not settled.steadiness.steady:
                 yield Publish(
-                    Warned(f"the bare frame is not steady at {omega:g} rad/s: no gain can be determined there")
+                    Warned(
+                        f"the bare frame is not steady at {omega:g} rad/s: no gain can be determined at this frequency"
+                    )
                 )
             self._bare[omega] = settled
             self._pace.finished(omega)
@@ -135,12 +137,12 @@ class HarmonicPlan:
         measured = yield from calibrate_drive(wanted, level, calibration)
         yield from self._end_test(specimen, fast=isinstance(measured, Fallen))
         if isinstance(measured, DriveCalibration):
-            # far above the frame's modes the block only adds mass: use the response of the bare frame
+            # far above the frame's modes, the block only adds mass: use the response of the bare frame
             calibration = measured.beyond(calibration)
         for omega in self._parameters.omega:
             point = yield from self._point(specimen, omega, calibration, plans[omega])
             self._pace.finished(omega)
-            yield Publish(self._pace.progress(f"finished beta = {specimen.label:g} at {omega:g} rad/s"))
+            yield Publish(self._pace.progress(f"beta = {specimen.label:g} at {omega:g} rad/s finished"))
             self._points.append(point)
             yield Publish(PointFinished(point))
 
@@ -206,7 +208,7 @@ class HarmonicPlan:
             bare_amplitude_m_s2=bare.amplitude,
             starts_tried=falls,
             start_chance=chance,
-            reason=f"the block fell in each of {falls} starts; the predicted orbit is {kind}",
+            reason=f"the block fell in all {falls} starts; the predicted orbit is {kind}",
         )
 
     def _orbit(self, specimen: Specimen, omega: float) -> Orbit | None:
@@ -281,7 +283,7 @@ def _to_be_held(settled: Settled, found: CycleMap) -> bool:
 def spring_calibration(
     parameters: HarmonicParameters, specimen: Specimen, starts: Sequence[Start]
 ) -> tuple[list[float], float]:
-    """Frequencies [rad/s] and level [m/s2] of the drive calibration with a spring: the block provably rests."""
+    """Frequencies [rad/s] and level [m/s2] of the drive calibration with a spring: the block provably stays at rest."""
     amplitude = parameters.amplitude_factor * specimen.uplift_acceleration
     omegas = sorted({leg.omega for start in starts for leg in start.legs})
     grid = np.linspace(omegas[0], omegas[-1], max(round((omegas[-1] - omegas[0]) / 1.5) + 1, 2))

@@ -28,29 +28,33 @@ class HarmonicParameters(Parameters):
         1.01, "1", "amplitude of the table acceleration, relative to the uplift acceleration g/lambda", ge=0.1, le=5
     )
     amplitude_tolerance: float = quantity(
-        0.001, "1", "largest relative error of the measured table amplitude before a point is measured", gt=0, le=0.1
+        0.001, "1", "largest relative error of the table's amplitude at which a point is measured", gt=0, le=0.1
     )
     phase_tolerance: float = quantity(
         0.00175,
         "rad",
-        "largest error of the table's phase relative to the oscillator before a point is measured",
+        "largest error of the table's phase relative to the oscillator at which a point is measured",
         gt=0,
         le=1,
     )
     distortion_tolerance: float = quantity(
         0.01,
         "1",
-        "largest rms of the table's harmonics relative to its fundamental before a point is measured",
+        "largest rms of the table's harmonics, relative to the fundamental, at which a point is measured",
         gt=0,
         le=1,
     )
     harmonics: int = quantity(10, "1", "highest cancelled harmonic of the table's acceleration; 1: none", ge=1, le=10)
     calibration_level: float = quantity(
-        0.5, "1", "level of the drive calibration relative to the test; below 1 so that the block rests", gt=0, lt=1
+        0.5,
+        "1",
+        "level of the drive calibration relative to the test; below 1, so that the block stays at rest",
+        gt=0,
+        lt=1,
     )
-    ramp_time: float = quantity(8.0, "s", "length of the ramp that starts the bare frame", gt=0, le=120)
+    ramp_time: float = quantity(8.0, "s", "duration of the ramp that starts the bare frame", gt=0, le=120)
     settle_tolerance: float = quantity(
-        0.002, "1", "remaining relative change at which a channel counts as steady", gt=0, le=0.1
+        0.002, "1", "relative change that may remain in a channel that counts as steady", gt=0, le=0.1
     )
     settle_limit: float = quantity(240.0, "s", "longest wait for the steady state", gt=0, le=3600)
     measured_cycles: int = quantity(24, "1", "measured cycles of a steady point", ge=4, le=1000)
@@ -77,7 +81,7 @@ class HarmonicPoint(Parameters):
     """Measured and predicted gain at one frequency and stiffness.
 
     Values that were not measured or do not exist are None, never zero. Uncertainties are expanded (k = 2). The
-    prediction is for the branch of the point, at the achieved amplitudes.
+    prediction is for the point's branch, at the achieved amplitudes.
     """
 
     omega_rad_s: float = quantity(..., "rad/s", "circular frequency of the base motion")
@@ -100,60 +104,64 @@ class HarmonicPoint(Parameters):
         "1",
         "gain of the largest peak of a cycle, for an unsteady free motion; it is alpha_2 unless the point was held",
     )
-    alpha_2_mean: float | None = quantity(None, "1", "gain of the mean peak of a cycle, for an unsteady motion")
+    alpha_2_mean: float | None = quantity(None, "1", "gain of the mean cycle peak of an unsteady motion")
     alpha_2_orbit: float | None = quantity(
-        None, "1", "gain of the mean cycle of a motion that turns about a periodic one: that of the orbit itself"
+        None, "1", "gain of the mean cycle of a motion that revolves about a periodic one: the gain of the orbit"
     )
     alpha_2_orbit_uncertainty: float | None = quantity(None, "1", "expanded uncertainty of alpha_2_orbit (k = 2)")
     orbit_agrees: bool | None = quantity(
         None, "1", "whether alpha_2_orbit and its prediction differ by no more than their combined uncertainty"
     )
     repeats_cycles: int | None = quantity(
-        None, "1", "number of cycles after which an unsteady motion repeats, up to 24; absent: it does not repeat"
+        None, "1", "number of cycles after which an unsteady motion repeats, up to 24; absent if it does not repeat"
     )
     multiplier: float | None = quantity(
         None,
         "1",
-        "measured modulus of the slowest multiplier of an unsteady motion; below 1: it becomes periodic",
+        "measured modulus of the slowest multiplier of an unsteady motion; below 1, the motion becomes periodic",
     )
     multiplier_uncertainty: float | None = quantity(None, "1", "expanded uncertainty of the multiplier (k = 2)")
     dominating: str = quantity("", "", "largest contribution to the uncertainty of alpha_2")
     uncertainty_parts: str = quantity("", "", "standard uncertainty of alpha_2 by contribution, largest first, as JSON")
     alpha_2_predicted: float | None = quantity(None, "1", "predicted gain at the achieved amplitude")
     alpha_2_predicted_uncertainty: float | None = quantity(
-        None, "1", "expanded uncertainty of the predicted gain (k = 2), from that of the specimen"
+        None, "1", "expanded uncertainty of the predicted gain (k = 2), due to that of the specimen"
     )
     predicted_stable: bool | None = quantity(None, "1", "whether the predicted orbit is stable on fixed ground")
     table_multiplier: float | None = quantity(
         None,
         "1",
-        "predicted modulus of the slowest multiplier on the simulated table, where the motion or the orbit on fixed "
-        "ground is not steady",
+        "predicted modulus of the slowest multiplier on the simulated table, if the motion is not steady or "
+        "the orbit is unstable on fixed ground",
     )
     agrees: bool | None = quantity(
         None, "1", "whether the difference is within the combined uncertainty of both (root sum of squares)"
     )
     drift_peak_m: float | None = quantity(None, "m", "peak drift of the coupled frame")
     bare_drift_peak_m: float | None = quantity(None, "m", "peak drift of the bare frame")
-    amplitude_m_s2: float | None = quantity(None, "m/s2", "achieved amplitude of the table, coupled")
-    bare_amplitude_m_s2: float | None = quantity(None, "m/s2", "achieved amplitude of the table, bare")
-    amplitude_error: float | None = quantity(None, "1", "relative error of the table's amplitude, coupled")
-    phase_error_rad: float | None = quantity(None, "rad", "phase lead of the table relative to the oscillator, coupled")
+    amplitude_m_s2: float | None = quantity(None, "m/s2", "achieved amplitude of the table, coupled frame")
+    bare_amplitude_m_s2: float | None = quantity(None, "m/s2", "achieved amplitude of the table, bare frame")
+    amplitude_error: float | None = quantity(None, "1", "relative error of the table's amplitude, coupled frame")
+    phase_error_rad: float | None = quantity(
+        None, "rad", "phase lead of the table relative to the oscillator, coupled frame"
+    )
     table_harmonics: float | None = quantity(
         None,
         "1",
-        "total harmonic distortion: rms of the table's harmonics 2 to 10 relative to its fundamental, coupled",
+        "total harmonic distortion: rms of the table's harmonics 2 to 10 relative to the fundamental, coupled frame",
     )
     table_updates: int = quantity(
-        0, "1", "number of drive corrections until the table's motion met the tolerances, coupled"
+        0, "1", "number of drive corrections until the table's motion met the tolerances, coupled frame"
     )
-    starts_tried: int = quantity(0, "1", "starts tried")
+    starts_tried: int = quantity(0, "1", "number of starts tried")
     start_chance: float | None = quantity(
-        None, "1", "estimated probability of success of the measured start, or of the best if the block fell in all"
+        None,
+        "1",
+        "estimated probability of success of the measured start, or of the best start if the block fell in all of them",
     )
     cycles_measured: int = quantity(0, "1", "number of cycles evaluated for the peaks")
     settle_time_s: float | None = quantity(None, "s", "time from the start of the dwell to the steady state")
-    reason: str = quantity("", "", "reason why the point is not steady, or remarks")
+    reason: str = quantity("", "", "remarks, or the reason why the point is not steady")
 
 
 class HarmonicSettings(Parameters):
@@ -162,7 +170,7 @@ class HarmonicSettings(Parameters):
     measured_cycles: int | None = quantity(
         None,
         "1",
-        "used cycles at the end of each dwell, after the last change of its drive; absent: as measured",
+        "number of cycles used at the end of each dwell, after the last change of its drive; if absent, as measured",
         ge=4,
         le=10000,
     )
@@ -174,7 +182,11 @@ class HarmonicSettings(Parameters):
         "mean: peak of the mean cycle; largest: largest single peak; judged: mean for a steady motion, else largest",
     )
     settle_tolerance: float | None = quantity(
-        None, "1", "remaining relative change at which a channel counts as steady; absent: as measured", gt=0, le=0.1
+        None,
+        "1",
+        "relative change that may remain in a channel that counts as steady; if absent, as measured",
+        gt=0,
+        le=0.1,
     )
 
 
@@ -182,9 +194,9 @@ PROTOCOL = Protocol(
     name="harmonic",
     summary="Steady sine tests of the bare and the coupled frame: gain coefficient alpha_2 against prediction.",
     details=(
-        "Tests the bare frame at every frequency, then the coupled frame at every frequency and stiffness, and "
-        "compares the measured gain of the peak drift with the predicted one. Without options: the campaign of the "
-        "paper on the simulated bench."
+        "Tests the bare frame at every frequency, then the coupled frame at every frequency and stiffness, "
+        "and compares the measured gain of the peak drift with the prediction. Without options, it runs the "
+        "campaign of the paper on the simulated bench."
     ),
     example="--omega 14:18:5 --beta 0.25 0.64 --yes",
     parameters=HarmonicParameters,

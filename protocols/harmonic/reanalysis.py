@@ -1,4 +1,4 @@
-"""Re-analysis of a recorded harmonic campaign with other cycles, harmonics, peaks, accuracies or another specimen."""
+"""Re-analysis of a recorded harmonic campaign with different cycles, harmonics, peaks, accuracies or specimen."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -70,7 +70,7 @@ class HarmonicFollower:
         return self._points
 
     def before(self, step: Step) -> None:
-        """Start a new series at its first dwell."""
+        """Start a new series with its first dwell."""
         match step:
             case Arm() | Sweep():
                 self._end_series(self._series)

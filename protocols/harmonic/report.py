@@ -45,16 +45,16 @@ def harmonic_sections(campaign: Campaign) -> list[Section]:
 
 
 def _results_section(campaign: Campaign) -> Section:
-    """Measured and predicted gain of every point with their uncertainties, and the conditions of its test."""
+    """Measured and predicted gain of every point with uncertainties, and the conditions of its test."""
     points = campaign.harmonic_points
     compared = [row["agrees"] for row in points if row["agrees"] is not None]
     parts: list[Part] = [
-        f"{counted(len(points), 'point was', 'points were')} tested; {len(compared)} of them had a steady motion to "
-        f"compare, and {sum(compared)} of those agree with the prediction. Both gains are for the achieved amplitudes "
-        "of the table and for the branch of the point. They agree when they differ by no more than their combined "
-        "uncertainty (root sum of squares). The uncertainty of a measured gain is expanded (k = 2) and includes "
-        "sensors and scatter; that of a predicted one (k = 2, to first order) follows from the uncertainty of the "
-        "specimen.",
+        f"{counted(len(points), 'point was', 'points were')} tested; {len(compared)} of them had a steady "
+        f"motion that can be compared, and {sum(compared)} of those agree with the prediction. Both gains are "
+        "for the achieved amplitudes of the table and for the branch of the point. They agree when they "
+        "differ by no more than their combined uncertainty (root sum of squares). The uncertainty of a "
+        "measured gain is expanded (k = 2) and includes sensors and scatter; that of a predicted one (k = 2, "
+        "to first order) follows from the uncertainty of the specimen.",
         _gains(campaign, points),
         _conditions(points),
         *_budget_parts(points),
@@ -109,9 +109,10 @@ def _histories(campaign: Campaign, points: Sequence[Mapping[str, Any]]) -> list[
         else:
             drawn.append(motion)
     parts: list[Part] = [
-        "The last measured cycles from the raw channels, relative to the zero at rest, in phase with the measured "
-        "table acceleration, including the delays of the sensors. u₁ is relative to the table. ϑ is not measured but "
-        "predicted, as are the thin dotted curves, for the achieved amplitude."
+        "The curves are the last measured cycles from the raw channels, relative to the values at rest, in "
+        "phase with the measured table acceleration, including the delays of the sensors. u₁ is relative to "
+        "the table. ϑ is not measured but predicted, as are the thin dotted curves, for the achieved "
+        "amplitude."
     ]
     for beta in sorted({motion.beta for motion in drawn}):
         of_spring = [motion for motion in drawn if motion.beta == beta]
@@ -218,7 +219,7 @@ def _conditions(points: Sequence[Mapping[str, Any]]) -> Table:
 
 
 def _budget_parts(points: Sequence[Mapping[str, Any]]) -> list[Part]:
-    """Table and figure of the uncertainty budgets; absent from older files."""
+    """Table and figure of the uncertainty budgets; None for older files, which lack them."""
     known = [(row, found) for row in points if row["alpha_2"] and (found := _budget(row))]
     if not known:
         return []
@@ -235,7 +236,10 @@ def _budget_parts(points: Sequence[Mapping[str, Any]]) -> list[Part]:
         [label, f"{size:.2f}", *(_share(found, name, row["alpha_2"]) for name in names)]
         for label, size, (row, found) in zip(labels, expanded, known, strict=True)
     ]
-    caption = "Uncertainty budget of α₂: expanded, and standard by contribution, largest first; common errors cancel"
+    caption = (
+        "Uncertainty budget of α₂: expanded uncertainty, and standard uncertainties by contribution, largest "
+        "first; common errors cancel"
+    )
     picture = Picture(
         budget_figure(labels[:MOST], [found for _, found in known[:MOST]], expanded[:MOST]),
         "Contributions to the uncertainty of α₂: each bar is the expanded uncertainty (k = 2), divided in "

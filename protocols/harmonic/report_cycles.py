@@ -39,7 +39,7 @@ PERIODS, SAMPLES = 3, 120
 """Number of drawn periods of the drive, and of points per curve and period."""
 
 QUIET = 1.5
-"""Time at the start of a run for the zero of the signals [s]; the table is at rest for 2 s."""
+"""Time at the start of a run in which the signals are zeroed [s]; the table is at rest for 2 s."""
 
 BOUNDARIES = ("StepStarted", "StateChanged")
 """Events that end a dwell."""
@@ -93,7 +93,7 @@ class Dwells:
         self._ends = _ends_of_dwells(self._record)
 
     def motion(self, point: Mapping[str, Any], layer: Layer | None) -> MeasuredMotion | None:
-        """Last measured cycles of a point; None if absent from the file. `layer` is the predicted motion."""
+        """Last measured cycles of a point; None if the file lacks them. `layer` is the predicted motion."""
         omega, beta = float(point["omega_rad_s"]), float(point["beta"])
         found = self._cycles(omega, beta, point.get("drift_peak_m"))
         if found is None:
@@ -111,7 +111,7 @@ class Dwells:
         )
 
     def _cycles(self, omega: float, beta: float | None, peak: float | None) -> Cycles | None:
-        """Cycles of the attempt with the peak nearest to that of the point."""
+        """Cycles of the attempt whose peak is closest to that of the point."""
         tries = [self._last_cycles(end, omega) for end in self._ends.get((omega, beta), ())]
         whole = [each for each in tries if each is not None]
         if peak is None or not whole:
@@ -119,7 +119,7 @@ class Dwells:
         return min(whole, key=lambda each: abs(float(np.nanmax(np.abs(each.drift))) - peak))
 
     def _last_cycles(self, end: float, omega: float) -> Cycles | None:
-        """Last complete periods before `end` [s of bench time], in phase with the table; None without them."""
+        """Last complete periods before `end` [s of bench time], in phase with the table; None if there are none."""
         block = bisect_right(self._blocks["time"], end + 1e-6) - 1
         if block < 0:
             return None
@@ -181,7 +181,9 @@ def _ends_of_dwells(record: DataFile) -> dict[tuple[float, float | None], list[f
 
 
 def _in_phase(signals: Floats, period: float) -> Cycles | None:
-    """Means over short equal parts of the period, from the first upward zero crossing of the table's fundamental on."""
+    """Means over short equal parts of the period, starting at the first upward zero crossing of the table's
+    fundamental.
+    """
     acceleration = signals[:, ACCELERATION]
     known = np.isfinite(acceleration)
     if known.mean() < 0.5:

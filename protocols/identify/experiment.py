@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 
 class Identification(Prepared[IdentifyParameters]):
-    """Identification of the table's response to its drive, written to a file for other runs.
+    """Identification of the table's response to its drive; the result is written to a file for other runs.
 
     Raises InvalidInput for a band that the bench cannot produce.
     """
@@ -79,7 +79,9 @@ class Identification(Prepared[IdentifyParameters]):
 
 
 def thirds(model: TableModel) -> Iterator[IdentifiedBand]:
-    """Table model in third-octave bands centred at 1 Hz times powers of 2^(1/3); bands without a line are omitted."""
+    """The table model in third-octave bands centred at 1 Hz times powers of 2^(1/3); bands without a line are
+    omitted.
+    """
     frequency = np.array(model.frequency)
     response = np.array(model.real) + 1j * np.array(model.imaginary)
     low, high = model.band
@@ -163,7 +165,7 @@ def _response_figure(model: TableModel | None) -> "Figure":
     coherence.semilogy(f, np.maximum(1.0 - np.array(model.coherence), 1e-12), color=BLUE)
     uncertain.loglog(f, gain, color=BLUE, label="response")
     uncertain.loglog(f, np.array(model.uncertainty), color=BLACK, label="standard uncertainty")
-    # distortion is not stated where it does not exceed the noise
+    # distortion is omitted where it does not exceed the noise
     distortion = np.array(model.distortion)
     uncertain.loglog(f, np.where(distortion > 0.0, distortion, np.nan), ".", ms=2, color=VERMILLION, label="distortion")
     uncertain.legend(loc="best", fontsize=8)

@@ -13,10 +13,12 @@ class IdentifiedBand(Parameters):
     phase_rad: float = quantity(
         ..., "rad", "phase lead of the acceleration relative to the drive at the line nearest to the centre"
     )
-    uncertainty: float = quantity(..., "1", "expanded relative uncertainty of a line (k = 2), noise and distortion")
-    distortion: float = quantity(..., "1", "relative standard deviation of one realisation from nonlinear distortion")
+    uncertainty: float = quantity(
+        ..., "1", "expanded relative uncertainty of a line (k = 2) due to noise and distortion"
+    )
+    distortion: float = quantity(..., "1", "relative standard deviation of one realisation due to nonlinear distortion")
     noise_m_s2_hz: float = quantity(..., "m/s2/Hz^0.5", "spectral density of the noise in the acceleration")
-    coherence: float = quantity(..., "1", "lowest share of the acceleration's power that is coherent with the drive")
+    coherence: float = quantity(..., "1", "lowest fraction of the acceleration's power that is coherent with the drive")
     lines: int = quantity(..., "1", "number of lines in the band")
 
 
@@ -24,10 +26,10 @@ PROTOCOL = Protocol(
     name="identify",
     summary="Identify the table: acceleration per volt of drive against frequency.",
     details=(
-        "Plays multisines with random phases at low level with the specimen on the table, after probes of the unknown "
-        "table, and separates response, noise and nonlinear distortion. The key `table_model` in the configuration of "
-        "other runs names the result, table_model.json. Without options: the bare frame, over the band required to "
-        "replicate records."
+        "Plays multisines with random phases at low level with the specimen on the table, after probes of "
+        "the unknown table, and separates response, noise and nonlinear distortion. The key `table_model` in "
+        "the configuration of other runs names the result, table_model.json. Without options, it identifies "
+        "the table with the bare frame, over the band required to replicate records."
     ),
     example="--config bench.toml --dry-run",
     parameters=IdentifyParameters,

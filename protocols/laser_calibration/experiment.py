@@ -72,7 +72,7 @@ class LaserCalibrationRun(Prepared[LaserCalibrationParameters]):
             raise InvalidInput(
                 "laser_calibration",
                 f"{configuration.calibrated.date:%Y-%m-%d}",
-                "an older calibration would affect the new one: remove it from the configuration",
+                "an existing calibration would affect the new one: remove it from the configuration",
             )
         reach = min(configuration.half_stroke, limits.displacement)
         reach = min(reach, limits.laser_range * min(configuration.laser_half_ranges))
@@ -84,7 +84,10 @@ class LaserCalibrationRun(Prepared[LaserCalibrationParameters]):
         ):
             most = float(getattr(limits, quantity))
             if MARGIN * value > most:
-                needs = f"{p.amplitude:g} m needs {value:.3g} {unit} there, limits.{quantity} = {most:g} {unit}"
+                needs = (
+                    f"at this frequency {p.amplitude:g} m needs {value:.3g} {unit}, but limits.{quantity} = "
+                    f"{most:g} {unit}"
+                )
                 raise InvalidInput("omega", p.omega, needs)
 
     @cached_property
@@ -151,14 +154,14 @@ def _fit_event(name: str, curve: ErrorCurve, delay: float, uncertainty: float) -
     at = np.linspace(curve.low, curve.high, curve.without.shape[1])
     fit = np.polynomial.chebyshev.chebval(np.linspace(-1.0, 1.0, at.size), curve.error)
     passes = {
-        f"without_{number}": Series(each - each.mean(), "m", f"the same without pass {number}")
+        f"without_{number}": Series(each - each.mean(), "m", f"same curve without pass {number}")
         for number, each in enumerate(curve.without, 1)
     }
     return FitFinished(
         f"error of {name}",
         f"{name}: order {curve.error.size - 1}, standard uncertainty {1e6 * curve.uncertainty:.1f} um at one reading",
         {
-            "reading": Series(at, "m", "reading from the middle of the range"),
+            "reading": Series(at, "m", "reading relative to mid range"),
             "error": Series(fit - fit.mean(), "m", "reading minus displacement measured by the table's sensor"),
             **passes,
         },
@@ -214,7 +217,7 @@ def _errors_figure(curves: tuple[ErrorCurve, ErrorCurve] | None) -> "Figure":
         orders.set_xlabel("order [1]")
         orders.set_ylabel("prediction error [µm]")
         set_grid(over)
-        # an order is a whole number
+        # an order is an integer
         orders.xaxis.get_major_locator().set_params(integer=True)
         set_grid(orders)
         if curves is None:

@@ -1,6 +1,6 @@
 """Errors of the lasers from cycles of a common motion.
 
-Under a slow sine of the table a laser's reading is r = x + e(r) - d v + c omega^2 x: with its position-dependent error
+Under a slow sine of the table, a laser's reading is r = x + e(r) - d v + c omega^2 x, with its position-dependent error
 e, its delay d, and the compliance c of the clamps, which accelerate the storeys; passes at two frequencies separate c
 from a scale error. All are fitted by least squares to the mean cycles of the passes, at equal steps of the phase, with
 e as Chebyshev polynomials of the reading. The table's motion need not be a pure sine, since both sensors measure it.
@@ -10,8 +10,8 @@ as well as the best order, within one standard error. The uncertainty of the cur
 that omit each pass in turn (jackknife) and the contribution of higher orders.
 
 The lasers are the length standard: the smooth linearity error on their data sheets, relative to the span of the passes,
-determines the scale better than the table's sensors. So the mean span of both lasers is the reference; the table's
-sensors and each laser are compared with it.
+determines the scale better than the table's sensors. Therefore the mean span of both lasers is the reference with which
+the table's sensors and each laser are compared.
 """
 
 from collections.abc import Sequence
@@ -31,7 +31,7 @@ from bench.analysis.signals import ACCELERATION, DISPLACEMENT, LASER_1, LASER_2
 Array = NDArray[np.float64]
 
 HIGHEST = 9
-"""Highest order of the fit; cycles with ten harmonics contain little information on higher orders."""
+"""Highest order of the fit; cycles with ten harmonics contain little information about higher orders."""
 
 READINGS = 201
 """Number of readings at which curves are compared."""
@@ -48,7 +48,7 @@ class Pass:
     speed: Array
     lasers: tuple[Array, Array]
     ratio: float
-    """Ratio of the table's displacement amplitude to that from its acceleration, a / omega^2."""
+    """Ratio of the table's displacement amplitude to that computed from its acceleration, a / omega^2."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +70,7 @@ class ErrorCurve:
 
     @property
     def uncertainty(self) -> float:
-        """Standard uncertainty of the curve at one reading [m], without its mean."""
+        """Standard uncertainty of the curve at one reading [m], excluding the mean error."""
         bent = self.without - self.without.mean(axis=1)[:, None]
         variance = float(np.mean([jackknife(place) ** 2 for place in bent.T]))
         return sqrt(variance + self.residual**2)
@@ -94,7 +94,7 @@ def jackknife(found: Array) -> float:
 
 
 def mean_pass(cycles: Sequence[Cycle], omega: float) -> Pass:
-    """Pass at `omega` [rad/s] from its cycles, whose signals are relative to the values at rest."""
+    """A pass at `omega` [rad/s], from its cycles, whose signals are relative to the values at rest."""
     waves = mean_waves(cycles)
     moved = np.mean([cycle.fundamental for cycle in cycles], axis=0)
     return Pass(
@@ -203,7 +203,7 @@ def calibration(
 
 
 def _span_uncertainty(span: float, accuracy: SensorAccuracy, whole: float) -> float:
-    """Standard relative uncertainty of a `span` [m] measured by one laser with the range `whole` [m].
+    """Relative standard uncertainty of a `span` [m] measured by one laser with the range `whole` [m].
 
     The contribution of the scale is half the variance of the difference of two lasers; that of the linearity is
     modelled as a sine of random phase with w waves over the range R: the difference of two of its values, one span
@@ -215,7 +215,9 @@ def _span_uncertainty(span: float, accuracy: SensorAccuracy, whole: float) -> fl
 
 
 def _rescaled(curve: ErrorCurve, factor: float) -> Array:
-    """Coefficients of the error relative to the true displacement, `factor` times the measured: r - factor (r - e)."""
+    """Coefficients of the error relative to the true displacement, which is `factor` times the measured one: r - factor
+    (r - e).
+    """
     error = factor * curve.error
     error[:2] += (1.0 - factor) * np.array([0.5 * (curve.high + curve.low), 0.5 * (curve.high - curve.low)])
     return error

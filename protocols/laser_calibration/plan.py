@@ -29,7 +29,7 @@ from protocols.laser_calibration.protocol import LaserCalibrationParameters
 from sim.channel import STOREYS
 
 REST = 2.0
-"""Time at rest for the readings of the lasers and the zero of the signals [s]."""
+"""Time at rest for the laser readings and for zeroing the signals [s]."""
 
 SMALLER = 0.01
 """Reduction of the amplitude from pass to pass, relative to the first."""
@@ -51,7 +51,7 @@ _LOOSE = "storey 1 has a permanent offset although no block is on the table: che
 
 
 def planned_passes(parameters: LaserCalibrationParameters) -> list[tuple[float, float]]:
-    """Frequency [rad/s] and amplitude [m] of the passes, slow ones first."""
+    """Frequencies [rad/s] and amplitudes [m] of the passes, slow ones first."""
     slow = parameters.passes // 2
     return [
         (parameters.omega * (0.5 if number < slow else 1.0), parameters.amplitude * (1.0 - SMALLER * number))
@@ -60,7 +60,7 @@ def planned_passes(parameters: LaserCalibrationParameters) -> list[tuple[float, 
 
 
 def expected_duration(parameters: LaserCalibrationParameters) -> float:
-    """Expected length of the calibration [s]."""
+    """Expected duration of the calibration [s]."""
     slow = 2.0 * tau / parameters.omega
     probing = 2 * (SETTLING + 8) * slow + len(LEVELS) * 2 * (6 * slow + 2.0)
     return 2.0 * REST + probing + 3.0 * START + _measuring(parameters)
@@ -105,7 +105,9 @@ def measure(
 
 
 def _passes(parameters: LaserCalibrationParameters) -> Generator[Step, Outcome, list[Pass]]:
-    """Calibrate the drive carefully, then drive and measure. Raises Unmeasurable if the response is insufficient."""
+    """Calibrate the drive in small steps, then drive the table and measure. Raises Unmeasurable if the response is
+    insufficient.
+    """
     slow = 0.5 * parameters.omega
     yield Publish(StepStarted("calibrate the drive"))
     known: DriveCalibration = yield from probed_drive(slow)
@@ -132,7 +134,7 @@ def _passes(parameters: LaserCalibrationParameters) -> Generator[Step, Outcome, 
         cycles = outcome.cycles[SETTLING:]
         need_cycles(cycles, parameters.cycles)
         passes.append(mean_pass(cycles, omega))
-    yield Publish(_progress(parameters, len(passes), "finished the passes"))
+    yield Publish(_progress(parameters, len(passes), "passes finished"))
     return passes
 
 
@@ -150,7 +152,7 @@ def _rests(heard: RestSamples) -> tuple[float, float]:
         values = channel.to_unit(heard.counts[:, column])
         if not np.isfinite(values).any():
             raise Unmeasurable(
-                f"{name} has no valid reading at rest: check that it is on and its storey is within its range"
+                f"{name} has no valid reading at rest: check that it is on and that its storey is within its range"
             )
         found.append(float(np.nanmean(values)))
     return found[0], found[1]

@@ -13,7 +13,8 @@ class LaserCalibrationParameters(Parameters):
     omega: float = quantity(
         8.0,
         "rad/s",
-        "circular frequency of half the passes; the others have half of it, to determine the compliance of the clamps",
+        "circular frequency of half of the passes; the others use half this frequency, to determine the "
+        "compliance of the clamps",
         ge=1,
         le=20,
     )
@@ -24,7 +25,7 @@ class LaserCalibrationParameters(Parameters):
         ge=6,
         le=20,
     )
-    cycles: int = quantity(6, "1", "measured cycles in each pass", ge=4, le=100)
+    cycles: int = quantity(6, "1", "number of cycles measured in each pass", ge=4, le=100)
     reference_linearity: float = quantity(
         0.0005,
         "1",
@@ -46,7 +47,7 @@ class CalibratedSensor(Parameters):
     lowest_m: float | None = quantity(None, "m", "smallest covered reading")
     highest_m: float | None = quantity(None, "m", "largest covered reading")
     order: int | None = quantity(None, "1", "order of the error polynomial")
-    largest_error_m: float | None = quantity(None, "m", "largest corrected error, without its mean")
+    largest_error_m: float | None = quantity(None, "m", "largest error that is corrected, excluding its mean")
     residual_m: float | None = quantity(None, "m", "expanded uncertainty of the error at one reading (k = 2)")
     delay_s: float | None = quantity(None, "s", "delay relative to the table's displacement")
     delay_uncertainty_s: float | None = quantity(None, "s", "expanded uncertainty of the delay (k = 2)")
@@ -56,10 +57,10 @@ PROTOCOL = Protocol(
     name="laser-calibration",
     summary="Calibrate both lasers and the table's sensors by a common slow motion with the frame locked.",
     details=(
-        "The storeys are clamped to the table, which moves slowly over the range of the tests. The result is the "
-        "scale, the smooth linearity error and the delay of each laser, and their agreement. The key "
-        "`laser_calibration` in the configuration of other runs names the result, laser_calibration.json. Without "
-        "options: eight passes of 50 mm, about four minutes."
+        "The storeys are clamped to the table, which moves slowly over the range of the tests. The result is "
+        "the scale, the smooth linearity error and the delay of each laser, and their agreement. The key "
+        "`laser_calibration` in the configuration of other runs names the result, laser_calibration.json. "
+        "Without options, a run has eight passes of 50 mm and takes about four minutes."
     ),
     example="--config bench.toml",
     parameters=LaserCalibrationParameters,

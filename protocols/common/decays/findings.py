@@ -1,4 +1,4 @@
-"""Results of the decays: the fit as an event, findings for other runs, and the masses on which they depend.
+"""Results of decays: the fit as an event, findings for other runs, and the masses on which they depend.
 
 The masses of the storeys are taken from a specimen file if it has them, else from the configuration.
 """
@@ -32,7 +32,7 @@ MASSES = ("m1", "m2")
 
 
 def fit_finished(decay: Decay, name: str) -> FitFinished:
-    """Event of a fitted decay, as measured by the lasers."""
+    """Event with a fitted decay as measured by the lasers."""
     fit, stretch = decay.fit, decay.fit.stretch
     columns = {"time": Series(stretch.time, "s", "time since the start of the recording")}
     for row, laser in enumerate(STOREYS):
@@ -40,7 +40,7 @@ def fit_finished(decay: Decay, name: str) -> FitFinished:
         columns[laser] = Series(measured, "m", f"signal of {laser}, averaged over the time step")
         columns[f"{laser}_fitted"] = Series(fitted, "m", f"signal of {laser} for the fitted frame")
         columns[f"{laser}_residual"] = Series(measured - fitted, "m", "measured minus fitted")
-    columns[TABLE_DISPLACEMENT] = Series(stretch.table, "m", "measured motion of the table, input of the fit")
+    columns[TABLE_DISPLACEMENT] = Series(stretch.table, "m", "measured motion of the table, used as input of the fit")
     uncertainties = np.sqrt(np.diag(decay.uncertainty.own + decay.uncertainty.common))
     parameters = {
         key: FittedParameter(float(value), float(uncertainty), unit)
@@ -52,8 +52,8 @@ def fit_finished(decay: Decay, name: str) -> FitFinished:
 def frame_findings(result: FrameResult, known: Identified) -> tuple[list[Finding], list[Correlation]]:
     """Stiffnesses, damping ratios and the masses used to identify them, with all correlations.
 
-    Known masses are kept; they correlate the frame with all other known quantities. A physically impossible
-    value, such as a negative damping ratio, is omitted.
+    Known masses are kept; they correlate the frame with all other known quantities. Physically impossible values, such
+    as a negative damping ratio, are omitted.
     """
     indices = list(FOUND.values())
     inner = result.frame.covariance[np.ix_(indices, indices)]
@@ -64,7 +64,7 @@ def frame_findings(result: FrameResult, known: Identified) -> tuple[list[Finding
     date = datetime.now(UTC).replace(microsecond=0)
     sources = [
         *[SOURCE] * len(FOUND),
-        *(f"as configured, standard uncertainty {mass:.2g} kg" for mass in uncertainties[-2:]),
+        *(f"as configured, with a standard uncertainty of {mass:.2g} kg" for mass in uncertainties[-2:]),
     ]
     findings = [
         Finding(name=name, value=value, standard_uncertainty=float(uncertainty), source=origin, date=date)
@@ -102,7 +102,7 @@ def impossible_values(result: FrameResult) -> str | None:
 
 
 def through_masses(shift: Array, known: Identified, name: str) -> float:
-    """Covariance with a known quantity of one with the sensitivity `shift`, shape (2,), to the known masses."""
+    """Covariance of a known quantity with a quantity whose sensitivity to the known masses is `shift`, shape (2,)."""
     return float(shift @ [known_covariance(known, mass, name) for mass in MASSES])
 
 
@@ -115,8 +115,8 @@ def known_covariance(known: Identified, first: str, second: str) -> float:
 def correlations_with(
     name: str, own: float, covariances: dict[str, float], others: dict[str, float]
 ) -> list[Correlation]:
-    """Correlations of `name`, with the standard uncertainty `own`, with other quantities, from their covariances and
-    standard uncertainties.
+    """Correlations of `name`, whose standard uncertainty is `own`, with other quantities, from covariances and standard
+    uncertainties.
     """
     return [
         Correlation(first=name, second=other, coefficient=float(np.clip(covariance / (others[other] * own), -1.0, 1.0)))
@@ -131,7 +131,7 @@ def standard_uncertainties(known: Identified) -> dict[str, float]:
 
 
 def known_masses(known: Identified | None) -> Identified | None:
-    """Identified quantities if they include both masses, else None."""
+    """The identified quantities if they include both masses, else None."""
     return known if known is not None and set(MASSES) <= set(known.names) else None
 
 
@@ -151,7 +151,8 @@ def check_masses(parameters: DecayParameters, configuration: BenchConfiguration)
         value = getattr(parameters, item)
         if value != DecayParameters.model_fields[item].default:
             allowed = (
-                f"{_masses_text(known)} are those of the specimen file: omit it, or remove both masses from that file"
+                f"the masses are those of the specimen file, {_masses_text(known)}: omit this parameter, or remove "
+                "both masses from that file"
             )
             raise InvalidInput(item, value, allowed)
 

@@ -26,8 +26,8 @@ class FrameResult:
 
     `frame` combines the quantities, `slopes` the changes of the damping with amplitude [1/m]. `masses` [kg] are as
     weighed, with the covariance `weighed` [kg2], shape (2, 2). `mass_shift`, shape (8, 2), is the sensitivity of the
-    quantities to the masses, `time_shift`, shape (8,), that to the timebase times its standard uncertainty. `parts` has
-    the standard uncertainties, shape (8,), by contribution.
+    quantities to the masses, `time_shift`, shape (8,), is the sensitivity to the timebase multiplied by the timebase's
+    standard uncertainty. `parts` holds the standard uncertainties, shape (8,), by contribution.
     """
 
     decays: tuple[Decay, ...]
@@ -41,7 +41,9 @@ class FrameResult:
 
     @property
     def shared_shift(self) -> Array:
-        """Sensitivity of the quantities to both masses and timebase, shared by all frames of a run, shape (8, 3)."""
+        """Sensitivity of the quantities to both masses and the timebase, which all frames of a run share, shape (8,
+        3).
+        """
         return np.column_stack((self.mass_shift, self.time_shift))
 
     @property
@@ -68,7 +70,7 @@ class FrameResult:
 
 
 def frame_result(decays: Sequence[Decay], masses: tuple[float, float], weighed: Array) -> FrameResult:
-    """Combined result of the decays of one frame."""
+    """Combine the decays of one frame."""
     frame = combine(
         [one.quantities for one in decays],
         [one.uncertainty.own for one in decays],
@@ -87,7 +89,7 @@ def frame_result(decays: Sequence[Decay], masses: tuple[float, float], weighed: 
 
 
 def decay_point(result: FrameResult, number: int) -> DecayPoint:
-    """Result as a point; `number` is 0 for all decays together."""
+    """The result as a point; `number` is 0 for the combination of all decays."""
     names = dict(zip(NAMES, _FIELDS, strict=True))
     values = {
         name: value
@@ -136,7 +138,7 @@ def _course_json(course: DampingCourse) -> str:
 
 
 def _short(value: float) -> float:
-    """Round to five digits for the texts of a data file."""
+    """Round to five digits, for strings in a data file."""
     return float(f"{value:.5g}")
 
 
@@ -153,13 +155,13 @@ _FIELDS = (
 
 
 def _part(name: str, decays: Sequence[Decay], frame: Combined) -> Array:
-    """Standard uncertainty from one contribution, which averages out over the decays if independent."""
+    """Standard uncertainty due to one contribution, which averages out over the decays if it is independent."""
     variances = np.array([np.diag(one.uncertainty.parts[name]) for one in decays])
     return np.sqrt(np.mean(variances, axis=0) if name in COMMON else np.sum(frame.weights**2 * variances, axis=0))
 
 
 def nonlinear_text(result: FrameResult) -> str:
-    """Warning that the damping depends on the amplitude, with the slopes."""
+    """Warning, with the slopes, that the damping depends on the amplitude."""
     slopes = [
         f"xi{mode + 1} changes by {slope:.2g} +- {uncertainty:.1g} per metre of drift"
         for mode, (slope, uncertainty) in enumerate(zip(result.slopes.values, result.slope_uncertainty, strict=True))

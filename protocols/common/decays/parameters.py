@@ -11,7 +11,7 @@ _COURSE = "drift amplitudes in the mode [m], damping ratios at these amplitudes,
 
 
 class DecayParameters(Parameters):
-    """Excitation and length of the decays, and the uncertainty of the weighed masses."""
+    """Excitation and duration of the decays, and uncertainty of the weighed masses."""
 
     drift: float = quantity(
         0.030,
@@ -23,7 +23,7 @@ class DecayParameters(Parameters):
     pulse: float | None = quantity(
         None,
         "s",
-        "length of the pulse; absent: inverse of the geometric mean of the frame's frequencies",
+        "duration of the pulse; if absent, the inverse of the geometric mean of the frame's frequencies",
         gt=0,
         le=10,
         usual=(0.02, 3.0),
@@ -31,12 +31,12 @@ class DecayParameters(Parameters):
     window: float | None = quantity(
         None,
         "s",
-        "recorded time after the excitation; absent: until the first mode has decayed to a twelfth, at most 60 s",
+        "time recorded after the excitation; if absent, until the first mode has decayed to a twelfth, at most 60 s",
         ge=5,
         le=300,
     )
     repeats: int = quantity(
-        5, "1", "number of combined decays; their scatter is compared with their uncertainty", ge=1, le=50
+        5, "1", "number of decays that are combined; their scatter is compared with their uncertainty", ge=1, le=50
     )
     mass_uncertainty: float = quantity(
         0.0005, "kg", "standard uncertainty of the weighed mass of each storey", ge=0, le=0.1
@@ -47,10 +47,10 @@ class DecayParameters(Parameters):
 
 
 class DecayPoint(Parameters):
-    """The frame identified from one decay or from all decays."""
+    """Frame identified from one decay or from all decays."""
 
     decay: int = quantity(..., "1", "number of the decay, from 1; 0 for all decays together", ge=0)
-    decays: int = quantity(..., "1", "number of decays combined", ge=1)
+    decays: int = quantity(..., "1", "number of combined decays", ge=1)
     k1_n_m: float = quantity(..., "N/m", "stiffness of the first storey")
     k1_uncertainty: float = quantity(..., "N/m", EXPANDED)
     k2_n_m: float = quantity(..., "N/m", "stiffness of the second storey")
@@ -86,5 +86,5 @@ class DecayPoint(Parameters):
 
 
 def decay_field(name: str) -> Any:
-    """Declaration of a field of `DecayPoint`, for points of other protocols."""
+    """Declaration of a field of `DecayPoint`, for the points of other protocols."""
     return copy(DecayPoint.model_fields[name])

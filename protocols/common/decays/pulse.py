@@ -26,13 +26,13 @@ from sim.specimen import Specimen
 Array = NDArray[np.float64]
 
 SHARE = 0.75
-"""Share of each limit that is used."""
+"""Fraction of each limit that is used."""
 
 QUIET = 2.0
 """Time at rest in the recording before the pulse [s], to determine the noise of the table's sensor."""
 
 LEFT, LONGEST = 1.0 / 12.0, 60.0
-"""Remaining share of the first mode at the end of the window, and the longest automatic window [s]."""
+"""Fraction of the first mode that remains at the end of the window, and the longest automatic window [s]."""
 
 LEAST = 0.003
 """Minimum drift of a decay [m]; below it the resolution of the lasers dominates."""
@@ -41,7 +41,7 @@ _FEWEST = 20
 """Minimum number of samples of a pulse."""
 
 _PADDING = 20.0
-"""Time at rest after a pulse in a Fourier transform [s]."""
+"""Time at rest appended to a pulse in a Fourier transform [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,23 +60,25 @@ class Pulse:
         return made / np.abs(made).max()
 
     def record(self, volts: float, window: float | None = None) -> Array:
-        """Drive [V], shape (n,), for a peak of `volts`: rest, pulse, and zeros for `window` [s] (default: its own)."""
+        """Drive [V], shape (n,), for a peak of `volts`: rest, pulse, and zeros for `window` [s], by default the pulse's
+        window.
+        """
         before, after = (round(time * self.sample_rate) for time in (QUIET, self.window if window is None else window))
         return np.concatenate((np.zeros(before), volts * self.shape, np.zeros(after)))
 
     @property
     def begin(self) -> float:
-        """Start of the free motion, from the start of the recording [s]."""
+        """Start of the free motion, relative to the start of the recording [s]."""
         return QUIET + self.duration
 
     @property
     def length(self) -> float:
-        """Length of the recording [s]."""
+        """Duration of the recording [s]."""
         return self.begin + self.window
 
 
 def frequencies(specimen: Specimen) -> Array:
-    """Undamped circular frequencies of the frame [rad/s], shape (2,), ascending; a spring is grounded at its block."""
+    """Undamped circular frequencies of the frame [rad/s], shape (2,), ascending; the block end of a spring is fixed."""
     mass, _, stiffness = frame_matrices(specimen.frame)
     stiffness[0, 0] += specimen.k_c
     root = np.sqrt(np.diag(mass))
@@ -91,7 +93,7 @@ def decay_pulse(parameters: DecayParameters, configuration: BenchConfiguration, 
 
 
 def decay_window(parameters: DecayParameters, specimen: Specimen) -> float:
-    """Length of a decay after its excitation [s]."""
+    """Duration of a decay after its excitation [s]."""
     if parameters.window is not None:
         return parameters.window
     rate = specimen.frame.xi1 * float(frequencies(specimen).min())
@@ -120,7 +122,7 @@ def plan_pulse(parameters: DecayParameters, configuration: BenchConfiguration, s
     pulse = decay_pulse(parameters, configuration, specimen)
     if pulse.shape.size < _FEWEST:
         least = _FEWEST / configuration.sample_rate
-        raise InvalidInput("pulse", pulse.duration, f"at this sample rate it must be at least {least:g} s")
+        raise InvalidInput("pulse", pulse.duration, f"at this sample rate the pulse must last at least {least:g} s")
     if parameters.drift < LEAST:
         raise InvalidInput("drift", parameters.drift, f"the lasers do not resolve a decay below {LEAST:g} m")
     unit = _unit_demands(pulse, configuration, specimen)
@@ -132,13 +134,13 @@ def plan_pulse(parameters: DecayParameters, configuration: BenchConfiguration, s
     binding = "requested drift" if wanted <= allowed[binds] else binds
     drift = scale * unit["drift"]
     if drift < LEAST:
-        needs = f"limits of {binding} allow a drift of only {drift:.2g} m, a decay needs {LEAST:g} m"
-        raise InvalidInput("pulse", pulse.duration, f"{needs}: raise that limit, or give another length")
+        needs = f"the limits on {binding} allow a drift of only {drift:.2g} m, but a decay needs {LEAST:g} m"
+        raise InvalidInput("pulse", pulse.duration, f"{needs}: raise that limit, or choose another pulse duration")
     return PlannedPulse(pulse, drift, {name: scale * value for name, value in unit.items()}, binding)
 
 
 def pulse_forecast(configuration: BenchConfiguration, pulses: Mapping[str, PlannedPulse], duration: float) -> Forecast:
-    """Largest demands of the `pulses`, by name of the specimen."""
+    """Largest demands over the `pulses`, which are keyed by the name of the specimen."""
     demands: list[Demand] = []
     for quantity in bounds(configuration):
         known = {name: pulse.demands[quantity] for name, pulse in pulses.items() if quantity in pulse.demands}

@@ -1,4 +1,4 @@
-"""Recording of the decays of one frame: search for the level, then recording, fit and point of each decay.
+"""Recording of the decays of one frame: a search for the level, followed by recording, fit and point of each decay.
 
 An unusable decay is repeated once, then omitted.
 """
@@ -27,7 +27,7 @@ from sim.parameters import Parameters
 Array = NDArray[np.float64]
 
 REST = 2.0
-"""Time at rest before each pulse, for the zero of the signals [s]."""
+"""Time at rest before each pulse, in which the signals are zeroed [s]."""
 
 STILL = 5e-5
 """Scatter below which the storeys count as at rest [m]; larger than the resolution of a laser."""
@@ -36,13 +36,13 @@ WAITING = 45.0
 """Expected time of a recording in addition to its drive: settling of the storeys, rest, ramp [s]."""
 
 DETECTABLE = 20.0
-"""Minimum ratio of the drift in a probe to its noise."""
+"""Minimum ratio of the drift in a probe to the noise."""
 
 GROWTH, NEAR = 10.0, 2.0
 """Largest growth factor of the drive between probes, and remaining growth factor below which a probe is the last."""
 
 _PROBED = 3.0
-"""Time after the pulse of a probe within which the largest motion occurs [s]."""
+"""Time after the pulse of a probe within which the largest motion is expected [s]."""
 
 _MOST = 6
 """Largest number of probes."""
@@ -56,11 +56,11 @@ class Pace:
     elapsed: float = 0.0
 
     def progress(self, activity: str) -> Progress:
-        """Present progress."""
+        """The present progress."""
         return Progress(self.elapsed / self.expected, self.expected - self.elapsed, activity)
 
     def finish(self, begun: float, planned: float) -> None:
-        """End a part that was expected to take `planned` [s] and began when `begun` [s] had elapsed.
+        """Register the end of a part that was expected to take `planned` [s] and began when `begun` [s] had elapsed.
 
         Its actual duration, which depends on the number of probes and repetitions, replaces the expected one.
         """
@@ -94,14 +94,14 @@ def record(volts: Array, sample_rate: float, pace: Pace, activity: str) -> Gener
 def find_level(
     pulse: Pulse, drift: float, configuration: BenchConfiguration, pace: Pace
 ) -> Generator[Step, Outcome, float]:
-    """Find the drive [V] for which the pulse causes a peak of `drift` [m], or as much as the limits allow.
+    """Find the drive [V] for which the pulse causes a peak of `drift` [m], or as large a drift as the limits allow.
 
     Raises Unmeasurable if the frame does not respond, or its drift does not reach `LEAST`.
     """
     volts, seen, limit = PROBE, 0.0, _largest_drive(pulse, configuration)
     for probe in range(1, _MOST + 1):
         yield Publish(StepStarted(f"probe {probe}: a pulse of {volts:.3g} V"))
-        signals = yield from record(pulse.record(volts, _PROBED), pulse.sample_rate, pace, "probing the pulse")
+        signals = yield from record(pulse.record(volts, _PROBED), pulse.sample_rate, pace, "pulse probe")
         rest = round(QUIET * pulse.sample_rate)
         seen, noise = _peak(signals[:, DRIFT]), float(np.nanstd(signals[:rest, DRIFT]))
         if not seen > DETECTABLE * noise:
@@ -120,24 +120,26 @@ def find_level(
             return (yield from _accept(left * volts, left * seen, drift, binds))
         volts *= min(GROWTH, left)
     raise Unmeasurable(
-        f"after {_MOST} probes the drift is {1e3 * seen:.2g} mm, {1e3 * drift:.2g} mm are required: check "
-        f"the amplifier's gain and the guides of the table"
+        f"after {_MOST} probes the drift is {1e3 * seen:.2g} mm, but {1e3 * drift:.2g} mm are required: check "
+        "the amplifier's gain and the guides of the table"
     )
 
 
 def _accept(volts: float, seen: float, drift: float, binds: str) -> Generator[Step, Outcome, float]:
     if seen < LEAST:
         raise Unmeasurable(
-            f"{binds} allows a drift of only {1e3 * seen:.2g} mm, a decay needs {1e3 * LEAST:g} mm: raise the limit, "
-            "or give another --pulse"
+            f"{binds} allows a drift of only {1e3 * seen:.2g} mm, but a decay needs {1e3 * LEAST:g} mm: raise the "
+            "limit, or choose another --pulse"
         )
     if seen < 0.9 * drift:
-        yield Publish(Warned(f"{binds} allows a drift of only {1e3 * seen:.2g} mm, {1e3 * drift:.2g} mm are requested"))
+        yield Publish(
+            Warned(f"{binds} allows a drift of only {1e3 * seen:.2g} mm, but {1e3 * drift:.2g} mm are requested")
+        )
     return volts
 
 
 def _headroom(signals: Array, sample_rate: float, configuration: BenchConfiguration) -> tuple[float, str]:
-    """Factor by which a motion may grow until it reaches `SHARE` of a limit, and the name of that limit."""
+    """Factor by which a motion may be scaled up until it reaches `SHARE` of a limit, and the name of that limit."""
     # average over a few milliseconds: differences of single samples are dominated by noise
     many = max(round(0.02 * sample_rate), 1)
     rows = len(signals) // many
@@ -167,7 +169,7 @@ PointMaker = Callable[[FrameResult, int], Parameters]
 """Creates the point of a result; the number is 0 for all decays together."""
 
 PROBES = 3
-"""Number of probes that most tables need, for the expected duration."""
+"""Number of probes that most tables need, used for the expected duration."""
 
 _TRIES = 2
 """Maximum number of attempts at a decay."""
@@ -224,7 +226,7 @@ def repeat_decays(
             try:
                 decay = yield from once(f"{name} {number} of {parameters.repeats}")
             except Unusable as refusal:
-                again = "it is repeated" if attempt + 1 < _TRIES else "it is omitted"
+                again = "the decay is repeated" if attempt + 1 < _TRIES else "the decay is omitted"
                 yield Publish(Warned(f"{name} {number}: {refusal}; {again}"))
                 continue
             decays.append(decay)
@@ -239,7 +241,7 @@ def repeat_decays(
 
 
 def fit_setting(parameters: DecayParameters, configuration: BenchConfiguration) -> Setting:
-    """Known values for the fit of a decay, with the covariance of the masses."""
+    """Known values for the fit of a decay, including the covariance of the masses."""
     frame = configuration.known_specimen.frame
     return Setting(
         sample_rate=configuration.sample_rate,
@@ -252,12 +254,12 @@ def fit_setting(parameters: DecayParameters, configuration: BenchConfiguration) 
 
 
 def pulsed_duration(parameters: DecayParameters, pulse: Pulse) -> float:
-    """Expected length of the decays after pulses [s]."""
+    """Expected duration of the decays after pulses [s]."""
     return _probing_duration(pulse) + parameters.repeats * (pulse.length + WAITING)
 
 
 def _probing_duration(pulse: Pulse) -> float:
-    """Expected time of the probes before the decays [s]."""
+    """Expected duration of the probes before the decays [s]."""
     return PROBES * (pulse.begin + WAITING)
 
 

@@ -10,7 +10,7 @@ from bench.figures.budget_figure import budget_figure
 
 Rows = Sequence[Mapping[str, Any]]
 
-EXPANDED = "Uncertainties are expanded (k = 2) and include those of the masses."
+EXPANDED = "Uncertainties are expanded (k = 2) and include the uncertainty of the masses."
 
 
 def budget_parts(quantity: str, labels: list[str], shares: list[dict[str, float]], expanded: list[float]) -> list[Part]:
@@ -21,7 +21,10 @@ def budget_parts(quantity: str, labels: list[str], shares: list[dict[str, float]
         [label, f"{size:.4f}", *(f"{share[name]:.4f}" if name in share else ABSENT for name in names)]
         for label, size, share in zip(labels, expanded, shares, strict=True)
     ]
-    caption = f"Uncertainty budget of {quantity}: expanded, and standard by contribution, largest first"
+    caption = (
+        f"Uncertainty budget of {quantity}: expanded uncertainty, and standard uncertainties by contribution, "
+        "largest first"
+    )
     figure = budget_figure(labels, shares, expanded, "expanded uncertainty")
     text = (
         f"Contributions to the uncertainty of {quantity}: each bar is the expanded uncertainty, divided in proportion "
@@ -41,6 +44,6 @@ def decay_label(row: Mapping[str, Any]) -> str:
 
 
 def expanded_text(row: Mapping[str, Any], name: str, uncertain: str, factor: float = 1.0) -> str:
-    """A field of a point with its expanded uncertainty, both times `factor`."""
+    """A field of a point with its expanded uncertainty, both multiplied by `factor`."""
     value, uncertainty = row[name], row[f"{uncertain}_uncertainty"]
     return ABSENT if value is None else with_uncertainty(factor * value, factor * (uncertainty or 0.0))

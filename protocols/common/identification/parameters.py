@@ -12,7 +12,7 @@ class IdentifyParameters(Parameters):
     beta: float | None = quantity(
         None,
         "1",
-        "stiffness ratio of the spring that couples the block; absent: bare frame, no block",
+        "stiffness ratio of the spring that couples the block; if absent, the bare frame without block",
         gt=0,
         le=100,
         usual=COUPLING,
@@ -20,46 +20,49 @@ class IdentifyParameters(Parameters):
     band_low: float | None = quantity(
         None,
         "Hz",
-        "lower end of the band; absent: half that of the table's band, as required for replication",
+        "lower end of the band; if absent, half the lower end of the table's band, as required for replication",
         gt=0,
         usual=(0.2, 1.8),
     )
     band_high: float | None = quantity(
         None,
         "Hz",
-        "upper end of the band; absent: twice that of the table's band, as required for replication",
+        "upper end of the band; if absent, twice the upper end of the table's band, as required for replication",
         gt=0,
         usual=(8.0, 80.0),
     )
     corner: float = quantity(
         1.0,
         "Hz",
-        "below this frequency the motion has constant displacement, above it constant acceleration",
+        "frequency below which the motion has constant displacement and above which it has constant acceleration",
         gt=0,
         le=50,
     )
     level: float = quantity(
         0.6,
         "m/s2",
-        "peak of the table's acceleration, reduced if required by the bench or to keep the block at rest",
+        "peak of the table's acceleration, reduced if the bench requires it or to keep the block at rest",
         gt=0,
     )
     period: float = quantity(8.0, "s", "period of the multisines, the inverse of their line spacing", ge=0.5, le=120)
     realisations: int = quantity(
         3, "1", "number of multisines with different phases; their differences show the distortion", ge=2, le=50
     )
-    periods: int = quantity(3, "1", "used periods of each multisine; their differences show the noise", ge=2, le=50)
+    periods: int = quantity(
+        3, "1", "number of periods used of each multisine; their differences show the noise", ge=2, le=50
+    )
     discarded: int | None = quantity(
         None,
         "1",
-        "discarded periods at the start of each multisine; absent: until the transient of the start has decayed to 2 %",
+        "number of periods discarded at the start of each multisine; if absent, until the starting transient "
+        "has decayed to 2 %",
         ge=1,
         le=100,
     )
     odd_lines: bool = quantity(
-        False, "", "omit every other line, so that the remaining lines have no distortion of even order"
+        False, "", "whether every other line is omitted, so that the remaining lines are free of even-order distortion"
     )
-    phase_seed: int = quantity(1, "", "seed of the phases", ge=0, lt=2**32)
+    phase_seed: int = quantity(1, "", "random seed for the phases", ge=0, lt=2**32)
 
     @model_validator(mode="after")
     def _a_band(self) -> "IdentifyParameters":

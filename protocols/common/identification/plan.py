@@ -37,17 +37,17 @@ from sim.specimen import Specimen
 Array = NDArray[np.float64]
 
 REST = 2.0
-"""Time at rest before each drive, for the zero of the signals [s]."""
+"""Time at rest before each drive, in which the signals are zeroed [s]."""
 
 OVERHEAD = 12.0
-"""Time in addition to the drive: rest, settling of the storeys, ramp [s]."""
+"""Time in addition to the duration of the drive: rest, settling of the storeys, ramp [s]."""
 
 
 @dataclass
 class Rules:
     """Limits and progress of all drives of one identification; `knee` [Hz] is the upper end of the table's band.
 
-    `expected` [s] is the total length, of which `gone` [s] have been played.
+    `expected` [s] is the total duration, of which `gone` [s] have been played.
     """
 
     limits: Limits
@@ -62,9 +62,9 @@ class Rules:
         limits = self.limits
         if peak > limits.drive_voltage or slew > limits.drive_slew:
             raise Unmeasurable(
-                f"the motion would need {peak:.3g} V and {slew:.3g} V/s of drive, limits.drive_voltage ="
-                f" {limits.drive_voltage:g} V, limits.drive_slew = {limits.drive_slew:g} V/s: reduce --level, or use a "
-                "narrower band"
+                f"the motion would need {peak:.3g} V and {slew:.3g} V/s of drive, but limits.drive_voltage = "
+                f"{limits.drive_voltage:g} V, limits.drive_slew = {limits.drive_slew:g} V/s: reduce --level, or use "
+                "a narrower band"
             )
 
     def progress(self, activity: str) -> Progress:
@@ -88,7 +88,7 @@ class Rules:
 
 
 def played(volts: Array, rules: Rules) -> Generator[Step, Outcome, Played | Fallen]:
-    """Arm, play and ramp out; `Fallen` also when the block falls in the ramp."""
+    """Arm, play and ramp out; returns `Fallen` even if the block falls only during the ramp."""
     yield Arm(REST)
     outcome = yield Play(volts, rules.watch())
     end = yield RampOut(fast=isinstance(outcome, Fallen))
@@ -102,7 +102,7 @@ GROWTH = 10.0
 """Largest growth factor of the table's motion between probes."""
 
 REACHED = 0.95
-"""Share of the final motion above which a probe is the last."""
+"""Fraction of the final motion above which a probe is the last."""
 
 AUDIBLE = 2.0
 """Minimum ratio of the response to its noise."""
@@ -145,8 +145,8 @@ def probed_response(motion: Complex, grid: Grid, rules: Rules) -> Generator[Step
             return response
         drive = drive_for(motion, response, short, rules.knee) * min(1.0, GROWTH * reached / level)
     raise Unmeasurable(
-        f"after {_MOST} probes the acceleration of the table is {reached:.2g} m/s2, {level:.2g} are required: check "
-        "the amplifier's gain and the guides of the table"
+        f"after {_MOST} probes the acceleration of the table is {reached:.2g} m/s2, but {level:.2g} are "
+        "required: check the amplifier's gain and the guides of the table"
     )
 
 
@@ -155,9 +155,9 @@ def _acceleration(outcome: Played) -> NDArray[np.float64]:
 
 
 def _answer(moved: Complex) -> tuple[float, float]:
-    """Rms of the mean of the periods, and of its noise, estimated from the scatter of the periods.
+    """Rms of the mean over the periods, and rms of its noise, estimated from the scatter of the periods.
 
-    Without a response both are equal except for their scatter, which decreases with the number of lines.
+    Without a response, both are equal except for their scatter, which decreases with the number of lines.
     """
     periods, mean = moved.shape[0], moved.mean(axis=0)
     noise = np.sum(np.abs(moved - mean) ** 2) / (periods * (periods - 1))
@@ -171,14 +171,16 @@ def _peak(spectrum: Complex, grid: Grid) -> float:
 Array = NDArray[np.float64]
 
 PROBES = 3
-"""Number of probes that most tables need, for the expected duration."""
+"""Number of probes that most tables need, used for the expected duration."""
 
 SENSORS_AGREE = 0.05
-"""Relative difference of the table's two sensors, or phase difference [rad] at the band edge, that causes a warning."""
+"""Relative difference of the table's two sensors, or phase difference [rad] at the band edge, above which a warning is
+issued.
+"""
 
 
 def expected_duration(parameters: IdentifyParameters, found: Planned) -> float:
-    """Expected length of an identification [s]."""
+    """Expected duration of an identification [s]."""
     probes = PROBES * (found.grid.shortened().duration + OVERHEAD)
     return probes + parameters.realisations * (found.grid.duration + OVERHEAD)
 
@@ -186,7 +188,7 @@ def expected_duration(parameters: IdentifyParameters, found: Planned) -> float:
 def identified(
     parameters: IdentifyParameters, configuration: BenchConfiguration, found: Planned
 ) -> Generator[Step, Outcome, TableModel]:
-    """The whole identification with the planned motions `found`, from mounting the specimen to the table model."""
+    """The complete identification with the planned motions `found`, from mounting the specimen to the table model."""
     specimen = specimen_of(parameters, configuration)
     rules = Rules(
         configuration.limits,
@@ -212,7 +214,7 @@ def identified(
         yield from _warned(outcome, specimen, configuration)
         records.append(outcome)
         rules.remains((parameters.realisations - number) * each)
-        yield Publish(rules.progress(f"finished multisine {number} of {parameters.realisations}"))
+        yield Publish(rules.progress(f"multisine {number} of {parameters.realisations} finished"))
     model, agreement = _identified(records, found, specimen)
     yield from _told(model, agreement)
     return model
@@ -243,7 +245,7 @@ def _warned(outcome: Played, specimen: Specimen, configuration: BenchConfigurati
     moved = outcome.signals[:, ACCELERATION]
     share = resting_demands(moved, configuration.sample_rate, specimen, configuration).get(RESTING, 0.0)
     if share > 1.0:
-        yield Publish(Warned(f"the block may have lifted: the moment reached {share:.2f} of that of its weight"))
+        yield Publish(Warned(f"the block may have lifted: the moment reached {share:.2f} of the moment of its weight"))
 
 
 def _identified(
@@ -270,7 +272,7 @@ def _told(model: TableModel, agreement: tuple[float, float]) -> Generator[Step, 
     if abs(gain - 1.0) > SENSORS_AGREE or abs(2.0 * np.pi * low * lead) > SENSORS_AGREE:
         yield Publish(
             Warned(
-                f"table_displacement measures {gain:.3f} times the motion of table_acceleration "
-                f"with a lead of {1e3 * lead:+.2f} ms: check both with `rockbench check`",
+                f"table_displacement measures {gain:.3f} times the motion measured by table_acceleration, with a "
+                f"lead of {1e3 * lead:+.2f} ms: check both with `rockbench check`",
             )
         )

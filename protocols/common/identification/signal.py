@@ -24,10 +24,10 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 FADE = 0.25
-"""Duration of the fade-in and the fade-out of a multisine, in periods."""
+"""Duration of the fade-in and of the fade-out of a multisine, in periods."""
 
 _LEFT = 0.02
-"""Remaining share of the specimen's transient at the first used period."""
+"""Fraction of the specimen's transient that remains at the first used period."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +52,7 @@ class Grid:
 
     @property
     def duration(self) -> float:
-        """Length of the drive of one realisation [s]."""
+        """Duration of the drive in one realisation [s]."""
         return (2 * self.fade + (self.discarded + self.periods) * self.samples) / self.sample_rate
 
     def shortened(self) -> "Grid":
@@ -60,7 +60,7 @@ class Grid:
         return Grid(self.lines, self.samples, self.sample_rate, 1, 2)
 
     def record(self, spectrum: Complex) -> Array:
-        """Signal of a spectrum at the lines, shape (n,), faded in and out from and to zero."""
+        """Signal with the given spectrum at the lines, shape (n,), faded in from zero and out to zero."""
         whole = np.tile(waveform(self.lines, spectrum, self.samples), self.discarded + self.periods)
         one, n = whole[: self.samples], self.fade
         rise = 0.5 * (1.0 - np.cos(np.pi * np.arange(n) / n))
@@ -95,7 +95,7 @@ def grid(parameters: IdentifyParameters, configuration: BenchConfiguration, spec
 
 
 def band(parameters: IdentifyParameters, configuration: BenchConfiguration) -> tuple[float, float]:
-    """Identified band [Hz]: as given in the parameters, else as required for replication."""
+    """Identified band [Hz]: as specified in the parameters, else as required for replication."""
     low, high = configuration.table_band
     return parameters.band_low or low / REACH, parameters.band_high or high * REACH
 
@@ -128,29 +128,29 @@ def drive_for(motion: Complex, response: Complex, grid: Grid, knee: float) -> Co
 
 
 def seen_peak(motion: Complex, grid: Grid, knee: float) -> float:
-    """Peak [m/s2] of an acceleration from its lines up to half the `knee` [Hz], where no filter attenuates."""
+    """Peak [m/s2] of an acceleration, from its lines up to half the `knee` [Hz], where no filter attenuates them."""
     seen = grid.frequency <= 0.5 * knee
     seen = seen if seen.any() else np.ones(seen.shape, np.bool_)
     return float(np.abs(waveform(grid.lines[seen], motion[seen], grid.samples)).max())
 
 
 def _settling(specimen: Specimen) -> float:
-    """Time for the slowest motion of the specimen, with a resting block, to decay to the share `_LEFT` [s]."""
+    """Time for the slowest motion of the specimen, with a resting block, to decay to the fraction `_LEFT` [s]."""
     return log(_LEFT) / float(resting_rates(specimen).real.max())
 
 
 SHARE = 0.75
-"""Share of each limit that is used."""
+"""Fraction of each limit that is used."""
 
 BLOCK_SHARE = 0.6
-"""Share of the uplift moment that is used; the margin covers the uncertainty of spring, frame and base."""
+"""Fraction of the uplift moment that is used; the margin covers the uncertainty of spring, frame and base."""
 
 
 @dataclass(frozen=True, eq=False)
 class Planned:
     """Planned multisines: acceleration spectra `motions` at the lines of `grid`, whose largest peak is `level`.
 
-    `asked` are the largest magnitudes of their demands. `binds` names the limit that determines the level.
+    `asked` holds the largest magnitudes of their demands. `binds` names the limit that determines the level.
     """
 
     grid: Grid
@@ -198,7 +198,7 @@ def _asked(lines: Grid, motion: Complex, specimen: Specimen, configuration: Benc
 
 
 def _drive(lines: Grid, motion: Complex, specimen: Specimen, configuration: BenchConfiguration) -> dict[str, float]:
-    """Peaks of the drive and of its slew rate, if the response of the table is known over the whole band."""
+    """Peaks of the drive and of its slew rate, if the response of the table is known over the entire band."""
     response = response_of(configuration)
     if response is None:
         return {}
