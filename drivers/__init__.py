@@ -1,1 +1,1 @@
-"""Instruments: the interface of a rig (`drivers.rig`), simulated and hardware rigs, device drivers."""
+"""Instruments: the rig interface (`drivers.rig`), simulated and hardware rigs, and device drivers."""

@@ -20,9 +20,9 @@ from sim.errors import RockbenchError
 
 MOST_CHANNELS = 256
 HIGHEST_RATE = 1e6
-"""Largest sample rate [1/s]: above it the buffers of this program would hold less than a second."""
+"""Largest sample rate [1/s]; above it, this program's buffers would hold less than a second."""
 LONGEST_LEAD = 10.0
-"""Longest lead [s]: the guard cannot act on commands with a longer delay."""
+"""Longest lead [s], the delay with which the guard's commands take effect."""
 HIGHEST_VOLTAGE = 100.0
 """Largest drive range [V]."""
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
@@ -57,16 +57,16 @@ class _CheckedVirtualClock(CheckedClock, VirtualClock):
 
 
 class CheckedRig:
-    """`drivers.rig.Rig` that validates the rig of the backend of this name.
+    """A `drivers.rig.Rig` that validates the rig of the backend `backend`.
 
-    The description of the rig is read once, here. Blocks are copied. A safety input counts as open if it disappears or
-    is not a Boolean. Raises BackendFault for an invalid rig, after closing the backend's rig.
+    The description of the rig is read once, on construction. Blocks are copied. A safety input counts as open if it
+    disappears or is not a Boolean. Raises BackendFault for an invalid rig, after closing the backend's rig.
     """
 
     def __init__(self, rig: Rig, backend: str) -> None:
         self._rig, self.backend = rig, backend
-        # every safety input named so far, in order; open unless it is reported good. A stopped rig may omit an input
-        # that it names only while armed, such as an amplifier that is ready only while it is enabled
+        # every safety input named so far, in order; open unless reported good. A stopped rig may omit an input that it
+        # names only while armed, such as an amplifier that is ready only while enabled
         self._inputs: dict[str, bool] = {}
         self._while_armed: dict[str, bool] = {}
         self._armed = False
@@ -80,7 +80,7 @@ class CheckedRig:
     def _describe(self) -> None:
         missing = [name for name in _CALLS if not callable(getattr(self._rig, name, None))]
         if missing:
-            self._refuse(f"returned {type(self._rig).__name__}, which is no rig: it has no {', '.join(missing)}")
+            self._refuse(f"returned {type(self._rig).__name__}, which is not a rig: it has no {', '.join(missing)}")
         self.channels = self._checked_channels(self._given("channels"))
         self.sample_rate = self._number("sample_rate", HIGHEST_RATE)
         self.drive_range = self._number("drive_range", HIGHEST_VOLTAGE)
@@ -126,7 +126,7 @@ class CheckedRig:
 
     def write(self, volts: NDArray[np.float64]) -> None:
         with self._calls("write"):
-            # the guard keeps its own: a backend may convert what it is given in place
+            # the guard keeps its own array: a backend may convert its argument in place
             self._rig.write(np.array(volts, dtype=np.float64))
 
     def read(self, n: int) -> Block:
@@ -164,7 +164,7 @@ class CheckedRig:
 
     @contextmanager
     def _calls(self, call: str) -> Generator[None]:
-        """Context manager that converts exceptions that a rig must not raise to BackendFault."""
+        """Context manager that converts exceptions that a rig must not raise into BackendFault."""
         try:
             yield
         except RockbenchError:
@@ -193,7 +193,7 @@ class CheckedRig:
     def _checked_lead(self, lead: object, rate: float) -> int:
         most = int(LONGEST_LEAD * rate)
         if not _is_count(lead) or not 0 <= lead <= most:
-            self._refuse(f"has a lead of {lead!a} samples: it must be a whole number from 0 to {most}")
+            self._refuse(f"has a lead of {lead!a} samples: it must be an integer from 0 to {most}")
         return int(lead)
 
     def _checked_channels(self, given: Any) -> tuple[Channel, ...]:
@@ -205,22 +205,22 @@ class CheckedRig:
             with self._calls("channels"):
                 wrong = _wrong_with(channel) or ("its name is repeated" if channel.name in known else "")
             if wrong:
-                self._refuse(f"has channels of which number {number} is none: {wrong}")
+                self._refuse(f"has an invalid channel, number {number}: {wrong}")
             known.add(channel.name)
         return channels
 
     def _checked_description(self, given: Any) -> dict[str, str]:
         pairs = cast("Mapping[Any, Any]", given).items() if isinstance(given, Mapping) else [(None, None)]
         if not all(_is_text(text) for pair in pairs for text in pair):
-            self._refuse(f"has a description {given!a:.80}: it must map texts to texts")
+            self._refuse(f"has a description {given!a:.80}: it must map strings to strings")
         return dict(pairs)
 
     def _checked_clock(self, clock: Any) -> Clock:
-        # clocks of this program need no check
+        # this program's clocks need no check
         if type(clock) in (VirtualClock, WallClock):
             return clock
         if not callable(getattr(clock, "now", None)) or not callable(getattr(clock, "wait_until", None)):
-            self._refuse(f"has a clock that is none: {type(clock).__name__}")
+            self._refuse(f"has an invalid clock: {type(clock).__name__}")
         return _CheckedVirtualClock(clock) if isinstance(clock, VirtualClock) else CheckedClock(clock)
 
     def _checked_block(self, given: Any) -> Block:
@@ -255,7 +255,7 @@ class CheckedRig:
         return tuple(RawValues(each.sensor, *(np.array(getattr(each, name)) for name in _RAW)) for each in raw)
 
     def _require_storable(self, counts: NDArray[Any]) -> None:
-        """Refuse counts beyond the range of their channel's storage, which the file would alter."""
+        """Check that counts are within the range of their channel's storage type; the file would alter others."""
         low, high = counts.min(axis=0), counts.max(axis=0)
         for column, channel in enumerate(self.channels):
             span = np.iinfo(channel.storage)
@@ -304,7 +304,7 @@ def _is_text(value: object, *, printable: bool = False) -> bool:
 def _is_alignment(value: Any, sensors: list[str]) -> bool:
     if not isinstance(value, Alignment) or value.sensor not in sensors:
         return False
-    # offset and rate are NaN while they are not known, as in a run that ends before its first block
+    # offset and rate are NaN while unknown, as in a run that ends before its first block
     line = (value.offset, value.rate)
     known = all(map(_is_number, line)) or all(each != each for each in line)
     return (
@@ -328,7 +328,7 @@ def _is_raw(value: Any, sensors: list[str]) -> bool:
 def _wrong_with(channel: Any) -> str:
     """Defect of a channel; empty for a valid one."""
     if not isinstance(channel, Channel):
-        return f"{type(channel).__name__} is no channel"
+        return f"{type(channel).__name__} is not a channel"
     if not (_is_text(channel.name) and _NAME.fullmatch(channel.name)):
         return f"its name is {channel.name!a}"
     for item, text in (("unit", channel.unit), ("quantity", channel.quantity)):
@@ -361,4 +361,4 @@ def _wrong_with_counts(channel: Channel) -> str:
         return f"the faults of {channel.name} are {faults!a}"
     with np.errstate(all="ignore"):
         limits = channel.limits
-    return "" if all(map(isfinite, limits)) else f"the values of {channel.name} reach from {limits[0]} to {limits[1]}"
+    return "" if all(map(isfinite, limits)) else f"the values of {channel.name} range from {limits[0]} to {limits[1]}"

@@ -7,7 +7,7 @@ from sim import waiting
 
 
 def now() -> float:
-    """Machine's clock [s since an arbitrary origin]: never decreases, resolution better than a microsecond.
+    """The machine's clock [s since an arbitrary origin], which never decreases and resolves better than a microsecond.
 
     All time stamps use this clock. Python's monotonic clock may step by 15.6 ms on Windows (documentation of Python,
     `time.monotonic` before 3.13); this counter does not. On Linux both are CLOCK_MONOTONIC, shared by all processes.
@@ -28,7 +28,7 @@ class Clock(Protocol):
 
 
 class VirtualClock:
-    """Virtual time: a wait returns at once and sets the clock to its end."""
+    """Virtual time: a wait sets the clock to the end of the wait and returns at once."""
 
     def __init__(self) -> None:
         self._now = 0.0
@@ -41,7 +41,7 @@ class VirtualClock:
 
 
 class WallClock:
-    """Machine's clock in real time."""
+    """The machine's clock in real time."""
 
     def now(self) -> float:
         return now()

@@ -14,8 +14,8 @@ from drivers.rig import Alignment, Block, Channel, Counts, OperatorTask
 
 
 class ComputedRig(RigBase, ABC):
-    """Base of the backends without hardware, at the pace of the clock: a subclass implements `respond`, and optionally
-    `begin` and `carry_out`. Blocks are returned when they would have been measured.
+    """Base class of backends without hardware, paced by the clock: a subclass implements `respond`, and optionally
+    `begin` and `carry_out`. A block is returned at the time at which it would have been measured.
     """
 
     def __init__(
@@ -35,8 +35,8 @@ class ComputedRig(RigBase, ABC):
 
     @abstractmethod
     def respond(self, volts: NDArray[np.float64]) -> Counts:
-        """Counts of all channels, shape (n, n_channels), under the next `volts`, shape (n,); sample i of the drive acts
-        after sample i of the inputs.
+        """Counts of all channels, shape (n, n_channels), under the next `volts`, shape (n,); sample i of the drive
+        takes effect after sample i of the inputs.
         """
 
     def begin(self) -> None:

@@ -1,4 +1,4 @@
-"""State and drive of a rig: refused calls, allowed samples, and the lead required when a block is read."""
+"""State and drive of a rig: permitted calls and samples, and the lead required when a block is read."""
 
 from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
@@ -15,7 +15,7 @@ from sim.errors import InvalidInput
 
 
 class Drive:
-    """Checks written samples and counts queued ones; does not play them.
+    """Checks written samples and counts those queued, without playing them.
 
     `range` is the largest magnitude [V], `lead` the number of samples required beyond those of a block. Raises
     InvalidInput for a negative lead.
@@ -28,10 +28,10 @@ class Drive:
         self.lead = lead
         self._waiting = 0
         self.index = 0
-        """Number of the next sample to be read, counted from `begin`."""
+        """Index of the next sample to be read, counted from `begin`."""
 
     def begin(self) -> None:
-        """Begin a run without queued samples, at sample 0."""
+        """Begin a run at sample 0, without queued samples."""
         self._waiting = self.index = 0
 
     def append(self, volts: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -60,7 +60,7 @@ class Drive:
             )
 
     def advance(self, n: int, gap: int = 0) -> int:
-        """Count `n` samples as played and read, after a gap without drive. Returns the number of the first."""
+        """Count `n` samples as played and read, after a gap without drive. Returns the index of the first sample."""
         first = self.index + gap
         self._waiting -= n
         self.index = first + n
@@ -75,7 +75,7 @@ def require_block(n: int) -> None:
 
 @contextmanager
 def ending_by(stop: Callable[[], None]) -> Generator[None]:
-    """Context manager that stops the rig when a RigError is raised inside."""
+    """Context manager that stops the rig if a RigError is raised in its body."""
     try:
         yield
     except RigError:
@@ -143,4 +143,4 @@ class RigBase:
 
 
 REARM = "stop it first, or open a new one"
-"""Remedy where a rig cannot be armed."""
+"""Remedy for a rig that cannot be armed."""

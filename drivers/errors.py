@@ -1,4 +1,4 @@
-"""Errors of instruments. With any of them, the output is at zero or being set to zero."""
+"""Errors of instruments. Whenever one is raised, the output is at zero or being set to zero."""
 
 from collections.abc import Sequence
 

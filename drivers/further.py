@@ -27,7 +27,7 @@ class FurtherChannel(CalibratedInput):
     measures: Literal["acceleration", "velocity", "displacement", "force", "strain", "current", "voltage"] = quantity(
         ..., "", "measured quantity", example="acceleration"
     )
-    unit: str = quantity(..., "", "its SI unit", min_length=1, example="m/s2")
+    unit: str = quantity(..., "", "SI unit of the quantity", min_length=1, example="m/s2")
     place: Place = quantity(..., "", "part on which it is mounted", example="storey 2")
     sensitivity: float = quantity(
         ..., "V/unit", "volts per unit as calibrated; its sign is the polarity", usual=(1e-6, 1e6), example=0.1
@@ -36,7 +36,8 @@ class FurtherChannel(CalibratedInput):
     limit: float | None = quantity(
         None,
         "unit",
-        "largest magnitude from the zero taken at rest, beyond which the guard aborts; absent: not monitored",
+        "largest magnitude relative to the zero at rest, beyond which the guard aborts; if absent, the "
+        "channel is not monitored",
         gt=0,
         example=20.0,
     )
@@ -49,7 +50,7 @@ class FurtherChannel(CalibratedInput):
     @model_validator(mode="after")
     def _a_name_of_its_own(self) -> "FurtherChannel":
         if self.name in TAKEN:
-            raise InvalidInput("name", self.name, "this name is reserved; choose another")
+            raise InvalidInput("name", self.name, "this name is reserved; choose a different one")
         return self
 
     @model_validator(mode="after")
@@ -65,7 +66,7 @@ class FurtherChannel(CalibratedInput):
     def simulated(self) -> PlacedSensor:
         """The sensor on the simulated bench. Raises InvalidInput for a motion that is not simulated."""
         if self.measures not in SIMULATED or self.place == "elsewhere":
-            allowed = f"the simulated bench has {', '.join(SIMULATED)} of table and storeys"
+            allowed = f"on the simulated bench, it must be {', '.join(SIMULATED)} of table or storeys"
             raise InvalidInput("measures", f"{self.measures} of {self.place}", allowed)
         return PlacedSensor(
             name=self.name,

@@ -17,11 +17,11 @@ class RecordedRun(Protocol):
 
     @property
     def stretches(self) -> Sequence[tuple[int, int]]:
-        """Index of the first sample and number of samples of each stretch without a gap, ascending."""
+        """Index of the first sample and number of samples of each gap-free section, ascending."""
         ...
 
     def counts(self, first: int, n: int) -> Counts:
-        """Counts at `n` samples from index `first` on, shape (n, n_channels); they lie within one stretch."""
+        """Counts at `n` samples from index `first` on, shape (n, n_channels); they lie within one section."""
         ...
 
 
@@ -109,7 +109,7 @@ class ReplayRig(RigBase):
 
     @property
     def over(self) -> str | None:
-        """Request beyond the end of the recording, as text; None if there was none."""
+        """Description of a request beyond the end of the recording; None if there was none."""
         return self._over
 
     def interlocks(self) -> Mapping[str, bool]:

@@ -60,18 +60,20 @@ class Alignment:
 
     A value taken at second t of the sensor's clock is placed at second `offset + rate * t + delay` of the sample clock.
     `residual` is the root mean square residual of the clock readings that bound it [s], `delay` the configured delay
-    [s], `values` the number of values received and `lost` that of missing ones.
+    [s], `values` the number of values received and `lost` the number of missing ones.
     """
 
     sensor: str = column("", "name of the channel")
     offset: float = column("s", "time in the run at second 0 of the sensor's clock, without delay")
     rate: float = column("1", "seconds of the sample clock per second of the sensor's clock")
     residual: float = column("s", "root mean square residual of the clock readings")
-    delay: float = column("s", "configured delay added to the time of the values")
-    values: int = column("1", "values received from the sensor")
-    lost: int = column("1", "missing values")
-    late: int = column("1", "samples whose values had not arrived when their block was due", default=0)
-    implausible: int = column("1", "values farther from their predecessors than the target can move", default=0)
+    delay: float = column("s", "configured delay added to the times of the values")
+    values: int = column("1", "number of values received from the sensor")
+    lost: int = column("1", "number of missing values")
+    late: int = column("1", "number of samples whose values had not arrived when their block was due", default=0)
+    implausible: int = column(
+        "1", "number of values farther from their predecessors than the target can move", default=0
+    )
 
     def __str__(self) -> str:
         rate, residual = 1e6 * (self.rate - 1.0), 1e6 * self.residual
@@ -85,7 +87,7 @@ class Alignment:
 
 
 class OperatorTask(StrEnum):
-    """An operator's task on the bench between two tests. Some have an amount, in SI units."""
+    """An operator's task on the bench between two tests. Some tasks have an amount, in SI units."""
 
     MOUNT_SPRING = "mount spring"
     """Block and spring are mounted, the block free to rock; the amount is the nominal stiffness on the spring's label
@@ -97,7 +99,9 @@ class OperatorTask(StrEnum):
     """The storeys are clamped to the table and move with it, without spring and block."""
     UNLOCK_FRAME = "unlock frame"
     HOLD_BLOCK = "hold block"
-    """As MOUNT_SPRING, with the block clamped to the table: it cannot lift, and fixes the spring to the table."""
+    """As MOUNT_SPRING, but with the block clamped to the table: it cannot lift, and it fixes the spring to the
+    table.
+    """
     LOCK_TABLE = "lock table"
     """The table is clamped to the ground at mid stroke, with any specimen; it must not be driven."""
     UNLOCK_TABLE = "unlock table"
@@ -116,7 +120,7 @@ class OperatorTask(StrEnum):
 
 
 class Rig(Protocol):
-    """Bench that can be driven and read. Every backend passes `bench.testing.conformance`."""
+    """A bench that can be driven and read. Every backend must pass `bench.testing.conformance`."""
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -135,7 +139,7 @@ class Rig(Protocol):
 
     @property
     def lead(self) -> int:
-        """Drive samples that must be written ahead of the sample being read: the output latency."""
+        """Number of drive samples that must be written ahead of the sample being read: the output latency."""
         ...
 
     @property
@@ -161,31 +165,35 @@ class Rig(Protocol):
         ...
 
     def interlocks(self) -> Mapping[str, bool]:
-        """Existing safety inputs by name, and whether each is closed (good)."""
+        """Existing safety inputs by name; True if closed (good)."""
         ...
 
     def arm(self) -> None:
-        """Close the enable line with the output at zero; sample 0 is acquired then, or when the first block is read."""
+        """Close the enable line with the output at zero; sample 0 is acquired at once, or when the first block is
+        read.
+        """
         ...
 
     def write(self, volts: NDArray[np.float64]) -> None:
-        """Append drive samples, shape (n,) [V]. Raises RigError when not armed, not finite or out of range."""
+        """Append drive samples, shape (n,) [V]. Raises RigError if the rig is not armed, or if a sample is not finite
+        or out of range.
+        """
         ...
 
     def read(self, n: int) -> Block:
         """The next `n` samples of all inputs; waits for them.
 
-        Raises DriveUnderflow, InputOverflow, DeviceTimeout or ConnectionLost, and RigError when not armed; the rig is
-        stopped then.
+        Raises DriveUnderflow, InputOverflow, DeviceTimeout or ConnectionLost, and RigError if not armed; the rig is
+        then stopped.
         """
         ...
 
     def stop(self) -> None:
-        """End the sample clock with the output at zero. Allowed in every state, any number of times."""
+        """End the sample clock with the output at zero. Allowed in every state, and repeatedly."""
         ...
 
     def halt(self) -> None:
-        """Cut the enable line now, then put the output to zero. Allowed in every state, any number of times.
+        """Cut the enable line now, then set the output to zero. Allowed in every state, and repeatedly.
 
         The only method that may be called during another: from another thread while `read` waits, and from a signal
         handler during any call, so it does not wait for locks held by calls. A call that it interrupts raises RigError,
@@ -194,11 +202,11 @@ class Rig(Protocol):
         ...
 
     def close(self) -> None:
-        """Stop, and release every device. Allowed any number of times."""
+        """Stop, and release every device; may be called repeatedly."""
         ...
 
     def perform(self, work: OperatorTask, amount: float | None = None) -> None:
-        """Register an operator's task `work`, with its `amount` if it has one, on a stopped rig.
+        """Register that the operator's task `work`, with its `amount` if any, was carried out on the stopped rig.
 
         A simulated rig carries it out on its specimen; a real one does nothing. Raises RigError when armed.
         """

@@ -25,7 +25,7 @@ _WARM_UP = 0.5
 
 class SimulatedRig(ComputedRig):
     """Rig with a simulated bench. Under a `VirtualClock` it runs as fast as the machine allows; under a `WallClock` a
-    block is returned when it would have been measured.
+    block is returned at the time at which it would have been measured.
 
     `lead` is the number of drive samples that must be queued, 50 ms by default. Between two runs the bench coasts at
     zero drive until it is at rest. A part held by hand is released a few seconds after sample 0; after a run that ended
@@ -79,7 +79,7 @@ class SimulatedRig(ComputedRig):
 
     def _come_to_rest(self) -> None:
         """Coast at zero drive until the bench is at rest."""
-        # not called in `halt`, which may interrupt a read
+        # not done in `halt`, which may interrupt a read
         self.bench.disarm()
         waited = 0.0
         while self._moved and waited < _LONGEST_WAIT:

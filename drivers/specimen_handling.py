@@ -10,14 +10,14 @@ from sim.errors import InvalidInput
 from sim.specimen import Frame, Specimen
 
 _CLAMPED = 400.0
-"""Factor on the stiffness of storeys clamped to the table: their natural frequencies are 20 times higher."""
+"""Factor on the stiffness of storeys clamped to the table, which raises their natural frequencies 20 times."""
 
 
 class SpecimenHandling:
     """Handles the original specimen, with springs `spring_factor` times as stiff as their labels.
 
     Mounting a spring, removing the block and clamping the storeys first release any part held by hand and the clamp of
-    the block. The lock of the table and the target of laser 2 change only by their own tasks.
+    the block. The lock of the table and the target of laser 2 are changed only by their own tasks.
     """
 
     def __init__(self, specimen: Specimen, spring_factor: float = 1.0) -> None:
@@ -25,7 +25,7 @@ class SpecimenHandling:
         self._spring_factor = spring_factor
 
     def after(self, work: OperatorTask, amount: float | None, now: Arrangement) -> Arrangement:
-        """Arrangement after `work` with `amount` on the arrangement `now`.
+        """The arrangement that results from `work` with `amount` on the arrangement `now`.
 
         Raises InvalidInput for an amount that is missing or out of range, RigError for an impossible task.
         """
@@ -54,7 +54,9 @@ class SpecimenHandling:
                 height = _needed("height", amount, "watching the block requires the height of the beam in m")
                 top = 2.0 * now.specimen.block.h_b
                 if not 0.0 < height < top:
-                    raise InvalidInput("height", height, f"the beam hits the block above 0 and below {top:g} m")
+                    raise InvalidInput(
+                        "height", height, f"the beam hits the block at heights above 0 and below {top:g} m"
+                    )
                 return replace(self._standing(self._free(now).with_spring(0.0), now), watched=height)
             case OperatorTask.WATCH_STOREYS:
                 return replace(now, watched=None)
@@ -75,7 +77,7 @@ class SpecimenHandling:
     def _pull(self, amount: float | None, now: Arrangement) -> float:
         """Displacement at which storey 2 is held [m]."""
         if now.specimen.frame != self._frame:
-            raise RigError("pull frame is refused: its storeys are clamped to the table; unlock frame first")
+            raise RigError("pull frame is refused: the storeys are clamped to the table; unlock frame first")
         pull = _needed("pull", amount, "pulling the frame requires the displacement of storey 2 in m")
         highest = now.specimen.frame.h2
         if not 0.0 < abs(pull) < highest:
@@ -102,7 +104,7 @@ def _tilt(amount: float | None, now: Arrangement) -> float:
     block = now.specimen.block
     overturning = atan(block.b / block.h_b)
     if not 0.0 < abs(tilt) < overturning:
-        raise InvalidInput("tilt", tilt, f"it must not be 0, and below {overturning:.4g} rad in magnitude")
+        raise InvalidInput("tilt", tilt, f"it must not be 0, and its magnitude must be below {overturning:.4g} rad")
     return tilt
 
 

@@ -20,7 +20,7 @@ _PORT = 31763
 
 
 class Connection:
-    """Options for new tasks: the only difference between this PC and a server.
+    """Options for new tasks, the only difference between this PC and a server.
 
     Encrypted with `tls`; a `plain` connection may leave private networks. Raises DeviceNotFound when no server answers
     within 2 s, InvalidInput for an address without port, for a plain connection to a public network, and for
@@ -46,7 +46,7 @@ class Connection:
         return self._deadline is not None and bool(self._deadline.late)
 
     def options(self, name: str = "") -> Options:
-        """Options for a new task of this name, under which later processes can find it; not for an existing task."""
+        """Options for a new task of this name, by which later processes can find it; not for an existing task."""
         return self._session(name, SessionInitializationBehavior.INITIALIZE_SERVER_SESSION)
 
     def attaching(self, name: str) -> Options:
@@ -54,7 +54,7 @@ class Connection:
         return self._session(name, SessionInitializationBehavior.ATTACH_TO_SERVER_SESSION)
 
     def close(self) -> None:
-        """Disconnect from the server; allowed any number of times."""
+        """Disconnect from the server; may be called repeatedly."""
         if self._channel is not None:
             self._channel.close()
 
@@ -82,7 +82,7 @@ class Connection:
             # at most two pings per call: servers disconnect clients that ping too often
             ("grpc.keepalive_time_ms", gone),
             ("grpc.keepalive_timeout_ms", gone),
-            # without it, a frozen machine is detected only after a minute
+            # otherwise a frozen machine is detected only after a minute
             ("grpc.http2.ping_timeout_ms", gone),
         ]
         library = cast(Any, grpc)

@@ -7,11 +7,11 @@ from typing import Any
 import grpc
 
 _SLOW = {"ResetDevice": 10.0}
-"""Additional time of calls whose requests carry no time-out [s]."""
+"""Additional time for calls whose requests have no time-out [s]."""
 _LATE = 0.1
 """Fraction of `patience` granted to calls after a first time-out."""
 _LEAST = 0.1
-"""Shortest time beyond a call's own [s]."""
+"""Shortest time granted beyond a call's own time-out [s]."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class CallDetails(grpc.ClientCallDetails):
 
 
 class Deadline(grpc.UnaryUnaryClientInterceptor):
-    """Sets the deadline of every call to its own time-out plus `patience` seconds."""
+    """Sets the deadline of every call to the call's time-out plus `patience` seconds."""
 
     def __init__(self, patience: float) -> None:
         self._patience = patience

@@ -21,7 +21,8 @@ from drivers.daqmx.library import InputChannel
 class InputDelay:
     """Delay of an input: its sample i is the signal `seconds` before edge i of the sample clock; negative: after it.
 
-    `uncertainty` is the standard uncertainty [s], infinite where the delay is not known; `source` is its origin.
+    `uncertainty` is the standard uncertainty [s], infinite if the delay is unknown; `source` names the source of the
+    value.
     """
 
     seconds: float
@@ -31,7 +32,7 @@ class InputDelay:
 
 @dataclass(frozen=True)
 class Connected:
-    """The device of an input: name, product, and whether its inputs are taken at one instant."""
+    """The device of an input: name, product, and whether its inputs are sampled simultaneously."""
 
     name: str
     product: str
@@ -40,23 +41,26 @@ class Connected:
 
 _SAMPLES = 40.0 + 5.0 / 512.0
 _KNOWN = {"9234": 2.6e-6, "9237": 4.5e-6, "9239": 3.3e-6}
-"""Input delay of delta-sigma modules without a property for it: (40 + 5/512) samples and this time [s], from their
-specifications and NI's knowledge base, kA00Z0000004A0YSAU."""
+"""Input delay of delta-sigma modules that have no property for it: (40 + 5/512) samples plus this time [s], from their
+specifications and NI's knowledge base, kA00Z0000004A0YSAU.
+"""
 _FIGURE = 1.0e-6
-"""Standard uncertainty of a delay in specifications [s]: rounding to two digits, and tolerance of analogue filters."""
+"""Standard uncertainty of a delay from specifications [s]: rounding to two digits, and tolerance of analogue
+filters.
+"""
 _CLOCKED = 1.0e-7
-"""Standard uncertainty of a time determined by the device's clock [s]: a few ticks."""
+"""Standard uncertainty of a time determined by the device's clock [s], a few ticks."""
 _DELTA_SIGMA_BITS = 24
-"""Resolution [bits] at and above which a converter is assumed to be a delta-sigma converter."""
+"""Resolution [bits] from which on a converter is assumed to be a delta-sigma converter."""
 
 
 def input_delays(
     task: library.Task, channels: Sequence[InputChannel], devices: Sequence[Connected], rate: float
 ) -> tuple[InputDelay, ...]:
-    """The delay of each input of a clocked task: from the device where it has a property for it, else the known figure.
+    """The delay of each input of a clocked task, from the device if it has a property for it, else the known value.
 
-    `devices` are those of the channels, in order. A device that would remove the delay itself is told not to, so that
-    there is one place for it.
+    `devices` are those of the channels, in order. If a device can remove the delay itself, this is switched off, so
+    that the delay is removed in one place only.
     """
     several = len({device.name for device in devices}) > 1
     steps: dict[str, float | None] = {}
@@ -79,7 +83,7 @@ def _multiplexed(number: int, total: int, step: float | None, rate: float) -> In
         return InputDelay(0.0, _CLOCKED, "first input of its multiplexer")
     if step is not None:
         return InputDelay(-number * step, _CLOCKED, "AI.ConvRate")
-    # evenly spaced over the sample at the most
+    # at most evenly spaced over the sample
     return InputDelay(0.0, number / (total * rate) / sqrt(3.0), "multiplexer without AI.ConvRate: within a sample")
 
 
@@ -106,5 +110,5 @@ def _filter_delay(channel: InputChannel, device: Connected, rate: float) -> Inpu
     if model is not None and (constant := _KNOWN.get(model[1])) is not None:
         return InputDelay(_SAMPLES / rate + constant, _FIGURE, f"specifications of the {device.product}")
     if channel.ai_resolution >= _DELTA_SIGMA_BITS:
-        return InputDelay(0.0, inf, f"not known for {device.product}")
+        return InputDelay(0.0, inf, f"unknown for {device.product}")
     return InputDelay(0.0, _CLOCKED, "simultaneous inputs")

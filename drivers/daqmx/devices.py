@@ -60,7 +60,7 @@ class FoundDevice:
 def find_devices(server: str | None, tls: Tls | None = None, *, plain: bool = False) -> list[FoundDevice]:
     """The devices of this PC, or of the gRPC device server at `server` (host:port); see `Connection`.
 
-    Raises DeviceNotFound when there is no driver or no server.
+    Raises DeviceNotFound if there is no driver or no server.
     """
     connection = Connection(server, _PATIENCE, tls, plain=plain)
     try:
@@ -124,7 +124,7 @@ _RANGE = "range of input {}"
 def checked_devices(
     system: library.System, daq: Daq, inputs: Sequence[AnalogInput], sample_rate: float, lead: int
 ) -> tuple[FoundDevice, ...]:
-    """Devices in use, each once. Raises InvalidInput for settings that they do not support."""
+    """The devices in use, each listed once. Raises InvalidInput for settings that they do not support."""
     if not inputs:
         raise InvalidInput("inputs", 0, "at least one analogue input is required")
     if lead < 0:
@@ -167,7 +167,9 @@ _NIBBLE = 4
 
 
 def _require_one_direction(daq: Daq, used: Mapping[str, FoundDevice]) -> None:
-    """Refuse outputs and inputs in one half of an NI 9401: the second would reverse the lines of the first."""
+    """Raise InvalidInput for outputs and inputs in the same half of an NI 9401: the second would reverse the lines of
+    the first.
+    """
     seen: dict[tuple[str, int], str] = {}
     for item, line in daq.digital_lines.items():
         device = used[device_name(line).lower()]
@@ -181,8 +183,8 @@ def _require_one_direction(daq: Daq, used: Mapping[str, FoundDevice]) -> None:
             raise InvalidInput(
                 f"hardware.daq.{item}",
                 line,
-                f"lines {low} to {high} of an NI 9401 have one direction, and hardware.daq.{other} is an {theirs}:"
-                f" wire this {mine} to one of its lines {free}, or to another module",
+                f"lines {low} to {high} of an NI 9401 share one direction, and hardware.daq.{other} is an {theirs}: "
+                f"wire this {mine} to one of lines {free}, or to another module",
             )
 
 
@@ -195,7 +197,7 @@ def _require_known(item: str, given: str, known: Sequence[str], kind: str, devic
 def _require_range(item: str, given: float, ranges: Sequence[tuple[float, float]], device: FoundDevice) -> None:
     highest = max((min(-low, high) for low, high in ranges), default=0.0)
     if given > highest:
-        raise InvalidInput(item, given, f"{device.name} ({device.product}) has at most +-{highest:g} V")
+        raise InvalidInput(item, given, f"the range of {device.name} ({device.product}) is at most +-{highest:g} V")
 
 
 def _require_wiring(given: AnalogInput, device: library.Device) -> None:
@@ -226,5 +228,5 @@ def _require_rate(
             raise InvalidInput(
                 "sample_rate",
                 rate,
-                f"{channels} inputs of {device.name} ({device.product}) are read at most {highest:g}/s each",
+                f"{channels} inputs of {device.name} ({device.product}) can be read at up to {highest:g}/s each",
             )

@@ -1,4 +1,4 @@
-"""Errors of the driver translated to those of the rig."""
+"""Translation of driver errors to rig errors."""
 
 from collections.abc import Generator
 from contextlib import contextmanager
@@ -30,7 +30,7 @@ _UNDERFLOW = _Meaning(DriveUnderflow, "the drive was written too late: increase 
 _OVERFLOW = _Meaning(InputOverflow, "the inputs were read too late: increase hardware.daq.buffer")
 _TIMEOUT = _Meaning(DeviceTimeout, "stop, and check the wiring of clock and trigger and the CPU load")
 _GONE = _Meaning(ConnectionLost, "check power and cables, then open a new session")
-_ABSENT = _Meaning(DeviceNotFound, "`rockbench devices` lists the devices present")
+_ABSENT = _Meaning(DeviceNotFound, "`rockbench devices` lists the devices that are present")
 _BUSY = _Meaning(DeviceNotFound, "another program holds the device: end it first")
 _NO_ROUTE = _Meaning(
     RigError,
@@ -160,7 +160,7 @@ def status_of(error: RpcError) -> str:
 
 @contextmanager
 def translated(doing: str) -> Generator[None]:
-    """Raise errors of the driver as errors of the rig, with the operation `doing` in the message."""
+    """Context manager that raises driver errors as rig errors, with the operation `doing` in the message."""
     try:
         yield
     except Error as error:
@@ -168,5 +168,5 @@ def translated(doing: str) -> Generator[None]:
 
 
 def _line(text: object) -> str:
-    """The first paragraph of the driver's text, in one line without full stop."""
+    """The first paragraph of the driver's message, in one line without full stop."""
     return " ".join(str(text).split("\n\n")[0].split()).rstrip(".")

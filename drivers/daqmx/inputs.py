@@ -23,8 +23,8 @@ from drivers.errors import DeviceTimeout, RigError
 class InputScaling:
     """One input: volts = coefficients[0] + coefficients[1] counts + coefficients[2] counts^2 + ...
 
-    The coefficients are the device's own calibration. Counts from `lowest` to `highest` are measurements; beyond, the
-    converter is saturated. `bits` is the size of a raw sample.
+    The coefficients are the device's own calibration. Counts from `lowest` to `highest` are measurements; beyond them,
+    the converter is saturated. `bits` is the size of a raw sample.
     """
 
     coefficients: tuple[float, ...]
@@ -34,7 +34,7 @@ class InputScaling:
 
 
 def scaling_of(channel: InputChannel, terminal: str) -> InputScaling:
-    """Scaling of a task's input from its device. Raises RigError when the device returns no slope."""
+    """Scaling of a task's input from its device. Raises RigError if the device returns no slope."""
     coefficients = tuple(float(c) for c in channel.ai_dev_scaling_coeff)
     if len(coefficients) < 2 or coefficients[1] == 0.0:
         raise RigError(f"{terminal} cannot be scaled: its coefficients are {coefficients}; recalibrate it")
@@ -109,8 +109,8 @@ class Inputs:
         self._raw: NDArray[np.int16 | np.int32] = np.empty((len(inputs), 0), self.dtype)
 
     def are_ours(self) -> bool:
-        """Whether the task still belongs to this client. A server identifies tasks by name, and tasks of all clients
-        have the same name.
+        """Whether this client still owns the task. A server identifies tasks by name, and the tasks of all clients have
+        the same name.
         """
         with translated("checking the owner of the input task"):
             try:
@@ -151,7 +151,7 @@ class Inputs:
             self._task.close()
 
     def _terminals(self) -> tuple[str, str]:
-        """Terminals of start trigger and sample clock; the timing engine to which they belong is kept.
+        """Terminals of start trigger and sample clock; their timing engine is kept.
 
         On a chassis with several engines they are undefined until the task is reserved, unless the engine is set
         (NI-DAQmx help, "cDAQ-91xx and TestScale Chassis Timing Engines").

@@ -28,7 +28,7 @@ _FULL = int(DAQmxErrors.SAMPLES_CAN_NOT_YET_BE_WRITTEN)
 class Output:
     """One output on the sample clock at the terminal `clock`.
 
-    Each run has a new task; samples left in the previous one are discarded.
+    Each run has a new task; samples left over from the previous run are discarded.
     """
 
     def __init__(self, connection: Connection, daq: Daq, clock: str, rate: float, lead: int) -> None:
@@ -62,8 +62,8 @@ class Output:
         """
         if not self._started and self._prefilled + volts.size > self._buffer:
             raise RigError(
-                f"{self._prefilled + volts.size} drive samples before the start are refused: the buffer holds"
-                f" {self._buffer}; start first"
+                f"{self._prefilled + volts.size} drive samples before the start are refused: the buffer holds "
+                f"{self._buffer}; start the output first"
             )
         rest = np.ascontiguousarray(volts, np.float64)
         deadline = time.monotonic() + volts.size / self.rate + self._daq.timeout_margin
@@ -127,7 +127,7 @@ class Output:
 def put_to_zero(connection: Connection, daq: Daq) -> None:
     """Set the output to 0 V now; no task may have reserved it."""
     with translated("setting the output to 0 V"):
-        # without a name: a task that a slow server creates late must not block the next one
+        # the task has no name: if a slow server creates it late, it must not block the next one
         task = library.task("", connection.options())
         try:
             _add_channel(task, daq)
@@ -144,7 +144,7 @@ def _add_channel(task: library.Task, daq: Daq) -> library.OutputChannel:
 def _transfer_early(channel: library.OutputChannel) -> str:
     """Refill the onboard memory as soon as it is half empty; returns a description.
 
-    A deep onboard memory then adds no latency: only the caller's lead does.
+    Even a deep onboard memory then adds no latency beyond the caller's lead.
     """
     try:
         channel.ao_data_xfer_req_cond = OutputDataTransferCondition.ON_BOARD_MEMORY_HALF_FULL_OR_LESS

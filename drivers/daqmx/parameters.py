@@ -19,7 +19,7 @@ class AnalogInput(Parameters):
 
 
 class SafetyInput(Parameters):
-    """Contact read by the program: its digital input line and its level in the good state."""
+    """Contact that the program reads: digital input line, and level in the good state."""
 
     line: str = quantity("Dev1/port0/line1", "", "digital input line")
     good: Literal["high", "low"] = quantity(
@@ -34,26 +34,26 @@ class EmergencyStop(SafetyInput):
 
 
 class OverTravel(SafetyInput):
-    """Contact of the over-travel switches: of both ends, or of one end if over_travel_2 is set."""
+    """Contact of the over-travel switches at both ends, or at one end if over_travel_2 is set."""
 
     line: str = quantity("Dev1/port0/line2", "", "digital input line")
 
 
 class OverTravel2(SafetyInput):
-    """Contact of the over-travel switch at the other end, if it has its own line."""
+    """Contact of the over-travel switch at the other end, if it has a separate line."""
 
     line: str = quantity("Dev1/port0/line3", "", "digital input line")
 
 
 class AmplifierReady(SafetyInput):
-    """Contact of the amplifier that signals ready or fault-free."""
+    """Contact with which the amplifier signals that it is ready or free of faults."""
 
     line: str = quantity("Dev1/port0/line4", "", "digital input line")
     delay: float | None = quantity(
         None,
         "s",
-        "longest time from closing the enable line to ready, for an amplifier that is ready only while enabled;"
-        " absent: it is ready before",
+        "longest time from closing the enable line to ready, for an amplifier that is ready only while "
+        "enabled; if absent, it is ready beforehand",
         gt=0,
         le=10,
         usual=(0.02, 5.0),
@@ -92,12 +92,12 @@ class Tls(Parameters):
 
 
 class Daq(Parameters):
-    """The DAQ device: location of its driver, drive output, enable line, safety inputs."""
+    """The DAQ device: location of its driver, drive output, enable line and safety inputs."""
 
     server: str | None = quantity(
         None,
         "",
-        "host:port of the gRPC device server on the controller; absent: the NI-DAQmx driver of this PC",
+        "host:port of the gRPC device server on the controller; if absent, the NI-DAQmx driver of this PC is used",
         example="crio.local:31763",
     )
     tls: Tls | None = quantity(None, "", "encryption of the connection to that server; absent: plain")
@@ -107,45 +107,47 @@ class Daq(Parameters):
     output: str = quantity("Dev1/ao0", "", "physical channel of the drive output")
     output_range: float = quantity(10.0, "V", "largest magnitude of the drive output", gt=0, le=10, usual=(1.0, 10.0))
     enable_line: str | None = quantity(
-        "Dev1/port0/line0", "", "digital line of the amplifier's enable relay; absent: none"
+        "Dev1/port0/line0", "", "digital line of the amplifier's enable relay; if absent, there is none"
     )
     start_trigger: str | None = quantity(
         None,
         "",
-        "terminal of the inputs' start trigger; absent: that of the input task",
+        "terminal of the inputs' start trigger; if absent, that of the input task",
         example="/Dev1/ai/StartTrigger",
     )
     clock: str | None = quantity(
         None,
         "",
-        "terminal of the output's sample clock; absent: that of the input task;"
-        " OnboardClock: its own clock, started together with the inputs",
+        "terminal of the output's sample clock; if absent, that of the input task; OnboardClock: the "
+        "output's own clock, started together with the inputs",
         example="OnboardClock",
     )
     watchdog: float | None = quantity(
         None,
         "s",
-        "time-out of the device's watchdog on the enable line; absent: no watchdog",
+        "time-out of the device's watchdog on the enable line; if absent, no watchdog is used",
         ge=0.1,
         le=30,
         usual=(0.2, 5.0),
         example=1.0,
     )
-    emergency_stop: EmergencyStop | None = quantity(None, "", "emergency stop; absent: not wired")
-    over_travel: OverTravel | None = quantity(None, "", "over-travel switches; absent: not wired")
+    emergency_stop: EmergencyStop | None = quantity(None, "", "emergency stop; absent if not wired")
+    over_travel: OverTravel | None = quantity(None, "", "over-travel switches; absent if not wired")
     over_travel_2: OverTravel2 | None = quantity(
-        None, "", "over-travel switch at the other end; absent: over_travel covers both ends, or not wired"
+        None, "", "over-travel switch at the other end; absent if over_travel covers both ends, or if not wired"
     )
-    amplifier_ready: AmplifierReady | None = quantity(None, "", "amplifier ready; absent: not wired")
-    heartbeat: Heartbeat | None = quantity(None, "", "heartbeat; absent: no heartbeat relay")
-    buffer: float = quantity(10.0, "s", "length of the input buffer: longest delay of a read", ge=1.0, le=60.0)
+    amplifier_ready: AmplifierReady | None = quantity(None, "", "amplifier ready; absent if not wired")
+    heartbeat: Heartbeat | None = quantity(None, "", "heartbeat; absent if there is no heartbeat relay")
+    buffer: float = quantity(
+        10.0, "s", "duration held by the input buffer: longest possible delay of a read", ge=1.0, le=60.0
+    )
     timeout_margin: float = quantity(
         2.0, "s", "time allowed for a call beyond its own duration", ge=0.1, le=60, formerly="patience"
     )
 
     @property
     def safety_inputs(self) -> dict[str, SafetyInput]:
-        """The wired safety inputs, by their names in the rig's interlocks."""
+        """The wired safety inputs by interlock name."""
         return {name: given for name, given in self._possible_inputs.items() if given is not None}
 
     @property
@@ -175,7 +177,7 @@ class Daq(Parameters):
         seen: dict[str, str] = {}
         for item, line in self.digital_lines.items():
             if (other := seen.setdefault(line.strip("/").lower(), item)) != item:
-                raise InvalidInput(item, line, f"{other} uses this line already; each needs its own")
+                raise InvalidInput(item, line, f"{other} already uses this line; each needs a separate line")
         return self
 
     @model_validator(mode="after")

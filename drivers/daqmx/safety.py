@@ -1,8 +1,8 @@
 """Enable chain: relay of the amplifier, watchdog of the device, heartbeat for an external relay, safety inputs.
 
 The relay is open at low level, and open is safe. X Series devices have a watchdog for their digital lines, cDAQ-9185
-and 9189 one for all outputs of their modules, a CompactRIO none (the manuals, "Watchdog Timer"). The heartbeat works
-without it: an external relay stays closed only while the control loop toggles the line.
+and 9189 have one for all outputs of their modules, and a CompactRIO has none (manuals, "Watchdog Timer"). The heartbeat
+works without a watchdog: an external relay stays closed only while the control loop toggles the line.
 """
 
 import time
@@ -25,13 +25,14 @@ _TIME = 0.1
 """Time-out of writing or reading a line, which never waits [s]."""
 _CHASSIS_EXPIRED = int(DAQmxErrors.CHASSIS_WATCHDOG_TIMER_EXPIRED)
 _EXPIRED = {int(DAQmxErrors.WRITE_FAILED_BECAUSE_WATCHDOG_EXPIRED), _CHASSIS_EXPIRED}
-"""Codes with which a device refuses a write because its watchdog has expired, and has opened the relay."""
+"""Error codes of a device that rejects a write because its watchdog has expired and opened the relay."""
 
 
 class EnableLine:
     """The digital line of the relay. After construction the relay is open and the task stopped.
 
-    `chassis_expired`: an expired watchdog of the chassis has opened it, and bars the chassis until it is reset.
+    `chassis_expired`: the chassis's watchdog has expired and opened the relay, and blocks the chassis until it is
+    reset.
     """
 
     def __init__(self, connection: Connection, line: str) -> None:
@@ -134,7 +135,7 @@ class Watchdog:
 
     @property
     def has_barred_chassis(self) -> bool:
-        """Whether it has expired on a chassis, which must then be reset."""
+        """Whether the watchdog has expired on a chassis, which must then be reset."""
         with translated("reading the watchdog"):
             return self._chassis is not None and self._alive().expired
 
@@ -150,7 +151,7 @@ class Watchdog:
         self._last_reset = time.monotonic()
 
     def reset(self) -> None:
-        """Reset the watchdog. Raises RigError when it has expired."""
+        """Reset the watchdog. Raises RigError if it has expired."""
         if time.monotonic() - self._last_reset >= self._interval:
             with translated("resetting the watchdog, which otherwise opens the enable line,"):
                 self._alive().reset_timer()
@@ -165,7 +166,7 @@ class Watchdog:
             task.stop()
 
     def close(self) -> None:
-        """Clear the task. Allowed any number of times."""
+        """Clear the task; may be called repeatedly."""
         if self._task is not None:
             try:
                 with translated("clearing the watchdog task"):
@@ -181,7 +182,7 @@ class Watchdog:
 
     def _alive(self) -> library.WatchdogTask:
         if self._task is None:
-            raise RigError("the watchdog is refused: its task is closed; open a new session")
+            raise RigError("the watchdog cannot be used: its task is closed; open a new session")
         return self._task
 
 
@@ -218,7 +219,7 @@ class Heartbeat:
         self._high = not self._high
 
     def rest(self) -> None:
-        """Set the line low and release it; it keeps its state."""
+        """Set the line low and release it; the line keeps its state."""
         self._high = False
         with translated("setting the heartbeat line low"):
             self._writer.write_one_sample_one_line(False, _TIME)
@@ -234,7 +235,7 @@ SAFETY_TASK = "rockbench_safety"
 
 
 class SafetyInputs:
-    """One unclocked task for all lines: a read returns their present levels, never stale ones."""
+    """Safety inputs: one unclocked task for all lines, so that a read returns their present levels."""
 
     def __init__(self, connection: Connection, wired: Mapping[str, SafetyInput]) -> None:
         self._names = tuple(wired)

@@ -35,15 +35,15 @@ class DaqSession:
     """Output and inputs share start trigger and sample clock: output sample i is played while input sample i is
     acquired.
 
-    The output is clocked from the terminal of the inputs' sample clock. A device without such a route refuses the
-    output: then `hardware.daq.clock` may name another terminal, or with OnboardClock give the output its own clock,
+    The output is clocked from the terminal of the inputs' sample clock. A device without such a route rejects the
+    output; then `hardware.daq.clock` may name another terminal or, with OnboardClock, give the output a separate clock,
     which starts with the inputs and stays synchronous if both have the same timebase. There is no automatic fallback.
 
     A run is `prepare`, `write` the first samples, `start`, then `write` and `read` in turn, and `stop`. On any failure
     in between, the relay is opened and the output set to zero before the error is raised. One thread at a time may use
-    it; `cut`, `stop` and `close` may be called from any other. The constructor makes the bench safe before it checks
-    anything. Raises InvalidInput for unsupported settings and for a sample rate that the device cannot produce exactly;
-    DeviceNotFound when driver, server or device are missing or held by another program.
+    it; `cut`, `stop` and `close` may be called from any other. The constructor brings the bench into a safe state
+    before it checks anything. Raises InvalidInput for unsupported settings and for a sample rate that the device cannot
+    produce exactly; DeviceNotFound when driver, server or device are missing or held by another program.
     """
 
     def __init__(self, daq: Daq, inputs: Sequence[AnalogInput], sample_rate: float, lead: int) -> None:
@@ -100,7 +100,7 @@ class DaqSession:
         return dict(self._description)
 
     def prepare(self) -> None:
-        """Set the output to 0 V, arm it on the inputs' start trigger, close the enable relay.
+        """Set the output to 0 V, arm it on the inputs' start trigger, and close the enable relay.
 
         The sample clock does not run yet.
         """
@@ -132,7 +132,7 @@ class DaqSession:
                 self._reset_watchdog()
 
     def start(self) -> None:
-        """Start the sample clock, at sample 0. Raises DriveUnderflow when nothing was written."""
+        """Start the sample clock, at sample 0. Raises DriveUnderflow if nothing was written."""
         with self._lock:
             self._require(_State.PREPARED, "start")
             with self._resting_on_failure():
@@ -145,7 +145,7 @@ class DaqSession:
     def read(self, n: int) -> NDArray[np.int16 | np.int32]:
         """The next `n` counts of each input, shape (n, channels), a copy in C order; waits for them.
 
-        Raises InputOverflow, DeviceTimeout, ConnectionLost, and RigError when the session does not run.
+        Raises InputOverflow, DeviceTimeout, ConnectionLost, and RigError if the session is not running.
         """
         self._require(_State.RUNNING, "read")
         if n < 1:
@@ -161,16 +161,19 @@ class DaqSession:
         return counts
 
     def acquired(self) -> int:
-        """Samples of each input acquired since `start`: bounds the sample clock. Raises as `read` does."""
+        """Number of samples of each input acquired since `start`, which bounds the sample clock. Raises as `read`
+        does.
+        """
         self._require(_State.RUNNING, "reading the sample clock")
         with self._resting_on_failure():
             return self._tasks.inputs.acquired()
 
     def safety_inputs(self) -> dict[str, bool]:
-        """Whether each wired safety input is good now, by one call to the device; in every state but closed.
+        """Whether each wired safety input is good now, read by one call to the device; available in every state but
+        closed.
 
-        An amplifier that reports ready only while enabled is omitted while it is not commanded on. Raises RigError as
-        `read` does.
+        An amplifier that reports ready only while enabled is omitted while it is not enabled. Raises RigError as `read`
+        does.
         """
         safety = self._tasks.safety
         if safety is None:
@@ -187,17 +190,18 @@ class DaqSession:
     def cut(self) -> bool:
         """Open the enable relay now, in one call, from any thread and in every state, even during a read.
 
-        True when the device confirmed it. False if there is no enable line or the device did not respond: then only
-        the emergency stop remains. Never raises. The sample clock runs until `stop`; the watchdog is no longer reset.
+        True when the device confirmed it. False if there is no enable line or the device did not respond, in which case
+        only the emergency stop remains. Never raises. The sample clock runs until `stop`; the watchdog is no longer
+        reset.
         """
         self._cut = True
         return self._tasks.relay is not None and self._tasks.relay.cut()
 
     def stop(self) -> None:
-        """Open the relay, end the tasks, set the output to 0 V.
+        """Open the relay, end the tasks, and set the output to 0 V.
 
-        Allowed in every state, any number of times. Attempts every step. Raises RigError at the end if relay or
-        output could not be set; the next call repeats them.
+        Allowed in every state, and repeatedly. Attempts every step. Raises RigError at the end if relay or output could
+        not be set; the next call repeats them.
         """
         with self._lock:
             if self._state is _State.CLOSED:
@@ -206,7 +210,7 @@ class DaqSession:
             self._rest()
 
     def close(self) -> None:
-        """Stop, and release the device. Allowed any number of times; raises as `stop` does."""
+        """Stop, and release the device; may be called repeatedly. Raises as `stop` does."""
         with self._lock:
             if self._state is _State.CLOSED:
                 return
@@ -236,7 +240,7 @@ class DaqSession:
             self._tasks.watchdog.reset()
 
     def _beat(self) -> None:
-        # under the lock: no edge may follow once a stop has set the line low
+        # under the lock, so that no edge follows once a stop has set the line low
         with self._lock:
             if self._tasks.heartbeat is not None and self._is_enabled:
                 self._tasks.heartbeat.beat()
@@ -276,7 +280,7 @@ def _make_safe(connection: Connection, daq: Daq) -> None:
             line = EnableLine(connection, daq.enable_line)
             line.close()
             if line.chassis_expired:
-                # the watchdog of a program that has crashed
+                # the watchdog may be that of a program that has crashed
                 with translated("looking for the chassis, whose watchdog has expired,"):
                     found = [described(device) for device in library.system(connection.options()).devices]
                 if (chassis := chassis_of(daq.enable_line, found)) is not None:

@@ -1,6 +1,6 @@
 """Tasks of one session, and removal of tasks left by a dead client.
 
-A gRPC device server keeps tasks indefinitely, independent of connections. Their output holds its last value, their
+A gRPC device server keeps tasks indefinitely, independently of connections. Their output holds its last value, their
 relay may be closed, and no other client can use the device.
 """
 
@@ -35,13 +35,13 @@ from sim.errors import InvalidInput
 _LOOK = 0.05
 """Interval between checks of an amplifier that is not yet ready [s]."""
 _SAME_RATE = 1.0e-9
-"""Relative difference below which two sample rates are equal."""
+"""Relative difference below which two sample rates count as equal."""
 
 
 class Tasks:
     """Enable relay, watchdog, heartbeat, safety inputs, output and inputs, on the devices `used`.
 
-    When one cannot be created, the others are cleared. After construction the relay is open and the output at 0 V.
+    If one cannot be created, the others are cleared. After construction the relay is open and the output at 0 V.
     `was_reset`: the device had to be reset to set the output to 0 V, so its tasks are gone. Raises InvalidInput for a
     sample rate that the device cannot produce exactly.
     """
@@ -61,7 +61,7 @@ class Tasks:
         self.safety: SafetyInputs | None = None
         self.was_reset = False
         self.ready_delay = None if daq.amplifier_ready is None else daq.amplifier_ready.delay
-        """Delay between enable line and amplifier ready [s]; None when ready does not depend on the line."""
+        """Delay from enable line to amplifier ready [s]; None if ready does not depend on the line."""
         with ExitStack() as made:
             if daq.enable_line is not None:
                 self.relay = EnableLine(connection, daq.enable_line)
@@ -87,7 +87,7 @@ class Tasks:
     def prepare(self, is_cut: Callable[[], bool]) -> None:
         """Set the output to 0 V, arm it on the inputs' trigger, close the enable relay and wait for the amplifier.
 
-        Raises RigError when a step fails, the amplifier does not report ready, or `is_cut` becomes true.
+        Raises RigError if a step fails, the amplifier does not report ready, or `is_cut` becomes true.
         """
         if self.relay is not None:
             self.relay.open()
@@ -132,7 +132,7 @@ class Tasks:
         if self.relay is not None:
             attempt(self.relay.open, matters=True)
         if self.heartbeat is not None:
-            # a line that cannot be set low does not toggle any more either
+            # a line that cannot be set low no longer toggles either
             attempt(self.heartbeat.rest)
         if self.safety is not None:
             attempt(self.safety.stop)
@@ -194,7 +194,7 @@ class Tasks:
 
 
 def chassis_of(line: str, used: Sequence[FoundDevice]) -> str | None:
-    """The chassis of a line's module; None for a device of its own."""
+    """The chassis of a line's module; None for a stand-alone device."""
     name = device_name(line).lower()
     return next((device.chassis for device in used if device.name.lower() == name), None)
 
@@ -231,7 +231,7 @@ def description_of(
     tasks: Tasks,
     stale: Sequence[str],
 ) -> dict[str, str]:
-    """Names and settings as text; `used` are the devices, `stale` the tasks left by another client."""
+    """Description of names and settings; `used` are the devices, `stale` the tasks left by another client."""
     heartbeat = daq.heartbeat
     return {
         "driver": f"NI-DAQmx {version.major_version}.{version.minor_version}.{version.update_version}",
@@ -252,7 +252,7 @@ def description_of(
         else f"{daq.watchdog:g} s",
         "heartbeat": "none"
         if heartbeat is None
-        else f"{heartbeat.line}, its relay opens after {heartbeat.timeout:g} s",
+        else f"{heartbeat.line}; its relay opens after {heartbeat.timeout:g} s",
         **{name: f"{given.line}, {given.good} is good" for name, given in daq.safety_inputs.items()},
         **dict.fromkeys(daq.missing_inputs, _MISSING),
         "tasks left by another client": ", ".join(stale) or "none",
@@ -261,7 +261,7 @@ def description_of(
 
 _OURS = (ENABLE_TASK, HEARTBEAT_TASK, output.NAME, inputs.NAME, SAFETY_TASK, WATCHDOG_TASK)
 _WATCH = 0.6
-"""Observation time of a running output [s]; an active client writes every 0.2 s."""
+"""Time for which a running output is observed [s]; an active client writes every 0.2 s."""
 _POLL = 0.05
 """Time between two readings [s]."""
 _UNKNOWN = ("FAILED_PRECONDITION", "NOT_FOUND")
@@ -282,7 +282,7 @@ def clear_stale(connection: Connection, devices: Iterable[str]) -> tuple[str, ..
         if output.NAME in found and _is_written(found[output.NAME]):
             raise DeviceNotFound(f"another client drives the shaker through {connection.server}: end its run first")
         with ExitStack() as ending:
-            # attempt all even if one fails, then reset
+            # clear all even if one fails, then reset
             if found:
                 ending.callback(_reset, connection, devices)
             for task in found.values():
@@ -291,7 +291,7 @@ def clear_stale(connection: Connection, devices: Iterable[str]) -> tuple[str, ..
 
 
 def _reset(connection: Connection, names: Iterable[str]) -> None:
-    """Reset those of the named devices that exist."""
+    """Reset the named devices that exist."""
     wanted = {name.lower() for name in names}
     with ExitStack() as resets:
         for device in library.system(connection.options()).devices:

@@ -1,1 +1,1 @@
-"""Emulated instruments: the real wire protocols, connected to the virtual bench."""
+"""Emulated instruments that use the real wire protocols and are connected to the virtual bench."""

@@ -1,4 +1,4 @@
-"""Virtual bench in real time, to which the emulated instruments are wired."""
+"""Real-time virtual bench to which the emulated instruments are wired."""
 
 import threading
 import time
@@ -18,9 +18,9 @@ from sim.specimen import Specimen
 from sim.virtual_bench import VirtualBench, VirtualBenchParameters
 
 _KEPT = 30.0
-"""Length of the retained history [s]."""
+"""Duration of the retained history [s]."""
 _IDLE_TURN = 0.02
-"""Period of the bench's steps without a client [s]."""
+"""Interval at which the bench advances without a client [s]."""
 
 
 class EmulatedBench:
@@ -67,14 +67,14 @@ class EmulatedBench:
         self._thread.start()
 
     def close(self) -> None:
-        """Stop the thread. Allowed any number of times."""
+        """Stop the thread; may be called repeatedly."""
         self._over.set()
         if self._thread.is_alive():
             waiting.join(self._thread)
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """Quantities at the inputs."""
+        """Quantities measured at the inputs."""
         return self._bench.channels
 
     @property
@@ -127,16 +127,18 @@ class EmulatedBench:
             self._subscriber = subscriber
 
     def connect_laser(self, storey: int, live: Callable[[], bool]) -> None:
-        """Make the analogue output of the laser on a storey, 1 or 2, show its error current while not `live`."""
+        """Switch the analogue output of the laser on storey 1 or 2: while not `live`, it shows the error current."""
         with self.lock:
             self._outputs[1 + storey] = live
 
     def sight(self, storey: int) -> "Storey":
-        """Target of the laser of a storey, 1 or 2: the storey, or the block while laser 2 is aimed at it."""
+        """Target of the laser of storey 1 or 2: the storey, or the block while laser 2 is aimed at it."""
         return Storey(self, storey)
 
     def seen(self, storey: int, times: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Displacement [m] of the target of a storey's laser at monotonic times [s]: cubic between the ticks."""
+        """Displacement [m] of the target of a storey's laser at monotonic times [s], with cubic interpolation between
+        ticks.
+        """
         ticks = (times - self._started) * self._rate
         with self.lock:
             if ticks.size and ticks[-1] > self._seen.end - 1:
@@ -187,7 +189,7 @@ class EmulatedBench:
         n = self.tick() - first
         if n <= 0:
             return
-        # the output continues regardless of the amplifier's state
+        # the output continues whatever the amplifier's state
         volts = np.zeros(n) if self._output is None else self._output(first, n)
         counts = self._bench.run(volts if self._enabled else np.zeros(n))
         for column, live in self._outputs.items():

@@ -1,4 +1,4 @@
-"""Control channel of an emulated laboratory, server and client: operator actions, faults, true values.
+"""Control channel of an emulated laboratory (server and client) for operator actions, faults and true values.
 
 A request is one line of JSON, `{"command": "handwork", "work": "remove block", "amount": null}`; the answer is one
 line, `{"ok": true, "result": ...}` or `{"ok": false, "error": "..."}`. A connection may carry any number of requests.
@@ -43,12 +43,12 @@ class ControlServer:
         self._accepting.start()
 
     def close(self) -> None:
-        """Close every connection, after the running handlers have ended. Allowed any number of times."""
+        """Close every connection after the running handlers have ended; may be called repeatedly."""
         with self._lock:
             first, self._closing = not self._closing, True
             served = list(self._served.items())
         if first:
-            # closing a socket does not wake the thread in accept(), a connection does
+            # closing a socket does not wake the thread in accept(), but a connection does
             with socket.create_connection(self._listening.getsockname()):
                 waiting.join(self._accepting)
             self._listening.close()
@@ -108,7 +108,7 @@ class ControlServer:
 
 
 def _requests(lines: BinaryIO) -> Iterator[bytes]:
-    """Received lines; only the beginning of a line that is too long."""
+    """Received lines; of a line that is too long, only the beginning."""
     while line := lines.readline(_LONGEST + 1):
         part = line
         while part and not part.endswith(b"\n"):
@@ -127,10 +127,11 @@ _PATIENCE = 60.0
 
 
 def ask(address: str, command: str, /, *, patience: float = _PATIENCE, **arguments: object) -> Any:
-    """Send a command to the emulated laboratory at `address` (`host:port`); returns its answer within `patience` [s].
+    """Send a command to the emulated laboratory at `address` (`host:port`); returns its reply, waiting up to `patience`
+    [s].
 
-    Raises RigError when it refuses, ConnectionLost without a connection, DeviceTimeout when it does not answer in time,
-    InvalidInput for an invalid address.
+    Raises RigError if the command is refused, ConnectionLost without a connection, DeviceTimeout if there is no reply
+    in time, InvalidInput for an invalid address.
     """
     place = place_of(address)
     deadline = time.monotonic() + patience
@@ -141,7 +142,7 @@ def ask(address: str, command: str, /, *, patience: float = _PATIENCE, **argumen
             line = _line(connection, deadline)
     except TimeoutError:
         raise DeviceTimeout(
-            f"the emulated laboratory at {address} did not answer {command} in {patience:g} s"
+            f"the emulated laboratory at {address} did not reply to {command} within {patience:g} s"
         ) from None
     except OSError as error:
         raise ConnectionLost(
@@ -160,7 +161,7 @@ def place_of(address: str) -> tuple[str, int]:
 
 
 def _line(connection: socket.socket, deadline: float) -> bytes:
-    """The answer, without the end of its line. Raises OSError, TimeoutError when the deadline passes."""
+    """The reply, without its line ending. Raises OSError, or TimeoutError when the deadline passes."""
     received = b""
     while not received.endswith(b"\n"):
         if (left := deadline - time.monotonic()) <= 0.0:
@@ -177,12 +178,12 @@ def _line(connection: socket.socket, deadline: float) -> bytes:
 
 
 def _result(address: str, command: str, line: bytes) -> Any:
-    """The result of an answer. Raises RigError."""
+    """The result in a reply. Raises RigError."""
     try:
         answer: Any = json.loads(line)
         if answer["ok"]:
             return answer["result"]
         error = str(answer["error"])
     except (ValueError, TypeError, KeyError):
-        raise RigError(f"invalid answer of {address} to {command}: check that it is an emulated laboratory") from None
+        raise RigError(f"invalid reply of {address} to {command}: check that it is an emulated laboratory") from None
     raise RigError(error)

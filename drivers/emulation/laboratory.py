@@ -92,7 +92,7 @@ class Laboratory:
         self.daq.start()
 
     def close(self) -> None:
-        """Switch everything off; no thread, port or process remains. Allowed any number of times."""
+        """Switch everything off; no thread, port or process remains. May be called repeatedly."""
         self._opened.close()
 
     def __enter__(self) -> Self:
@@ -116,20 +116,22 @@ class Laboratory:
         self.bench.perform(OperatorTask(arguments["work"]), arguments.get("amount"))
 
     def _laser(self, arguments: Mapping[str, Any]) -> None:
-        """Inject a fault of the laser on `storey`: the name of a method of EmulatedLaser, and its `arguments`."""
+        """Inject a fault of the laser on `storey` by the name of a method of EmulatedLaser and its `arguments`."""
         laser = self.lasers[int(arguments["storey"]) - 1]
         _FAULTS_OF_LASER[arguments["fault"]](laser, *arguments.get("arguments", ()))
 
     def _daq(self, arguments: Mapping[str, Any]) -> None:
-        """Inject a fault of the DAQ: the name of a method of DaqServer, and its `arguments`."""
+        """Inject a fault of the DAQ by the name of a method of DaqServer and its `arguments`."""
         _FAULTS_OF_DAQ[arguments["fault"]](self.daq, *arguments.get("arguments", ()))
 
     def _safety(self, arguments: Mapping[str, Any]) -> None:
-        """Change the enable chain: the name of a method of SafetyChain, and its `arguments`."""
+        """Change the enable chain by the name of a method of SafetyChain and its `arguments`."""
         _FAULTS_OF_SAFETY[arguments["fault"]](self.safety, *arguments.get("arguments", ()))
 
     def _truth(self, arguments: Mapping[str, Any]) -> dict[str, Any]:  # noqa: ARG002 - the signature of a handler
-        """Host times [s] of the clocks' zeros and their true rates; the enable chain; volts at the drive output."""
+        """True values: host times [s] of the clocks' zeros and their true rates, state of the enable chain, and volts
+        at the drive output.
+        """
         return {
             "enabled": self.bench.enabled,
             "contacts": self.safety.contacts,

@@ -15,7 +15,7 @@ from drivers.errors import RigError
 
 
 class PulseRelay:
-    """Closed for `timeout` [s] after each rising edge; a constant level, high or low, opens it."""
+    """Relay that is closed for `timeout` [s] after each rising edge; a constant level, high or low, opens it."""
 
     def __init__(self, timeout: float) -> None:
         self._timeout = timeout
@@ -82,7 +82,7 @@ class SafetyChain:
 
     @property
     def inputs(self) -> Mapping[str, Callable[[], bool]]:
-        """Level of each input by name of the contact: high while it is closed."""
+        """Level of each input by contact name: high while the contact is closed."""
         return {name: lambda name=name: self._level(name) for name in INPUTS}
 
     def enable_line(self, high: bool) -> None:
@@ -107,7 +107,7 @@ class SafetyChain:
         self._change(lambda: setattr(self, "_emergency_stop", True))
 
     def trip_over_travel(self, end: int = 1) -> None:
-        """Hold the switch of one end open: 1, where displacements are positive, or 2."""
+        """Hold the switch at one end open: end 1, where displacements are positive, or end 2."""
         if end not in _ENDS:
             raise RigError(f"over-travel at end {end!r} is refused: the ends are 1 and 2")
         self._change(lambda: self._jammed.add(end))

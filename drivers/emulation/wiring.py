@@ -33,8 +33,8 @@ _RELAYS, _CONTACTS = 2, 4
 class Site:
     """Devices of a laboratory and the terminals in use.
 
-    `inputs` are those of displacement, acceleration and lasers; `contacts` the digital inputs in the order of INPUTS of
-    the safety chain, empty on a device without. `range` is the largest voltage of all inputs [V].
+    `inputs` are those of displacement, acceleration and lasers; `contacts` are the digital inputs in the order of the
+    safety chain's INPUTS, empty on a device without digital inputs. `range` is the largest voltage of all inputs [V].
     """
 
     devices: tuple[DeviceModel, ...]
@@ -55,13 +55,13 @@ def site_of(device: Device, modules: Sequence[str] = ()) -> Site:
     """
     if device in ("usb", "crio"):
         if modules:
-            raise InvalidInput("--modules", " ".join(modules), f"{device} is a fixed set; name a chassis")
+            raise InvalidInput("--modules", " ".join(modules), f"{device} is a fixed set of devices; specify a chassis")
         devices = (x_series(calibrated=True),) if device == "usb" else compact_rio(calibrated=True)
     else:
         devices = build(device, modules)
     analogue = [one for one in devices if one.inputs is not None]
     if device == "crio":
-        # the second module has its own terminals
+        # the second module has separate terminals
         analogue = analogue[:1]
     drive = _first(devices, "an analogue output (9263, 9269)", lambda one: one.output_names)
     relays = _first(devices, "relays or digital outputs (9485, 9401)", lambda one: one.line_names)
@@ -71,7 +71,7 @@ def site_of(device: Device, modules: Sequence[str] = ()) -> Site:
     ]
     rest = others[0] if others else first
     ranges = [one.inputs.ranges[0] for one in (first, rest) if one.inputs is not None]
-    # the heartbeat of a single device is beside its contacts
+    # on a single device, the heartbeat line is next to the contacts
     heartbeat = relays.line_names[_CONTACTS + 1 if len(devices) == 1 else 1]
     return Site(
         devices=devices,
@@ -93,7 +93,7 @@ def _first(devices: Sequence[DeviceModel], what: str, has: Callable[[DeviceModel
 
 
 def _contacts(devices: Sequence[DeviceModel], relays: DeviceModel) -> tuple[str, ...]:
-    """The lines of the safety inputs, on a module other than the relays' where there is one."""
+    """The lines of the safety inputs, if possible on a module other than that of the relays."""
     for one in sorted(devices, key=lambda one: one is relays):
         names = one.input_line_names
         if one is not relays:

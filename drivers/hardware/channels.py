@@ -42,7 +42,7 @@ def laser_scaling(measuring_range: float, load: float) -> AnalogueScaling:
 
 
 def require_input_range(item: str, input_range: float, load: float) -> None:
-    """Raise InvalidInput about `item` when an input of +-`input_range` [V] does not cover the measuring range.
+    """Raise InvalidInput about `item` if an input of +-`input_range` [V] does not cover the measuring range.
 
     The converter may saturate within the reserve beyond it: values there are then invalid.
     """
@@ -139,6 +139,8 @@ def _analogue(
 
 
 def serial_laser(name: str, measuring_range: float, polarity: int, device: str, faults: Mapping[int, str]) -> Channel:
-    """A laser read serially: counts from mid range; `faults` are the meanings of counts outside it."""
+    """Channel of a laser read serially: counts relative to mid range; `faults` gives the meanings of counts outside the
+    range.
+    """
     scale, valid = polarity * count_size(measuring_range), (-MID_RANGE, MID_RANGE)
     return Channel(name, "displacement", "m", scale, 0.0, valid, device, faults=faults)

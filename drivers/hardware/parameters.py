@@ -21,7 +21,7 @@ class CalibratedInput(AnalogInput):
         if self.sensitivity == 0.0:
             raise InvalidInput("sensitivity", self.sensitivity, "volts per unit, not 0")
         if abs(self.zero) >= self.range:
-            raise InvalidInput("zero", self.zero, f"it must lie within the input's range of {self.range:g} V")
+            raise InvalidInput("zero", self.zero, f"it must be within the input's range of {self.range:g} V")
         return self
 
 
@@ -68,11 +68,11 @@ class Lasers(Parameters):
     reference: Literal["ground", "table"] = quantity(
         "ground", "", "where the lasers are mounted: on the ground they measure x + u, on the table u"
     )
-    rate: float = quantity(4000.0, "1/s", "measurements per second of each laser", gt=0, le=8000)
+    rate: float = quantity(4000.0, "1/s", "measuring rate of each laser", gt=0, le=8000)
     delay: float = quantity(
         0.0,
         "s",
-        "correction added to the time of the laser values; `rockbench check` measures it",
+        "correction added to the times of the laser values; `rockbench check` measures it",
         ge=-0.1,
         le=0.1,
         usual=(1e-4, 0.05),
@@ -80,7 +80,7 @@ class Lasers(Parameters):
     observation_time: float = quantity(
         10.0,
         "s",
-        "observation time of the lasers before the first run, to identify their clocks",
+        "time for which the lasers are observed before the first run, to identify their clocks",
         ge=1,
         le=120,
         formerly="listening",
@@ -97,7 +97,8 @@ class LaserInput(AnalogInput):
     serial_number: str | None = quantity(
         None,
         "",
-        "serial number of the sensor, to detect swapped ports; absent: any sensor of this measuring range",
+        "serial number of the sensor, to detect swapped ports; if absent, any sensor with this measuring "
+        "range is accepted",
         min_length=1,
         example="15030002",
     )

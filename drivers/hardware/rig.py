@@ -24,20 +24,21 @@ from drivers.rig import Alignment, Block, Channel, Counts, OperatorTask, RawValu
 from drivers.timebase.deskew import Deskew
 
 _FIRST_READINGS = 20
-"""Number of readings of the sample clock after its start, which bound it to a fraction of a call's duration."""
+"""Number of readings of the sample clock after its start; they bound it to a fraction of a call's duration."""
 
 _GOLDEN = 0.6180339887498949
 """Phase step between two readings, whose multiples are evenly distributed over a period."""
 _READINGS = 6
-"""Number of readings of the sample clock after each block: the best of several is much better than a single one."""
+"""Number of readings of the sample clock after each block; the best of several is much better than a single one."""
 
 
 class HardwareRig(RigBase):
     """DAQ and lasers as one rig. The sample clock starts with the first block that is read.
 
     Samples are returned without the delays of filters and multiplexers: a block is complete when its most delayed input
-    is. That delay is added to `lead`, the number of drive samples that must be waiting. `further` are additional
-    sensors. Raises InvalidInput or RigError when the bench differs from the configuration; nothing is left open then.
+    is. That delay is added to `lead`, the number of drive samples that must be queued. `further` are additional
+    sensors. Raises InvalidInput or RigError if the bench differs from the configuration; in that case nothing is left
+    open.
     """
 
     def __init__(self, hardware: Hardware, *, lead: int, further: Sequence[FurtherChannel] = ()) -> None:
@@ -143,7 +144,7 @@ class HardwareRig(RigBase):
 
     def perform(self, work: OperatorTask, amount: float | None = None) -> None:
         self.require_stopped(work.value)
-        # on a real bench the operator has carried it out; an emulated laboratory changes its virtual specimen
+        # on a real bench the operator has carried it out; an emulated laboratory must change its virtual specimen
         if self._laboratory is not None:
             ask(self._laboratory, "handwork", work=work.value, amount=amount)
 
@@ -158,7 +159,7 @@ class HardwareRig(RigBase):
         """Bound the sample clock between two readings of the machine's clock, made by the process that watches it, or
         here without one.
 
-        The readings are spread over the sample period: right after a block all would have the same phase, and the
+        The readings are spread over the sample period, since right after a block all would have the same phase, and the
         bounds would be no tighter than a period.
         """
         watched = [] if self._watch is None else self._watch.take()

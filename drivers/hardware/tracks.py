@@ -21,9 +21,9 @@ from drivers.timebase.sensor_track import SensorTrack
 from sim.errors import InvalidInput
 
 _PATIENCE = 0.05
-"""Longest wait of a block for late values [s]; values that arrive later count as lost."""
+"""Longest time that a block waits for late values [s]; values that arrive later count as lost."""
 _SHARE = 0.5
-"""The same as a fraction of the block's duration, so that the drive is written in time."""
+"""The same time as a fraction of the block's duration, so that the drive is written in time."""
 
 
 _FASTEST = 5.0
@@ -60,7 +60,7 @@ class ClockedSensor(Protocol):
 
     @property
     def silent(self) -> bool:
-        """Whether no value has arrived for a long time, so that blocks do not wait for it."""
+        """Whether no value has arrived for so long that blocks do not wait for the sensor."""
         ...
 
     def start(self) -> None:
@@ -76,15 +76,15 @@ class ClockedSensor(Protocol):
         ...
 
     def close(self) -> None:
-        """Release the device. Allowed any number of times, never raises."""
+        """Release the device; may be called repeatedly, and never raises."""
         ...
 
 
 @dataclass(frozen=True)
 class Track:
-    """One instrument: its open sensor, its channel, and the placement of its values.
+    """An instrument: its open sensor, its channel, and the placement of its values on the sample clock.
 
-    `observation_time` is the observation time of its clock before the first run [s].
+    `observation_time` [s] is the time for which its clock is observed before the first run.
     """
 
     sensor: ClockedSensor
@@ -168,7 +168,7 @@ class Tracks:
         return () if clock is None else tuple(track.placing.alignment(clock) for track in self._tracks)
 
     def close(self) -> None:
-        """Stop the streams and release the devices. Allowed any number of times."""
+        """Stop the streams and release the devices; may be called repeatedly."""
         self._opened.close()
 
     @property
@@ -194,10 +194,10 @@ class Tracks:
 
 
 def open_serial_lasers(hardware: Hardware) -> tuple[Track, ...]:
-    """Open the serial lasers; returns none with the analogue connection.
+    """Open the serial lasers; returns none if they are connected by analogue outputs.
 
-    The caller closes them. Raises InvalidInput for a laser without port, RigError when one is missing or differs from
-    the configuration; none is left open then.
+    The caller closes them. Raises InvalidInput for a laser without port, RigError if one is missing or differs from the
+    configuration; in that case none is left open.
     """
     with ExitStack() as opened:
         tracks: list[Track] = []
@@ -211,7 +211,7 @@ def open_serial_lasers(hardware: Hardware) -> tuple[Track, ...]:
 
 def _open(name: str, given: LaserInput, lasers: Lasers) -> Track:
     if given.port is None:
-        allowed = "give the serial port of the laser (`rockbench devices` lists them), or lasers.connection"
+        allowed = "specify the serial port of the laser (`rockbench devices` lists them), or lasers.connection"
         raise InvalidInput(f"hardware.{name}.port", given.port, allowed)
     reach = given.measuring_range
     step = _FASTEST / lasers.rate / count_size(reach)

@@ -110,8 +110,8 @@ MEANINGS: Mapping[int, str] = MappingProxyType(
         NOT_CALCULABLE: "the value cannot be calculated",
         TOO_WIDE: "the reflection is too large",
         LASER_OFF: "the laser is off; its on/off wire must be grounded",
-        LATE: "the value arrived after its block was due, or not at all",
-        IMPLAUSIBLE: "the value differs from its predecessors by more than a moving target can",
+        LATE: "the value did not arrive, or arrived after its block was due",
+        IMPLAUSIBLE: "the value differs from its predecessors by more than a moving target allows",
         OTHER: "no distance: the baud rate is too low for the data, or an unknown error",
     }
 )

@@ -9,8 +9,8 @@ from drivers.errors import ConnectionLost, DeviceTimeout, RigError
 
 _WORD = re.compile(rb"[\x00-\x3f][\x40-\x7f][\x80-\xff]")
 _PROMPT = re.compile(rb"(?:^|(?<=[\r\n\x80-\xff]))->")
-"""Prompt at the start of a line, since a minus sign in text or a value may resemble one. The rest of a truncated value
-may precede it.
+"""Prompt at the start of a line, since a minus sign in text or a value may resemble a prompt. The rest of a truncated
+value may precede it.
 """
 _NOT_TEXT = re.compile(rb"[^\t\r\n\x20-\x7e]")
 
@@ -18,7 +18,7 @@ _NOT_TEXT = re.compile(rb"[^\t\r\n\x20-\x7e]")
 class Reply:
     """Collects the bytes after a command up to the prompt.
 
-    Measured values that arrive during the answer are removed and lost: a value split by text would be misread.
+    Measured values that arrive during the reply are discarded, since a value split by text would be misread.
     """
 
     def __init__(self) -> None:
@@ -30,7 +30,7 @@ class Reply:
         self._text = b""
 
     def feed(self, chunk: bytes) -> None:
-        """Process more bytes from the line; empty when the reply is complete."""
+        """Process more bytes from the line; returns nothing once the reply is complete."""
         line, self._text = self._text + chunk, b""
         self.prompt_in_value |= b"->" in line
         place = 0
@@ -75,11 +75,11 @@ def parameters_in(name: str, lines: list[str]) -> list[str]:
 USUAL = 1.0
 """Time-out of a command [s]."""
 SLOW = 3.0
-"""Time-out of a command that waits for a measurement, 2 s at most (manual, p. 108) [s]."""
+"""Time-out of a command that waits for a measurement, which takes at most 2 s (manual, p. 108) [s]."""
 
 
 class CommandRefused(RigError):
-    """The sensor answered a command with an error; `answer` is its code and text."""
+    """The sensor replied to a command with an error; `answer` is its code and text."""
 
     error_code = "command_refused"
 
@@ -93,7 +93,7 @@ class CommandRefused(RigError):
 
 
 class Dialogue:
-    """Command dialogue with a sensor. `who` names sensor and port in errors; `port` has a read time-out of some 10 ms.
+    """Command dialogue with a sensor. `who` names sensor and port in errors; `port` has a read time-out of about 10 ms.
 
     Every method raises ConnectionLost if the port has disappeared.
     """
@@ -130,7 +130,7 @@ class Dialogue:
         """The lines of a received reply. Raises CommandRefused, or DeviceTimeout when it is incomplete."""
         if not (reply.complete or reply.prompt_in_value):
             raise DeviceTimeout(
-                f"{self.who} did not answer {command} within {timeout:g} s; check its power and cable, and reopen it"
+                f"{self.who} did not reply to {command} within {timeout:g} s; check its power and cable, and reopen it"
             )
         lines = reply.lines
         if (answer := error_in(command, lines)) is not None:
@@ -159,7 +159,7 @@ class Dialogue:
         return ConnectionLost(f"{self.who} was disconnected ({error}); plug it in, check its power, and reopen it")
 
     def _read(self) -> bytes:
-        """Bytes received; waits for the read time-out of the port when there are none."""
+        """Bytes received; if there are none, waits for the port's read time-out."""
         try:
             return self.port.read(max(1, self.port.in_waiting))
         except OSError as error:

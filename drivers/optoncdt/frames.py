@@ -20,7 +20,9 @@ _VALUES = {"TIMESTAMP": ("TIMESTAMP_LO", "TIMESTAMP_HI")}
 
 @dataclass(frozen=True)
 class Layout:
-    """Positions of a measurement's values; the distance is at 0. `time` are the two halves of the time stamp."""
+    """Positions of a measurement's values; the distance is at 0. `time` holds the positions of the two halves of the
+    time stamp.
+    """
 
     size: int
     counter: int
@@ -30,7 +32,7 @@ class Layout:
 def wanted(rate: float, baud: int) -> tuple[str, ...]:
     """The additional signals that fit on the line at `rate` [1/s]: counter and time stamp, or the counter alone.
 
-    Raises InvalidInput when the counter does not fit: without it a lost value would go unnoticed.
+    Raises InvalidInput if the counter does not fit, since without it a lost value would go unnoticed.
     """
     for signals in _WISHES:
         if (1 + len(_values(signals))) * rate * BITS_PER_VALUE <= baud:
@@ -46,7 +48,7 @@ def wanted(rate: float, baud: int) -> tuple[str, ...]:
 def layout_in(who: str, reported: list[str], signals: tuple[str, ...]) -> Layout:
     """The layout that the sensor reports by GETOUTINFO_RS422, in the order of its output (manual, p. 109).
 
-    Raises RigError when it does not begin with the distance or lacks one of `signals`.
+    Raises RigError if it does not begin with the distance or lacks one of `signals`.
     """
     values = _values(tuple(reported))
     needed = _values(signals)
@@ -74,7 +76,9 @@ TICK = 10e-6
 _LOCK = 8
 """Number of consecutive measurements without a gap before values are accepted."""
 _FACTORY = 100
-"""Consecutive words that each begin a measurement after which the sensor is known to send distances alone."""
+"""Number of consecutive words that each begin a measurement after which it is certain that the sensor sends distances
+alone.
+"""
 _SLACK = 2.0
 """Largest difference of time stamp and counter between consecutive measurements [periods]."""
 _RATE_SLACK = 0.01
@@ -128,7 +132,9 @@ class Assembler:
         return Frames(index, elapsed.astype(np.float64) * TICK, code)
 
     def _blocks(self, words: Words) -> tuple[NDArray[np.int32], NDArray[np.int64], NDArray[np.int64]]:
-        """Distance, counter and time stamp of the complete measurements; an incomplete one waits for more words."""
+        """Distance, counter and time stamp of the complete measurements; an incomplete one is kept until more words
+        arrive.
+        """
         code = np.concatenate((self._code, words.code))
         first = np.concatenate((self._first, words.first))
         start = np.flatnonzero(first)
@@ -191,14 +197,16 @@ class Assembler:
         return index, elapsed
 
     def _checked(self, steps: NDArray[np.int64], passed: NDArray[np.int64]) -> NDArray[np.int64]:
-        """The steps of the index, plus the counter's full turns within gaps; `passed` are the ticks between values."""
+        """The steps of the index, including full turns of the counter within gaps; `passed` holds the ticks between
+        values.
+        """
         if self._layout.time is None:
             jump = steps > COUNTER_TURN // 2
         else:
             expected = passed * (TICK * self._rate)
             turns = np.maximum(np.rint((expected - steps) / COUNTER_TURN), 0.0).astype(np.int64)
             steps = steps + turns * COUNTER_TURN
-            # in a gap in which the two may differ by a full period of the counter, its wraps are ambiguous
+            # in a gap in which the two may differ by a full period of the counter, the number of wraps is ambiguous
             slack = 2.0 * _SLACK + _RATE_SLACK * expected
             jump = (np.abs(expected - steps) > slack) | (slack > COUNTER_TURN // 2)
         if jump.any():

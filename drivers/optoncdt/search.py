@@ -76,18 +76,18 @@ class Answer:
 def silenced(dialogue: Dialogue, item: str, baud: int | None) -> Answer:
     """Switch the output of the sensor off, at `baud` or at the detected baud rate.
 
-    A running stream may cause the loss of the first command. Raises DeviceNotFound when nothing answers, InvalidInput
-    about `item` when the sensor answers at another baud rate than `baud`, CommandRefused when it continues to stream.
+    A running stream may cause the loss of the first command. Raises DeviceNotFound if nothing responds, InvalidInput
+    about `item` if the sensor responds at a baud rate other than `baud`, CommandRefused if it continues to stream.
     """
     first, *others = BAUDS if baud is None else (baud, *(other for other in BAUDS if other != baud))
     answer = _answer(dialogue, first, _SILENCE, tries=3) or _search(dialogue, others, _SILENCE)
     if answer is None:
         raise DeviceNotFound(
-            f"{dialogue.who} does not answer at any baud rate: switch the sensor on, check that the two RS422 pairs are"
-            " not swapped or reversed, and that the data output is not set to its web interface"
+            f"{dialogue.who} does not respond at any baud rate: switch the sensor on, check that the two RS422 "
+            "pairs are not swapped or reversed, and that the data output is not set to its web interface"
         )
     if baud is not None and answer.baud != baud:
-        allowed = f"{dialogue.who} answers at {answer.baud}: set this baud rate, or omit it"
+        allowed = f"{dialogue.who} responds at {answer.baud}: set this baud rate, or omit it"
         raise InvalidInput(item, baud, allowed)
     if answer.refusal is not None:
         raise answer.refusal
@@ -95,7 +95,7 @@ def silenced(dialogue: Dialogue, item: str, baud: int | None) -> Answer:
 
 
 def asked(dialogue: Dialogue) -> Answer | None:
-    """Detect baud rate and sensor without changing its settings; None when nothing answers."""
+    """Detect baud rate and sensor without changing the sensor's settings; None if nothing responds."""
     return _search(dialogue, BAUDS, "GETUSERLEVEL")
 
 
@@ -112,14 +112,16 @@ def _answer(dialogue: Dialogue, baud: int, command: str, tries: int) -> Answer |
             refusal = _refusal(dialogue, command)
         except DeviceTimeout:
             continue
-        # noise may resemble a prompt; only a name and a range count as an answer
+        # noise may resemble a prompt; only a name and a range count as a reply
         if (found := _identity(dialogue)) is not None:
             return Answer(baud, found, refusal)
     return None
 
 
 def _refusal(dialogue: Dialogue, command: str) -> CommandRefused | None:
-    """Refusal of a command that the sensor repeats; None once it executes the command. Raises DeviceTimeout."""
+    """Error with which the sensor repeatedly rejects a command; None once it executes the command. Raises
+    DeviceTimeout.
+    """
     refusal = None
     for _ in range(_TRIES):
         try:
@@ -127,7 +129,7 @@ def _refusal(dialogue: Dialogue, command: str) -> CommandRefused | None:
         except CommandRefused as error:
             refusal = error
             continue
-        # an error text within a value is not detected: only the sensor's reaction counts
+        # an error text within a value would not be detected, so only the sensor's reaction counts
         if command != _SILENCE or dialogue.drain(_QUIET, _DRAINED):
             return None
         refusal = CommandRefused(dialogue.who, command, "values continue to arrive")

@@ -21,7 +21,7 @@ _FIXED = ("AVERAGE NONE", "TRIGGER NONE", "OUTHOLD NONE", "OUTREDUCEDEVICE NONE"
 def require_sensor(
     name: str, who: str, info: SensorInfo, measuring_range: float, serial_number: str | None = None
 ) -> None:
-    """Raise DeviceNotFound for another model, InvalidInput for another measuring range [m] than configured."""
+    """Raise DeviceNotFound for another model, InvalidInput if the measuring range [m] is not the configured one."""
     if not info.supported:
         raise DeviceNotFound(
             f"{who} is a {info.model}, whose data format is not supported; connect an ILD1420, or correct the port"
@@ -37,7 +37,7 @@ def require_sensor(
 def configure(dialogue: Dialogue, rate: float, baud: int) -> tuple[Layout, bool]:
     """Configure all settings for measurements at `rate` [1/s], with the output switched off.
 
-    Raises InvalidInput for a rate that line or sensor do not support, RigError when the sensor refuses.
+    Raises InvalidInput for a rate that line or sensor does not support, RigError if the sensor rejects a setting.
     """
     signals = wanted(rate, baud)
     dialogue.ask("ECHO OFF")
@@ -52,9 +52,9 @@ def configure(dialogue: Dialogue, rate: float, baud: int) -> tuple[Layout, bool]
 
 
 def _require_no_mastering(dialogue: Dialogue) -> None:
-    """Refuse a sensor with mastering, which shifts the zero without an indication in the stream (manual, p. 65).
+    """Check that mastering is off, since it shifts the zero without an indication in the stream (manual, p. 65).
 
-    A sensor without the query, which the manual does not document, is told MASTERMV NONE, which it does (p. 108).
+    The query is not documented; to a sensor without it, MASTERMV NONE is sent, which is documented (p. 108).
     """
     remedy = "set MASTERMV NONE in its web interface"
     try:
@@ -73,19 +73,19 @@ def _require_no_mastering(dialogue: Dialogue) -> None:
 
 
 _RATE = "hardware.lasers.rate"
-_RATES = "sensors have 250, 500, 1000, 2000 and 4000 1/s, newer ones 8000 1/s"
+_RATES = "sensors support 250, 500, 1000, 2000 and 4000 1/s, newer ones also 8000 1/s"
 
 
 def _set_rate(dialogue: Dialogue, rate: float) -> bool:
-    """Set the rate, in kHz, and read it back: a rejected rate would only show as a wrong time scale.
+    """Set the rate, in kHz, and read it back, since a rejected rate would only show as a wrong time scale.
 
-    False if the sensor has no such query, which the manual does not document: the values must be counted.
+    Returns False if the sensor lacks the query, which the manual does not document; the values must then be counted.
     """
     item, known = _RATE, _RATES
     try:
         dialogue.ask(f"MEASRATE {rate / 1e3:g}")
     except CommandRefused as error:
-        raise InvalidInput(item, rate, f"{dialogue.who} does not accept it ({error.answer}); {known}") from error
+        raise InvalidInput(item, rate, f"{dialogue.who} does not accept this rate ({error.answer}); {known}") from error
     try:
         answer = " ".join(dialogue.setting("MEASRATE"))
     except CommandRefused:
@@ -112,12 +112,12 @@ _COUNTING, _COUNTED = 0.5, 0.2
 
 
 class SerialLaser:
-    """A sensor that measures `rate` times a second over `measuring_range` [m], with its output off until `start`.
+    """A sensor that measures `rate` times per second over `measuring_range` [m], with its output off until `start`.
 
     `baud` is its baud rate; None detects it. `name` is the laser's name in the configuration.
 
-    Raises DeviceNotFound when the port is absent or in use, or no sensor of this type answers; InvalidInput when
-    sensor and configuration do not agree; RigError when the sensor refuses a setting. The port is released then.
+    Raises DeviceNotFound if the port is absent or in use, or no sensor of this type responds; InvalidInput if sensor
+    and configuration do not agree; RigError if the sensor rejects a setting. In these cases the port is released.
     """
 
     def __init__(
@@ -131,7 +131,7 @@ class SerialLaser:
         serial_number: str | None = None,
     ) -> None:
         if baud is not None and baud not in BAUDS:
-            allowed = f"the sensor has {', '.join(str(one) for one in sorted(BAUDS))}"
+            allowed = f"the sensor supports {', '.join(str(one) for one in sorted(BAUDS))}"
             raise InvalidInput(f"hardware.{name}.baud", baud, allowed)
         self.name = name
         self._who = f"{name} on {port}"
@@ -159,7 +159,7 @@ class SerialLaser:
 
     @property
     def silent(self) -> bool:
-        """True when no measurement has arrived for 10 periods, and for 0.1 s; also before `start` and after `stop`."""
+        """True if no measurement has arrived for 10 periods and 0.1 s, and also before `start` and after `stop`."""
         if self._stream is None or not self._streaming:
             return True
         return now() - self._stream.last_arrival > max(_SILENT_PERIODS / self._rate, _SILENT_TIME)
@@ -167,7 +167,7 @@ class SerialLaser:
     def start(self) -> None:
         """Switch the stream on, with index and time at zero, and return when values are accepted.
 
-        Raises DeviceTimeout when they do not arrive in the configured format, ConnectionLost.
+        Raises DeviceTimeout if they do not arrive in the configured format, ConnectionLost.
         """
         self._require_open("start")
         if self._streaming:
@@ -194,7 +194,7 @@ class SerialLaser:
             raise
 
     def take(self) -> Readings:
-        """All values received since the last call, 60 s at most; never waits.
+        """All values received since the last call, at most 60 s; never waits.
 
         Raises ConnectionLost if the port disappeared or the sensor was switched off in between, RigError before
         `start`.
@@ -208,13 +208,13 @@ class SerialLaser:
         return self._stream.wait(timeout) if self._stream is not None else False
 
     def laser(self, on: bool) -> None:
-        """Switch the beam on or off. Values that arrive with the sensor's answer are lost. Raises RigError."""
+        """Switch the beam on or off. Values that arrive together with the reply are lost. Raises RigError."""
         self._require_open("laser")
         ask = self._stream.ask if self._stream is not None and self._streaming else self._dialogue.ask
         ask(f"LASERPOW {'FULL' if on else 'OFF'}")
 
     def stop(self) -> None:
-        """Switch the stream off; earlier values can still be read. Allowed any number of times, never raises."""
+        """Switch the stream off; earlier values can still be read. May be called repeatedly, and never raises."""
         if self._stream is None or not self._streaming:
             return
         with suppress(RigError):
@@ -227,7 +227,7 @@ class SerialLaser:
                 self._dialogue.drain(_QUIET, _DRAINED)
 
     def close(self) -> None:
-        """Switch the stream off and release the port. Allowed any number of times, never raises."""
+        """Switch the stream off and release the port. May be called repeatedly, and never raises."""
         self.stop()
         self._is_closed = True
         with suppress(OSError):

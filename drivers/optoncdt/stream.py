@@ -16,7 +16,7 @@ from drivers.optoncdt.line import Line
 from sim import waiting
 
 _KEPT = 60.0
-"""Length of the buffer of unread values [s]."""
+"""Duration held by the buffer of unread values [s]."""
 
 
 @dataclass(frozen=True)
@@ -24,8 +24,8 @@ class Readings:
     """Measurements of one laser, each array of shape (n,).
 
     `index` counts them since the start of the stream, with gaps where some were lost. `time` is the time of measurement
-    on the sensor's own clock [s]. `code` are the raw words. `arrival` is the time on the machine's clock [s] when their
-    bytes had been read: an upper bound of the arrival.
+    on the sensor's clock [s]. `code` holds the raw words. `arrival` is the time on the machine's clock [s] at which
+    their bytes had been read, an upper bound of the arrival.
     """
 
     index: NDArray[np.int64]
@@ -61,7 +61,9 @@ class Stream:
         return self._last
 
     def ask(self, command: str, timeout: float = USUAL) -> list[str]:
-        """Send a command during the stream; values that arrive with the answer are lost. Raises as `Dialogue.ask`."""
+        """Send a command during the stream; values that arrive with the reply are lost. Raises as `Dialogue.ask`
+        does.
+        """
         reply = Reply()
         with self._changed:
             self._reply = reply
@@ -76,7 +78,7 @@ class Stream:
         return self._dialogue.judged(command, reply, timeout)
 
     def take(self) -> Readings:
-        """All values since the last call, 60 s at most; does not wait. Raises ConnectionLost."""
+        """All values since the last call, at most 60 s; does not wait. Raises ConnectionLost."""
         self._raise_failure()
         with self._changed:
             held, self._held, self._holding = self._held, deque(), 0

@@ -6,8 +6,9 @@ from numpy.typing import NDArray
 from drivers.timebase.fit import Bounds, Points, bends, due, floor_below, rate_error, typical
 
 _TOLERANCE = 0.25
-"""Largest deviation of a history from a line, in sample periods, before its older half is discarded: counts are
-integers, so the bounds of a reader in step with the clock wander by a fraction of a period."""
+"""Largest deviation of a history from a line, in sample periods, before its older half is discarded: since counts are
+integers, the bounds of a reader in step with the clock wander by a fraction of a period.
+"""
 _RECENT = 2.0
 """Longest time over which two bounds can be compared without the rate [s]."""
 _CONTRADICTION = 200e-6
@@ -19,9 +20,9 @@ class SampleClock:
 
     Each reading bounds the clock on both sides: by the last sample taken and by the next one. The estimate is midway
     between the tightest bounds, and NaN before the first sample. With packet transfer, as over USB, the count lags, and
-    an uncounted sample may have been taken: the bounds then contradict each other. For the rest of the run only the
-    last counted sample is used, late by the shortest transfer: a constant that is part of the delay measured by a
-    check.
+    an uncounted sample may have been taken: the bounds then contradict each other. For the rest of the run, only the
+    last counted sample is used; it is late by the shortest transfer time, a constant that is part of the delay measured
+    by the loop check.
     """
 
     def __init__(self, sample_rate: float) -> None:
@@ -55,7 +56,7 @@ class SampleClock:
 
     @property
     def residual(self) -> float:
-        """Root mean square distance of the tightest bounds from the line used [s]."""
+        """Root mean square distance [s] of the tightest bounds from the line in use."""
         self._refresh()
         return self._residual
 
@@ -94,7 +95,7 @@ class SampleClock:
 
 
 def _least(points: Points) -> float:
-    """The least recent delay [s]."""
+    """The smallest recent delay [s]."""
     return float(points.delay[points.seconds >= points.seconds[-1] - _RECENT].min())
 
 
@@ -105,7 +106,7 @@ _SENSOR_TOLERANCE = 100e-6
 class SensorClock:
     """Estimator of a sensor's clock: second t of the sensor is at second `offset + rate * t` of the machine's clock.
 
-    The line is the earliest consistent with the arrivals, so the least transfer delay is part of `offset`. To track
+    The line is the earliest consistent with the arrivals, so the smallest transfer delay is part of `offset`. To track
     changes, the older half of a history that no single line fits is discarded. All values are NaN before the first
     reading.
     """
@@ -121,14 +122,14 @@ class SensorClock:
         """Add readings, shape (n,): ascending seconds of the sensor's clock, and of the machine's clock at arrival."""
         if time.size == 0:
             return
-        # of values that arrived together, the last one has the smallest delay
+        # of values that arrive together, the last one has the smallest delay
         last = np.flatnonzero(np.diff(arrival, append=np.inf))
         self._bounds.add(time[last], arrival[last] - time[last])
         self._first, self._last = min(self._first, float(time[0])), float(time[-1])
 
     @property
     def history(self) -> float:
-        """Length of the history, in seconds of the sensor's clock."""
+        """Duration of the history, in seconds of the sensor's clock."""
         return max(self._last - self._first, 0.0)
 
     @property
@@ -145,7 +146,7 @@ class SensorClock:
 
     @property
     def residual(self) -> float:
-        """Root mean square delay of the best readings after the line [s]."""
+        """Root mean square delay [s] of the best readings relative to the line."""
         self._refresh()
         return self._residual
 
@@ -160,6 +161,6 @@ class SensorClock:
         points = self._bounds.points
         floor = floor_below(points, self._slope)
         delay = points.delay - self._slope * points.seconds - floor
-        # delays of burst and scheduler add up and are rarely both short: the smallest of n remains above zero
+        # delays of burst and scheduler add up and are rarely both short, so the smallest of n remains above zero
         self._offset = floor - typical(delay) / np.sqrt(len(points))
         self._residual = float(np.sqrt(np.mean(delay**2)))

@@ -19,8 +19,8 @@ _LEAST = 3
 class CommonMotion:
     """The second signal is `polarity * scale` times the first, `delay` [s] later.
 
-    `uncertainty` is the standard uncertainty of the delay [s], from the scatter of the phases about a line;
-    `scatter` is that scatter [rad]: it is large if the two did not measure the same motion.
+    `uncertainty` is the standard uncertainty of the delay [s], from the scatter of the phases about a line; `scatter`
+    is that scatter [rad], which is large if the two did not measure the same motion.
     """
 
     delay: float
@@ -35,9 +35,9 @@ def common_motion(
 ) -> CommonMotion:
     """Compare the complex amplitudes of two signals at `omega` [rad/s], shape (m,) each.
 
-    Frequencies must be dense enough, from zero on, that the delay shifts the phase by less than pi from each
-    to the next. Frequencies are weighted by the square of the first signal's amplitude. Raises InvalidInput for fewer
-    than three frequencies, or where a signal does not move.
+    Frequencies must be dense enough, from zero on, that the delay shifts the phase by less than pi from each to the
+    next. Frequencies are weighted by the square of the first signal's amplitude. Raises InvalidInput for fewer than
+    three frequencies, or if a signal does not move.
     """
     if omega.size < _LEAST:
         raise InvalidInput("frequencies", omega.size, f"at least {_LEAST}")

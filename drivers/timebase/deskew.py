@@ -7,7 +7,7 @@ import numpy as np
 from sim.channel import Counts
 
 _NODES = 4
-"""Samples of an interpolation."""
+"""Number of samples in an interpolation."""
 _WHOLE = 1.0e-4
 """Distance from a whole number of samples below which nothing is interpolated [samples]."""
 
@@ -36,7 +36,7 @@ class Deskew:
         self._kept = None
 
     def missing(self, n: int) -> int:
-        """Samples that must be read for the next `n`."""
+        """Number of samples that must be read to return the next `n`."""
         return n + (self.latency if self._kept is None else 0)
 
     def moved(self, raw: Counts) -> Counts:
@@ -54,7 +54,7 @@ class Deskew:
 
 
 class _Column:
-    """The interpolation of one input, `shift` samples ahead of those returned."""
+    """Interpolation of one input, `shift` samples ahead of the returned ones."""
 
     def __init__(self, shift: float, latency: int, valid: tuple[int, int]) -> None:
         whole = int(np.floor(shift))

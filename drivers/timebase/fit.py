@@ -7,9 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 _STRETCH = 0.2
-"""Length of an interval [s] of which the best reading is kept; clocks 50 ppm apart drift by 10 us in it."""
+"""Length of an interval [s] of which the best reading is kept; clocks that differ by 50 ppm drift apart by 10 us in
+it.
+"""
 _KEPT = 120.0
-"""Length of the history [s]: sufficient for the rate to 1e-6, short enough that a quartz hardly drifts."""
+"""Duration of the history [s]: long enough for a rate accurate to 1e-6, short enough that a quartz hardly drifts."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +26,7 @@ class Points:
 
 
 class Bounds:
-    """Smallest delays of the last two minutes."""
+    """History of the smallest delays of the last two minutes."""
 
     def __init__(self) -> None:
         self._points = Points(np.zeros(0), np.zeros(0))
@@ -35,7 +37,7 @@ class Bounds:
         return self._points
 
     def add(self, seconds: NDArray[np.float64], delay: NDArray[np.float64]) -> None:
-        """Add readings, shape (n,) both [s], none older than the last stretch."""
+        """Add readings, shape (n,) both [s], none older than the last interval."""
         kept = self._points
         if seconds.size == 0:
             return
@@ -59,7 +61,7 @@ class Bounds:
 
 
 _RATE_SPREAD = 50e-6
-"""Standard deviation of the rate error of a quartz clock against another one [1]."""
+"""Standard deviation of the relative rate error between two quartz clocks [1]."""
 _LARGEST = 1e-3
 """Largest rate error searched for [1]: a machine's clock is slewed by at most 500 ppm."""
 _HALVINGS = 18
@@ -75,10 +77,11 @@ _RESOLUTION = 1e-7
 _FAR = 5.0
 """A delay of this many typical ones is a stall of the machine and excluded as an outlier."""
 _QUARTER = 8
-"""Least number of readings in a quarter of the history for the test."""
+"""Minimum number of readings in a quarter of the history for the test."""
 _CHANCE = 4.0
-"""The least of n delays practically never exceeds this many times mean/sqrt(n), even for sums of two delays, such as
-those of burst and scheduler."""
+"""Multiple of mean/sqrt(n) that the smallest of n delays practically never exceeds, even for sums of two delays, such
+as those of burst and scheduler.
+"""
 
 _GROWTH = 0.02
 """Growth of the history, as a fraction, after which a line is refitted."""
@@ -87,7 +90,7 @@ _PATIENCE = 1.0
 
 
 def due(history: float, fitted: float) -> bool:
-    """Whether a line over `history` [s] must be refitted when last fitted at `fitted` [s]."""
+    """Whether a line over `history` [s] must be refitted if it was last fitted at `fitted` [s]."""
     return history - fitted >= min(_GROWTH * history, _PATIENCE)
 
 
@@ -112,7 +115,7 @@ def rate_error(sides: Sequence[tuple[Points, float]]) -> float:
 
 @dataclass(frozen=True)
 class _Side:
-    """Delays over centred seconds."""
+    """Delays against centred seconds."""
 
     sign: float
     seconds: NDArray[np.float64]
@@ -157,7 +160,7 @@ def _log_posterior(sides: Sequence[_Side], slopes: NDArray[np.float64]) -> NDArr
 
 
 def floor_below(points: Points, slope: float) -> float:
-    """The highest line of this slope below the points: its delay at second 0 [s]. Infinite without points."""
+    """Delay at second 0 [s] of the highest line of this slope below the points; infinite if there are no points."""
     return float((points.delay - slope * points.seconds).min(initial=np.inf))
 
 
@@ -169,7 +172,7 @@ def typical(above: NDArray[np.float64]) -> float:
 def bends(points: Points, slope: float, tolerance: float) -> bool:
     """Whether the points differ from the line by more than `tolerance` [s] and chance, as after a change of the rate.
 
-    Uses the least delays of the last three quarters; the first may have been read differently.
+    Uses the smallest delays of the last three quarters; the first may have been read differently.
     """
     size = len(points) // 4
     if size < _QUARTER:

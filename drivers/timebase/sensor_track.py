@@ -40,7 +40,7 @@ _FIRST = 10.0
 
 
 class Course:
-    """Sensor's clock as a function of the sample clock: continuous, and linear within each block."""
+    """The sensor's clock as a function of the sample clock: continuous, and linear within each block."""
 
     def __init__(self) -> None:
         self._began = self._seconds = self._time = np.nan
@@ -51,7 +51,7 @@ class Course:
         return self._time
 
     def times(self, line: Line, seconds: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Sensor times, shape (n,), at `seconds`, ascending, from the present `line`; advances to the last of them."""
+        """Sensor times, shape (n,), at ascending `seconds`, from the present `line`; advances to the last of them."""
         end = float(seconds[-1])
         if not self._seconds < float(seconds[0]):
             # the first request, or a request for the past: no point to continue from
@@ -65,7 +65,7 @@ class Course:
         return times
 
     def reach(self, line: Line, time: float) -> float:
-        """The last second of the sample clock for which `times` would return at most `time` [s]."""
+        """The latest second of the sample clock for which `times` would return at most `time` [s]."""
         known = line.seconds_at(time)
         if np.isnan(self._seconds):
             return known
@@ -88,11 +88,11 @@ class Course:
 
 
 _KEPT = 10.0
-"""Length of the buffer of values [s]."""
+"""Duration held by the buffer of values [s]."""
 _LEAST_HISTORY = 1.0
 """Shortest history of a clock for placing values [s]."""
 _BACK = 0.25
-"""Age relative to the newest value [s] above which a value is no repetition: the sensor's clock was restarted."""
+"""Age relative to the newest value [s] above which a value is not a repetition: the sensor's clock was restarted."""
 
 
 class SensorTrack:
@@ -123,7 +123,7 @@ class SensorTrack:
         self._asked = 0.0
 
     def begin(self) -> None:
-        """Begin a run: restart the count of values, keep the history of the sensor's clock."""
+        """Begin a run: restart the count of values, and keep the history of the sensor's clock."""
         self._course = Course()
         self._values = self._lost = self._late = 0
         self._plausibility.count = 0
@@ -164,7 +164,7 @@ class SensorTrack:
         return counts
 
     def alignment(self, clock: SampleClock) -> Alignment:
-        """Alignment of the values in this run; NaN where not yet known."""
+        """Alignment of the values in this run; NaN where still unknown."""
         line, last = self._line(clock), self._resampler.last
         behind = self._asked if last is None else self._course.time - last[1]
         return Alignment(

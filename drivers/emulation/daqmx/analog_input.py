@@ -29,7 +29,9 @@ _WIRING_OF = {
 
 @dataclass
 class FilterDelay:
-    """Settings of a converter with properties for its delay: whether its whole samples are removed, and its unit."""
+    """Settings of a converter with properties for its delay: whether whole samples of delay are removed, and the
+    delay's unit.
+    """
 
     removed: bool = True
     units: int = DigitalWidthUnits.SAMPLE_CLOCK_PERIODS.value
@@ -60,8 +62,9 @@ def require_wiring(inputs: AnalogInputs, wiring: int) -> None:
 
 
 _AUTOMATIC_BUFFER = ((100.0, 1_000), (10_000.0, 10_000), (1.0e6, 100_000), (float("inf"), 1_000_000))
-"""Sample rates, and the samples per channel of the driver's default buffer up to each (NI-DAQmx help, "How Is Buffer
-Size Determined?")."""
+"""Sample rates and, up to each of them, the samples per channel in the driver's default buffer (NI-DAQmx help, "How Is
+Buffer Size Determined?").
+"""
 
 
 class AnalogInput:
@@ -128,7 +131,7 @@ class AnalogInput:
 
     @property
     def highest_rate(self) -> float:
-        """Highest sample rate per channel of the slowest of its devices."""
+        """Highest sample rate per channel of the slowest device."""
         rates: list[float] = []
         for name in self.devices:
             mine = [channel.inputs for channel in self.inputs if channel.device.name == name]
@@ -138,7 +141,7 @@ class AnalogInput:
 
     @property
     def converters(self) -> list[DeltaSigma]:
-        """Its delta-sigma converters, which restrict the rates; none for other types."""
+        """The task's delta-sigma converters, which restrict the rates; none for other types."""
         return [one.inputs.delta_sigma for one in self.inputs if one.inputs.delta_sigma is not None]
 
     def conversion(self, device: str) -> float | None:
@@ -220,9 +223,11 @@ class AnalogInput:
             return self._fetch(first, ticks, divider)
 
     def _take(self, n: int, deadline: float, run: int) -> tuple[int, int, int]:
-        """Wait for samples and advance; returns tick of the first, their number, and ticks between samples."""
+        """Wait for samples and advance; returns the tick of the first sample, the number of samples, and the ticks
+        between them.
+        """
         if self.clock is None:
-            # on demand: the present value for each read
+            # sampling on demand: each read returns the present value
             self._first, self._position = self._plant.tick() + 1, 0
         self._require_run(run)
         self._require_not_overrun()
@@ -239,7 +244,7 @@ class AnalogInput:
         return first, got, self.clock.divider if self.clock else 1
 
     def _fetch(self, first: int, n: int, divider: int) -> Seen:
-        """The plant's counts, without holding `changed`, because the plant may have to compute them first."""
+        """The plant's counts, read without holding `changed`, because the plant may have to compute them first."""
         if n == 0:
             return np.zeros((0, len(self.inputs)), np.int16)
         shifts = self.delays * self._plant.tick_rate

@@ -88,7 +88,7 @@ class AnalogOutput:
 
     @property
     def highest_rate(self) -> float:
-        """Highest sample rate per channel of the slowest of its devices."""
+        """Highest sample rate per channel of the slowest device."""
         return min(channel.highest_rate for channel in self.outputs)
 
     @property
@@ -211,7 +211,7 @@ class AnalogOutput:
         return wait_until(self._changed, float("inf") if tick is None else self._plant.time_of(tick), deadline)
 
     def _prepared(self, samples: int) -> Generation:
-        """The current generation; the first write sizes the buffer if no size is set."""
+        """The current generation; the first write determines the buffer size if none is set."""
         assert self.clock is not None
         if self._generation is None:
             self._buffer = self._buffer or samples

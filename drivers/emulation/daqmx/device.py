@@ -35,10 +35,10 @@ class AnalogInputs:
     """The inputs of a device. Input k is terminal `first_terminal + k` of the plant; beyond the last terminal it reads
     0 V.
 
-    `ranges` are the largest magnitudes [V], widest first; rates are per second. The converter has `resolution` bits
-    in raw samples of `raw_bits`. `polynomials` are, for single inputs, volts per power of the counts in the widest
-    range; the others are linear, with their rails at the ends of the range. `delta_sigma` describes converters of that
-    type; `conversion` is the fastest conversion of a multiplexed converter [s], None for inputs taken at one instant.
+    `ranges` are the largest magnitudes [V], widest first; rates are per second. The converter has `resolution` bits in
+    raw samples of `raw_bits`. `polynomials` are, for single inputs, volts per power of the counts in the widest range;
+    the others are linear, with their rails at the ends of the range. `delta_sigma` describes converters of that type;
+    `conversion` is the fastest conversion of a multiplexed converter [s], None for simultaneously sampled inputs.
     """
 
     count: int
@@ -73,10 +73,11 @@ class AnalogOutputs:
 class DeviceModel:
     """Device, chassis, or module in a `chassis`.
 
-    `lines` is the number of lines at port 0 that can be outputs, `input_lines` of those that can be inputs;
-    `direction_group` lines in a row have one direction. `watchdog` is the longest time-out [s] of its watchdog, None
-    where there is none; that of a chassis acts on the outputs of its modules. `input_engines` and `output_engines` are
-    the timing engines of analogue inputs and outputs, in the order of their numbers; a module has those of its chassis.
+    `lines` is the number of lines at port 0 that can be outputs, `input_lines` of those that can be inputs; groups of
+    `direction_group` consecutive lines share one direction. `watchdog` is the longest time-out [s] of its watchdog,
+    None where there is none; that of a chassis acts on the outputs of its modules. `input_engines` and `output_engines`
+    are the timing engines of analogue inputs and outputs, in the order of their numbers; a module has those of its
+    chassis.
     """
 
     name: str
@@ -158,7 +159,7 @@ class InputConverter:
         self._same = self.coefficients == (0.0, source.lsb) and self._rails == source.codes
 
     def is_like(self, other: "InputConverter") -> bool:
-        """Whether both give the same raw counts."""
+        """Whether both produce the same raw counts."""
         return self.coefficients == other.coefficients and self._rails == other._rails
 
     def raw(self, counts: Seen) -> NDArray[np.int16 | np.int32]:

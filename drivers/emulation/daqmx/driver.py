@@ -19,7 +19,7 @@ from sim.sensors import Converter
 class Driver:
     """Devices, tasks and reservations; `changed` guards all of it.
 
-    It outlives every client. `drive` is the output wired to the plant; None leaves it unconnected. `wires` are
+    It outlives every client. `drive` is the output wired to the plant; with None, no output is connected. `wires` are
     connected to the digital lines. `converter` is that of the plant's counts. `output_clock_error` and `packet` as in
     `DaqServer`.
     """
@@ -80,7 +80,7 @@ class Driver:
         return self._tasks[name]
 
     def reserve(self, task: Task) -> None:
-        """Reserve the task's resources. Raises DaqmxFailure when one is in use."""
+        """Reserve the task's resources. Raises DaqmxFailure if one is in use."""
         with self.changed:
             # the task may have been cleared during this call
             job = self.task(task.name).required_job
@@ -116,7 +116,7 @@ class Driver:
             self.changed.notify_all()
 
     def stop(self, task: Task) -> None:
-        """End a task and release its resources. Raises DaqmxFailure if its run had failed."""
+        """End a task and release its resources. Raises DaqmxFailure if the run had failed."""
         with self.changed:
             self._end(task)
             if task.job is not None:

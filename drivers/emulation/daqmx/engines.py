@@ -1,4 +1,4 @@
-"""Timing engines of a device: each runs one clocked task, and is part of the names of that task's terminals."""
+"""Timing engines of a device: each runs one clocked task and appears in the names of that task's terminals."""
 
 from collections.abc import Callable
 
@@ -37,7 +37,7 @@ class EngineSlot:
         return f"{device.clockwork} timing engine {engines[self.number(engines) or 0]}"
 
     def request(self, number: int, engines: tuple[str, ...]) -> None:
-        """Set the engine. Raises DaqmxFailure when there is no such engine, or no choice."""
+        """Set the engine. Raises DaqmxFailure if there is no such engine, or no choice."""
         if len(engines) == 1:
             raise DaqmxFailure(
                 DAQmxErrors.ATTRIBUTE_NOT_SUPPORTED_IN_TASK_CONTEXT,

@@ -4,7 +4,7 @@ from nidaqmx.error_codes import DAQmxErrors
 
 
 class DaqmxFailure(Exception):
-    """An error of the driver. For a write, with the samples per channel written before it."""
+    """An error of the driver; for a write, with the number of samples per channel written before it."""
 
     def __init__(self, code: DAQmxErrors, text: str, *, samples_written: int = 0) -> None:
         super().__init__(text)

@@ -16,7 +16,7 @@ Signal = Callable[[int, int], NDArray[np.float64]]
 """Volts at `n` ticks from tick `first` on: `signal(first, n)`, shape (n,)."""
 
 _PATIENCE = 10.0
-"""Length of the retained output [s]."""
+"""Duration of the retained output [s]."""
 
 
 class Generation:
@@ -80,7 +80,7 @@ class Generation:
 
 
 class Instant:
-    """Synchronisation: a common tick for everything that starts or changes together.
+    """Synchronisation: provides a common tick for everything that starts or changes together.
 
     `tick` is the plant's clock; it is read under the lock and must not block. The plant takes the same lock when it
     reads past ticks: decisions made under it precede every read.
@@ -97,7 +97,7 @@ class Instant:
 
     @contextmanager
     def next(self) -> Generator[int]:
-        """The next tick; it is not read while this context lasts."""
+        """Context manager for the next tick, which is not read meanwhile."""
         with self.lock:
             yield self._tick() + 1
 

@@ -161,7 +161,7 @@ class DigitalInput(LineTask):
         return self._made
 
     def read(self) -> bytes:
-        """One byte per line with its present level, channel after channel; a shorter channel is padded with 0."""
+        """The present levels, one byte per line, channel after channel; a shorter channel is padded with 0."""
         width = self.lines_per_channel
         return b"".join(
             bytes(self._lines.shows(line.name) for line in channel.lines).ljust(width, b"\0") for channel in self.inputs

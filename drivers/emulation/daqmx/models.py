@@ -1,4 +1,4 @@
-"""Two sets of devices with specifications from their data sheets."""
+"""Two sets of devices, with specifications from the data sheets."""
 
 import re
 from collections.abc import Sequence

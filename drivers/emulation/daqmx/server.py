@@ -1,4 +1,4 @@
-"""Server: devices on a plant, at a network address, with planned faults."""
+"""Server: devices wired to a plant, at a network address, with planned faults."""
 
 # ruff: noqa: ARG002 - gRPC gives every call a context, needed or not
 
@@ -41,7 +41,7 @@ class Faults:
         self._silent_until = 0.0
 
     def fail_next(self, call: str, code: int) -> None:
-        """Make the next call of this name fail with a DAQmx code and without effect, once per request."""
+        """Make the next call of this name fail with a DAQmx code and without effect; each request applies once."""
         with self._changed:
             self._codes.setdefault(call, deque()).append(code)
 
@@ -235,11 +235,11 @@ class DaqServer:
             return self._driver.terminals[output].volts_at(tick)
 
     def start(self) -> None:
-        """Start to answer requests."""
+        """Start answering requests."""
         self._server.start()
 
     def close(self) -> None:
-        """Switch devices and server off; no thread or port remains. Allowed any number of times."""
+        """Switch devices and server off; no thread or port remains. May be called repeatedly."""
         self._faults.end()
         gone = self._server.stop(None)
         # also ends waiting reads and writes
@@ -274,7 +274,7 @@ class DaqServer:
 
 
 def _chosen(item: str, given: str | None, known: Sequence[str]) -> str | None:
-    """The given one, else the first."""
+    """The specified one, or else the first."""
     if given is None:
         return known[0] if known else None
     if given not in known:

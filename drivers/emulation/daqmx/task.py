@@ -48,15 +48,15 @@ class Job(Protocol):
         ...
 
     def engage(self, is_free: Callable[[str], bool]) -> None:
-        """Choose what the driver chooses when it reserves the task, among the resources that are free."""
+        """Choose from the free resources what the driver chooses when it reserves the task."""
         ...
 
     def check(self) -> None:
-        """Raise DaqmxFailure when it cannot start."""
+        """Raise DaqmxFailure if the job cannot start."""
         ...
 
     def begin(self, tick: int) -> None:
-        """Start; clocked channels have their first sample at `tick`, the next one."""
+        """Start; the first sample of clocked channels is at `tick`, the next tick."""
         ...
 
     def end(self) -> None:

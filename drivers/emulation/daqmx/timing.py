@@ -21,7 +21,7 @@ def deadline_after(timeout: float) -> float:
 
 
 def wait_until(changed: threading.Condition, instant: float, deadline: float) -> bool:
-    """Wait until `instant`, `deadline` or a change; False if the deadline has passed before."""
+    """Wait until `instant`, `deadline` or a change; returns False if the deadline passes first."""
     now = time.monotonic()
     if now >= deadline:
         return False

@@ -1,4 +1,4 @@
-"""The watchdog of a device: without a reset in time its lines go to their safe states."""
+"""The watchdog of a device: unless it is reset in time, the lines go to their safe states."""
 
 import threading
 import time
@@ -42,7 +42,7 @@ class Watchdog:
         self.timeout = timeout
         self.device = device
         self.guarded = frozenset(part.name for part in parts)
-        """Its devices: none of their tasks may be reserved when it starts."""
+        """Its devices, of whose tasks none may be reserved when it starts."""
         self._parts = tuple(parts)
         self._expire = expire
         self._lines = lines
@@ -68,7 +68,7 @@ class Watchdog:
 
     @property
     def expired(self) -> bool:
-        """Whether it was not reset in time."""
+        """Whether it has expired because it was not reset in time."""
         return self._expired
 
     def expire_to(self, states: dict[str, bool]) -> None:
@@ -141,7 +141,7 @@ class Watchdog:
         pass
 
     def reset(self) -> None:
-        """Restart the count."""
+        """Restart the timer."""
         with self._changed:
             if self._expired:
                 raise DaqmxFailure(

@@ -25,7 +25,7 @@ def _outputs() -> AnalogOutputs:
 
 
 MODULES: dict[str, DeviceModel] = {
-    # NI 9205 Specifications: one converter for all channels, 250 kS/s; conversions every 4 us at most
+    # NI 9205 Specifications: one converter for all channels, 250 kS/s: at most one conversion per 4 us
     "9205": DeviceModel(
         "",
         "NI 9205",
@@ -152,11 +152,11 @@ SINGLE: dict[str, DeviceModel] = {
 NAMES = (*CHASSIS, *SINGLE)
 """Every device that can be emulated by its name."""
 SUGGESTED = ("9205", "9263", "9401", "9485")
-"""Modules of a chassis unless others are chosen: inputs, output, digital inputs, relays."""
+"""Default modules of a chassis: inputs, output, digital inputs, relays."""
 
 
 def build(device: str, modules: Sequence[str] = ()) -> tuple[DeviceModel, ...]:
-    """The device, or the chassis with `modules` in its slots from the first on.
+    """The device, or the chassis with `modules` in its slots starting with the first.
 
     Inputs 0, 1, 2, ... of every input module are wired to terminals 0, 1, 2, ... of the plant, in parallel. Raises
     InvalidInput for an unknown device or module, for too many modules, and for modules without a chassis.

@@ -29,7 +29,9 @@ class Identity:
 
     @property
     def lines(self) -> list[str]:
-        """Layout and other entries as in the manual of the optoNCDT 1420, p. 97."""
+        """The text that identifies the sensor; layout and other entries as in the manual of the optoNCDT 1420, p.
+        97.
+        """
         return [
             f"Name:            {self.name}",
             f"Serial:          {self.serial}",

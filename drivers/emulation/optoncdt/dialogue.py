@@ -19,7 +19,7 @@ if sys.platform != "win32":
 _TCGETS2 = 0x802C542A
 """Linux ioctl request for terminal settings with numeric speeds."""
 _SPEED_AT = 40
-"""Offset of the output speed in the answer: after four flags, a byte, nineteen control characters, one speed."""
+"""Offset of the output speed in the reply: after four flags, a byte, nineteen control characters and one speed."""
 _MOST = 4096
 """Bytes per read."""
 
@@ -81,7 +81,7 @@ class PseudoTerminal:
         self.dropped += len(sent) - taken
 
     def close(self) -> None:
-        """Close the line: the client's next access fails. Allowed any number of times."""
+        """Close the line, so that the client's next access fails; may be called repeatedly."""
         if self._open:
             self._open = False
             os.close(self._end)

@@ -30,7 +30,7 @@ class Fault(IntEnum):
 
 
 def distance_codes(shares: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Codes of distances given as shares of the measuring range, shape (n,), reserve included.
+    """Codes of distances given as fractions of the measuring range, shape (n,), including the reserve.
 
     x = (100 d / MR + 1) 65520 / 102 (manual of the optoNCDT 1420, p. 65). NaN is not allowed.
     """
@@ -60,7 +60,7 @@ def words(blocks: NDArray[np.int64]) -> NDArray[np.uint8]:
 Array = NDArray[np.float64]
 
 _RESERVE = 0.01
-"""Reserve beyond either end of the measuring range that is still measured [share of the range]."""
+"""Reserve beyond either end of the measuring range that is still measured, as a fraction of the range."""
 
 
 class Optics:
@@ -71,7 +71,7 @@ class Optics:
         self._phase = float(random.uniform(0.0, 2.0 * np.pi))
 
     def shares(self, displacement: Array) -> Array:
-        """Measured distances as shares of the measuring range for displacements from mid range [m], shape (n,)."""
+        """Measured distances as fractions of the measuring range, for displacements from mid range [m], shape (n,)."""
         laser = self._laser
         seen = displacement + laser.noise * self._random.standard_normal(displacement.size)
         place = seen / laser.measuring_range
@@ -93,7 +93,9 @@ class Evaluation:
         self._age = np.inf
 
     def codes(self, shares: Array, faults: NDArray[np.int64], settings: Settings) -> NDArray[np.int64]:
-        """Codes of measurements, shape (n,), n > 0: of `shares` of the range where `faults` is zero, else the fault."""
+        """Codes of measurements, shape (n,), n > 0: of `shares` (fractions of the range) where `faults` is zero, else
+        the fault.
+        """
         valid = faults == 0
         shares = self._mean(np.where(valid, shares, np.nan), settings.average)
         shares = np.where(valid, shares, 0.0)

@@ -28,7 +28,7 @@ class Line:
     def __init__(self, random: Generator) -> None:
         self._random = random
         self.lose = 0
-        """Number of next bytes to lose."""
+        """Number of following bytes to lose."""
         self.probability = 0.0
         """Probability of the loss of a byte."""
         self.garbage = 0
@@ -39,7 +39,7 @@ class Line:
         """Whether an answer may split a value."""
 
     def carried(self, stream: Bytes, answer: bytes, now: float) -> Bytes:
-        """Bytes that reach the client: values of `stream` with an answer between any two of them."""
+        """Bytes that reach the client: the values of `stream`, with the answer between two of them."""
         sent = self._woven(stream, answer)
         if now < self.silent_until:
             return sent[:0]
@@ -116,7 +116,7 @@ class EmulatedLaser:
         self._thread.start()
 
     def close(self) -> None:
-        """Switch off; no thread or port remains. Allowed any number of times."""
+        """Switch off; no thread or port remains. May be called repeatedly."""
         self.unplug()
         if self._thread.is_alive():
             waiting.join(self._thread)
@@ -185,12 +185,12 @@ class EmulatedLaser:
             self._sensor.beam = False
 
     def laser_on(self) -> None:
-        """Close it again."""
+        """Close the input again."""
         with self._lock:
             self._sensor.beam = True
 
     def target(self, place: Literal["too close", "too far", "none"] | None) -> None:
-        """Replace the target by another, or none; None restores its sight."""
+        """Replace the target by another or none; None restores the original sight."""
         with self._lock:
             self._sensor.target = _TARGETS[place]
 

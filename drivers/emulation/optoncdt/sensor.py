@@ -73,16 +73,18 @@ PIPELINE = 3
 _PAST = 10.0
 """Longest stall of the computer without loss of measurements [s]."""
 _EXPOSURE = 1000
-"""Exposure time that the sensor reports, in tenths of a microsecond."""
+"""Exposure time reported by the sensor, in tenths of a microsecond."""
 _INTENSITY = 32736
-"""Intensity that the sensor reports: 50 %."""
+"""Intensity reported by the sensor: 50 %."""
 _STATES = {
     0: 1 << 16,
     Fault.NO_PEAK: 2 << 16 | 1 << 2,
     Fault.TOO_CLOSE: 2 << 16 | 1 << 5,
     Fault.TOO_FAR: 2 << 16 | 1 << 6,
 }
-"""Status words: the light is green (1) or red (2), bits 2, 5 and 6 the reason (manual of the optoNCDT 1420, p. 66)."""
+"""Status words: the light is green (1) or red (2); bits 2, 5 and 6 state the reason (manual of the optoNCDT 1420, p.
+66).
+"""
 
 Codes = NDArray[np.int64]
 
@@ -143,7 +145,7 @@ class Sensor:
         return 1 + len(self.settings.additional) + ("TIMESTAMP" in self.settings.additional)
 
     def look(self, now: float) -> float | None:
-        """The present distance as a share of the measuring range; None when it is invalid."""
+        """The present distance as a fraction of the measuring range; None if it is invalid."""
         shares, faults = self._measure(np.array([now]))
         return None if faults[0] else float(shares[0])
 
@@ -156,7 +158,9 @@ class Sensor:
         return True
 
     def _measure(self, times: NDArray[np.float64]) -> tuple[NDArray[np.float64], Codes]:
-        """Shares of the measuring range and faults at `times`, shape (n,) each; shares at faults are meaningless."""
+        """Fractions of the measuring range and faults at `times`, shape (n,) each; the fractions at faults are
+        meaningless.
+        """
         if not self.beam or self.settings.laser_power == "OFF":
             return np.full(times.size, np.nan), np.full(times.size, Fault.LASER_OFF)
         if self.target is not None:

@@ -9,13 +9,13 @@ BAUDS = (9600, 19200, 56000, 115200, 128000, 230400, 256000, 460800, 691200, 921
 ADDITIONAL = ("SHUTTER", "COUNTER", "TIMESTAMP", "INTENSITY", "STATE", "DIST_RAW")
 """Values that can be sent with the distance.
 
-Their order of transmission is not documented; this sensor sends them in this order, regardless of that of the request.
+Their order of transmission is not documented; this sensor sends them in this order, whatever the order of the request.
 """
 
 
 @dataclass(frozen=True)
 class Mastering:
-    """The distance at mastering [share of the measuring range], reported as `value` [m]."""
+    """The distance at mastering, as a fraction of the measuring range, which is reported as `value` [m]."""
 
     place: float
     value: float
@@ -35,7 +35,9 @@ class Settings:
     average: int = 1
     """Measurements in the moving mean."""
     hold: float = 0.0
-    """Number of measurements for which the last valid value replaces an error; infinity: until the next valid one."""
+    """Number of measurements for which the last valid value replaces an error; infinity means until the next valid
+    value.
+    """
     reduction: int = 1
     """Output reduction: one of this number of measurements is sent."""
     reduced: tuple[str, ...] = ("RS422",)
