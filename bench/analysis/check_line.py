@@ -12,12 +12,12 @@ class Verdict(StrEnum):
     PASSED = "passed"
     FAILED = "failed"
     STATED = "stated"
-    """Verdict of a line without tolerance."""
+    """Verdict for a line without tolerance."""
     UNTESTED = "untested"
 
 
 _OWN_UNIT = "any"
-"""Every line states its unit."""
+"""Unit of the numbers in the declaration of a line, since every line states its unit."""
 
 
 class CheckLine(Parameters):
@@ -31,8 +31,8 @@ class CheckLine(Parameters):
     expected: float | None = quantity(None, _OWN_UNIT, "expected value, in `unit`")
     lowest: float | None = quantity(None, _OWN_UNIT, "lowest value that passes, in `unit`")
     highest: float | None = quantity(None, _OWN_UNIT, "highest value that passes, in `unit`")
-    unit: str = quantity("1", "", "unit of the numbers of this line")
-    remedy: str = quantity("", "", "remedy if it has not passed")
+    unit: str = quantity("1", "", "unit of the numbers in this line")
+    remedy: str = quantity("", "", "remedy if the line has not passed")
 
 
 def judged(
@@ -46,7 +46,7 @@ def judged(
     expected: float | None = None,
     uncertainty: float | None = None,
 ) -> CheckLine:
-    """A line that passes when the measured value lies within `allowed`, ends included; the upper may be infinite."""
+    """A line that passes if the measured value is within `allowed`, ends included; the upper end may be infinite."""
     lowest, highest = allowed
     passed = lowest <= measured <= highest
     return CheckLine(

@@ -1,4 +1,4 @@
-"""Each cycle of a dwell as Fourier coefficients: least squares on a known frequency (IEEE 1057, joint harmonics).
+"""Fourier coefficients of each cycle of a dwell, by least squares at a known frequency (IEEE 1057, joint harmonics).
 
 A fit over one cycle does not require an integer number of samples, averages the noise of hundreds of samples, and
 yields the peak of the motion without the upward bias of the largest noisy sample.
@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 HARMONICS = 10
-"""Harmonics fitted jointly: the drift of a rocking frame has less than 1e-5 of its peak above them."""
+"""Number of jointly fitted harmonics; the drift of a rocking frame has less than 1e-5 of its peak above them."""
 
 COMPLETE = 0.98
-"""Least fraction of valid samples in a cycle: a laser that leaves its range at every peak would bias the fit."""
+"""Minimum fraction of valid samples in a cycle: a laser that leaves its range at every peak would bias the fit."""
 
 _GRID = 256
 _ANGLES: NDArray[np.float64] = np.arange(_GRID, dtype=np.float64) * (tau / _GRID)
@@ -40,12 +40,12 @@ def _period(harmonics: int) -> NDArray[np.float64]:
 
 @dataclass(frozen=True)
 class Cycle:
-    """One cycle of the drive's period. The last column of every array is the drive [V], the others the signals.
+    """One cycle of the drive's period. The last column of every array is for the drive [V], the others for the signals.
 
     `coefficients`, shape (1 + 2 H, m): mean, cosines and sines of the harmonics of phase = omega (sample index) / rate.
     `fundamental` are complex amplitudes c with signal = Re(c exp(-i phase)); `peak` is the largest magnitude of the
-    fitted motion, its mean included; `noise` the residual's rms; shape (m,) each. `extreme`, shape (m,), is the largest
-    magnitude of the samples: the fit overshoots a motion that differs at both ends of the cycle.
+    fitted motion, including its mean; `noise` is the rms of the residual; shape (m,) each. `extreme`, shape (m,), is
+    the largest magnitude of the samples: the fit overshoots a motion that differs at both ends of the cycle.
     """
 
     index: int
@@ -59,7 +59,7 @@ class Cycle:
     def harmonics(self, column: int) -> NDArray[np.complex128]:
         """Complex amplitudes z_k of one signal, shape (HARMONICS,): it is Im(sum of z_k exp(i k phase)) and its mean.
 
-        Harmonics without a fit are zero, higher ones are omitted.
+        Harmonics that were not fitted are zero; higher ones are omitted.
         """
         fitted = (self.coefficients.shape[0] - 1) // 2
         found = np.zeros(HARMONICS, dtype=np.complex128)
@@ -71,8 +71,8 @@ class Cycle:
 def fit_cycle(
     index: int, phase: NDArray[np.float64], values: NDArray[np.float64], highest: int = HARMONICS
 ) -> Cycle | None:
-    """Fit samples `values`, shape (n, m), at `phase` [rad] up to harmonic `highest`, or fewer if there are few samples.
-    None where too many samples are missing (NaN).
+    """Fit samples `values`, shape (n, m), at `phase` [rad] up to harmonic `highest`, or to a lower one if there are few
+    samples. Returns None if too many samples are missing (NaN).
     """
     finite = np.isfinite(values)
     share = 1.0
@@ -98,8 +98,8 @@ def fit_cycle(
 
 
 _SHARE = 16
-"""A peak is the vertex of a parabola fitted to a sixteenth of the cycle, which averages the noise; the error of the
-vertex is 5e-6 for a sine and 3e-3 for a fifth harmonic.
+"""Fraction of a cycle to which a parabola is fitted, whose vertex is the peak: this averages the noise; the error of
+the vertex is 5e-6 for a sine and 3e-3 for a fifth harmonic.
 """
 
 
@@ -126,7 +126,7 @@ def _extreme(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def mean_amplitude(cycles: Sequence[Cycle], column: int) -> float:
-    """Mean over cycles of the magnitude of one signal's fundamental."""
+    """Mean, over cycles, of the magnitude of one signal's fundamental."""
     return float(np.mean([abs(cycle.fundamental[column]) for cycle in cycles]))
 
 
@@ -135,8 +135,8 @@ class Waves:
     """The mean of many cycles.
 
     `waveform` and its `rates` [per rad of phase], shape (k, m), over one period; `peaks`, shape (m,), are the largest
-    magnitudes, in row `at` of the waveform; `there`, (n, m), is each cycle's magnitude at that point. `harmonics`,
-    (m,), are the rms of all above the fundamental over the fundamental.
+    magnitudes, in row `at` of the waveform; `there`, shape (n, m), is each cycle's magnitude at that point.
+    `harmonics`, shape (m,), is the rms of all harmonics above the fundamental, divided by the fundamental.
     """
 
     waveform: NDArray[np.float64]
@@ -148,7 +148,7 @@ class Waves:
 
 
 def mean_waves(cycles: Sequence[Cycle], bound: Mapping[int, int] | None = None) -> Waves:
-    """Mean of the coefficients, which unlike a mean of peaks is not biased by noise.
+    """Mean of the coefficients, which, unlike a mean of peaks, is not biased by noise.
 
     `bound` is the highest harmonic of each column whose signal has no mean and no higher harmonics.
     """

@@ -17,8 +17,8 @@ PERIODS = 2.0
 """Periods of the frame's first mode covered by the mean.
 
 In violent rocking without a fall (30 simulated records, up to 3 times the uplift acceleration) the mean over one period
-reaches 1.28 times the threshold, that over two 0.68 times; a fall is detected 0.2 to 0.9 s after the block has passed
-`FALLEN_TILT`.
+reaches 1.28 times the threshold, the mean over two periods 0.68 times; a fall is detected 0.2 to 0.9 s after the block
+has passed `FALLEN_TILT`.
 """
 
 
@@ -41,7 +41,7 @@ class FallWatch:
         return self._threshold
 
     def fallen(self, signals: NDArray[np.float64]) -> bool:
-        """Whether the next block of signals, shape (n, n_signals), shows a fallen block."""
+        """Whether the next block of signals, shape (n, n_signals), shows that the rocking block has fallen."""
         if self._threshold == 0.0:
             return False
         u1 = signals[:, U1]

@@ -1,7 +1,7 @@
 """Description of an unsteady motion: peaks of its cycles, period, and rate of approach to a periodic motion.
 
-The peak of a cycle is that of its samples. A fit of one cycle by harmonics of the drive overshoots it, by 10 % where
-the amplitude changes by half within a few cycles, because the motion then differs at both ends of the cycle.
+The peak of a cycle is taken from its samples. A fit of one cycle by harmonics of the drive overshoots it, by 10 % if
+the amplitude changes by half within a few cycles, because the motion then differs at the two ends of the cycle.
 """
 
 from collections.abc import Sequence
@@ -24,16 +24,18 @@ KEPT = 1000
 """Largest number of cycles from which the rate is computed."""
 
 LINEAR = 0.98
-"""Smallest share of the changes from cycle to cycle explained by one pair of multipliers for which a rate is stated."""
+"""Smallest fraction of the changes from cycle to cycle that one pair of multipliers must explain for a rate to be
+stated.
+"""
 
 
 KNOWN, TURNS = 0.02, 2.0
-"""Largest standard uncertainty of the modulus, and least number of turns of the spiral, for the orbit's own peak to be
-stated: the mean over less than a turn is that of one side.
+"""Largest standard uncertainty of the modulus, and minimum number of turns of the spiral, for the orbit's peak to be
+stated: the mean over less than a turn covers only one side.
 """
 
 UNKNOWN = 0.1
-"""Standard uncertainty of a modulus above which no rate is stated: the multiplier is that of the noise."""
+"""Standard uncertainty of a modulus above which no rate is stated, since the multiplier is then due to noise."""
 
 SMALL = 0.15
 """Largest relative deviation of the peaks from their mean at which the peak of the orbit is still stated."""
@@ -61,7 +63,7 @@ class Rate:
 @dataclass(frozen=True)
 class FreeMotion:
     """Peaks of the drift per cycle [m]: smallest, mean and largest. `repeats` is the number of cycles after which the
-    motion repeats, 0 where it does not; `rate` is None where the changes are not those of a linear system.
+    motion repeats, 0 if it does not; `rate` is None if the changes are not those of a linear system.
     """
 
     least: float
@@ -86,8 +88,9 @@ def free_motion(cycles: Sequence[Cycle]) -> FreeMotion:
 
 
 def orbit_peak(cycles: Sequence[Cycle], motion: FreeMotion, omega: float) -> SteadyPeak | None:
-    """Peak of the mean of the last `CYCLES` cycles at `omega` [rad/s]: that of the periodic motion about which a motion
-    turns, to second order in the deviation. None where the deviation is large, or the changes are not linear.
+    """Peak of the mean of the last `CYCLES` cycles at `omega` [rad/s], which to second order in the deviation is the
+    peak of the periodic motion about which the motion revolves. None if the deviation is large or the changes are not
+    linear.
 
     The square of the relative deviation, as a rectangular distribution, is added as a transient. On exact motions of
     the model near their boundaries of stability, with deviations up to 10 %, the error was at most 5.1e-4.
@@ -102,7 +105,7 @@ def _rate(amplitudes: NDArray[np.complex128]) -> Rate | None:
     """Rate from the linear map of changes from cycle to cycle, in the plane of their two largest components.
 
     The preceding changes are the instrumental variables of the least-squares problem: noise of the amplitudes would
-    bias the multipliers low, but is independent for changes that share no cycle.
+    bias the multipliers towards zero, but is independent for changes that share no cycle.
     """
     moved = np.diff(np.concatenate((amplitudes.real, amplitudes.imag), axis=1), axis=0)
     size = float(np.sum(moved**2))

@@ -1,4 +1,4 @@
-"""Gain coefficient from measured cycles, with its uncertainty (GUM and Monte Carlo method of its Supplement 1)."""
+"""Gain coefficient from measured cycles, with its uncertainty (GUM, and the Monte Carlo method of GUM Supplement 1)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,13 +15,15 @@ from bench.analysis.uncertainty import COVERAGE as COVERAGE
 from bench.analysis.uncertainty import Budget
 
 DRAWS, SEED = 4000, 1
-"""Monte Carlo draws of the sensors' errors: the expanded uncertainty then has a statistical scatter of 1.1 %."""
+"""Number of Monte Carlo draws of the sensors' errors; with it, the expanded uncertainty has a statistical scatter of
+1.1 %.
+"""
 
 ZERO_PLACES = 32
 """Number of points that represent the mean over a cycle."""
 
 PEAK_HARMONICS = 5
-"""Highest harmonic of the peak of a steady drift. An impact acts on the second storey through two springs and two
+"""Highest harmonic used for the peak of a steady drift. An impact acts on the second storey through two springs and two
 masses: higher harmonics change the peak by less than 1e-4, less than the laser resolution does.
 """
 
@@ -72,10 +74,10 @@ def steady_peak(cycles: Sequence[Cycle], omega: float, residual: float = 0.0) ->
     """Peak of the mean cycle at `omega` [rad/s], counted from the mean over the cycle.
 
     Over a period of a steady motion the second storey gains no momentum, so the force k2 drift that alone drives it has
-    zero mean, whatever the block does: the mean is a better zero of the sensors than a rest before the test, which has
-    one rounding error of each laser. The larger of both sides then does not include that error. The scatter is that of
-    the cycles at the peak, corrected for the correlation of neighbours, M_eff = M (1 - r1) / (1 + r1). `residual`, the
-    relative bound of a remaining transient, is taken as a rectangular distribution.
+    zero mean, whatever the block does: the mean is a better zero of the sensors than a rest before the test, which
+    contains one rounding error of each laser, and the larger of the two sides does not include that error. The scatter
+    is that of the cycles at the peak, corrected for the correlation of neighbours, M_eff = M (1 - r1) / (1 + r1).
+    `residual`, the relative bound of a remaining transient, is taken as a rectangular distribution.
     """
     waves = mean_waves(cycles, {DRIFT: PEAK_HARMONICS})
     drift = float(waves.peaks[DRIFT])
@@ -158,14 +160,14 @@ def gain(
     """alpha_2 = peak drift coupled / peak drift bare (Eq. 10) at one frequency.
 
     The lasers are the same in both tests, so their common errors cancel, including nearly all of a scale error: see
-    `SensorUncertainty.drift_errors`. As the second storey is driven by k2 drift alone, the reading of a laser on the
-    ground is the same multiple of the drift in both tests, except for damping and harmonics, and so is the effect of a
-    scale error.
+    `SensorUncertainty.drift_errors`. Since only the force k2 times drift acts on the second storey, the reading of a
+    laser on the ground is the same multiple of the drift in both tests, except for damping and harmonics, and so is the
+    effect of a scale error.
 
     `amplitude_slope` is d ln alpha_2 / d ln amplitude: the effect of a scale error of the table's acceleration on the
     gain at the stated amplitude; it cancels for a proportional response.
 
-    With `shared` draws the uncertainty differs by at most 1e-9, relative, at a fraction of the time.
+    With `shared` draws the uncertainty differs by at most 1e-9, relative, and takes a fraction of the time.
     """
     alpha = coupled.drift / bare.drift
     draws = Draws(np.random.default_rng(SEED), DRAWS) if shared is None else shared.again()
@@ -173,7 +175,7 @@ def gain(
     parts = {name: float(np.std(each[1] / coupled.drift - each[0] / bare.drift)) for name, each in errors.items()}
     parts |= {
         "scatter of the cycles": hypot(coupled.scatter / coupled.drift, bare.scatter / bare.drift),
-        "transient that may be left": hypot(coupled.transient / coupled.drift, bare.transient / bare.drift),
+        "transient that may remain": hypot(coupled.transient / coupled.drift, bare.transient / bare.drift),
         "amplitude of the table": abs(amplitude_slope) * sensors.table_scale,
     }
     return Gain(alpha, Budget({name: alpha * value for name, value in parts.items()}))

@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 
 class LaserCurve(Parameters):
-    """Error of one laser as a function of its reading [m] from the middle of its range."""
+    """Error of one laser as a function of its reading [m] relative to mid range."""
 
     sensor: str = quantity(..., "", "description of the laser in the data file of its calibration")
     lowest: float = quantity(..., "m", "least reading covered", usual=(1e-3, 1.0))
@@ -28,15 +28,17 @@ class LaserCurve(Parameters):
     error: tuple[float, ...] = quantity(
         ...,
         "m",
-        "Chebyshev coefficients, over the covered readings, of the laser's error",
+        "Chebyshev coefficients of the laser's error over the covered readings",
         min_length=2,
         usual=(0.0, 2e-3),
     )
     uncertainty: float = quantity(
         ..., "m", "standard uncertainty of that error at one reading", ge=0, usual=(1e-6, 1e-3)
     )
-    scale: float = quantity(..., "1", "relative span of its readings, normalised to a mean of 1 over both lasers")
-    delay: float = quantity(..., "s", "delay after the table's displacement sensor", usual=(1e-5, 0.05))
+    scale: float = quantity(
+        ..., "1", "relative span of the laser's readings, normalised to a mean of 1 over both lasers"
+    )
+    delay: float = quantity(..., "s", "delay relative to the table's displacement sensor", usual=(1e-5, 0.05))
     delay_uncertainty: float = quantity(..., "s", "standard uncertainty of the delay", ge=0, usual=(1e-7, 1e-3))
 
     @model_validator(mode="after")
@@ -60,7 +62,7 @@ class LaserCalibration(Parameters):
     laser_2: LaserCurve
     differential_scale: float = quantity(..., "1", "ratio of the scales of laser 2 and laser 1, before the correction")
     differential_uncertainty: float = quantity(
-        ..., "1", "standard uncertainty of that ratio after the correction", ge=0
+        ..., "1", "standard uncertainty of that ratio, after the correction", ge=0
     )
     common_linearity: float = quantity(
         ...,
@@ -92,9 +94,9 @@ class LaserCalibration(Parameters):
         )
 
     def strange(self, devices: Mapping[str, str]) -> tuple[str, ...]:
-        """Warnings where `devices`, by channel, differ from the calibrated ones."""
+        """Warnings about `devices`, by channel, that differ from the calibrated ones."""
         return tuple(
-            f"the laser calibration is for {name} = {curve.sensor}, this one is {devices[name]}: "
+            f"the laser calibration is for {name} = {curve.sensor}, but the mounted laser is {devices[name]}: "
             "calibrate again with `rockbench run laser-calibration`"
             for name, curve in (("laser_1", self.laser_1), ("laser_2", self.laser_2))
             if name in devices and devices[name] != curve.sensor

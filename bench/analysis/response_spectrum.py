@@ -82,7 +82,7 @@ def _turning_points(u: Array, v: Array, dt: float) -> float:
     u0, v0, v1 = u[at], v[at] * dt, v[at + 1] * dt
     rise = u[at + 1] - u0
     second, third = 3.0 * rise - 2.0 * v0 - v1, v0 + v1 - 2.0 * rise
-    # the one root in (0, 1) of v0 + 2 second s + 3 third s^2, in the form that does not cancel
+    # the one root in (0, 1) of v0 + 2 second s + 3 third s^2, in a form without cancellation
     q = -second - np.copysign(np.sqrt(np.maximum(second**2 - 3.0 * third * v0, 0.0)), second)
     s = np.where((q * v0 > 0.0) & (np.abs(v0) <= np.abs(q)), v0 / q, q / np.where(third == 0.0, 1.0, 3.0 * third))
     return float(np.abs(u0 + s * (v0 + s * (second + s * third))).max())

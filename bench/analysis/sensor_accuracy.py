@@ -24,7 +24,7 @@ from sim.parameters import Parameters, quantity
 Array = NDArray[np.float64]
 
 WAVES = (0.5, 2.0)
-"""Least and most periods of a linearity error within the range."""
+"""Minimum and maximum number of periods of a linearity error within the range."""
 
 LINEARITY, SCALES, TIMING, STEPS = (
     "linearity of the lasers",
@@ -63,12 +63,10 @@ class SensorAccuracy(Parameters):
 class PeakReadings:
     """Readings of both lasers at the peak of a drift, from the rest position of the storeys.
 
-    drift, sign : the peak [m], and its side, 1 or -1.
-    lasers, speeds : reading of each laser [m] and its rate [m/s].
-    zero : readings [m] whose mean is the zero of the peak, shape (2, n): (0, 0) for a zero taken at rest.
-    swings : span of each laser's readings [m] in the fit of the peak; `terms`: number of independent rounding errors in
-    the peak: 1 for a mean.
-    at_rest : whether the zero was taken at rest, where the rounding is not averaged.
+    drift, sign : the peak [m], and its side, 1 or -1. lasers, speeds : reading of each laser [m] and its rate [m/s].
+    zero : readings [m] whose mean is the zero of the peak, shape (2, n): (0, 0) for a zero taken at rest. swings : span
+    of each laser's readings [m] in the fit of the peak; `terms`: number of independent rounding errors in the peak, 1
+    for a mean. at_rest : whether the zero was taken at rest, where the rounding is not averaged.
     """
 
     drift: float
@@ -94,11 +92,11 @@ class SensorUncertainty:
 
     @property
     def table_scale(self) -> float:
-        """Standard relative uncertainty of the scales of the table's sensors."""
+        """Relative standard uncertainty of the scales of the table's sensors."""
         return self.accuracy.table_scale if self.calibration is None else self.calibration.table_uncertainty
 
     def drift_errors(self, seen: Sequence[PeakReadings], draws: "Draws") -> dict[str, Array]:
-        """Errors [m] of the peaks of tests with the same lasers, by contribution, shape (tests, n) each."""
+        """Errors [m] of the peaks in tests with the same lasers, by contribution, shape (tests, n) each."""
         first, second = (self.linearity(k, seen, draws) for k in range(2))
         errors = {LINEARITY: second - first + self._common(seen, draws)}
         mismatch = self.accuracy.laser_mismatch
@@ -164,7 +162,7 @@ class Curve:
 
 
 class Draws:
-    """`n` draws of the errors of sensors, from one generator, in the order of the calls."""
+    """`n` draws of sensor errors from one generator, in the order of the calls."""
 
     def __init__(self, random: np.random.Generator, n: int) -> None:
         self._random, self.n = random, n
@@ -184,8 +182,8 @@ class Draws:
 
 
 NODES = 24
-"""Chebyshev points in the range of WAVES. The mean of exp(i w x) over places x, all within the measuring range of the
-zero, is interpolated at w with a relative error of 1e-14.
+"""Number of Chebyshev points in the range of WAVES. The mean of exp(i w x) over places x, all within the measuring
+range of the zero, is interpolated at w with a relative error of 1e-14.
 """
 
 
@@ -214,7 +212,7 @@ class InterpolatedCurve(Curve):
 
 
 class SharedDraws(Draws):
-    """Equal draws for every pair of peaks: those of a new generator, made once; curves are interpolated."""
+    """Identical draws for every pair of peaks, made once by a new generator; curves are interpolated."""
 
     def __init__(self, seed: int, n: int) -> None:
         super().__init__(np.random.default_rng(seed), n)
@@ -224,7 +222,7 @@ class SharedDraws(Draws):
         self._curves: dict[object, Curve] = {}
 
     def again(self) -> "SharedDraws":
-        """Return these draws, restarted from the first one."""
+        """These draws, restarted from the first one."""
         self._asked = ()
         return self
 

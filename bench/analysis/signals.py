@@ -19,7 +19,7 @@ table [m], drift u2 - u1 [m], and the readings of the two lasers [m]."""
 ACCELERATION, DISPLACEMENT, U1, DRIFT, LASER_1, LASER_2 = range(6)
 
 MEASURED_BY = (TABLE_ACCELERATION, TABLE_DISPLACEMENT, *STOREYS)
-"""The channels from which the signals are computed."""
+"""Channels from which the signals are computed."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class SignalMap:
 
     Lasers on the ground measure x_g + u; lasers on the table measure u. The drift does not depend on x_g in either
     case. A `calibration` corrects lasers and table sensors for their identified errors. All other channels are
-    `further` columns after those of SIGNALS. Raises InvalidInput where a channel is missing.
+    `further` columns after those of SIGNALS. Raises InvalidInput if a channel is missing.
     """
 
     def __init__(
@@ -66,7 +66,7 @@ class SignalMap:
     def tare(self, values: NDArray[np.float64]) -> None:
         """Take the mean of channel values at rest, shape (n, n_channels), as the zero of every signal.
 
-        A signal without any value keeps the zero of its sensor.
+        A signal without any value keeps its sensor's zero.
         """
         raw = self._raw(values)
         valid = np.count_nonzero(np.isfinite(raw), axis=0)
@@ -100,6 +100,8 @@ class SignalMap:
 
 
 def scatter(signals: NDArray[np.float64]) -> float:
-    """Larger standard deviation of u1 and drift [m], shape (n, n_signals); infinite where samples are missing."""
+    """The larger of the standard deviations of u1 and drift [m] in signals of shape (n, n_signals); infinite if samples
+    are missing.
+    """
     deviation = np.std(signals[:, [U1, DRIFT]], axis=0)
     return float(np.nan_to_num(deviation, nan=np.inf).max())

@@ -23,8 +23,8 @@ KIN_SHARE = 0.25
 
 @dataclass(frozen=True)
 class Steadiness:
-    """Steadiness of a dwell. `spread` and `drift` are relative to each signal's mean amplitude, the largest over the
-    signals.
+    """Steadiness of a dwell. `spread` and `drift` are relative to each signal's mean amplitude; they are the largest
+    values over the signals.
 
     `repeats` is the number of cycles after which the motion repeats: 1 when it is steady, 2..6 for a
     subharmonic, 0 when it does not repeat.
@@ -42,9 +42,9 @@ class SteadyDetector:
     Steady means: the means of the two windows differ by less than a third of the tolerance, which bounds the remainder
     of a transient that decays by 2 % per cycle (0.98^12 / (1 - 0.98^12) / 3 = 1.2 tolerances); and within the last
     window no cycle deviates from the mean by more than `SPREAD` tolerances. A weakly damped orbit excited by noise, or
-    a transient that rotates from cycle to cycle, spreads more than it shifts the mean; its remainder is in the scatter
-    of the measured cycles. Every signal is allowed a noise floor of four standard deviations of a fitted amplitude,
-    sigma sqrt(2 / N), and every phase the jitter of a sensor with a free clock.
+    a transient that rotates from cycle to cycle, spreads the cycles more than it shifts their mean; what remains of it
+    is part of the scatter of the measured cycles. Every signal is allowed a noise floor of four standard deviations of
+    a fitted amplitude, sigma sqrt(2 / N), and every phase the jitter of a sensor with a free clock.
     """
 
     def __init__(
@@ -55,9 +55,9 @@ class SteadyDetector:
         jitter: float = 0.0,
         reference: Sequence[int] = (),
     ) -> None:
-        """`columns` are the signals assessed, by default all; `kin` the indices among them of signals of the same kind,
-        each assessed relative to at least `KIN_SHARE` of the largest. `reference` are signals not assessed; every other
-        one is assessed relative to at least `KIN_SHARE` of them. `jitter` [rad] is the wander of a phase due to a
+        """`columns` are the assessed signals, by default all; `kin` holds the indices among them of signals of the same
+        kind, each assessed relative to at least `KIN_SHARE` of the largest. `reference` are signals not assessed; every
+        other one is assessed relative to at least `KIN_SHARE` of them. `jitter` [rad] is the wander of a phase due to a
         sensor's free clock.
         """
         self._tolerance = tolerance
@@ -72,7 +72,7 @@ class SteadyDetector:
         self._cycles.append(cycle)
 
     def restart(self) -> None:
-        """Discard all cycles, after a change of the drive."""
+        """Discard all cycles after a change of the drive."""
         self._cycles.clear()
 
     def judge(self, allowance: float = 1.0) -> Steadiness:
@@ -108,7 +108,7 @@ class SteadyDetector:
         these: NDArray[np.complex128] | NDArray[np.float64],
         those: NDArray[np.complex128] | NDArray[np.float64],
     ) -> NDArray[np.float64]:
-        """Distance of amplitudes: in magnitude, or in phase beyond the jitter."""
+        """Distance between amplitudes, in magnitude or in phase beyond the jitter."""
         size = np.abs(those)
         turned = np.abs(np.angle(these * np.conj(those))) * size
         return np.maximum(np.abs(np.abs(these) - size), turned - self._jitter * size)

@@ -38,7 +38,7 @@ def table_motion(acceleration: Array, dt: float) -> TableMotion:
 
 
 def at_rest_in_the_end(acceleration: Array, dt: float) -> Array:
-    """`acceleration` minus the two lowest sines over its length, so that the table ends at rest where it began.
+    """`acceleration` minus the two lowest sines over its duration, so that the table ends at rest where it began.
 
     The final velocity and displacement are linear in the two amplitudes, so this is exact except for
     rounding; the second iteration corrects the rounding of the first. The sines vanish at both ends: the record's end

@@ -1,7 +1,8 @@
 """Base motion of a transient from both table sensors, as the input of its prediction.
 
 At low frequencies a displacement sensor measures the acceleration far more precisely than an accelerometer, at high
-ones far less: its noise grows with omega^2. At each frequency both are combined, weighted by their noise at rest,
+frequencies far less precisely, since its noise grows with omega^2. At each frequency both are combined, weighted by
+their noise at rest,
 
     A = w (-omega^2 X) + (1 - w) A_a,    w = S_a / (S_a + omega^4 S_x),
 
@@ -33,7 +34,7 @@ def noise_density(rest: Array, sample_rate: float) -> tuple[Array, Array]:
     """Frequencies [Hz] and one-sided spectral density [unit^2/Hz] of `rest`, shape (n,), without its linear trend."""
     from scipy import signal
 
-    # `Any`: scipy's stubs know no linear trend
+    # `Any`: scipy's stubs lack the linear trend
     tools: Any = signal
     frequency, power = tools.welch(rest, sample_rate, nperseg=max(rest.size // 4, 8), detrend="linear")
     return np.asarray(frequency), np.asarray(power)
@@ -45,22 +46,24 @@ MODEL_RATE = 1000.0
 _TOP = 0.4
 """Fraction of that rate up to which the motion is retained."""
 _NOISE_BAND = (2.0, 60.0)
-"""Frequencies [Hz] between which the sensors' noise is white."""
+"""Frequencies [Hz] between which the sensors' noise is assumed white."""
 _PASSING = 0.05
 """Interval in which a sensor's resolution steps are counted [s]: a fraction of the relevant periods."""
 _CLEAR = 100.0
 """Ratio of power to noise above which a sensor measures the motion."""
 ALIKE = 0.02
-"""Relative difference of the two sensors' scales above which one is wrong: the accelerometer is used alone."""
+"""Relative difference of the two sensors' scales above which one is assumed wrong and only the accelerometer is
+used.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class BaseMotion:
     """Acceleration of the table [m/s2], shape (n,), every `dt` [s]; `draw` adds random errors.
 
-    `agreement` is the displacement sensor's scale over the accelerometer's, from the motion itself; None where the
-    motion is too small. Where it is not 1 the accelerometer is used alone. `noise` is the spectral density of
-    the error [(m/s2)^2/Hz] at the frequencies of `numpy.fft.rfft` of so many samples.
+    `agreement` is the ratio of the displacement sensor's scale to the accelerometer's, from the motion itself; None if
+    the motion is too small. If it differs from 1, only the accelerometer is used. `noise` is the spectral density of
+    the error [(m/s2)^2/Hz] at the frequencies of `numpy.fft.rfft` for n samples.
     """
 
     acceleration: Array
@@ -93,7 +96,7 @@ def base_motion(signals: Array, rest: Array, sample_rate: float) -> BaseMotion:
     """
     sensors = signals[:, [ACCELERATION, DISPLACEMENT]]
     if not (np.isfinite(sensors).all() and np.isfinite(rest[:, [ACCELERATION, DISPLACEMENT]]).all()):
-        raise InvalidInput("motion of the table", len(signals), "every sample of both of its sensors is needed")
+        raise InvalidInput("motion of the table", len(signals), "every sample of both table sensors is needed")
     still = len(rest)
     size = len(signals)
     frequency = np.fft.rfftfreq(size, 1.0 / sample_rate).astype(np.float64)
@@ -117,7 +120,7 @@ def base_motion(signals: Array, rest: Array, sample_rate: float) -> BaseMotion:
 
 
 def _density(rest: Array, values: Array, sample_rate: float) -> float:
-    """Spectral density of a sensor's white noise [unit^2/Hz]: at `rest`, or of the steps of its `values`."""
+    """Spectral density of a sensor's white noise [unit^2/Hz], at `rest` or due to the steps of its `values`."""
     frequency, power = noise_density(rest, sample_rate)
     inside = (frequency >= _NOISE_BAND[0]) & (frequency <= _NOISE_BAND[1])
     return max(float(np.mean(power[inside])), _of_steps(values, sample_rate), 1e-30)
@@ -142,7 +145,7 @@ def _levelled(values: Array, still: int) -> Array:
 
 
 def _closed(values: Array, still: int) -> Array:
-    """Values with the final offset removed smoothly: friction may stop a table at another position."""
+    """Values with the final offset removed smoothly, since friction may stop a table at a different position."""
     begin, end = float(values[:still].mean()), float(values[-still:].mean())
     x = np.linspace(0.0, 1.0, values.size)
     return values - begin - (end - begin) * x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
@@ -156,7 +159,9 @@ def _alignment(
     noise_x: Array,
     duration: float,
 ) -> tuple[float | None, float]:
-    """Ratio of the scales of displacement sensor and accelerometer, None where not measurable, and its lead [s]."""
+    """Ratio of the scales of displacement sensor and accelerometer, None if not measurable, and the displacement
+    sensor's lead [s].
+    """
     # a density and the spectrum of n samples at rate f: |S|^2 = density n f / 2
     to_power = 0.5 * duration * (2.0 * frequency[-1]) ** 2
     clear = (np.abs(a) ** 2 > _CLEAR * noise_a * to_power) & (np.abs(x) ** 2 > _CLEAR * noise_x * to_power)

@@ -1,10 +1,10 @@
 """Peak of a noisy transient, without the bias of the largest sample.
 
-The largest of many noisy samples is too large by several standard deviations, the more so the smaller the motion. Here
-a polynomial of degree four is fitted by least squares around each maximum that may be the greatest, and its extremum is
-the peak. The window follows from the signal's bandwidth: of the terms missing in the polynomial, the sixth derivative
-is the first that shifts the centre of the window. The residual of x^6 over a window of half width h is the monic
-Legendre polynomial P_6 there, so the shift is
+The largest of many noisy samples is too large by several standard deviations, and the relative error grows as the
+motion becomes smaller. Here a polynomial of degree four is fitted by least squares around each maximum that may be the
+greatest, and its extremum is the peak. The window follows from the signal's bandwidth: of the terms missing in the
+polynomial, the sixth derivative is the first that shifts the centre of the window. The residual of x^6 over a window of
+half width h is the monic Legendre polynomial P_6 there, so the shift is
 
     (5 / 231) h^6 s^(6) / 720,    s^(6) ~ A omega_6^6,    omega_6^12 = sum omega^12 |S|^2 / sum |S|^2,
 
@@ -54,15 +54,17 @@ _REMAINDER = 5.0 / 231.0 / 720.0
 _VARIANCE = 225.0 / 64.0
 """Variance of the fitted value at the centre, relative to sigma^2 / samples."""
 _NARROWEST = 6
-"""Least half width of the window in samples."""
+"""Minimum half width of the window in samples."""
 _WIDEST = 0.5 * pi
-"""Largest omega_6 h: a quarter of a period to either side."""
+"""Largest omega_6 h, a quarter of a period to either side."""
 _BAND = (4.0, 50.0)
-"""Frequencies [Hz] at which the noise of a fit is evaluated: below them a frame may still vibrate at rest."""
+"""Frequencies [Hz] at which the noise of a fit is evaluated; below them, a frame may still vibrate at rest."""
 _STANDS_OUT, _SMOOTHED = 4.0, 0.5
-"""Power relative to the noise above which a frequency counts as signal; width of the preceding average [Hz]."""
+"""Power relative to the noise above which a frequency counts as signal, and width of the average taken beforehand
+[Hz].
+"""
 _RIVALS = 6.0
-"""Standard deviations below the greatest maximum within which another one may be the true greatest."""
+"""Number of standard deviations below the greatest maximum within which another maximum may be the true greatest."""
 _RAISED = 0.5
 _DRAWS, _SEED, _HALVINGS = 2000, 20, 30
 _MISSING = 0.25
@@ -74,8 +76,9 @@ class TransientPeak:
     """The greatest magnitude of a signal, in its unit.
 
     `value` is corrected for the selection of the greatest; `uncertainty` is standard and due to noise alone; `bias` is
-    the largest shift due to the fit's degree. `time` [s] since the first sample is that of the greatest maximum, `sign`
-    its side, `window` [s] the half width of the fit, and `rivals` the number of other maxima that may be the greatest.
+    the largest shift due to the fit's degree. `time` [s] is the time of the greatest maximum since the first sample,
+    `sign` its side, `window` [s] the half width of the fit, and `rivals` the number of other maxima that may be the
+    greatest.
     """
 
     value: float
@@ -90,7 +93,7 @@ class TransientPeak:
 def transient_peak(signal: Array, rest: Array, sample_rate: float) -> TransientPeak:
     """The peak of |`signal`|, shape (n,), zero at rest; `rest`, shape (m,), is its noise without motion.
 
-    NaN stands for a missing sample. Raises InvalidInput when there is no motion above the noise, or when samples are
+    NaN stands for a missing sample. Raises InvalidInput if there is no motion above the noise, or if samples are
     missing where it is greatest.
     """
     known = np.isfinite(signal)
@@ -132,7 +135,7 @@ class _Maximum:
 def _equivalent_noise(density: tuple[Array, Array], sample_rate: float) -> float:
     """Standard deviation of the white noise that has the density of the slow part of the true one.
 
-    Only that part affects a fit; filtered samples scatter less but are not independent.
+    Only that part affects a fit; filtered samples scatter less, but are not independent.
     """
     frequency, power = density
     slow = (frequency > _BAND[0]) & (frequency < _BAND[1])
@@ -206,9 +209,9 @@ def _greatest(maxima: Array) -> tuple[float, float]:
 
     `maxima`: (value, uncertainty), shape (n, 2). The largest of several noisy values is too large. The estimate mu is
     the value for which the expected maximum equals the observed one, with no true value above mu. The others are raised
-    by half a standard deviation: near mu they appear too low because the greatest was selected. The bias, 2 standard
-    deviations for 24 equal maxima, falls below a half, also for fewer maxima. The uncertainty is that of one maximum:
-    rivals do not reduce it.
+    by half a standard deviation, because near mu they appear too low once the greatest has been selected. The bias, 2
+    standard deviations for 24 equal maxima, thus falls below one half, also for fewer maxima. The uncertainty is that
+    of one maximum; rivals do not reduce it.
     """
     values, spreads = maxima.T
     top, widest = float(values.max()), float(spreads.max())

@@ -2,10 +2,10 @@
 
 The Birge ratio, the root of chi2 / (R - 1), shows whether R repeats scatter more than stated (Birge, Physical Review 40
 (1932) 207). Where it exceeds 1, the same term is added to each variance to reduce it to 1 (Mandel and Paule, Analytical
-Chemistry 42 (1970) 1194): a dominant scatter makes the weights equal. Few repeats determine the scatter only roughly,
-so its part follows Student's t with R - 1 degrees of freedom: it is enlarged until +-1.96 times the combined
-uncertainty covers 95 %, as elsewhere (GUM:2008, G.4). Where the scatter is one to four times as large as stated,
-repeats may agree by chance: the interval of two then covers 87 %, of three 91 %, of five or more 93 %.
+Chemistry 42 (1970) 1194): a dominant scatter makes the weights equal. A few repeats determine the scatter only roughly,
+so its contribution follows Student's t with R - 1 degrees of freedom: it is enlarged until +-1.96 times the combined
+uncertainty covers 95 %, as elsewhere (GUM:2008, G.4). If the scatter is one to four times as large as stated, repeats
+may agree by chance: the interval then covers 87 % for two repeats, 91 % for three, and 93 % for five or more.
 """
 
 import json
@@ -25,7 +25,8 @@ _STEPS, _CLOSE = 200, 1e-10
 @dataclass(frozen=True, eq=False)
 class Repeats:
     """`values`, shape (n,), the means; `weights`, shape (R, n), of the repeats, which sum to 1; `scatter`, shape (n,),
-    its part of the standard uncertainties, with Student's t; `birge`, shape (n,), NaN for a single repeat.
+    the contribution of the scatter to the standard uncertainties, with Student's t; `birge`, shape (n,), NaN for a
+    single repeat.
     """
 
     values: Array
@@ -35,7 +36,7 @@ class Repeats:
 
 
 def mean_of_repeats(values: ArrayLike, variances: ArrayLike) -> Repeats:
-    """Mean of R repeats of n independent quantities: `values` and their own `variances`, shapes (R, n)."""
+    """Mean of R repeats of n independent quantities, from `values` and their `variances`, both of shape (R, n)."""
     found, own = np.asarray(values, dtype=np.float64), np.asarray(variances, dtype=np.float64)
     number = len(found)
     added, birge = np.zeros(found.shape[1]), np.full(found.shape[1], np.nan)
@@ -55,7 +56,9 @@ def enlarged(covariance: Array, scatter: Array) -> Array:
 
 
 def student_factor(number: int) -> float:
-    """Factor on the scatter of so many repeats: 95 % interval of Student's t over the normal one."""
+    """Factor on the scatter for this number of repeats: ratio of the 95 % intervals of Student's t and the normal
+    distribution.
+    """
     from scipy.stats import norm, t
 
     return float(t.ppf(_LEVEL, number - 1) / norm.ppf(_LEVEL)) if number > 1 else 0.0
@@ -70,7 +73,7 @@ def _squares(values: Array, variances: Array) -> Array:
 
 
 def _addition(values: Array, variances: Array) -> Array:
-    """Common addition to the variances for Birge ratios of 1, shape (n,); zero where they are smaller.
+    """Common addition to the variances for Birge ratios of 1, shape (n,); zero where the ratios are smaller.
 
     Newton's method from zero converges from below (DerSimonian and Kacker, Contemporary Clinical Trials 28 (2007) 105),
     and doubles the addition per step while far from the solution.
@@ -99,7 +102,7 @@ class Budget:
 
     @property
     def largest_first(self) -> dict[str, float]:
-        """The parts in descending order."""
+        """The contributions in descending order."""
         return dict(sorted(self.parts.items(), key=lambda part: -part[1]))
 
     @property
@@ -127,12 +130,12 @@ def decimals(uncertainty: float) -> int | None:
 
 
 def plus_minus(value: float, uncertainty: float, sign: str = "+-") -> str:
-    """A value with its uncertainty, as in 213.44 +- 0.32; only the value without a usable uncertainty."""
+    """A value with its uncertainty, as in 213.44 +- 0.32; the value alone if there is no usable uncertainty."""
     places = decimals(uncertainty)
     return f"{value:.6g}" if places is None else f"{value:.{places}f} {sign} {uncertainty:.{places}f}"
 
 
 def in_brackets(value: float, uncertainty: float) -> str:
-    """A value with its uncertainty in units of the last digits, as in 213.44(16); alone without one."""
+    """A value with its uncertainty in units of the last digits, as in 213.44(16); the value alone if there is none."""
     places = decimals(uncertainty)
     return f"{value:.6g}" if places is None else f"{value:.{places}f}({round(uncertainty * 10.0**places):d})"

@@ -47,7 +47,7 @@ def _factor(typed: str, unit: str) -> float:
     if root in angular and base in cycles and _in_hertz(unit):
         return factor / tau / wanted
     hint = {("gram", "m/s2"): " (g is the gram; the acceleration of gravity is g_0)"}.get((_name(typed), unit), "")
-    what = "a pure number, or in %" if unit == "1" else f"in {unit}, or in a unit of the same dimension"
+    what = "a pure number, or a value in %" if unit == "1" else f"a value in {unit} or in a unit of the same dimension"
     raise ValueError(f"{typed} ({root or '1'}) does not have the dimension of {unit} ({base or '1'}): use {what}{hint}")
 
 

@@ -103,10 +103,12 @@ class LaserInput(AnalogInput):
         example="15030002",
     )
     baud: int | None = quantity(
-        None, "1/s", "baud rate; absent: detected automatically", ge=9600, le=1_000_000, example=921600
+        None, "1/s", "baud rate; if absent, it is detected automatically", ge=9600, le=1_000_000, example=921600
     )
-    measuring_range: float = quantity(0.200, "m", "measuring range; with serial connection checked by the sensor", gt=0)
-    polarity: Literal[1, -1] = quantity(1, "", "1 when the distance grows with the displacement of the storey")
+    measuring_range: float = quantity(
+        0.200, "m", "measuring range; checked against the sensor if connected serially", gt=0
+    )
+    polarity: Literal[1, -1] = quantity(1, "", "1 if the distance grows with the displacement of the storey, else -1")
 
 
 class Laser1(LaserInput):
@@ -125,7 +127,7 @@ class Laser2(LaserInput):
 
 
 class Hardware(Parameters):
-    """The laboratory bench: DAQ device, transducers of the table, lasers."""
+    """The laboratory bench: DAQ device, table transducers and lasers."""
 
     sample_rate: float = quantity(2000.0, "1/s", "samples per second of drive and inputs", gt=0, le=20_000)
     half_stroke: float = quantity(0.075, "m", "distance from mid stroke to each end stop", gt=0)
@@ -134,13 +136,13 @@ class Hardware(Parameters):
     moving_mass: float | None = quantity(
         None,
         "kg",
-        "mass of armature, table and fixtures, to estimate force and current; absent: no estimate",
+        "mass of armature, table and fixtures, used to estimate force and current; if absent, they are not estimated",
         gt=0,
         usual=(2.0, 500.0),
         example=50.0,
     )
     force_constant: float | None = quantity(
-        None, "N/A", "force constant of the coil, to estimate its current", gt=0, usual=(5.0, 200.0), example=50.0
+        None, "N/A", "force constant of the coil, used to estimate the current", gt=0, usual=(5.0, 200.0), example=50.0
     )
     emulator_address: str | None = quantity(
         None,
@@ -151,8 +153,8 @@ class Hardware(Parameters):
     daq: Daq = Daq()
     table_displacement: TableDisplacement = TableDisplacement()
     table_acceleration: TableAcceleration = TableAcceleration()
-    table_force: TableForce | None = quantity(None, "", "the load cell; absent: none")
-    coil_current: CoilCurrent | None = quantity(None, "", "the current monitor; absent: none")
+    table_force: TableForce | None = quantity(None, "", "the load cell; absent if there is none")
+    coil_current: CoilCurrent | None = quantity(None, "", "the current monitor; absent if there is none")
     lasers: Lasers = Lasers()
     laser_1: Laser1 = Laser1()
     laser_2: Laser2 = Laser2()
@@ -179,7 +181,7 @@ class Hardware(Parameters):
 
     @property
     def transducers(self) -> tuple[tuple[str, Transducer], ...]:
-        """The analogue inputs besides the lasers: name of the channel and its input."""
+        """The analogue inputs other than the lasers: channel name and input."""
         given = (
             (TABLE_DISPLACEMENT, self.table_displacement),
             (TABLE_ACCELERATION, self.table_acceleration),
@@ -207,8 +209,8 @@ class Hardware(Parameters):
         seen: dict[str, str] = {}
         for name, given in (*self.transducers, *self.analogue_lasers):
             if (other := seen.setdefault(given.terminal.lower(), name)) != name:
-                raise InvalidInput(f"{name}.terminal", given.terminal, f"{other} uses this terminal already")
+                raise InvalidInput(f"{name}.terminal", given.terminal, f"{other} already uses this terminal")
         serial = self.lasers.connection == "serial"
         if serial and self.laser_1.port is not None and self.laser_1.port == self.laser_2.port:
-            raise InvalidInput("laser_2.port", self.laser_2.port, "laser_1 uses this port already")
+            raise InvalidInput("laser_2.port", self.laser_2.port, "laser_1 already uses this port")
         return self

@@ -30,17 +30,17 @@ from bench.analysis.gain import SensorAccuracy
 Array = NDArray[np.float64]
 
 WAVES = np.arange(0.5, 3.01, 0.5)
-"""Periods of a linearity error within the range of a laser."""
+"""Numbers of periods of a linearity error within the range of a laser."""
 
 CLOCKS = np.array([5e-6, 1e-5, 2e-5, 5e-5, 1e-4])
 """Relative errors of a laser's clock, which determine how often a measurement is gained or lost."""
 
 PHASES = 8
-"""Phases of such a wander that are evaluated."""
+"""Number of phases of such a wander that are evaluated."""
 
 
 def waves(fit: Fit, size: float, ranges: tuple[float, float]) -> Array:
-    """Linearity errors of each laser: every number of periods and both quadratures, shape (m, 2, n)."""
+    """Linearity errors of each laser, for every number of periods and both quadratures, shape (m, 2, n)."""
     seen = fit.fitted
     errors: list[Array] = []
     # uniformly distributed phase: each quadrature has half the power
@@ -56,7 +56,7 @@ def waves(fit: Fit, size: float, ranges: tuple[float, float]) -> Array:
 
 
 def clocks(fit: Fit, wander: float) -> Array:
-    """Sawtooth delays of each laser by `wander` [s], at several rates and phases, shape (m, 2, n)."""
+    """Sawtooth delays of each laser of up to `wander` [s], at several rates and phases, shape (m, 2, n)."""
     speed, time = np.gradient(fit.fitted, fit.stretch.step, axis=1), fit.stretch.time
     errors: list[Array] = []
     for laser in range(2):
@@ -73,10 +73,10 @@ OWN, COMMON = ("noise", "table", "clock"), ("linearity", "masses", "timebase")
 """Sources that are independent between decays, and those common to all."""
 
 _RATES = np.array([2.0, 2.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0])
-"""Exponents of the sample rate in the quantities of `modal.NAMES`."""
+"""Exponents with which the sample rate enters the quantities of `modal.NAMES`."""
 
 SEGMENT = 4.0
-"""Length of the segments for the spectrum of the residual [s]."""
+"""Duration of the segments for the spectrum of the residual [s]."""
 
 BAND = 30.0
 """Upper frequency of the band in which the noise of the table's sensor at rest is evaluated [Hz]."""
@@ -84,8 +84,8 @@ BAND = 30.0
 
 @dataclass(frozen=True, eq=False)
 class Errors:
-    """Description of the errors: the `accuracy` of the sensors, the lasers' `ranges` [m], the time [s] until which
-    the stretch is at rest (`quiet`, 0 where it is not), and the covariance of the `masses` [kg2], shape (2, 2).
+    """Description of the errors: the `accuracy` of the sensors, the lasers' `ranges` [m], the time [s] until which the
+    section is at rest (`quiet`, 0 if it is not), and the covariance of the `masses` [kg2], shape (2, 2).
     """
 
     accuracy: SensorAccuracy
@@ -153,7 +153,9 @@ def _spread(moved: Array) -> Array:
 
 
 def _noise(fit: Fit) -> Array:
-    """Contribution of noise from the spectrum of each laser's residual: J R J' with R its covariance."""
+    """Contribution of noise, from the spectrum of each laser's residual: J R J', where R is the covariance of the
+    residual.
+    """
     from scipy import signal
 
     welch: Any = signal.welch

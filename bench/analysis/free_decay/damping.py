@@ -1,10 +1,10 @@
 """Dependence of a mode's damping on its amplitude.
 
-With a damping ratio xi + s A, A the amplitude of the drift in the mode, the mode's coordinate q changes by
+With a damping ratio xi + s A, where A is the amplitude of the drift in the mode, the mode's coordinate q changes by
 
     - s omega q integral of A dt
 
-to first order. These changes are further columns of the linearised fit: one for the slope s of each mode, or one for
+to first order. These changes are additional columns of the linearised fit: one for the slope s of each mode, or one for
 each of several time windows with a damping ratio different from that of the whole decay.
 """
 
@@ -20,7 +20,7 @@ from bench.analysis.free_decay.fit import COUNT, DELAYS, GAINS, OFFSETS, STATE, 
 Array = NDArray[np.float64]
 
 WINDOWS = 5
-"""Number of windows in which a mode's damping is evaluated; in each its amplitude falls by the same factor."""
+"""Number of windows in which a mode's damping is evaluated; the amplitude falls by the same factor in each."""
 
 FLOOR = 0.03
 """Fraction of its largest amplitude down to which a mode is evaluated."""
@@ -48,7 +48,7 @@ class DampingCourse:
 def damping_courses(
     fit: Fit, errors: Errors, begin: float, ratios: Array, omegas: Array
 ) -> tuple[DampingCourse, DampingCourse]:
-    """The courses of both modes from `begin` [s] on, when the excitation is over.
+    """The damping of both modes against amplitude, from `begin` [s] on, when the excitation is over.
 
     `ratios` and `omegas` [rad/s], shape (2,), are the damping ratios and undamped frequencies as fitted.
     """
@@ -118,14 +118,14 @@ def _mode(fit: Fit, which: int, begin: float, omega: float) -> _Mode:
 
 
 def _stepped(extended: Fit) -> tuple[Array, Fit]:
-    """Shifts of all values to the best fit, and the fit with the remaining residual."""
+    """Shifts of all values to the best fit, and the fit with the residual that remains."""
     moved = extended.moved(extended.residual)
     left = extended.residual - np.tensordot(moved, extended.jacobian, 1)
     return moved, replace(extended, residual=np.where(extended.residual == 0.0, 0.0, left))
 
 
 def _extended(fit: Fit, columns: list[Array], *, keep_damping: bool) -> Fit:
-    """The linearised fit with further values, appended to its own; the dashpots are fixed unless `keep_damping`."""
+    """The linearised fit with additional values appended; the dashpots are fixed unless `keep_damping`."""
     there = fit.jacobian[OFFSETS].any(axis=0)
     jacobian = np.concatenate((fit.jacobian, np.array(columns) * there))
     flat = jacobian.reshape(len(jacobian), -1)

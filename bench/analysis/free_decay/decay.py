@@ -21,7 +21,7 @@ LET_GO = 0.2
 """Time excluded after the start of a release, until the hand has left the storey [s]."""
 
 _HELD = 0.5
-"""Time at the start of a recording in which the storey is still held [s]."""
+"""Time at the start of a recording during which the storey is still held [s]."""
 
 _SLIPPED = 0.1
 """Fraction of its later motion at which a storey counts as released."""
@@ -44,7 +44,7 @@ class Setting:
 @dataclass(frozen=True, eq=False)
 class Decay:
     """One decay: the `quantities` of `modal.NAMES`, shape (8,), their uncertainty, the underlying fit, the damping of
-    either mode over its amplitude, and the end of the excitation (`begin` [s]).
+    each mode against its amplitude, and the end of the excitation (`begin` [s]).
 
     `peak` [m] is the largest drift.
     """
@@ -60,7 +60,7 @@ class Decay:
 def pulsed_decay(signals: Array, setting: Setting, quiet: float, begin: float) -> Decay:
     """Decay after a pulse of the table, from `signals` in the order of `bench.analysis.signals`.
 
-    Everything is at rest until `quiet` [s], and the pulse is over at `begin`. Raises Unusable when the fit fails.
+    Everything is at rest until `quiet` [s], and the pulse is over at `begin`. Raises Unusable if the fit fails.
     """
     seen = signals[:, [LASER_1, LASER_2]].T
     stretch = stretch_of(signals[:, DISPLACEMENT], seen, setting.sample_rate, on_table=setting.on_table)
@@ -70,7 +70,7 @@ def pulsed_decay(signals: Array, setting: Setting, quiet: float, begin: float) -
 def released_decay(signals: Array, setting: Setting) -> Decay:
     """The decay of a frame that was released on a locked table some time after the start of the recording.
 
-    Raises Unusable when the fit fails.
+    Raises Unusable if the fit fails.
     """
     seen = signals[:, [LASER_1, LASER_2]].T
     # a locked table does not move: its sensor measures only noise
@@ -95,7 +95,9 @@ def _decay(stretch: Stretch, setting: Setting, quiet: float, begin: float) -> De
 
 
 def _released(stretch: Stretch) -> float:
-    """Time of the release of storey 2 [s], from a fraction of its later motion. Raises Unusable without one."""
+    """Time of the release of storey 2 [s], at which it has moved by a fraction of its later motion. Raises Unusable if
+    there was no release.
+    """
     seen = stretch.seen[1] - np.nanmedian(stretch.seen[1][stretch.time < _HELD])
     moved = np.nan_to_num(np.abs(seen))
     if moved.max() < 10.0 * np.nanstd(stretch.seen[1][stretch.time < _HELD]):
@@ -126,10 +128,11 @@ class Combined:
 
 
 def combine(values: Sequence[Array], own: Sequence[Array], common: Sequence[Array]) -> Combined:
-    """Combine R decays: `values`, shape (n,) each, and covariances, shape (n, n) each.
+    """Combine R decays, each with `values`, shape (n,), and covariances, shape (n, n).
 
     Each quantity is the mean of the decays, weighted by their independent parts. Excess scatter enlarges the covariance
-    (`bench.analysis.uncertainty`) and never reduces it. The common part is added once."""
+    (`bench.analysis.uncertainty`) and never reduces it. The common part is added once.
+    """
     found = mean_of_repeats(values, [np.diag(one) for one in own])
     inner = np.einsum("rn,rm,rnm->nm", found.weights, found.weights, np.array(own))
     shared = np.mean(common, axis=0)

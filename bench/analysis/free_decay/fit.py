@@ -3,9 +3,9 @@
     laser_i = G_i z_i(t - tau_i) + o_i + sum_k a_ik (z_i / R_i)^k,    i = 1, 2
 
 z is the response to the table's displacement from a free initial state (`response`). Gain, delay, offset and smooth
-curvature of each laser are nuisance parameters: they are fitted too, so that they do not bias the stiffness. Those that
-the motion does not determine (such as the common gain of a released frame on a locked table) keep their expected value
-and its uncertainty.
+curvature of each laser are nuisance parameters, which are fitted as well, so that they do not bias the stiffness. Those
+that the motion does not determine (such as the common gain for a released frame on a locked table) keep their expected
+value and its uncertainty.
 """
 
 from dataclasses import dataclass, replace
@@ -27,7 +27,7 @@ CONSTANTS, STATE = slice(0, 4), slice(4, 8)
 GAINS, DELAYS, OFFSETS = slice(8, 10), slice(10, 12), slice(12, 14)
 BENDS = slice(14, 14 + 2 * len(BEND))
 COUNT = BENDS.stop
-"""Indices of the values: k1, k2, c1, c2 of the frame, its initial state, then the lasers' parameters."""
+"""Indices of the values: k1, k2, c1, c2 of the frame, the frame's initial state, then the lasers' parameters."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +41,7 @@ class Shown:
     def parts(self, values: Array) -> tuple[Response, Array, Array]:
         """The response, and (z1, z2) [m] and their velocities, shape (2, n), including the delays."""
         found = response(Constants(*self.masses, *values[:4].tolist()), self.stretch.step)
-        # a common delay equals one of the table's motion: the initial state is free
+        # a common delay is equivalent to a delay of the table's motion, since the initial state is free
         late, rate = self.stretch.driving(float(values[DELAYS][0]))
         q = found.forced(late) + (found.adjoint @ values[STATE])[:, None] * found.free(late.size)
         return found, self._seen(found.storeys(q), late), self._seen(found.velocities(q, late), rate)
@@ -111,7 +111,7 @@ class Fit:
     `jacobian`, shape (COUNT, 2, n), are the derivatives of the laser signals, zero where a sample is missing;
     `mass_jacobian`, shape (2, 2, n), those to the masses; `residual` [m], shape (2, n), measured minus fitted, zero
     where missing; `expected`, shape (COUNT, COUNT), is the contribution of the expected values to the normal matrix,
-    and `inverse` the inverse of the total.
+    and `inverse` the inverse of the total matrix.
     """
 
     stretch: Stretch
@@ -131,7 +131,7 @@ class Fit:
 
     @property
     def response(self) -> Response:
-        """The model's response at the samples of the stretch."""
+        """The model's response at the samples of the section."""
         return response(self.constants, self.stretch.step)
 
     def moved(self, error: Array) -> Array:
@@ -140,7 +140,7 @@ class Fit:
 
 
 def fit(stretch: Stretch, masses: tuple[float, float], start: Constants) -> Fit:
-    """Fit the stretch, starting from the frame `start`. Raises Unusable when the fit fails."""
+    """Fit the section, starting from the frame `start`. Raises Unusable if the fit fails."""
     from scipy.optimize import least_squares
 
     there = np.isfinite(stretch.seen)
@@ -160,7 +160,7 @@ def fit(stretch: Stretch, masses: tuple[float, float], start: Constants) -> Fit:
         try:
             shown = model.shown(values)
         except ArithmeticError:
-            # not a valid frame: the solver takes a shorter step
+            # not a valid frame, so the solver takes a shorter step
             return np.full(seen.size + rows.size, np.inf)
         return np.concatenate((((shown - seen) * there).ravel() / NOISE, ((values - expected) / uncertainty)[rows]))
 
@@ -198,7 +198,7 @@ def fit(stretch: Stretch, masses: tuple[float, float], start: Constants) -> Fit:
 
 
 def fit_from_scratch(stretch: Stretch, masses: tuple[float, float]) -> Fit:
-    """Fit the stretch, starting from Prony's estimate. Raises Unusable when the fit fails."""
+    """Fit the section, starting from Prony's estimate. Raises Unusable if the fit fails."""
     return fit(stretch, masses, constants_of(*modes_of(stretch), *masses))
 
 
@@ -213,7 +213,7 @@ def _mass_slope(model: Shown, values: Array, which: int) -> Array:
 
 
 def _expectations() -> tuple[Array, Array]:
-    """Expected values and their standard uncertainties, infinite for values without one."""
+    """Expected values and their standard uncertainties, which are infinite for values without expectation."""
     expected, uncertainty = np.zeros(COUNT), np.full(COUNT, np.inf)
     expected[GAINS] = 1.0
     uncertainty[GAINS], uncertainty[DELAYS], uncertainty[BENDS] = GAIN_UNCERTAINTY, DELAY_UNCERTAINTY, BEND_UNCERTAINTY

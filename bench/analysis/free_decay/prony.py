@@ -5,7 +5,7 @@ Both lasers' signals obey one difference equation of fourth order, whose coeffic
     y(n) = sum_k a_k y(n - k) + sum_k b_k x(n - k) + const
 
 The roots of 1 - sum a_k z^-k are the modes (Marple, Digital Spectral Analysis, 1987, ch. 11, and with an input Ljung,
-System Identification, 2nd ed., sec. 7.3: ARX). Given those, the mode shapes are a linear problem too.
+System Identification, 2nd ed., sec. 7.3: ARX). Given the roots, the mode shapes are also a linear problem.
 """
 
 import numpy as np
@@ -18,13 +18,15 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 RATE = 20.0
-"""Sample rate of the estimate [1/s]: a few samples per period of the second mode, else noise would dominate."""
+"""Sample rate of the estimate [1/s]: a few samples per period of the second mode, since otherwise noise would
+dominate.
+"""
 
 LENGTH = 15.0
-"""Duration of the estimate [s]: after it the second mode has decayed."""
+"""Duration used for the estimate [s], after which the second mode has decayed."""
 
 DAMPING = 0.003, 0.06
-"""Range of damping ratios for the start of the fit."""
+"""Range of damping ratios at the start of the fit."""
 
 ORDER = 4
 """Order of the difference equation, for two modes."""
@@ -33,7 +35,7 @@ ORDER = 4
 def modes_of(stretch: Stretch) -> tuple[Complex, Array]:
     """Poles [1/s], shape (2,), slower first, and the ratio of storey 2 to storey 1 in each, shape (2,).
 
-    Raises Unusable when the signals do not show two modes of a frame.
+    Raises Unusable if the signals do not show two modes of a frame.
     """
     many = max(round(1.0 / (RATE * stretch.step)), 1)
     rows = min(stretch.time.size, round(LENGTH / stretch.step)) // many
@@ -50,8 +52,8 @@ def modes_of(stretch: Stretch) -> tuple[Complex, Array]:
 def constants_of(poles: Complex, ratios: Array, m1: float, m2: float) -> Constants:
     """The frame with these modes.
 
-    Two frequencies leave two pairs of stiffnesses, k2 from (1/m1 + 1/m2) k2^2 - T k2 + m2 P = 0 with T the sum and P
-    the product of the squared frequencies; the shape of the first mode selects one.
+    Two frequencies are compatible with two pairs of stiffnesses: k2 from (1/m1 + 1/m2) k2^2 - T k2 + m2 P = 0 with T
+    the sum and P the product of the squared frequencies; the shape of the first mode selects one.
     """
     squares = np.abs(poles) ** 2
     total, product = float(squares.sum()), float(squares.prod())

@@ -39,7 +39,7 @@ class Response:
     """The frame's two modes; `poles`, shape (2,) [1/s], lie in the upper half plane, the slower first.
 
     `shapes`, shape (4, 2), are of (z1, z2, w1, w2); `adjoint`, shape (2, 4), maps a state to the modes; `push`, shape
-    (2,), is the input vector of x. `step` is the time between samples [s], `feed` [1/s] the direct feed of x to z1'.
+    (2,), is the input vector for x. `step` is the time between samples [s], `feed` [1/s] the direct feed of x to z1'.
     """
 
     poles: Complex
@@ -71,7 +71,7 @@ class Response:
         return q
 
     def storeys(self, q: Complex) -> Array:
-        """Absolute displacements (z1, z2) [m], shape (2, n), of modal coordinates, shape (2, n)."""
+        """Absolute displacements (z1, z2) [m], shape (2, n), for modal coordinates, shape (2, n)."""
         return 2.0 * (self.shapes[:2] @ q).real
 
     def velocities(self, q: Complex, x: Array) -> Array:
@@ -82,7 +82,7 @@ class Response:
 
 
 def response(constants: Constants, step: float) -> Response:
-    """The modes of a frame. Raises ArithmeticError for one that does not oscillate in both."""
+    """The modes of a frame. Raises ArithmeticError if it does not oscillate in both."""
     m1, m2, k1, k2, c1, c2 = constants
     inverse = np.array([[1.0 / m1], [1.0 / m2]])
     stiffness = inverse * np.array([[k1 + k2, -k2], [-k2, k2]])
@@ -91,7 +91,7 @@ def response(constants: Constants, step: float) -> Response:
     feed = np.array([c1 / m1, 0.0])
     entry = np.concatenate((feed, np.array([k1 / m1, 0.0]) - damping @ feed))
     if not np.isfinite(system).all():
-        raise ArithmeticError("the frame is not finite")
+        raise ArithmeticError("the matrices of the frame are not finite")
     found, vectors = np.linalg.eig(system)
     poles = np.asarray(found, np.complex128)
     upper = np.flatnonzero(poles.imag > 0.0)

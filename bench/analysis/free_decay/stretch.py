@@ -1,4 +1,4 @@
-"""The fitted stretch of a recording, reduced to means over a few samples.
+"""The fitted section of a recording, reduced to means over a few samples.
 
 The mean is the same linear filter on all channels, so its output obeys the same equations as its input.
 """
@@ -23,7 +23,7 @@ MOST_LOST = 0.02
 
 
 class Unusable(RockbenchError):
-    """The recording is not sufficient for the fit."""
+    """Error: the recording is not sufficient for the fit."""
 
     error_code = "not_measurable"
 
@@ -63,16 +63,16 @@ class Stretch:
         return course - delay * rate + 0.5 * delay**2 * bent, rate
 
     def from_time(self, begin: float) -> "Stretch":
-        """The samples from `begin` [s] on."""
+        """The section from `begin` [s] on."""
         kept = self.time >= begin
         return replace(self, time=self.time[kept], table=self.table[kept], seen=self.seen[:, kept])
 
 
 def stretch_of(table: Array, seen: Array, sample_rate: float, *, on_table: bool) -> Stretch:
-    """The stretch of raw signals: table displacement [m], shape (n,), and lasers [m], shape (2, n).
+    """The section from raw signals: table displacement [m], shape (n,), and lasers [m], shape (2, n).
 
-    Raises Unusable when more than `MOST_LOST` of the samples of a sensor are missing; missing samples of
-    the table's sensor below that share are interpolated linearly.
+    Raises Unusable if more than the fraction `MOST_LOST` of a sensor's samples is missing; fewer missing samples of the
+    table's sensor are interpolated linearly.
     """
     for name, values in zip((TABLE_DISPLACEMENT, *STOREYS), (table, *seen), strict=True):
         lost = float(np.mean(~np.isfinite(values)))

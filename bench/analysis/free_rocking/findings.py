@@ -1,14 +1,14 @@
-"""Results of several tilts with their uncertainty: restitution and trend, slenderness and size; errors of the laser.
+"""Results of several tilts with their uncertainty: restitution and trend, slenderness and size; laser errors.
 
-Linearity: a smooth error, size sin(2 pi n x / range + phase), with the amplitude of the data sheet and uniformly
+Linearity: a smooth error, size sin(2 pi n x / range + phase), with `size` from the data sheet, and with uniformly
 distributed phase and number n of periods within the measuring range; it is common to all tilts. The fitted curvature
 absorbs its smooth part. Over the phase its mean square is that of two components, with sin and cos - 1 of the
 displacement from the rest, each of size / sqrt(2).
 
 Timing: a laser with a free clock delays its values by up to one measuring period. The delay grows with the difference
-of the clocks and falls back at any moment of a recording.
+of the clocks and may jump back at any moment of a recording.
 
-Noise and resolution are in the residual of a fit.
+Noise and resolution are included in the residual of a fit.
 """
 
 from collections.abc import Sequence
@@ -51,7 +51,7 @@ class Tilt:
 
     @property
     def push(self) -> float:
-        """Relative difference of the equivalent tilt from rest to the held tilt."""
+        """Relative difference between the equivalent tilt from rest and the held tilt."""
         return abs(self.fit.motion.tilt / self.swings.held) - 1.0
 
 
@@ -63,15 +63,15 @@ def analyse_tilt(seen: Recording, specimen: Specimen, least: float) -> Tilt:
     alpha = critical_angle(specimen.block)
     seen = without_gaps(seen)
     swings = find_swings(seen, least)
-    # the reading at rest is limited by the laser's resolution: the motion to both sides yields a better zero
+    # the reading at rest is limited by the laser's resolution, so the motion to both sides yields a better zero
     fit = fit_rocking(
         seen, swings, find_points(seen, swings, swings.zero), alpha, frequency_parameter(specimen.block, specimen.g)
     )
     mean = float(abs(seen.height * swings.peaks).mean())
     if fit.rms > POOR * mean:
         raise NotRocking(
-            f"the exact motion leaves {1e3 * fit.rms:.2g} mm of {1e3 * mean:.3g} mm: check that the block rocks on its"
-            " two edges without yawing or sliding, then repeat"
+            f"the fit of the exact motion leaves a residual of {1e3 * fit.rms:.2g} mm out of {1e3 * mean:.3g} mm: "
+            "check that the block rocks on its two edges without yawing or sliding, then repeat"
         )
     straight = replace(seen, displacement=fit.straightened(seen.displacement))
     points = find_points(straight, swings, 0.0)
@@ -79,15 +79,15 @@ def analyse_tilt(seen: Recording, specimen: Specimen, least: float) -> Tilt:
 
 
 WAVES = (0.5, 3.0)
-"""Least and most periods of the linearity error in the measuring range: fewer act as a scale error, more are not
-smooth.
+"""Minimum and maximum number of periods of the linearity error in the measuring range: fewer act as a scale error, more
+are not smooth.
 """
 
 CLOCK = 50e-6
 """Largest relative difference between the laser's clock and that of the samples: two quartz clocks."""
 
 _NUMBERS, _RATES, _PHASES = 24, 12, 12
-"""Number of equally likely values each of periods, clock differences and initial delays."""
+"""Numbers of equally likely values of periods, clock differences and initial delays."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,25 +98,25 @@ class LaserErrors:
     measuring_range: float
 
     def linearity(self, fit: RockingFit) -> Array:
-        """Shifts of the values and the trend by the components of the linearity error, shape (9, components)."""
+        """Shifts of the values and of the trend due to the components of the linearity error, shape (9, components)."""
         return _carried(fit, self._components(fit.fitted - fit.values[ZERO]))
 
     def timing(self, fit: RockingFit) -> Array:
-        """Standard uncertainty of the values and the trend by the laser's free clock, shape (9,)."""
+        """Standard uncertainty of the values and of the trend due to the laser's free clock, shape (9,)."""
         longest = self.accuracy.laser_timing
         if longest == 0.0:
             return np.zeros(fit.values.size + 1)
         rate, phase = np.meshgrid(CLOCK / longest * _middles(-1.0, 1.0, _RATES), _middles(0.0, 1.0, _PHASES))
         delay = longest * ((rate.ravel() * fit.times[:, None] + phase.ravel()) % 1.0)
-        # a delay of the signal equals a later release
+        # a delay of the signal is equivalent to a later release
         changes = _carried(fit, fit.jacobian[:, [START]] * delay)
         return np.sqrt(np.mean(changes**2, axis=1))
 
     def of_relation(self, relation: Relation, fit: RockingFit) -> Array:
-        """Shifts of the amplitude relation's r by the components of the linearity error, shape (components,)."""
+        """Shifts of the amplitude relation's r due to the components of the linearity error, shape (components,)."""
         seen = block_face.displacement(relation.angles, fit.height, fit.block)
         rate = block_face.displacement_rate(relation.angles, fit.height, fit.block)
-        # the fit has removed zero and bend of this error from the relation's angles
+        # the fit has removed zero and curvature of this error from the relation's angles
         found = np.column_stack((np.ones(seen.size), seen**2, seen**3)) @ self.linearity(fit)[ZERO : BEND_3 + 1]
         return np.asarray(relation.weights @ ((self._components(seen) - found) / rate[:, None]))
 
@@ -139,7 +139,7 @@ def _carried(fit: RockingFit, error: Array) -> Array:
 @dataclass(frozen=True)
 class Combined:
     """A value and its standard uncertainty with its parts: `noise` and `timing` differ between tilts, `linearity` and
-    `scale` are the laser's, `scatter` is the excess scatter of the tilts, with Student's t.
+    `scale` are due to the laser, and `scatter` is the excess scatter of the tilts, with Student's t.
 
     `birge` is the ratio of the tilts' scatter to the expected one; NaN for a single tilt.
     """
@@ -166,9 +166,9 @@ class Combined:
 def combined(values: ArrayLike, noise: ArrayLike, timing: ArrayLike, linearity: Array, scale: float) -> Combined:
     """Mean of n `values`, weighted by their independent standard uncertainties `noise` and `timing`.
 
-    `linearity`, shape (n, components), are shifts by errors that are common to all values, component by component, and
-    `scale` is a common standard uncertainty. Scatter beyond the independent uncertainties widens the result and makes
-    the weights more equal (`bench.analysis.uncertainty`).
+    `linearity`, shape (n, components), are shifts due to errors that are common to all values, component by component,
+    and `scale` is a common standard uncertainty. Scatter beyond the independent uncertainties widens the result and
+    makes the weights more equal (`bench.analysis.uncertainty`).
     """
     found, own, wander = (np.asarray(each, dtype=np.float64) for each in (values, noise, timing))
     repeats = mean_of_repeats(found[:, None], (own**2 + wander**2)[:, None])
@@ -185,7 +185,7 @@ def combined(values: ArrayLike, noise: ArrayLike, timing: ArrayLike, linearity: 
 
 
 _TREND = -1
-"""Row of the trend, after the six values."""
+"""Row of the trend, which follows the values."""
 
 
 SCATTERED = 2.0
@@ -215,15 +215,15 @@ class Findings:
 
     @property
     def restitution(self) -> Combined:
-        """The restitution by the better of the two estimators."""
+        """The restitution from the better of the two estimators."""
         return self.relation if self.by_amplitudes else self.motion
 
 
 def findings(tilts: Sequence[Tilt], laser: LaserErrors, height: float, height_uncertainty: float) -> Findings:
-    """Combine the tilts; the scatter of a single one is its residual alone.
+    """Combine the tilts; for a single tilt, the scatter is only that of its residual.
 
     Errors of the beam's `height` [m] and of the laser's scale affect the conversion to an angle: alpha fully, the
-    amplitude relation little, r and p, which depend on time, not at all. p has the error of the sample clock.
+    amplitude relation slightly, and r and p, which depend on time, not at all. p has the error of the sample clock.
     """
     fits = [tilt.fit for tilt in tilts]
     linearity = np.array([laser.linearity(fit) for fit in fits])
@@ -254,7 +254,7 @@ def findings(tilts: Sequence[Tilt], laser: LaserErrors, height: float, height_un
 
 
 def uncertainties(fit: RockingFit, laser: LaserErrors, height: float, height_uncertainty: float) -> Array:
-    """Standard uncertainties of all values of one fit, noise and the laser's errors, shape (8,)."""
+    """Standard uncertainties of all values of one fit due to noise and the laser's errors, shape (8,)."""
     common = np.zeros(fit.values.size)
     common[ALPHA] = fit.values[ALPHA] * hypot(laser.accuracy.laser_slope, height_uncertainty / height)
     common[P] = fit.values[P] * laser.accuracy.timebase

@@ -1,11 +1,11 @@
 """Fit of the exact nonlinear motion to the laser signal, from shortly after the release to the last usable impact.
 
-Six values are of the motion: alpha, p and r of `sim.free_rocking`, the tilt (as a share of alpha) and the instant of a
-release from rest that leads to it, and the laser's reading for the block at rest. A release by hand is neither
+Six values describe the motion: alpha, p and r of `sim.free_rocking`, the tilt (as a fraction of alpha) and instant of
+an equivalent release from rest, and the laser's reading for the block at rest. A release by hand is neither
 instantaneous nor free of a push: tilt and instant account for its energy and phase, and the samples until the block is
-free are excluded. Two more are of the laser: at the displacement D its reading is D + c_2 D^2 + c_3 D^3, the smooth
-part of its linearity error. Its scale is not fitted: a scale factor s multiplies alpha and tilt by s and does not
-affect r and p, which depend on the times of the impacts.
+free are excluded. Two more describe the laser: at the displacement D its reading is D + c_2 D^2 + c_3 D^3, which
+includes the smooth part of its linearity error. Its scale is not fitted: a scale factor s multiplies alpha and tilt by
+s and does not affect r and p, which depend on the times of the impacts.
 """
 
 from collections.abc import Callable
@@ -31,7 +31,7 @@ FREE = 0.9
 """Fraction of the held tilt below which the block counts as released."""
 
 FEWEST = 12
-"""Fewest impacts that determine the parameters."""
+"""Minimum number of impacts that determine the parameters."""
 
 _RATE = 250.0
 """Sample rate of the fit [1/s], to which the laser's samples are averaged; the motion is smooth at this rate.
@@ -46,11 +46,12 @@ _STEP = 1e-5
 
 @dataclass(frozen=True, eq=False)
 class RockingFit:
-    """Result of a fit: `values`, shape (8,), in the order of `NAMES`, SI, for the view of `block` at `height` [m].
+    """Result of a fit: `values`, shape (8,), in the order of `NAMES`, in SI units, for `block` measured at `height`
+    [m].
 
     `times` [s], `displacement` [m] and `swing` (the number of impacts before), all of shape (n,), are the data,
-    `fitted` [m] the model; `jacobian`, shape (n, 9), holds the derivatives to the values and, last, to the trend of
-    r with the impacts' speed around its mean.
+    `fitted` [m] the model; `jacobian`, shape (n, 9), holds the derivatives with respect to the values and, last, to the
+    trend of r with impact velocity about its mean.
     """
 
     values: Array
@@ -84,7 +85,7 @@ class RockingFit:
 
     @cached_property
     def gain(self) -> Array:
-        """Sensitivities of the values to the displacement, shape (8, n) [unit/m]."""
+        """Sensitivities of the values to errors of the displacement, shape (8, n) [unit/m]."""
         return np.asarray(np.linalg.pinv(self.jacobian[:, :-1]), dtype=np.float64)
 
     @cached_property
@@ -127,11 +128,11 @@ class RockingFit:
 def fit_rocking(seen: Recording, swings: Swings, points: Points, alpha: float, p: float) -> RockingFit:
     """Fit the motion, starting from the geometry's `alpha` [rad] and `p` [rad/s].
 
-    Raises NotRocking for too few impacts, or when no motion of a rocking block fits.
+    Raises NotRocking if there are too few impacts, or if no motion of a rocking block fits.
     """
     size = max(round(seen.sample_rate / _RATE), 1)
     times, displacement = _thinned(seen.times, size), _thinned(seen.displacement, size)
-    # the mean over a bin is the value at its middle plus this factor times the second derivative
+    # the mean over a bin is the value at its centre plus this factor times the second derivative
     spread = (size**2 - 1) / (24.0 * seen.sample_rate**2)
     swing = np.searchsorted(swings.crossings, times)
     since = times - np.append(-np.inf, swings.crossings)[swing]
@@ -167,7 +168,7 @@ def _motion(values: Array, side: float, trend: float = 0.0, trend_at: float = 0.
 
 
 def _freed(seen: Recording, swings: Swings) -> float:
-    """Time after which the block is free [s]; before, the hand may tremble."""
+    """Time after which the block is free [s]; before it, the hand may tremble."""
     before = seen.angle(swings.zero)[: int(swings.crossings[0] * seen.sample_rate)]
     return float(np.flatnonzero(np.abs(before) >= FREE * abs(swings.held))[-1]) / seen.sample_rate
 
@@ -178,7 +179,9 @@ def _thinned(samples: Array, size: int) -> Array:
 
 
 def _bounds(alpha: float, p: float) -> tuple[Array, Array]:
-    """Bounds: within a factor of two of the geometry; tilt ratio and r where a motion exists; wide for the others."""
+    """Bounds: within a factor of two of the geometry; tilt ratio and r where a motion exists; wide bounds for the
+    others.
+    """
     lowest = np.array([0.5 * alpha, 0.5 * p, 0.05, 1e-3, -1e4, -1.0, -10.0, -1e3])
     return lowest, np.array([2.0 * alpha, 2.0 * p, 0.9999, 0.999, 1e4, 1.0, 10.0, 1e3])
 
@@ -188,7 +191,7 @@ def _from_points(swings: Swings, points: Points, alpha: float, p: float) -> Arra
     known = np.isfinite(points.impacts) & np.isfinite(points.amplitudes)
     count = known.size if known.all() else int(np.argmin(known))
     if count < FEWEST:
-        few = f"{count} impacts are large enough, {FEWEST} are required"
+        few = f"{count} impacts are large enough, but {FEWEST} are required"
         raise NotRocking(f"{few}: tilt the block farther, or raise the laser")
     instants, sizes = points.impacts[:count], np.abs(points.amplitudes[:count])
     side = float(np.sign(swings.held))

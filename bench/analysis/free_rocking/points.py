@@ -1,16 +1,16 @@
-"""Single points of the motion from the samples around them: impact times, turning points, and the restitution from
-these. They assume only a smooth motion between impacts, and so check a model fitted to the whole. A Butterworth
-low-pass delays a smooth motion without distortion: its gain has no term in omega^2, so its impulse response has no
-second cumulant, and a parabola passes unchanged. Its response to the kink at an impact has decayed after `AFTER`, and
-those samples are excluded.
+"""Single points of the motion, each from the samples around it: impact times and turning points, and the restitution
+that follows from them. They assume only a smooth motion between impacts, and so check a model fitted to the entire
+motion. A Butterworth low-pass delays a smooth motion without distortion: its gain has no term in omega^2, so its
+impulse response has no second cumulant, and a parabola passes unchanged. Its response to the kink at an impact has
+decayed after `AFTER`, and those samples are excluded.
 
 Between impacts the energy is constant, so the largest angles before and after an impact give the restitution of the
 angular velocity, exactly and independent of time:
 
     r_n^2 = (cos(alpha - |theta_n+1|) - cos(alpha)) / (cos(alpha - |theta_n|) - cos(alpha)).
 
-For a constant r the logarithm of that energy falls along a line, by 2 ln(r) an impact; the line through all of them
-gives the mean r. alpha and the laser's scale have little influence: both sides of the quotient contain them.
+For a constant r the logarithm of that energy falls linearly, by 2 ln(r) per impact; the line through all points gives
+the mean r. alpha and the laser's scale have little influence: both sides of the quotient contain them.
 """
 
 from dataclasses import dataclass
@@ -26,7 +26,8 @@ Array = NDArray[np.float64]
 BEFORE, AFTER = 0.005, 0.025
 """Time excluded before and after an impact [s].
 
-After 25 ms, a fourth-order low-pass at 100 Hz, with a delay of 2.6 ms, has reduced a kink of about 15 um to exp(-6).
+After 25 ms, a fourth-order low-pass at 100 Hz, with a delay of 2.6 ms, has reduced a kink of about 15 um by a factor of
+exp(-6).
 """
 
 _WINDOW, _PART = 0.08, 0.45
@@ -37,13 +38,13 @@ _TURN = 0.6
 
 _DEGREE = 4
 _FEWEST = 12
-"""Fewest samples of a point."""
+"""Minimum number of samples for a point."""
 
 
 @dataclass(frozen=True, eq=False)
 class Points:
     """`impacts` [s], shape (n,), accurate to 50 us, and `amplitudes` [rad], shape (n,), signed, of the turning points
-    that follow them, with standard uncertainties of noise; NaN where too few samples are left.
+    that follow them, with standard uncertainties due to noise; NaN where too few samples remain.
     """
 
     impacts: Array
@@ -69,7 +70,7 @@ def find_points(seen: Recording, swings: Swings, zero: float) -> Points:
 
 
 def _impact(times: Array, angle: Array, guess: float, window: float) -> tuple[float, float]:
-    """Zero crossing of a cubic whose slope and curvature change there, and its uncertainty [s]."""
+    """Zero crossing of a cubic whose slope and curvature change at the crossing, and its uncertainty [s]."""
     instant, uncertainty = guess, np.nan
     for _ in range(3):
         instant, uncertainty = _closer(times, angle, instant, window)
@@ -77,7 +78,7 @@ def _impact(times: Array, angle: Array, guess: float, window: float) -> tuple[fl
 
 
 def _closer(times: Array, angle: Array, instant: float, window: float) -> tuple[float, float]:
-    """One step towards the zero of the cubic, from an `instant` near it; NaN where too few samples are left."""
+    """One step towards the zero of the cubic, from an `instant` near it; NaN if too few samples remain."""
     if not np.isfinite(instant):
         return np.nan, np.nan
     low, high = np.searchsorted(times, (instant - window, instant + window + AFTER))
@@ -132,9 +133,9 @@ class Relation:
     """r of single impacts, and of all from the fitted line.
 
     `speed`, shape (n,), of each impact relative to that of a fall from alpha; `each` and `each_uncertainty`, shape
-    (n,), standard, of noise; neighbours share a turning point and are correlated. `restitution` has the standard
-    `uncertainty` of the scatter about the line; `weights`, shape (m,), are its sensitivities to the turning `angles`
-    [rad], shape (m,).
+    (n,), are single values and their standard uncertainties due to noise; neighbours share a turning point and are
+    correlated. `restitution` has the standard `uncertainty` due to the scatter about the line; `weights`, shape (m,),
+    are its sensitivities to the turning `angles` [rad], shape (m,).
     """
 
     speed: Array
@@ -147,7 +148,9 @@ class Relation:
 
 
 def amplitude_relation(points: Points, alpha: float) -> Relation:
-    """The relation for a block of critical angle `alpha` [rad], from the turning points up to the first unknown one."""
+    """The relation for a block with critical angle `alpha` [rad], from the turning points up to the first unknown
+    one.
+    """
     known = np.isfinite(points.amplitudes)
     count = int(np.argmin(known)) if not known.all() else known.size
     angles, uncertainty = points.amplitudes[:count], points.amplitude_uncertainty[:count]

@@ -15,7 +15,7 @@ REST = 1.0
 """Time at the end of a recording for which the block must be at rest [s]."""
 
 GAP = 0.005
-"""Longest gap without valid samples that is interpolated [s]: the error is below 5 um."""
+"""Longest gap without valid samples that is interpolated [s], with an error below 5 um."""
 
 STILL = 2e-4
 """Largest standard deviation of the displacement at rest [m]: resolution and noise of a laser."""
@@ -24,11 +24,11 @@ _HELD = 0.5
 """Time at the beginning over which the held tilt is averaged [s]."""
 
 _SHARE = 0.25
-"""Fraction of the least usable angle that the block must reach on the other side."""
+"""Fraction of the smallest usable angle that the block must reach on the other side."""
 
 
 class NotRocking(RockbenchError):
-    """The recording does not show the free rocking of a tilted block."""
+    """Error: the recording does not show the free rocking of a tilted block."""
 
     error_code = "not_measurable"
 
@@ -86,12 +86,12 @@ def without_gaps(seen: Recording) -> Recording:
 def find_swings(seen: Recording, least: float) -> Swings:
     """The half swings down to the first one whose largest angle is below `least` [rad].
 
-    Raises NotRocking, with the remedy, when the block was not released or did not come to rest.
+    Raises NotRocking, with the remedy, if the block was not released or did not come to rest.
     """
     n = round(REST * seen.sample_rate)
     end = seen.displacement[-n:]
     if float(end.std()) > STILL:
-        raise NotRocking("the block did not come to rest within the recording: release it earlier, or use less tilt")
+        raise NotRocking("the block did not come to rest within the recording: release it earlier, or tilt it less")
     zero = float(end.mean())
     angle = seen.angle(zero)
     if not np.isfinite(angle).all():

@@ -104,7 +104,7 @@ def test_load_limits_of_the_laboratory_are_held_against_its_sensors_or_the_estim
 def test_a_scale_is_never_zero(kind: type[TableDisplacement]) -> None:
     with pytest.raises(ValueError, match=r"sensitivity = 0.0 is refused"):
         kind(sensitivity=0.0)
-    with pytest.raises(ValueError, match=r"zero = 12.0 is refused: it must lie within the input's range of 10 V"):
+    with pytest.raises(ValueError, match=r"zero = 12.0 is refused: it must be within the input's range of 10 V"):
         kind(zero=12.0)
     FILE.write_text("[hardware.table_displacement]\nsensitivity = 0\n", encoding="utf-8")
     assert problems_of(FILE)[0].item == "bench.toml: hardware.table_displacement.sensitivity"

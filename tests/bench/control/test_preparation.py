@@ -127,7 +127,7 @@ def test_a_motion_that_fits_is_left_alone() -> None:
     free = prepare(record(), band=BAND, peak=1.0)
     fitted = prepare(record(), band=BAND, peak=1.0, reach=QUIET)
     assert np.array_equal(fitted.record.acceleration, free.record.acceleration)
-    assert "nothing" in fitted.steps[-1]
+    assert "unchanged" in fitted.steps[-1]
 
 
 def test_the_target_of_the_table_is_the_motion_of_the_prediction() -> None:

@@ -205,7 +205,7 @@ def test_what_fits_already_is_left_alone() -> None:
     first = fit_stroke(SampledRecord(ground_motion(0), 0.005), Reach(0.05, 0.6))
     again = fit_stroke(first.record, Reach(0.05, 0.6))
     assert np.array_equal(again.record.acceleration, first.record.acceleration)
-    assert "nothing" in again.done
+    assert "unchanged" in again.done
     assert not again.change.any()
 
 
@@ -231,7 +231,8 @@ def test_the_high_pass_halves_its_corner_and_starts_early_enough() -> None:
 
 
 @pytest.mark.parametrize(
-    ("method", "frequency", "says"), [(Method.LEAST_CHANGE, 10.0, "below 2 Hz"), (Method.HIGH_PASS, 12.0, "above 5 Hz")]
+    ("method", "frequency", "says"),
+    [(Method.LEAST_CHANGE, 10.0, "below 2 Hz"), (Method.HIGH_PASS, 12.0, "high-passed at 5 Hz")],
 )
 def test_what_cannot_fit_is_refused_with_the_reason(method: Method, frequency: float, says: str) -> None:
     t = np.arange(4001) * 0.005

@@ -302,7 +302,7 @@ def test_significant_digits() -> None:
         ("steady --beta 0,25", "--beta = '0,25' is refused: write 0.25; separate values by spaces"),
         ("steady --beta 0.25,0.64", "--beta = '0.25,0.64' is refused: a comma is not a separator"),
         ("map --omega 21:12:10", "--omega = '21:12:10' is refused: the range descends: write 12:21:10"),
-        ("steady --omega 16mm", "--omega = '16mm' is refused: mm (meter) is not of"),
+        ("steady --omega 16mm", "--omega = '16mm' is refused: mm (meter) does not have"),
         ("steady --omega 12:21", "--omega = '12:21' is refused: a range is start:stop:count"),
         ("steady --beta -1", "--beta = -1.0 is refused"),
         ("map --omega 1:2:10000 --beta 1:2:101", "at most 1000000 points"),

@@ -207,7 +207,7 @@ def test_the_figure_breaks_the_curve_where_the_block_topples() -> None:
         ("seismic synthetic:tohoku", "the synthetic motions are pacoima"),
         (
             "seismic synthetic:kobe synthetic:kobe:2",
-            "its name, synthetic kobe, is also that of synthetic:kobe; omit one",
+            "its name, synthetic kobe, is already used by synthetic:kobe; omit one",
         ),
         ("seismic --table-band 5:1", "--table-band = '5:1' is refused: it must be LOW:HIGH"),
         ("seismic --table-band wide", "--table-band = 'wide' is refused"),

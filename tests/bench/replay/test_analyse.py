@@ -168,7 +168,7 @@ def test_results_that_do_not_come_again_are_no_ground_for_others(
         (["--set", "peak=tallest"], "--set peak"),
         (["--set", "measured_cycles=3"], "--set measured_cycles"),
         (["--set", "specimen.frame.k1=213,44"], "write 213.44; separate values by spaces"),
-        (["--set", "specimen.frame.k1=20 mm"], "not of the dimension of N/m"),
+        (["--set", "specimen.frame.k1=20 mm"], "not have the dimension of N/m"),
         (["--set", "peek=mean"], "the nearest is peak"),
         (["--set", "limits.velocity=1"], "only the configuration tables analysis, specimen, uncertainty"),
         (["--set", "specimen.frame.m1.kg=1"], "there is no table m1"),

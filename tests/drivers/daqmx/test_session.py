@@ -78,7 +78,7 @@ def test_more_than_the_buffer_holds_is_waited_for(session: DaqSession) -> None:
 
 def test_more_than_the_buffer_holds_is_refused_before_the_start(session: DaqSession, plant: Loopback) -> None:
     session.prepare()
-    with pytest.raises(RigError, match="start first"):
+    with pytest.raises(RigError, match="start the output first"):
         session.write(np.zeros(LEAD + round(2.0 * RATE) + 1))
     eventually(lambda: is_safe(plant))
 

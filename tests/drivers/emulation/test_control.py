@@ -162,7 +162,7 @@ def test_an_answer_of_something_else_is_refused(answer: bytes) -> None:
 
         thread = threading.Thread(target=talk)
         thread.start()
-        with pytest.raises(RigError, match="invalid answer"):
+        with pytest.raises(RigError, match="invalid reply"):
             ask(f"127.0.0.1:{listening.getsockname()[1]}", "handwork")
         thread.join()
 

@@ -93,7 +93,7 @@ def test_a_fast_sensor_on_the_factorys_baud_rate_sends_its_counter_only() -> Non
         (
             replaced(OPENED[:5], MEASRATE=b"E236 Value out of range\r\n->"),
             InvalidInput,
-            r"hardware\.lasers\.rate = 4000\.0 is refused: .* does not accept it \(E236 Value out of range\); sensors",
+            r"hardware\.lasers\.rate = 4000\.0 is refused: .* does not accept this rate \(E236 Value out of range\); sensors",
         ),
         (
             [*OPENED[:5], (b"MEASRATE", b"MEASRATE 2\r\n->")],
@@ -116,7 +116,7 @@ def test_a_fast_sensor_on_the_factorys_baud_rate_sends_its_counter_only() -> Non
             RigError,
             "sends DIST1 instead of distance, counter, timestamp; its firmware is not supported",
         ),
-        (replaced(OPENED, AVERAGE=b""), DeviceTimeout, "did not answer AVERAGE NONE within 1 s; check its power"),
+        (replaced(OPENED, AVERAGE=b""), DeviceTimeout, "did not reply to AVERAGE NONE within 1 s; check its power"),
     ],
 )
 def test_a_sensor_that_is_not_as_it_should_be_is_refused(script: Script, error: type[Exception], text: str) -> None:
@@ -144,7 +144,7 @@ def test_a_line_without_a_sensor_is_refused_after_all_baud_rates(noise: bytes, m
     monkeypatch.setattr("drivers.optoncdt.search.has_baud", lambda _, baud: asked.append(baud) or True)
     with (
         Peer([], baud=38_400, noise=noise) as peer,
-        pytest.raises(DeviceNotFound, match=r"does not answer at any baud rate: .* pairs"),
+        pytest.raises(DeviceNotFound, match=r"does not respond at any baud rate: .* pairs"),
     ):
         opened(peer.path, baud=115_200)
     assert asked[0] == 115_200
@@ -160,13 +160,15 @@ def test_the_baud_rate_is_searched_for(noise: bytes) -> None:
 def test_a_baud_rate_that_is_not_the_sensors_is_refused() -> None:
     with (
         Peer(SILENCED, baud=1_000_000) as peer,
-        pytest.raises(InvalidInput, match=r"hardware\.laser_1\.baud = 921600 .* answers at 1000000: set"),
+        pytest.raises(InvalidInput, match=r"hardware\.laser_1\.baud = 921600 .* responds at 1000000: set"),
     ):
         opened(peer.path)
 
 
 def test_a_baud_rate_that_no_sensor_has_is_refused_before_anything_is_opened() -> None:
-    with pytest.raises(InvalidInput, match=r"hardware\.laser_1\.baud = 57600 is refused: the sensor has 9600, 19200"):
+    with pytest.raises(
+        InvalidInput, match=r"hardware\.laser_1\.baud = 57600 is refused: the sensor supports 9600, 19200"
+    ):
         opened("/dev/nothing", baud=57_600)
 
 

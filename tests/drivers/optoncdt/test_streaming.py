@@ -219,7 +219,7 @@ def test_the_beam_is_switched_at_rest() -> None:
 def test_a_command_that_is_not_answered_while_values_come_times_out() -> None:
     with Peer([*streaming(50), (b"LASERPOW OFF", b""), *STOPPED]) as peer, opened(peer) as laser:
         laser.start()
-        with pytest.raises(DeviceTimeout, match="did not answer LASERPOW OFF"):
+        with pytest.raises(DeviceTimeout, match="did not reply to LASERPOW OFF"):
             laser.laser(False)
 
 

@@ -118,7 +118,7 @@ def test_what_a_measured_point_says(done: Path) -> None:
 
 def test_the_statement_is_checked_by_name(done: Path) -> None:
     checked = summary(done)["statement"]
-    assert checked["statement"].startswith("seismic gains below one")
+    assert checked["statement"].startswith("seismic gains are below one")
     assert checked["band_hz"] == [1.5, 25.0]
     (record,) = checked["measured"]["records"]
     assert record["toppled"] == [TOPPLES]

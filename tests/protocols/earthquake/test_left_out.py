@@ -62,8 +62,8 @@ def test_a_campaign_keeps_its_limits_without_what_it_leaves_out(campaign: Earthq
     kept = margins(found.demands, bounds(CONFIGURATION))
     assert refusal(kept) is None
     assert not any("newhall" in each.demand.where for each in kept)
-    warned = [text for text in found.warnings if "is left out" in text]
-    assert [text.partition(" is left out: ")[0] for text in warned] == [
+    warned = [text for text in found.warnings if "is omitted" in text]
+    assert [text.partition(" is omitted: ")[0] for text in warned] == [
         "synthetic newhall with the bare frame",
         "synthetic newhall with beta = 0.25",
         "synthetic newhall with beta = 0.97",
@@ -114,7 +114,7 @@ def test_every_combination_has_a_point_and_a_spring_without_a_record_is_not_moun
         ("synthetic pacoima", 0.97, "not played"),
         ("synthetic newhall", 0.97, "not played"),
     ]
-    assert points[0].reason == "left out, since it would exceed a limit: drift"
+    assert points[0].reason == "omitted, since it would exceed a limit: drift"
     assert points[2].reason == "refused by the table"
     assert "0 of 0 runs toppled" in earthquake_table(points)
 

@@ -225,7 +225,7 @@ def test_a_mode_below_the_band_is_told() -> None:
     for low, told in ((1.6, 0), (1.62, 1)):
         found = table_warnings(ONE.model_copy(update={"table_band": f"{low}:25"}), BenchConfiguration(), None)
         assert len(found) == told
-        assert all("first mode at 1.01 Hz lies below" in warning for warning in found)
+        assert all("first mode at 1.01 Hz is below" in warning for warning in found)
 
 
 def test_the_identification_is_planned_beforehand_down_to_any_band() -> None:

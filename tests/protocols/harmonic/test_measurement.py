@@ -76,7 +76,7 @@ def test_a_difference_beyond_the_uncertainties_of_both_is_flagged(
     assert off(0.95 * both + 1e-9).agrees is (both > 0.0)
     beyond = off(1.05 * both + 1e-6)
     assert beyond.agrees is False
-    assert "differs from the prediction by more than the uncertainty of both" in beyond.reason
+    assert "the difference from the prediction exceeds the combined uncertainty" in beyond.reason
 
 
 @pytest.mark.parametrize(("repeats", "words"), [(0, "does not repeat"), (3, "repeats every 3 cycles")])

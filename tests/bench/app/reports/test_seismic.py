@@ -193,5 +193,5 @@ def test_the_report_says_who_with_what_software_and_which_parameters(file: Path)
     assert "git " in known["reported by"]
     assert [column.title for column in parameters.columns] == ["parameter", "name", "value", "unit"]
     rows = {row[1]: row for row in parameters.rows}
-    assert rows["decay"] == ["measured free vibration after a record", "decay", "5", "s"]
+    assert rows["decay"] == ["duration of the free vibration measured after a record", "decay", "5", "s"]
     assert rows["records"][2] == "synthetic:pacoima"
