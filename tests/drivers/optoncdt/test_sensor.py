@@ -93,7 +93,7 @@ def test_a_fast_sensor_on_the_factorys_baud_rate_sends_its_counter_only() -> Non
         (
             replaced(OPENED[:5], MEASRATE=b"E236 Value out of range\r\n->"),
             InvalidInput,
-            r"hardware\.lasers\.rate = 4000\.0 is refused: .* does not accept this rate \(E236 Value out of range\); sensors",
+            r"hardware\.lasers\.rate = 4000\.0 is refused: .* does not accept this rate \(E236 Value out of range\)",
         ),
         (
             [*OPENED[:5], (b"MEASRATE", b"MEASRATE 2\r\n->")],
