@@ -110,7 +110,7 @@ def test_its_file_replays_bit_for_bit_and_is_reported(done: Path, capsys: Said) 
     file = str(done / "campaign.h5")
     assert main(["replay", file]) == 0
     shown = capsys.readouterr().out
-    assert "Identical to the file in every bit" in shown
+    assert "Bit-identical to the file" in shown
     assert "2 live values" in shown
     page = done / "report.html"
     assert main(["report", file, "--html", str(page)]) == 0

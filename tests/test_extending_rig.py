@@ -132,7 +132,7 @@ def test_it_is_run_replayed_and_reported(file: Path, tmp_path: Path, capsys: Sai
         assert json.loads(record.metadata["configuration"])["rig"]["gain"] == 2.0
     capsys.readouterr()
     assert main(["replay", str(out / "campaign.h5")]) == 0
-    assert "Identical to the file in every bit" in capsys.readouterr().out
+    assert "Bit-identical to the file" in capsys.readouterr().out
     assert main([*run, "--seed", "3", "--out", str(tmp_path / "seed")]) == 2
     assert "--seed = '3' is refused: the backend linear-table has no seed" in capsys.readouterr().err
 

@@ -1,1 +1,1 @@
-"""The command line, a client of the engine on a par with the window."""
+"""The command line, a client of the engine with the same standing as the window."""

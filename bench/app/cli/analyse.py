@@ -1,4 +1,6 @@
-"""`rockbench analyse`: recomputes the results of a recorded campaign with other settings, in a new file."""
+"""`rockbench analyse`: recomputes the results of a recorded campaign with other settings, and writes them to a new
+file.
+"""
 
 import sys
 from collections.abc import Mapping, Sequence
@@ -26,7 +28,7 @@ if TYPE_CHECKING:
     from bench.replay.session import Replayed
 
 HEADLINES = ("status", "alpha_2", "alpha_2_uncertainty", "alpha_2_predicted", "agrees")
-"""Fields printed for protocols that have them; the file contains all fields."""
+"""Fields that are printed if a protocol has them; the file contains all fields."""
 
 WIDEST = 44
 """Maximum number of printed characters of a value or label."""
@@ -64,7 +66,9 @@ def analyse(
     ] = None,
     out: Annotated[
         Path | None,
-        Parameter(name="--out", metavar="FILE", help="File to write.", show_default="<name>.analysis-<n>.h5 beside it"),
+        Parameter(
+            name="--out", metavar="FILE", help="File to write.", show_default="<name>.analysis-<n>.h5 next to it"
+        ),
     ] = None,
     list_: Annotated[
         bool, Parameter(name="--list", negative=(), show_default=False, help="List the settings and exit.")
@@ -74,8 +78,8 @@ def analyse(
 ) -> int:
     """Recompute every result of a recorded campaign from its samples, with other settings.
 
-    The new results are written to a separate file in the same folder, with the name and SHA-256 of the recorded one and
-    the settings, and are printed next to the old. A protocol that identifies the specimen also writes
+    The new results are written to a separate file in the same folder, with the settings and with the name and SHA-256
+    of the recorded file, and are printed next to the old ones. A protocol that identifies the specimen also writes
     `<name>.specimen.json` for other runs. Settings that would have changed the drive of the table are refused: the
     recorded samples cannot show their effect.
 
@@ -89,7 +93,7 @@ def analyse(
     from bench.replay.recording import former_keys
 
     if out is not None and out.exists():
-        raise InvalidInput("--out", str(out), "the file exists and is never overwritten; name another")
+        raise InvalidInput("--out", str(out), "the file exists and is never overwritten; choose another name")
     with open_datafile(file) as record:
         choice = choice_of(record, set_, config, specimen)
         if list_:
@@ -126,8 +130,8 @@ def analyse(
 
 
 def _kept(result: "Result | None", written: Path) -> Path | None:
-    """Write the result files that other runs use, such as a specimen file; returns the path of the last, None without
-    any.
+    """Write the result files that other runs use, such as a specimen file; returns the path of the last one, or
+    None.
     """
     path: Path | None = None
     if result is None:
@@ -141,7 +145,7 @@ def _kept(result: "Result | None", written: Path) -> Path | None:
 def _carried_out(
     record: "DataFile", choice: Choice, subscribers: Sequence[Any]
 ) -> "tuple[Result | None, Replayed, tuple[Parameters, ...]]":
-    """The result (None for a protocol with its own re-analysis), the replay, and the recomputed points."""
+    """The result (None for a protocol that defines a re-analysis), the replay, and the recomputed points."""
     from bench.app.session import result_of
     from bench.replay.analysis import carry_out, follow
 

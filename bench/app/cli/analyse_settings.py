@@ -30,7 +30,8 @@ class Choice:
 
     `asked` are the parameters of the campaign, `settings` those of the analysis; `changed` is the `recorded`
     configuration with the new settings applied, and `given` maps the name of each new setting to its value. A protocol
-    with its own re-analysis has a `follower`; any other protocol is executed again with the settings as its parameters.
+    that defines a re-analysis has a `follower`; any other protocol is executed again with the settings as its
+    parameters.
     """
 
     protocol: "Protocol[Any]"

@@ -1,4 +1,4 @@
-"""The run display on a terminal. No state is shown by colour alone: each has its word."""
+"""The run display on a terminal. No state is shown by colour alone: each one also has a word."""
 
 import threading
 from collections import deque
@@ -93,12 +93,12 @@ class LiveConsole:
         live.update(picture, refresh=True)
 
     def _print_grave(self) -> None:
-        """Print the lines that remain on the terminal after the display has gone."""
+        """Print the lines that remain on the terminal after the display has been removed."""
         while self._grave:
             self._console.print(log_line(self._grave.popleft()))
 
     def _show(self) -> None:
-        # a new Live each time: restarting a stopped one would move the cursor over later output
+        # a new Live each time, since restarting a stopped one would move the cursor over later output
         self._live = Live(console=self._console, auto_refresh=False, transient=True, redirect_stdout=False)
         self._live.start()
 

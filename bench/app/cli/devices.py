@@ -44,8 +44,8 @@ def devices(
 ) -> int:
     """List the NI devices with their channels and ranges, the lasers on the serial ports, and the rig backends.
 
-    A port is queried at every baud rate; name the ports when other instruments must not be disturbed. The exit code is
-    0, even when nothing is found, or 2 when an argument is refused.
+    A port is queried at every baud rate; name the ports if other instruments must not be disturbed. The exit code is 0,
+    even if nothing is found, or 2 if an argument is refused.
     """
     progress("searching for NI devices")
     if server is not None:
@@ -92,7 +92,7 @@ def _configured(hardware: "Hardware | None") -> tuple[str, ...]:
 
 
 def _lasers(ports: tuple[str, ...]) -> "tuple[list[FoundLaser], str | None]":
-    """The lasers on the serial ports; an empty list and the reason when the search failed."""
+    """The lasers on the serial ports, or an empty list and the reason if the search failed."""
     try:
         require("serial", "the search for lasers")
     except MissingExtra as error:

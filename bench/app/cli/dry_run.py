@@ -1,4 +1,6 @@
-"""`--dry-run` of a run or a queue: demands on the bench and the margin to each limit, without opening a device."""
+"""`--dry-run` of a run or a queue: prints the demands on the bench and the margin to each limit, without opening a
+device.
+"""
 
 import sys
 import textwrap
@@ -59,7 +61,7 @@ def dry_run(
     *,
     as_json: bool,
 ) -> int:
-    """Print the preflight on standard output; returns 0 when the run may begin, 2 when it is refused."""
+    """Print the preflight on standard output; returns 0 if the run may begin, 2 if it is refused."""
     progress("loading the program")
     from bench.app.preflight import compile_run, prepare
 
@@ -163,7 +165,7 @@ def plans_text(plans: "Sequence[Mapping[str, object]]") -> str:
 
 
 def plan_content(number: int, test: "Queued", found: "Preflight") -> dict[str, object]:
-    """The plan of a queue's test for JSON."""
+    """The plan of a queued test, for JSON."""
     tightest = found.margins[0] if found.margins else None
     return {
         "test": number,

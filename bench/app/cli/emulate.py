@@ -45,7 +45,8 @@ def emulate(
             metavar="MODULE",
             negative=(),
             consume_multiple=True,
-            help="Modules of a chassis from its first slot on: 9205, 9215, 9234, 9239, 9263, 9269, 9401, 9421, 9485.",
+            help="Modules of a chassis, starting with the first slot: 9205, 9215, 9234, 9239, 9263, 9269, 9401, "
+            "9421, 9485.",
             show_default="9205 9263 9401 9485",
         ),
     ] = None,
@@ -193,7 +194,7 @@ def _hand_out(configuration: "BenchConfiguration", laboratory: "Laboratory", pat
             with path.open("x", encoding="utf-8", newline="\n") as file:
                 file.write(text)
         except OSError as error:
-            raise InvalidInput("--write", str(path), f"it cannot be written: {error.strerror}") from None
+            raise InvalidInput("--write", str(path), f"the file cannot be written: {error.strerror}") from None
     _say(f"DAQ at {hardware.daq.server}, {hardware.sample_rate:g} samples per second")
     for name, laser in (("laser 1", hardware.laser_1), ("laser 2", hardware.laser_2)):
         _say(f"{name} at {laser.port if hardware.lasers.connection == 'serial' else laser.terminal}")
@@ -204,7 +205,7 @@ def _hand_out(configuration: "BenchConfiguration", laboratory: "Laboratory", pat
 
 @contextmanager
 def _until_asked() -> Generator[threading.Event]:
-    """An event that Ctrl-C, SIGTERM and a closed terminal set, instead of their default actions."""
+    """Event that is set by Ctrl-C, SIGTERM and a closed terminal, instead of their default actions."""
     over = threading.Event()
 
     def handle(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - the signature is Python's

@@ -21,7 +21,7 @@ else:
 def info(file: CampaignFile, /, *, as_json: Json = False, progress: Handed = silent) -> int:
     """Describe a data file: how the campaign ended, its channels, runs, points and tables.
 
-    The file may still be being written. The exit code is 0, or 2 when the file is refused.
+    The file may still be in the process of being written. The exit code is 0, or 2 if the file is refused.
     """
     progress("reading the file")
     from bench.datafile.inspection import overview
@@ -34,9 +34,9 @@ def info(file: CampaignFile, /, *, as_json: Json = False, progress: Handed = sil
 
 
 def verify(file: CampaignFile, /, *, as_json: Json = False, progress: Handed = silent) -> int:
-    """Read a whole data file and compare every dataset with its checksum and the layout.
+    """Read a complete data file and compare every dataset with its checksum and the layout.
 
-    The exit code is 0 when the file is complete and unchanged, 2 when it is damaged or refused.
+    The exit code is 0 if the file is complete and unchanged, 2 if it is damaged or refused.
     """
     progress("loading the program")
     from bench.datafile.inspection import verify as judge
@@ -84,7 +84,7 @@ def recover(
     """Rebuild a file after a crash or a full disk, or upgrade one of an older version.
 
     The original is only read. Intact data are copied to a new file of the current layout with checksums; lost events
-    are restored from the journal next to the file. The exit code is 0, or 2 when the file is refused.
+    are restored from the journal next to the file. The exit code is 0, or 2 if the file is refused.
     """
     progress("loading the program")
     from bench.datafile.recovery import recover as rebuild
@@ -124,7 +124,7 @@ def export(
     out: Annotated[
         Path | None,
         Parameter(
-            metavar="DIR", help="New folder for the files.", show_default="<name>-<format> beside the campaign's file"
+            metavar="DIR", help="New folder for the files.", show_default="<name>-<format> next to the campaign file"
         ),
     ] = None,
     raw: Annotated[
@@ -136,8 +136,8 @@ def export(
     """Write a recorded campaign for other programs: every channel and the drive, and the tables of results.
 
     Writes one file per run; names and units are kept, and missing samples are NaN. Every dataset is compared with its
-    checksum; damaged ones are reported and listed in the file DAMAGED.txt of the folder. The exit code is 0 when
-    everything was written, 1 when the disk failed, 2 when an input was refused; no partial files remain.
+    checksum; damaged ones are reported and listed in the file DAMAGED.txt of the folder. The exit code is 0 if
+    everything was written, 1 if the disk failed, 2 if an input was refused; no partial files remain.
     """
     progress("loading the program")
     from bench.app.export.format import export as write
@@ -161,7 +161,7 @@ def export(
 
 
 def _text(content: dict[str, Any]) -> str:
-    """The content of `bench.datafile.inspection`, of a campaign or a re-analysis."""
+    """The contents of a campaign or re-analysis file as text, from `bench.datafile.inspection`."""
     heading = f"{content['file']}, {content['bytes'] / 1e6:.1f} MB, format {content['format_version']}"
     if "original" in content:
         return _lines({"file": heading} | _reanalysis(content))

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 P = TypeVar("P", bound=Parameters)
 
 MOST_POINTS = 1_000_000
-"""Maximum number of points of all ranges together; more is probably a typing error."""
+"""Maximum number of points of all ranges together; a larger number is probably a typing error."""
 
 SPECIMEN_FILE = ".json"
 """Extension of a specimen file, which holds identified properties."""
@@ -51,8 +51,8 @@ def parameters_from(model: type[P], arguments: Mapping[str, Any], file: Path | N
 
 
 def configuration_from(file: Path | None, seed: str | None, specimen: Path | None = None) -> "BenchConfiguration":
-    """The configuration of the bench; `seed` and the identified properties of the file `specimen`, where given, replace
-    its own. Raises InvalidInput.
+    """The configuration of the bench; `seed` and the identified properties in the file `specimen`, if given, replace
+    those of the configuration. Raises InvalidInput.
     """
     from bench.config.model import BenchConfiguration
     from bench.config.sections import Simulation
@@ -192,7 +192,7 @@ def named_records(named: Sequence[str]) -> list[str]:
             try:
                 RecordReference.parse(str(path)).read()
             except InvalidInput as refused:
-                print(f"rockbench: left out: {refused}", file=sys.stderr)
+                print(f"rockbench: skipped: {refused}", file=sys.stderr)
             else:
                 good.append(str(path))
         if not good:

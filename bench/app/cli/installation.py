@@ -38,7 +38,7 @@ def init(
     from bench.config.toml import write_template
 
     if minimal and hardware:
-        raise InvalidInput("--minimal", "--hardware", "give only one of them")
+        raise InvalidInput("--minimal", "--hardware", "use only one of them")
     if backend is not None and (minimal or hardware):
         raise InvalidInput("--backend", backend, f"not allowed with {'--minimal' if minimal else '--hardware'}")
     write_template(file, "minimal" if minimal else "hardware" if hardware else "all", backend)
@@ -58,7 +58,7 @@ def init(
 def check(file: Annotated[Path, Parameter(help="File to check.", metavar="FILE", negative=())], /) -> int:
     """Check a configuration file and list every error, one line for each key.
 
-    Valid but unusual values get a warning. The exit code is 0 when the file is valid and 2 when it is not.
+    Valid but unusual values get a warning. The exit code is 0 if the file is valid and 2 if it is not.
     """
     from bench.config.review import review
     from bench.config.toml import former_keys, problems_of, read_configuration
@@ -91,7 +91,7 @@ def benchmark(
 
     Prints tables and writes benchmark.md and benchmark.json, with machine and versions, and the figure
     work_precision.png. Integrators that are not installed are marked; `uv sync --group benchmark` installs them. The
-    exit code does not depend on the numbers: 0, or 2 when an input was refused.
+    exit code does not depend on the numbers: it is 0, or 2 if an input was refused.
     """
     progress("loading the program")
     from bench.app.benchmark.suite import FULL, QUICK, RESULTS, run_benchmark
@@ -140,5 +140,5 @@ def completion(
         raise InvalidInput("SHELL", "none", "the running shell was not recognised: name bash, zsh or fish") from None
     except OSError as error:
         where = "its start-up file" if error.filename is None else Path(error.filename)
-        raise InvalidInput("--install", str(where), f"it cannot be written: {error.strerror}") from None
+        raise InvalidInput("--install", str(where), f"the file cannot be written: {error.strerror}") from None
     return 0

@@ -111,7 +111,9 @@ def interruptible(requests: "Requests", asking: Callable[[], bool]) -> Generator
 
 @contextmanager
 def leaving() -> Generator[None, None, None]:
-    """In this context, SIGINT ends the process at once, provided that `handle_signals` has installed its handler."""
+    """Context manager in which SIGINT ends the process at once, provided that `handle_signals` has installed its
+    handler.
+    """
     before = signal.getsignal(signal.SIGINT)
     if not isinstance(before, Interrupts):
         yield
@@ -126,9 +128,9 @@ def leaving() -> Generator[None, None, None]:
 class Watch:
     """A thread that handles a signal when the main thread does not.
 
-    Python runs a signal handler in the main thread, between two bytecode instructions: not while native code runs or
-    waits, and on Windows, before Python 3.14, not during a wait for a lock. The number of the signal, however, is
-    written at once to a socket on which this thread waits. This thread ends the process only while the installed
+    Python runs a signal handler in the main thread, between two bytecode instructions: it does not run while native
+    code runs or waits nor, on Windows before Python 3.14, during a wait for a lock. The number of the signal, however,
+    is written at once to a socket on which this thread waits. This thread ends the process only while the installed
     handler allows it (`leavable`): never while a rig is open, and never under a handler of another program.
     """
 

@@ -50,7 +50,8 @@ COMMANDS = {
     ),
     "doctor": (
         "support:doctor",
-        "Check the machine for a bench: versions, clocks, disk, power settings, serial ports, graphics; with remedies.",
+        "Check the machine for a bench: versions, clocks, disk, power settings, serial ports and graphics, "
+        "with remedies.",
         "--out runs",
     ),
     "emulate": (
@@ -80,7 +81,7 @@ COMMANDS = {
     ),
     "predict stability": (
         "predict:stability",
-        "Boundaries of stability of the rocking motions over frequency, on fixed ground and on a table.",
+        "Stability boundaries of the rocking motions in frequency, on fixed ground and on a table.",
         "--beta 0.64 0.97 --plot stability.png",
     ),
     "predict attractor": (
@@ -126,7 +127,7 @@ COMMANDS = {
     ),
     "file verify": (
         "file:verify",
-        "Read a whole data file and compare every dataset with its checksum and the layout.",
+        "Read a complete data file and compare every dataset with its checksum and the layout.",
         "campaign.h5 --json",
     ),
     "file recover": (
@@ -136,7 +137,7 @@ COMMANDS = {
     ),
     "file bundle": (
         "support:bundle",
-        "Collect a fault report: log, configuration, versions and last data of a campaign in one archive.",
+        "Collect a fault report: log, configuration, versions and latest data of a campaign in one archive.",
         "campaign.h5 --anonymous",
     ),
     "replay": (
@@ -175,7 +176,7 @@ COMMANDS = {
         "bash --install",
     ),
 }
-"""Commands, by name: the function in this package, the first paragraph of its documentation, and example arguments."""
+"""Commands by name: the function in this package, the first paragraph of its documentation, and example arguments."""
 
 
 def rockbench_app(arguments: Sequence[str] = ()) -> App:
@@ -254,7 +255,7 @@ def main(argv: Sequence[str] | None = None, progress: Progress = silent) -> int:
     arguments = sys.argv[1:] if argv is None else list(argv)
     forget_completed()
     app = rockbench_app(arguments)
-    # also for a command line that cannot be parsed
+    # needed even for a command line that cannot be parsed
     reply_in_json(sys.stdout if "--json" in arguments else None)
     try:
         command, bound, handed = app.parse_args(arguments, exit_on_error=False, print_error=False)

@@ -66,7 +66,7 @@ RecordText = Annotated[
     Parameter(
         name="FILE",
         metavar="FILE",
-        help="A record: FILE, FILE@KEY=VALUE,... with the keys unit, dt, channel, column, name; or "
+        help="A record: FILE, FILE@KEY=VALUE,... with the keys unit, dt, channel, column and name, or "
         "synthetic:NAME[:SEED].",
     ),
 ]
@@ -154,7 +154,8 @@ class RunOptions:
         Path | None,
         Parameter(
             metavar="FILE",
-            help="Parameters of the protocol (TOML, keys as the flags above with _ for -); flags override the file.",
+            help="Parameters of the protocol (TOML, with keys like the flags above but _ instead of -); flags "
+            "override the file.",
         ),
     ] = None
     out: Annotated[
@@ -194,11 +195,13 @@ class RunOptions:
     ] = None
     dry_run: Annotated[
         bool,
-        switch("Compute the whole run, check it against every limit, and print the margins, without opening a device."),
+        switch(
+            "Compute the complete run, check it against every limit, and print the margins, without opening a device."
+        ),
     ] = False
     yes: Yes = False
     ask: Annotated[
-        bool, switch("Ask the operator even on the simulated bench, which otherwise acts as its own operator.")
+        bool, switch("Ask the operator even on the simulated bench, which otherwise performs the tasks itself.")
     ] = False
     realtime: Annotated[bool, switch("Run the simulated bench in real time, not as fast as possible.")] = False
     json: Annotated[
@@ -208,7 +211,7 @@ class RunOptions:
 
     @property
     def about(self) -> dict[str, str]:
-        """Descriptive attributes of the data file, without effect on the run."""
+        """Descriptive attributes of the data file, which do not affect the run."""
         texts = {"operator": self.operator, "notes": "\n".join(self.note)}
         return {name: text for name, text in texts.items() if text}
 
@@ -222,8 +225,8 @@ class SpecimenOptions:
         Path | None,
         Parameter(
             metavar="FILE",
-            help="Specimen: TOML with keys as in [specimen] of a configuration, or a specimen file (.json) of "
-            "identified values; flags override the file.",
+            help="Specimen: TOML with keys as in the table [specimen] of a configuration, or a specimen file "
+            "(.json) of identified values; flags override the file.",
             show_default="the paper's specimen",
         ),
     ] = None
@@ -239,7 +242,7 @@ class SpecimenOptions:
         str | None,
         Parameter(
             metavar="NUMBER",
-            help="Restitution of the block over the theoretical one (at least 0).",
+            help="Ratio of the block's restitution to the theoretical one (at least 0).",
             show_default="the specimen's, 1",
         ),
     ] = None

@@ -82,7 +82,7 @@ def report_error(error: BaseException | str, code: Code | None = None) -> None:
 
 def error_object(error: BaseException | str, code: Code | None = None) -> dict[str, Any]:
     """An error as a JSON object: `code`, `message`, and `item`, `value`, `remedy` where they are known. The code is
-    that of the error's type; `code` applies to errors other than RockbenchError.
+    that of the error type; the argument `code` applies to errors other than RockbenchError.
     """
     known = isinstance(error, InvalidInput)
     return {
@@ -114,7 +114,8 @@ class Result:
 
 
 def check_files(options: "ResultOptions") -> None:
-    """Refuse output files that exist, cannot be created, have an unknown extension, or are named twice; creates none.
+    """Check that no output file exists, is impossible to create, has an unknown extension, or is named twice; creates
+    none.
 
     Raises InvalidInput naming the option.
     """
@@ -129,10 +130,10 @@ def check_files(options: "ResultOptions") -> None:
         if path.exists():
             raise InvalidInput(item, str(path), "the file exists and is never overwritten; choose another name")
         if not path.parent.is_dir():
-            raise InvalidInput(item, str(path), "its folder does not exist; create it first")
+            raise InvalidInput(item, str(path), "the folder does not exist; create it first")
         other = seen.setdefault(path.resolve(), item)
         if other != item:
-            raise InvalidInput(item, str(path), f"{other} writes the same file; choose another name")
+            raise InvalidInput(item, str(path), f"{other} would write the same file; choose another name")
         try:
             # permission bits are not reliable on every file system
             with tempfile.TemporaryFile(dir=path.parent):
@@ -144,8 +145,8 @@ def check_files(options: "ResultOptions") -> None:
 def deliver(make: Callable[[], Result], options: "ResultOptions", progress: Progress = silent) -> int:
     """Compute a result, write the requested files, then print.
 
-    Returns 0; or 1, with a line on standard error, when the computation or the disk fails, or there is nothing to draw
-    (no file is then written). Raises InvalidInput.
+    Returns 0, or 1 with a line on standard error if the computation or the disk fails or there is nothing to draw (no
+    file is then written). Raises InvalidInput.
     """
     try:
         _write(make(), options, progress)

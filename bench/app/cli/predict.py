@@ -46,8 +46,8 @@ MOST_HISTORIES = 6
 """Maximum number of points in a figure of histories."""
 
 _EXIT_CODES = (
-    "The exit code is 0 when the prediction succeeded, 1 when it failed, 2 when an input was refused. "
-    "Existing files are never overwritten."
+    "The exit code is 0 if the prediction succeeded, 1 if it failed, 2 if an input was refused. Existing "
+    "files are never overwritten."
 )
 
 _Records = Annotated[
@@ -56,7 +56,7 @@ _Records = Annotated[
         name="FILE",
         metavar="FILE",
         help="Records, before the flags: FILE, FILE@KEY=VALUE,... with the keys unit, dt, channel, column, name, "
-        "or synthetic:NAME[:SEED]. Without any: the seven synthetic ones.",
+        "or synthetic:NAME[:SEED]. Default: the seven synthetic ones.",
     ),
 ]
 
@@ -100,7 +100,7 @@ def _sine(
         if options.plot is not None and drawable is not None and isinstance(request, SineRequest):
             points = len(request.omega) * len(request.beta)
             if points > drawable:
-                allowed = f"at most {drawable} points fit in this figure; give fewer"
+                allowed = f"at most {drawable} points fit in this figure; specify fewer"
                 raise InvalidInput("--plot", f"{points} points", allowed)
         warn_of_unusual(request, specimen)
         make = resolve_name(f"bench.app.cli.predict_sine:{function}")
@@ -136,7 +136,7 @@ def _under_records(
         progress("reading the records")
         records = records_from(files)
         if options.plot is not None and len(records) > drawable:
-            allowed = f"at most {drawable} fit in this figure; give fewer"
+            allowed = f"at most {drawable} fit in this figure; specify fewer"
             raise InvalidInput("--plot", f"{len(records)} records", allowed)
         warn_of_unusual(request, specimen)
         make = resolve_name(f"bench.app.cli.predict_seismic:{function}")
@@ -165,11 +165,11 @@ history = _sine(
 steady = _sine(
     SteadyRequest,
     "steady",
-    "Steady motions at single points: gain coefficients, peaks, impacts, Floquet multipliers.\n\n"
-    "The periodic motions are solved for directly, without waiting for transients to decay. Up to two exist at a "
-    "point: the block rocks, or it never lifts. Each is listed, its alpha_2 with an uncertainty band: expanded "
-    "uncertainty (k = 2) to first order, or the 95 % interval of a Monte Carlo simulation with --members. The figure "
-    "shows two periods of each.",
+    "Steady motions at single points: gain coefficients, peaks, impacts, Floquet multipliers.\n\nThe "
+    "periodic motions are solved for directly, without waiting for transients to decay. Up to two exist "
+    "at a point: the block rocks, or it never lifts. Each is listed, and its alpha_2 has an uncertainty "
+    "band: expanded uncertainty (k = 2) to first order, or the 95 % interval of a Monte Carlo simulation "
+    "with --members. The figure shows two periods of each.",
     drawable=MOST_HISTORIES,
 )
 spectrum = _sine(
@@ -187,10 +187,11 @@ gain_map = _sine(
 stability = _sine(
     StabilityRequest,
     "stability",
-    "Boundaries of stability of the rocking motions over frequency, on fixed ground and on a table.\n\n"
-    "The block pushes the table, which changes how a disturbance grows or decays: a motion may be stable on the table "
-    "and unstable on fixed ground. The motion of the table is a sine up to --harmonics, under a drive that does not "
-    "react within a period. Lists the boundaries; --csv, --json and --plot have the multipliers of every point.",
+    "Stability boundaries of the rocking motions in frequency, on fixed ground and on a table.\n\nThe "
+    "block pushes the table, which changes how a disturbance grows or decays: a motion may be stable on "
+    "the table and unstable on fixed ground. The motion of the table is a sine up to --harmonics, under "
+    "a drive that does not react within a period. Lists the boundaries; --csv, --json and --plot have "
+    "the multipliers of every point.",
 )
 attractor = _sine(
     AttractorRequest,

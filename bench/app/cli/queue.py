@@ -38,9 +38,9 @@ def queue(
     """Check every pending test, then run them in order; the file keeps the status of each.
 
     `rockbench run PROTOCOL ... --queue FILE` adds a test; the operator's window can store its queue in the same format.
-    No test starts when one of the plans is refused. A test that fails or is stopped ends the queue; the others stay
-    pending, and the same command continues with them. The exit code is 0 when every pending test was carried out, 1
-    when not, 2 when an input was refused before the first test, 130 after Ctrl-C.
+    No test starts if one of the plans is refused. A test that fails or is stopped ends the queue; the others stay
+    pending, and the same command continues with them. The exit code is 0 if every pending test was carried out, 1 if
+    not, 2 if an input was refused before the first test, 130 after Ctrl-C.
     """
     progress("loading the program")
     from bench.app.cli.inputs import configuration_from
@@ -80,7 +80,7 @@ def queue(
         lambda: {"tests": [test.model_dump(mode="json") for test in tests.tests]},
         lambda: tests_text(tests.tests),
         as_json=as_json,
-        error="the queue was not carried out: see the tests" if code else None,
+        error="the queue was not completed: see the status of its tests" if code else None,
         code="run_failed" if code == 1 else "interrupted",
     )
     return code

@@ -47,22 +47,24 @@ def info(
 ) -> int:
     """Describe earthquake records: peaks, Arias intensity, significant duration, hash.
 
-    The format is recognised from the content of the file. Unit and time step must be given if the file does not state
-    them; values that contradict the file are refused, and so is a file that is not a complete acceleration record. The
-    exit code is 0 when every record was read, 1 when a figure could not be written, 2 when an input was refused.
-    Existing files are never overwritten.
+    The format is recognised from the content of the file. Unit and time step must be specified if the file does not
+    state them; values that contradict the file are refused, as is a file that is not a complete acceleration record.
+    The exit code is 0 if every record was read, 1 if a figure could not be written, 2 if an input was refused. Existing
+    files are never overwritten.
     """
     progress("reading the records")
     from bench.accelerograms.reference import GRAMMAR, RecordReference, read_records, seconds_of
     from bench.provenance import software
 
     if not files:
-        raise InvalidInput("FILE", None, f"give at least one record: {GRAMMAR}")
+        raise InvalidInput("FILE", None, f"specify at least one record: {GRAMMAR}")
     references = [RecordReference.parse(text) for text in files]
     options = ResultOptions(json=as_json, plot=plot)
     check_files(options)
     if plot is not None and len(references) > MOST_DRAWN:
-        raise InvalidInput("--plot", f"{len(references)} records", f"at most {MOST_DRAWN} fit in a figure; give fewer")
+        raise InvalidInput(
+            "--plot", f"{len(references)} records", f"at most {MOST_DRAWN} fit in a figure; specify fewer"
+        )
     defaults: dict[str, Any] = {
         "dt": None if dt is None else seconds_of("--dt", dt),
         "unit": unit,

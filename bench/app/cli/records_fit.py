@@ -1,4 +1,4 @@
-"""`rockbench records fit`: a record fitted to the stroke of the bench, and the change of its spectrum."""
+"""`rockbench records fit`: fits a record to the stroke of the bench, and prints the change of its spectrum."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -49,8 +49,8 @@ def _fit(
 
     The record is scaled in time (--length-ratio), trimmed, limited to a band, scaled to a peak, then fitted: by the
     least change below 2 Hz, by a high-pass filter, or by both for comparison. Stroke, velocity and the change of the
-    response spectrum are printed. Nothing is written unless requested. The exit code is 0 when the fit succeeded, 1
-    when writing failed, 2 when an input was refused. Existing files are never overwritten.
+    response spectrum are printed. Nothing is written unless requested. The exit code is 0 if the fit succeeded, 1 if
+    writing failed, 2 if an input was refused. Existing files are never overwritten.
     """
     progress("loading the program")
     from bench.accelerograms.reference import RecordReference
@@ -163,7 +163,7 @@ def _write_record(path: Path, fits: "StrokeFits") -> None:
     comments = [
         "earthquake record fitted to a shake table",
         f"from: {record.name}, {record.source}, {record.format}",
-        f"sha256 of that: {record.sha256}",
+        f"sha256 of the original: {record.sha256}",
         *motion.steps,
         f"begins at {motion.begin:.9g} s of the original record; starts and ends at rest",
         f"acceleration in m/s2, dt = {motion.record.dt:.12g} s",

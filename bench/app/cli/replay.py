@@ -40,8 +40,8 @@ def replay(
     answers, and a requested end is requested again. No device is opened and no other file is read. Every drive sample,
     journal entry and result is compared with the file.
 
-    The exit code is 0 when everything agrees with the recording except for rounding, also for an incomplete recording;
-    1 when there are differences, which are printed; 2 when the file cannot be replayed; 130 after Ctrl-C.
+    The exit code is 0 if everything agrees with the recording to within rounding, even if the recording is incomplete;
+    1 if there are differences, which are printed; 2 if the file cannot be replayed; 130 after Ctrl-C.
     """
     progress("loading the program")
     from bench.app.catalogue import parameters_of, protocol_of
@@ -113,13 +113,13 @@ def _text(replayed: "Replayed", table: str) -> str:
         lines.append("The file is from an older version; its sentences were not compared")
     if replayed.identical:
         there = " up to there" if replayed.ended is not None else ""
-        lines.append(f"Identical to the file in every bit{there}: {compared}")
+        lines.append(f"Bit-identical to the file{there}: {compared}")
         return "\n".join(lines)
     differences = sorted(replayed.found.differences, key=lambda each: each.rounding)
     lines.append(f"Compared with the file: {compared}")
     lines += [("Rounding: " if each.rounding else "Differs: ") + each.text for each in differences[:MOST_TOLD]]
     if len(differences) > MOST_TOLD:
-        lines.append(f"... and {len(differences) - MOST_TOLD} more (--json has all)")
+        lines.append(f"... and {len(differences) - MOST_TOLD} more (--json lists all)")
     return "\n".join([*lines, _software(replayed)])
 
 
@@ -131,7 +131,7 @@ def _software(replayed: "Replayed") -> str:
 
 def _different(file: Path, replayed: "Replayed") -> str:
     first = one_line(next(each.text for each in replayed.found.differences if not each.rounding))
-    return f"{file} did not replay as it was recorded: {first}"
+    return f"{file} did not replay as recorded: {first}"
 
 
 def _content(replayed: "Replayed") -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Reports as HTML and PDF: `rockbench report`, of a campaign, and `rockbench paper`, from simulation alone."""
+"""Reports as HTML and PDF: `rockbench report` on a campaign, and `rockbench paper` from simulation alone."""
 
 import sys
 from pathlib import Path
@@ -39,11 +39,11 @@ def report(
 ) -> int:
     """Create a report of a campaign from its data file.
 
-    One self-contained page: test and specimen, figures like the paper's Fig. 3 to 9 from this file's data, tables with
+    One self-contained page: test and specimen, figures like the paper's Figs. 3 to 9 from this file's data, tables with
     uncertainties, comparison with the prediction, limits and warnings, provenance. Every dataset is compared with its
     checksum first; damaged ones are listed at the top of the report. Without --html and --pdf, the report is written as
-    HTML next to FILE, with the extension .report.html. The exit code is 0 when it was written, 1 when it could not be
-    written, 2 when an input was refused. Existing files are kept unless --overwrite is given.
+    HTML next to FILE, with the extension .report.html. The exit code is 0 if it was written, 1 if it could not be
+    written, 2 if an input was refused. Existing files are kept unless --overwrite is given.
     """
     progress("loading the program")
     from bench.app.catalogue import installed_protocol
@@ -102,7 +102,7 @@ def paper(
         Parameter(
             name="--specimen",
             metavar="FILE",
-            help="Specimen: TOML with keys as in [specimen] of a configuration, or a specimen file (.json).",
+            help="Specimen: TOML with keys as in the table [specimen] of a configuration, or a specimen file (.json).",
             show_default="the paper's specimen",
         ),
     ] = None,
@@ -112,9 +112,9 @@ def paper(
     """Reproduce the paper from simulation alone, statement by statement.
 
     Draws the figures of the paper (Fig. 3 to 9), checks its eight statements numerically, and prints the verdicts.
-    Without --html and --pdf, the report is written as paper.html in the current folder. The exit code is 0 when the
-    report was written, whatever the verdicts, 1 when it could not be written, 2 when an input was refused. Existing
-    files are kept unless --overwrite is given.
+    Without --html and --pdf, the report is written as paper.html in the current folder. The exit code is 0 if the
+    report was written, whatever the verdicts, 1 if it could not be written, 2 if an input was refused. Existing files
+    are kept unless --overwrite is given.
     """
     progress("loading the program")
     from bench.app.cli.inputs import named_records, records_from, specimen_from, warn_of_unusual
@@ -141,20 +141,22 @@ def paper(
 
 
 def _check_outputs(html: Path | None, pdf: Path | None, *, overwrite: bool) -> None:
-    """Refuse output files that cannot be written, and PDF without the typesetter. Raises InvalidInput."""
+    """Check that the output files can be written and, for PDF, that the typesetter is installed. Raises
+    InvalidInput.
+    """
     if pdf is not None:
         require("pdf", "--pdf")
     for item, path in (("--html", html), ("--pdf", pdf)):
         if path is None:
             continue
         if path.is_dir():
-            raise InvalidInput(item, str(path), "it is a folder; name a file in it")
+            raise InvalidInput(item, str(path), "it is a folder; specify a file in it")
         if path.exists() and not overwrite:
-            raise InvalidInput(item, str(path), "it exists; choose another name, or give --overwrite")
+            raise InvalidInput(item, str(path), "the file exists; choose another name, or use --overwrite")
         if not path.parent.is_dir():
-            raise InvalidInput(item, str(path), "its folder does not exist; create it first")
+            raise InvalidInput(item, str(path), "the folder does not exist; create it first")
     if html is not None and pdf is not None and html.resolve() == pdf.resolve():
-        raise InvalidInput("--pdf", str(pdf), "--html writes the same file; choose another name")
+        raise InvalidInput("--pdf", str(pdf), "--html would write the same file; choose another name")
 
 
 def _deliver(

@@ -27,9 +27,9 @@ GOOD = ("completed", "stopped")
 """Statuses of a session with valid results."""
 
 _EXIT_CODES = (
-    "The exit code is 0 when the campaign was carried out (also when a point was not reached, see its status), "
-    "1 when it failed or was aborted, 2 when it was refused before it began, 130 after Ctrl-C. "
-    "With --dry-run it is 0 when the campaign would be carried out."
+    "The exit code is 0 if the campaign was carried out (even if a point was not reached, see its "
+    "status), 1 if it failed or was aborted, 2 if it was refused before it began, 130 after Ctrl-C. With "
+    "--dry-run it is 0 if the campaign would be carried out."
 )
 
 
@@ -40,7 +40,7 @@ def __getattr__(name: str) -> App:
     try:
         protocol = load_protocol(name)
     except InvalidInput as refused:
-        # reported when it is listed or run, so that the others stay usable
+        # reported when the protocol is listed or run, so that the others stay usable
         failure = refused
     else:
         command = name if name == CHECK else f"run {name}"
@@ -168,7 +168,7 @@ def carry_out(
     about: Mapping[str, str],
 ) -> "tuple[SessionResult | Exception, int | None]":
     """Run a protocol and display its progress. Returns its result or error, and the exit code of the signal that
-    requested its end, or None. Raises InvalidInput when it is refused.
+    requested its end, or None. Raises InvalidInput if it is refused.
     """
     from bench.app.cli.interrupt import interruptible
     from bench.app.cli.streams import lasting
@@ -223,7 +223,7 @@ def carry_out(
             # a summary exists only after a run: `check_folder` refuses a folder that has one before
             if (out / SUMMARY).exists():
                 raise KeyboardInterrupt(f"interrupted after the run: {out} has its results, without figures") from None
-            raise KeyboardInterrupt("interrupted: ended before anything moved") from None
+            raise KeyboardInterrupt("interrupted before anything moved") from None
         except (RockbenchError, OSError) as error:
             ended = error
     return ended, interrupts.exit_code
@@ -247,7 +247,7 @@ def _print_result(result: "SessionResult", out: Path, as_json: bool, interrupted
 
 
 def _error(result: "SessionResult") -> tuple[str | None, Code]:
-    """The error in the JSON object of a run, None for a run that ended well, and its code."""
+    """The error for the JSON object of a run, None if the run ended well, and its code."""
     if result.status not in GOOD:
         return result.reason, "run_failed" if result.status == "failed" else "run_aborted"
     return None if result.passed else "at least one check failed: see the points", "check_failed"

@@ -18,14 +18,16 @@ def doctor(
     ] = None,
     server: Annotated[
         str | None,
-        Parameter(metavar="HOST:PORT", help="Address of a device server to reach.", show_default=False),
+        Parameter(
+            metavar="HOST:PORT", help="Address of a device server whose connection is checked.", show_default=False
+        ),
     ] = None,
     as_json: Json = False,
     progress: Handed = silent,
 ) -> int:
-    """Check the machine for a bench: versions, clocks, disk, power settings, serial ports, graphics; with remedies.
+    """Check the machine for a bench: versions, clocks, disk, power settings, serial ports and graphics, with remedies.
 
-    Nothing is changed and no device is opened. The exit code is 0, or 1 when a check is bad.
+    Nothing is changed and no device is opened. The exit code is 0, or 1 if a check is bad.
     """
     progress("checking the machine")
     from bench.app.support.doctor import Health, examine
@@ -34,7 +36,7 @@ def doctor(
 
     folder = out or Path.cwd()
     if not folder.is_dir():
-        raise InvalidInput("--out", str(folder), "it is not an existing folder")
+        raise InvalidInput("--out", str(folder), "the folder does not exist")
     found = list(examine(folder, server))
     rows = [(each.item, str(each.health), each.found, each.remedy) for each in found]
     bad = any(each.health is Health.BAD for each in found)
@@ -43,7 +45,7 @@ def doctor(
             "good": not bad,
             "checks": [dict(zip(("item", "health", "found", "remedy"), row, strict=True)) for row in rows],
         },
-        lambda: text_table([TextColumn(name, "") for name in ("check", "health", "found", "what to do")], rows),
+        lambda: text_table([TextColumn(name, "") for name in ("check", "health", "found", "remedy")], rows),
         as_json=as_json,
     )
     return 1 if bad else 0
@@ -66,10 +68,10 @@ def bundle(
     as_json: Json = False,
     progress: Handed = silent,
 ) -> int:
-    """Collect a fault report: log, configuration, versions and last data of a campaign in one archive.
+    """Collect a fault report: log, configuration, versions and latest data of a campaign in one archive.
 
-    The data are those of the last minute. A part of a damaged file that cannot be read is replaced by the reason. The
-    exit code is 0, or 2 when the archive is refused.
+    The data cover the last minute. A part of a damaged file that cannot be read is replaced by the reason. The exit
+    code is 0, or 2 if the archive is refused.
     """
     progress("collecting the report")
     from bench.app.support.bundle import write_bundle

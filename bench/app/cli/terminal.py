@@ -81,7 +81,7 @@ class LogLines(PlainLines):
 def progress_on(
     stream: TextIO, person_answers: bool, protocol: "Protocol[Any] | None" = None
 ) -> "LiveConsole | PlainLines":
-    """The log of a `protocol` that has a log format; else the live display if `stream` is a terminal that can redraw,
+    """The log for a `protocol` that has a log format; else the live display if `stream` is a terminal that can redraw,
     or plain lines.
     """
     if protocol is not None and protocol.log_line is not None:
@@ -136,10 +136,10 @@ def choose(*, serves_itself: bool, yes: bool, ask: bool, terminal: bool) -> Oper
     """The operator of a run.
 
     A bench that `serves_itself` performs the operator's actions unless `ask`; on a real bench the person at a
-    `terminal` is asked unless `yes`. Raises RockbenchError when nobody could answer.
+    `terminal` is asked unless `yes`. Raises RockbenchError if nobody could answer.
     """
     if yes and ask:
-        raise RockbenchError("--yes and --ask contradict each other: give only one of them")
+        raise RockbenchError("--yes and --ask contradict each other: use only one of them")
     if yes:
         return Unattended("unattended run (--yes)")
     if ask:
@@ -148,4 +148,4 @@ def choose(*, serves_itself: bool, yes: bool, ask: bool, terminal: bool) -> Oper
         return Unattended("the bench itself")
     if terminal:
         return AtTheConsole()
-    raise RockbenchError("nobody can answer the operator's questions: run in a terminal, or give --yes")
+    raise RockbenchError("nobody can answer the operator's questions: run in a terminal, or use --yes")

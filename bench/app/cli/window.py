@@ -46,7 +46,7 @@ PACKAGES = {
 
 
 class NoDisplay(InvalidInput):
-    """No window can be opened on this system. `item` is the variable or library, `allowed` the remedy."""
+    """Error: no window can be opened on this system. `item` is the variable or library, `allowed` the remedy."""
 
     def __init__(self, item: str, why: str, remedy: str) -> None:
         RockbenchError.__init__(self, f"rockbench gui cannot open a window: {why}; {remedy}, or use {HEADLESS}")
@@ -60,13 +60,13 @@ def gui(
         Parameter(
             metavar="FILE",
             help="Configuration of the bench (TOML).",
-            show_default="the paper's specimen on the simulated bench, with a first minute that is guided",
+            show_default="the paper's specimen on the simulated bench, with a guided tour",
         ),
     ] = None,
     seed: Seed = None,
     specimen: SpecimenFile = None,
     queue: Annotated[
-        Path, Parameter(metavar="FILE", help="File of the queue, which `rockbench queue` can run too.")
+        Path, Parameter(metavar="FILE", help="File of the queue, which `rockbench queue` can also run.")
     ] = Path("runs", "queue.json"),
     progress: Handed = silent,
 ) -> int:
@@ -111,7 +111,7 @@ def require_display() -> None:
             check=False,
         )
     except subprocess.TimeoutExpired:
-        why = f"{chosen} = {os.environ[chosen]!r} does not answer within {PATIENCE:g} s"
+        why = f"{chosen} = {os.environ[chosen]!r} does not respond within {PATIENCE:g} s"
         raise NoDisplay(chosen, why, "start it on a desktop or over `ssh -X`") from None
     if probe.returncode == 0:
         return

@@ -1,4 +1,4 @@
-"""Runs of other windows and of terminals on this machine: they are watched for, and attached to."""
+"""Detection of runs started by other windows and terminals on this machine, and attachment to them."""
 
 from PySide6.QtCore import QObject, QTimer
 
@@ -6,11 +6,11 @@ from bench.app.gui.controller import Controller
 from bench.app.ipc.sessions import running_sessions
 
 PERIOD = 1000
-"""Interval between two looks for sessions [ms]."""
+"""Interval between two searches for sessions [ms]."""
 
 
 class SessionWatch(QObject):
-    """Looks for sessions while the window has no run; at the first look it attaches to one that is under way."""
+    """Searches for sessions while the window has no run; the first search attaches to a session that is under way."""
 
     def __init__(self, controller: Controller, parent: QObject) -> None:
         super().__init__(parent)

@@ -50,7 +50,7 @@ class Ring:
 
     def window(self, seconds: float, buckets: int) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
         """The last `seconds` as a line through the extremes of `buckets` parts of equal length, and of the part in
-        which the window begins.
+        which the displayed interval begins.
 
         Returns times relative to the newest sample [s], shape (n,), not above zero, and values, shape (n, n_signals),
         minimum and maximum of each part in turn. Parts begin at multiples of their length in bench time, independently

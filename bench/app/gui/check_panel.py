@@ -1,4 +1,4 @@
-"""The loop check: started like any run; each line is shown with its verdict when it is complete."""
+"""The loop check, which is started like any run; each line is shown with its verdict when it is complete."""
 
 from datetime import datetime
 from pathlib import Path
@@ -40,10 +40,10 @@ MARKS = {
 
 
 class CheckPanel(QWidget):
-    """Runs `rockbench check` with its defaults; other parameters are on the Protocol page."""
+    """Runs `rockbench check` with default parameters; others can be set on the Protocol page."""
 
     predicted = Signal(object)
-    """An empty prediction when a check begins, since it measures no gains."""
+    """An empty prediction, emitted when a check begins, since a check measures no gains."""
 
     def __init__(self, controller: Controller, theme: Theme) -> None:
         super().__init__()

@@ -38,7 +38,9 @@ from bench.events import State, StateChanged
 from drivers.clock import now
 
 PERIOD = 28
-"""Redraw interval [ms], slightly over thirty per second; and maximum interval between checks of the connection."""
+"""Redraw interval [ms], for slightly more than thirty redraws per second; and maximum interval between checks of the
+connection.
+"""
 
 BUDGET = 0.02
 """Maximum time for handling messages in one iteration of the main loop [s]; the rest waits for the next iteration."""
@@ -48,7 +50,7 @@ DELIBERATE = 0.7
 
 
 class Controller(QObject):
-    """The only user of the session connection; lives in the window's thread."""
+    """The only user of the connection to the session; it lives in the window's thread."""
 
     changed = Signal()
     """The state, a time or the connection changed."""
@@ -113,14 +115,16 @@ class Controller(QObject):
 
     @property
     def why_busy(self) -> str:
-        """Why no run can begin beside those under way; empty if one can. Simulated benches run beside each other."""
+        """Reason why no run can begin in addition to those under way; empty if one can. Simulated benches may run
+        concurrently.
+        """
         if self._running:
             return texts.START_BUSY
         return texts.START_ELSEWHERE if self.elsewhere is not None and self.elsewhere.real else ""
 
     @property
     def owner(self) -> str:
-        """Whose run is shown, and what this window may do; empty without a run."""
+        """Description of whose run is shown and what this window may do; empty without a run."""
         if not self._running:
             return ""
         if self.attached is not None:
@@ -190,14 +194,16 @@ class Controller(QObject):
         self._introduce(run, 0.0)
 
     def attach(self, session: RunningSession) -> None:
-        """Show the run of a session that another window or a terminal has started; this window can stop it."""
+        """Attach to a session that another window or a terminal has started, and show its run; this window can stop
+        it.
+        """
         if not self._running:
             self.latched = False
             self._use(AttachedClient(session, self._call), session)
             self.changed.emit()
 
     def detach(self) -> None:
-        """Leave a session that this window has attached to; its run is not affected."""
+        """Detach from a session; its run is not affected."""
         link = self._link
         if link is not None and self.attached is not None:
             self._link, self._running, self._started, self._question = None, False, 0.0, None
@@ -236,7 +242,7 @@ class Controller(QObject):
         self.changed.emit()
 
     def clear_stop(self) -> None:
-        """Allow a new run; has no effect while the stopped run is still under way."""
+        """Clear STOP, which allows a new run; has no effect while the stopped run is still under way."""
         self.latched = self.latched and self._running
         self.changed.emit()
 
@@ -324,7 +330,7 @@ class Controller(QObject):
                 if isinstance(event, StateChanged):
                     self._entered(event.after)
             case Beat():
-                # holds even if the change itself was lost
+                # holds even if the event of the change was lost
                 self.scene.state, self.scene.time = message.state, message.time
                 if not self.scene.preparing:
                     self.scene.reason = message.reason

@@ -1,4 +1,4 @@
-"""The figures that a run wrote beside its data file."""
+"""The figures that a run wrote next to its data file."""
 
 from pathlib import Path
 

@@ -21,8 +21,8 @@ Field = QLineEdit | QComboBox | QCheckBox
 
 
 class Form(QWidget):
-    """One line per parameter: name, value, unit, and error message. An empty line means the default. The parameter
-    model validates the values strictly; a refused value stays as it was typed.
+    """One line per parameter: name, value, unit, and error message. An empty field means the default. The parameter
+    model validates the values strictly; an invalid value stays as typed.
     """
 
     edited = Signal()
@@ -83,7 +83,7 @@ class Form(QWidget):
             set_level(error, "alarm")
 
     def _data(self) -> dict[str, Any]:
-        """Plain data as in a file; empty lines are omitted."""
+        """Plain data as in a file; empty fields are omitted."""
         typed: dict[str, Any] = {}
         for entry in declared(self._model):
             field = self.fields.get(entry.name)
@@ -97,7 +97,7 @@ class Form(QWidget):
 
 
 def _parts(entry: Declared, text: str) -> list[str]:
-    """Split a list of values: texts, which may contain spaces, at semicolons; numbers at spaces, as everywhere."""
+    """Split a list of values: strings, which may contain spaces, at semicolons; numbers at spaces, as everywhere."""
     return [part.strip() for part in text.split(";") if part.strip()] if entry.kind is str else [text]
 
 
@@ -198,7 +198,7 @@ class RunOptions(QWidget):
         }
 
     def run(self, plan: PlanCheck) -> Run:
-        """The run of a plan."""
+        """The run for a plan."""
         told = {"operator": self.operator.text().strip(), "notes": self.note.text().strip()}
         return Run(
             plan.protocol,

@@ -54,7 +54,8 @@ class GainPlot(pg.PlotWidget):
         self._item.setMenuEnabled(False)
         self._item.sigYRangeChanged.connect(self._tick)
         self._legend = self._item.addLegend(offset=(-8, 8), labelTextSize="9pt")
-        # one item for all points and one for all uncertainties: separate items take half a millisecond each per frame
+        # one item for all points and one for all uncertainties, because separate items take half a millisecond each per
+        # frame
         self._points, self._spreads = pg.ScatterPlotItem(size=11), pg.PlotCurveItem(connect="pairs")
         self._bars: list[tuple[float, float, float]] = []
         self._now = pg.ScatterPlotItem(size=18, brush=None, symbol="o")
@@ -148,8 +149,8 @@ class GainPlot(pg.PlotWidget):
         return [{"pos": (x, self._place(mark.gain)), "symbol": symbol, "size": 11, "pen": pen, "brush": brush}]
 
     def add_all(self, points: Sequence[Mapping[str, Any]], run: int = 0, name: str = "") -> None:
-        """Draw the points of a run, which the legend calls `name`. Points of a quantity other than that of the axis are
-        not drawn, which the legend states.
+        """Draw the points of a run, called `name` in the legend. Points of a quantity other than that of the axis are
+        not drawn; the legend says so.
         """
         before = len(self._marks)
         self._draw([(point, run) for point in points])
@@ -214,7 +215,7 @@ class GainPlot(pg.PlotWidget):
             edges = [
                 pg.PlotCurveItem(line.x[part], np.log10(edge[part]) if self._log else edge[part]) for edge in line.band
             ]
-            # the axis ignores bands: a wide one must not hide the points
+            # the axis ignores bands, since a wide band must not hide the points
             self._item.addItem(pg.FillBetweenItem(*edges, brush=pg.mkBrush(pale)), ignoreBounds=True)
         self.bands += 1
         self.setToolTip(texts.BAND)

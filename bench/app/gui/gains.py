@@ -74,7 +74,7 @@ def kind_of(prediction: Table) -> Kind | None:
 
 
 def lines_of(prediction: Table) -> list[Line]:
-    """The lines of a prediction; empty for one that cannot be drawn."""
+    """The lines of a prediction; empty if it cannot be drawn."""
     kind = kind_of(prediction)
     if kind is None:
         return []
@@ -103,7 +103,7 @@ def lines_of(prediction: Table) -> list[Line]:
 
 
 def mark_of(point: Mapping[str, Any]) -> Mark | None:
-    """The mark of a recorded point; None for a point without gain fields, or not played."""
+    """The mark for a recorded point; None if it has no gain fields or was not played."""
     beta = point.get("beta")
     if beta is None or "alpha_2" not in point:
         return None
@@ -163,8 +163,8 @@ class Difference:
 
 
 def compare(reference: Sequence[Mapping[str, Any]], other: Sequence[Mapping[str, Any]]) -> list[Difference]:
-    """Every point of either run, those of the reference first, in order. The last of repeated measurements counts.
-    Uncertainties are the root sum of squares of those of the points (k = 2).
+    """Every point of either run, in order, those of the reference first. Of repeated measurements, the last one counts.
+    Uncertainties are the root sum of squares of the points' uncertainties (k = 2).
     """
     before, after = _by_key(reference), _by_key(other)
     return [_difference(before.get(key), after.get(key)) for key in {**before, **after}]

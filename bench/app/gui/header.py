@@ -29,7 +29,7 @@ KEY = Qt.Key.Key_F12
 
 
 class StopButton(QPushButton):
-    """Requests the end of the run; it is not the emergency stop, which is hardware."""
+    """The STOP button, which requests the end of the run; it is not the emergency stop, which is hardware."""
 
     def __init__(self, controller: Controller, parent: QWidget | None = None) -> None:
         super().__init__(texts.STOP, parent)
@@ -56,7 +56,7 @@ class StopFilter(QObject):
         self._controller, self._button = controller, button
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: ARG002 - the signature is Qt's
-        """Consume events for STOP; a key held down counts once."""
+        """Consume events meant for STOP; a key held down counts once."""
         if isinstance(event, QKeyEvent) and event.key() == KEY:
             return self._take_key(event)
         if isinstance(event, QMouseEvent) and event.type() == QEvent.Type.MouseButtonPress:
@@ -89,11 +89,13 @@ class StopFilter(QObject):
 STALE = 2.0
 """Age above which the safety inputs are unknown [s]."""
 STEP = 90
-"""Largest length of the displayed step; its tooltip has all of it."""
+"""Largest length of the displayed step; its tooltip shows the full text."""
 SIDE, HEIGHT, LOW = 56, 120, 72
-"""Side of the lamp, height of the header, and its height in a small window [px]: its text never moves STOP."""
+"""Side of the lamp, height of the header, and its height in a small window [px]; they are fixed, so that text never
+moves STOP.
+"""
 ROOMY, MEDIUM = (1150, 600), 700
-"""Size of the window below which the header is low, and width below which it shows no times [px]."""
+"""Window size below which the header is low, and width below which it shows no times [px]."""
 
 
 class Lamp(QWidget):
@@ -147,7 +149,7 @@ def _corners(shape: Shape, box: QRectF) -> QPolygonF:
 
 
 class Header(QWidget):
-    """Updated by the signals of the controller."""
+    """The header, updated by the controller's signals."""
 
     def __init__(self, controller: Controller, theme: Theme, toggle: Callable[[], None] = lambda: None) -> None:
         super().__init__()
@@ -192,7 +194,7 @@ class Header(QWidget):
             details.addWidget(_label("faint", name), row, 0)
             details.addWidget(value, row, 1)
             value.setWordWrap(value is not self.owner)
-            # a long text is elided and does not widen the label
+            # a long text is elided, so that it does not widen the label
             value.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         details.addWidget(self.progress, len(rows), 0, 1, 2)
         details.setColumnStretch(1, 1)

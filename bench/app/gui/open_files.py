@@ -43,7 +43,7 @@ CHUNK = 1_000_000
 
 @dataclass(frozen=True, eq=False)
 class RunFile:
-    """Description of a file, its points and its prediction; `runs` are the numbers of its runs and their durations
+    """Description of a file, its points and its prediction; `runs` holds the numbers of its runs and their durations
     [s].
     """
 
@@ -63,7 +63,7 @@ class RunFile:
 
     @property
     def name(self) -> str:
-        """Short name: that of the folder, since the file of every run has the same name."""
+        """Short name: the name of the folder, since the files of all runs have the same name."""
         return self.path.resolve().parent.name or self.path.stem
 
 
@@ -214,7 +214,7 @@ SETTLE = 150
 
 
 class HistoryView(QWidget):
-    """Plot of a channel: the wheel zooms in time, dragging pans; a thread reads the file."""
+    """Plot of a channel; the wheel zooms in time, dragging pans, and a thread reads the file."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()

@@ -1,4 +1,4 @@
-"""Report and export of a file with the commands of the command line; existing files are never overwritten."""
+"""Report on and export of a file, using the command-line commands; existing files are never overwritten."""
 
 from contextlib import suppress
 from pathlib import Path
@@ -27,7 +27,7 @@ def free(path: Path) -> Path:
 
 
 class Outputs(QWidget):
-    """A row for an output: title, buttons, result."""
+    """A row for an output: title, buttons and result."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -7,7 +7,9 @@ from PySide6.QtGui import QColor, QGuiApplication, QPalette
 from PySide6.QtWidgets import QApplication
 
 BASE, SMALL, VALUE, BANNER = 11, 14, 20, 26
-"""Font sizes [pt]: text, STOP in a small window, live values, and the state of the bench, readable at two metres."""
+"""Font sizes [pt] of text, of STOP in a small window, of live values, and of the bench's state, which is readable at
+two metres.
+"""
 
 
 @dataclass(frozen=True)
@@ -89,7 +91,7 @@ def style_sheet(theme: Theme) -> str:
 
 def dress(application: QApplication, theme: Theme) -> None:
     """Apply a theme to every widget."""
-    # styling every widget takes long: a theme that is in use is kept
+    # styling every widget takes a long time, so a theme that is already in use is kept
     if application.styleSheet() == style_sheet(theme):
         return
     application.setStyle("Fusion")

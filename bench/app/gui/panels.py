@@ -14,13 +14,13 @@ from bench.events import Event, OperatorAsked, PointFinished
 from drivers.rig import OperatorTask
 
 UNREAD = 700
-"""Time after a question appears during which answers are ignored [ms]: it cannot have been read yet."""
+"""Time after a question appears during which answers are ignored [ms], since it cannot have been read yet."""
 
 
 _AT_ZERO = "The output is at zero and the rig is stopped until you answer."
 _ARMING = (
-    "Before arming, every safety input; then, at rest, that every sensor measures and the storeys are still. The "
-    "table moves only after these checks."
+    "Before arming: every safety input. Then, at rest: that every sensor measures and the storeys are "
+    "still. The table moves only after these checks."
 )
 _NOT_CHECKED = "No sensor detects whether this task is done: check before you answer. {what}"
 UNKNOWN_TASK = (
@@ -46,7 +46,7 @@ TASKS = {
     ),
     OperatorTask.LOCK_TABLE: (
         f"The manual release must not move the table. {_AT_ZERO} A clamped table is not driven.",
-        _NOT_CHECKED.format(what="Recordings with the clamped table are without drive."),
+        _NOT_CHECKED.format(what="Recordings with the clamped table are made without drive."),
     ),
     OperatorTask.UNLOCK_TABLE: (
         f"The table must be free before it is driven again. {_AT_ZERO}",
@@ -54,23 +54,24 @@ TASKS = {
     ),
     OperatorTask.WATCH_BLOCK: (
         f"Laser 2 measures the rocking of the block. {_AT_ZERO}",
-        "Before arming, every safety input; then, at rest, that the laser measures. The guard does not monitor the "
-        "drift while the laser points at the block. The table is not driven.",
+        "Before arming: every safety input. Then, at rest: that the laser measures. The guard does not "
+        "monitor the drift while the laser points at the block. The table is not driven.",
     ),
     OperatorTask.WATCH_STOREYS: (
         f"Laser 2 must point at storey 2 again: the guard needs it for the drift. {_AT_ZERO}",
         _NOT_CHECKED.format(what="The next test zeroes the signal at the new target."),
     ),
     OperatorTask.TILT_BLOCK: (
-        f"The block starts from this tilt, without a push. {_AT_ZERO} The output stays at zero during the recording.",
-        "Before arming, every safety input; afterwards, in the recording, that the block was released and rocked. "
-        "The table does not move.",
+        f"The block must start from this tilt, without a push. {_AT_ZERO} The output stays at zero during the "
+        "recording.",
+        "Before arming: every safety input. Afterwards, in the recording: that the block was released and "
+        "rocked. The table does not move.",
     ),
     OperatorTask.PULL_FRAME: (
-        f"The frame starts from this displacement, without a push. {_AT_ZERO} The output stays at zero during the "
-        "recording.",
-        "Before arming, every safety input; afterwards, in the recording, that the frame was released. The table "
-        "does not move.",
+        f"The frame must start from this displacement, without a push. {_AT_ZERO} The output stays at zero "
+        "during the recording.",
+        "Before arming: every safety input. Afterwards, in the recording: that the frame was released. The "
+        "table does not move.",
     ),
 }
 """Reason for each operator task, and the checks after it."""
@@ -138,11 +139,13 @@ class Prompt(QFrame):
 
 
 SHARE, LEAST = 0.6, 70
-"""Largest share of the window below the header that panels take, and their least height [px] while one is shown."""
+"""Largest fraction of the window below the header that panels take, and their minimum height [px] while one is
+shown.
+"""
 
 
 class PanelArea(QScrollArea):
-    """Panels one below another, as high as their content; they scroll in a low window."""
+    """Stack of panels, as high as their contents; it scrolls in a low window."""
 
     def __init__(self, panels: Sequence[QWidget]) -> None:
         super().__init__(widgetResizable=True)
@@ -162,12 +165,12 @@ class PanelArea(QScrollArea):
             panel.installEventFilter(self)
 
     def fit(self, available: int) -> None:
-        """Set the height to that of the content, up to a share of the `available` height [px]."""
+        """Set the height to that of the contents, up to a fraction of the `available` height [px]."""
         self._available = available
         self._fit()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Update the height, since a narrower area needs more height for its texts."""
+        """Update the height, since a narrower area needs more height for its text."""
         super().resizeEvent(event)
         if event.size().width() != event.oldSize().width():
             self._fit()
@@ -218,7 +221,7 @@ class LeavePanel(QFrame):
 
 
 class Tour(QFrame):
-    """The guided tour: shows the next step without performing it."""
+    """The guided tour, which shows the next step without performing it."""
 
     def __init__(self, controller: Controller) -> None:
         super().__init__()

@@ -138,7 +138,7 @@ LARGER, SMALLER = (Qt.Key.Key_Plus, Qt.Key.Key_Equal, Qt.Key.Key_Up), (Qt.Key.Ke
 
 
 class PhysicalPicture(QWidget):
-    """Picture drawn from the measured displacements of table and storeys, and the block's angle of the model, where
+    """Picture drawn from the measured displacements of table and storeys, and from the model's angle of the block, if
     available.
     """
 

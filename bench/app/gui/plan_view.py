@@ -1,4 +1,4 @@
-"""Result of a plan check: margins, time, disk, warnings, or the reason of a refusal."""
+"""Result of a plan check: margins, time, disk and warnings, or the reason for a refusal."""
 
 from math import inf, isfinite
 
@@ -22,7 +22,7 @@ from bench.preflight.margins import Margin
 
 
 class PlanView(QWidget):
-    """Verdict, table of margins, tightest first, and notes of a plan check."""
+    """Verdict, table of margins (tightest first) and notes of a plan check."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -89,7 +89,7 @@ class PlanView(QWidget):
 
 
 def _left(each: Margin) -> float:
-    """Margin kept by 95 % of the specimens, or that of the nominal one; infinite if not predicted."""
+    """Margin kept by 95 % of the specimens, or else that of the nominal one; infinite if not predicted."""
     left = each.margin if each.likely is None else each.likely
     return inf if left is None else left
 

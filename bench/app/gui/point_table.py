@@ -14,7 +14,7 @@ from bench.document.typography import first_words
 
 _UNCERTAINTY, _PREDICTED = "_uncertainty", ("_predicted", "_nominal")
 _GOOD = ("", "steady", "held", "measured", "resting")
-"""States of a point that are not displayed beside its verdict."""
+"""States of a point that are not displayed next to its verdict."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Measured:
 
     @property
     def cells(self) -> tuple[str, ...]:
-        """Texts of the row, one for each of `texts.POINT_TITLES`."""
+        """Cell texts of the row, one for each of `texts.POINT_TITLES`."""
         factor, unit = in_screen_unit(self.unit)
         predicted = measurement(factor * self.predicted, factor * self.predicted_uncertainty, unit)
         if isfinite(self.low) and isfinite(self.high):
@@ -64,7 +64,7 @@ class Measured:
 
 
 def rows_of(results: Mapping[str, Column], points: Sequence[Mapping[str, Any]]) -> list[Measured]:
-    """Quantities of all points: those with an uncertainty, or where there is none, every number."""
+    """Quantities of all points: those with an uncertainty or, if there are none, all numbers."""
     stems = {name: _stem(name, column.unit) for name, column in results.items()}
     if {"measured", "expected", "unit"} <= results.keys():
         return [_line(point) for point in points]
@@ -125,7 +125,7 @@ def _rows(
 
 
 def _line(point: Mapping[str, Any]) -> Measured:
-    """Table row for one result of the loop check, in its own unit."""
+    """Table row for one result of the loop check, in its unit."""
 
     def number(name: str) -> float:
         value = point.get(name)
@@ -165,7 +165,7 @@ def _quantity(stem: str, description: str) -> str:
 
 
 def _stem(name: str, unit: str) -> str:
-    """A name without the suffix that repeats its unit: `k1_n_m` in N/m is k1."""
+    """A name without the suffix that repeats the unit: `k1_n_m` in N/m becomes k1."""
     suffix = unit.lower().replace("1/", "per_").replace("/", "_").replace(" ", "_").replace("^0.5", "")
     return name.removesuffix(f"_{suffix}") if suffix not in ("", "1") else name
 

@@ -1,4 +1,4 @@
-"""The Protocol page: form of the parameters, check of the plan, start or queueing of a run."""
+"""The Protocol page: parameter form, plan check, and start or queueing of a run."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -82,7 +82,7 @@ class ProtocolPage(QWidget):
 
     @property
     def why_not_planned(self) -> str:
-        """Why no plan can be started or queued; empty if one can."""
+        """Reason why no plan can be started or queued; empty if one can."""
         if self.form.refused:
             return texts.START_BAD
         if self._checked is None:
@@ -91,7 +91,7 @@ class ProtocolPage(QWidget):
 
     @property
     def why_not(self) -> str:
-        """Why a run cannot be started now; empty if it can."""
+        """Reason why a run cannot be started now; empty if it can."""
         if busy := self._controller.why_busy:
             return busy
         if self._controller.latched:

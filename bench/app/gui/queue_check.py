@@ -17,7 +17,7 @@ from bench.config.model import BenchConfiguration
 
 @dataclass(frozen=True, eq=False)
 class Checked:
-    """A test whose plan was accepted, with the bench of `plan`."""
+    """A test whose plan was accepted, with the bench that the `plan` is for."""
 
     test: Queued
     plan: PlanCheck
@@ -31,8 +31,8 @@ class Checked:
 
 
 class QueueCheck(QObject):
-    """Checks the parameters and folders of all pending tests in a thread, then their plans one by one, then the disk
-    space for all. Tests are compared by identity, since copies may be equal.
+    """Checks the parameters and folders of all pending tests in a thread, then their plans one by one, and finally the
+    disk space for all of them. Tests are compared by identity, since copies may be equal.
     """
 
     good = Signal()

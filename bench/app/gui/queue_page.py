@@ -33,7 +33,7 @@ COPIES, COPIES_TIP = "times", "Number of copies that *Repeat* inserts below the 
 QUEUE_ACTIONS = (
     ("up", "Up", "Ctrl+Up", "Moves the test one place up"),
     ("down", "Down", "Ctrl+Down", "Moves the test one place down"),
-    ("repeat", "Repeat", "Ctrl+R", "Inserts copies of the test below it, each with a separate folder"),
+    ("repeat", "Repeat", "Ctrl+R", "Inserts copies below the test, each with a separate folder"),
     ("skip", "Skip", "Ctrl+T", "Skips the test, or restores it"),
     ("edit", "Edit …", "Ctrl+Shift+E", "Opens a pending test in the form on the Protocol page"),
     ("remove", "Remove", "Del", "Removes the test from the list; its results are kept"),
@@ -42,7 +42,7 @@ QUEUE_ACTIONS = (
 
 
 class QueuePage(QWidget):
-    """List of tests; every action applies to the selected test and has a key."""
+    """List of tests; every action applies to the selected test and has a shortcut key."""
 
     edit_asked = Signal(object, int)
     """A `Queued` that has not begun, to be edited, and its number."""
@@ -225,12 +225,12 @@ class QueuePage(QWidget):
 
 
 def _plain(default: object) -> object:
-    """A default as in a file."""
+    """A default, formatted as in a file."""
     return [*cast(tuple[object, ...], default)] if isinstance(default, tuple) else getattr(default, "value", default)
 
 
 def _said(of: Declared, value: object) -> str:
-    """A parameter with its value and unit, as typed in the form."""
+    """A parameter with value and unit, as typed in the form."""
     values = cast(list[object], value) if isinstance(value, list) else [value]
     text = " ".join(as_typed(each) for each in values)
     unit = "" if of.unit in ("", "1") else f" {unit_text(of.unit)}"

@@ -46,7 +46,7 @@ class QueueRunner(QObject):
         self.going = False
         """Whether the next test begins after the current one."""
         self.why = ""
-        """Why the queue was paused; empty without a problem."""
+        """Reason why the queue was paused; empty if there was no problem."""
         try:
             self.queue = Queue() if store is None else Queue(store.read(), store.write)
         except RockbenchError:
@@ -63,7 +63,7 @@ class QueueRunner(QObject):
 
     @property
     def why_not(self) -> str:
-        """Why the queue cannot be started now; empty when it can."""
+        """Reason why the queue cannot be started now; empty if it can."""
         if self._controller.latched:
             return texts.LATCHED
         if self.queue.running is None and (busy := self._controller.why_busy):
@@ -94,9 +94,7 @@ class QueueRunner(QObject):
         return True
 
     def replace(self, old: Queued, new: Queued) -> bool:
-        """Replace the test `old` in place; refused with a report if `old` has begun, or was changed, skipped or
-        removed.
-        """
+        """Replace the test `old` in place; reports a refusal if `old` has begun, or was changed, skipped or removed."""
         index = self._place(old)
         if index is None:
             self.troubled.emit(Trouble(texts.QUEUE_GONE, texts.QUEUE_GONE_DID, texts.QUEUE_GONE_NOW))

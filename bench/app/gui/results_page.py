@@ -57,7 +57,7 @@ def read_only(name: str) -> QTableWidget:
 def show_points(
     table: QTableWidget, results: Mapping[str, Column], points: Sequence[Mapping[str, object]], *, everything: bool
 ) -> None:
-    """Show the quantities of every point with prediction and verdict; with `everything` every field of the file."""
+    """Show the quantities of every point with prediction and verdict; with `everything`, every field of the file."""
     if everything:
         headings, rows = every_field(results, points)
         _fill(table, headings, [of.description for of in results.values()], rows)
@@ -66,7 +66,7 @@ def show_points(
     header = table.horizontalHeader()
     header.setSectionResizeMode(QHeaderView.ResizeMode.Interactive)
     if not everything:
-        # all six columns in view: a long quantity is elided, its tooltip has all of it
+        # keep all six columns in view: a long quantity is elided, and its tooltip shows the full text
         header.setSectionResizeMode(1, QHeaderView.ResizeMode.Stretch)
 
 

@@ -58,9 +58,9 @@ from bench.protocol import Protocol
 
 LOG_LINES = 2000
 GAINS_HEIGHT, LOWEST = 150, 540
-"""Minimum heights of the gain plot, for a readable axis, and of the page, for a whole picture [px]."""
+"""Minimum heights of the gain plot, for a readable axis, and of the page, for a complete picture [px]."""
 OLD = 0.5
-"""Age of the newest sample above which it is shown during a run [s]."""
+"""Age of the newest sample above which that age is shown during a run [s]."""
 
 
 class RunPage(QWidget):

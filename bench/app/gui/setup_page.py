@@ -196,7 +196,7 @@ class DevicesPanel(QWidget):
 
 
 class SetupPage(QWidget):
-    """Shows and selects the configuration; it is edited in its file, and another one is opened here while no run is
+    """Shows and selects the configuration. It is edited in its file; another one can be opened here while no run is
     active.
     """
 
@@ -232,7 +232,9 @@ class SetupPage(QWidget):
         self._use(configuration, path)
 
     def open_identified(self, path: Path) -> None:
-        """Use the identified specimen in a file; after a refusal, which is shown, the current one stays in use."""
+        """Use the identified specimen in a file; if it is invalid, the reason is shown and the current one stays in
+        use.
+        """
         try:
             configuration = with_identified(self.configuration, read_specimen(path))
         except RockbenchError as error:

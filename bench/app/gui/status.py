@@ -26,7 +26,7 @@ DRIVEN = frozenset({State.ARMED, State.RUNNING, State.STOPPING, State.ABORTING})
 
 @dataclass(frozen=True)
 class Status:
-    """Displayed word and reason, and the style that repeats them as colour and shape."""
+    """Displayed word and reason, and the style that conveys them by colour and shape."""
 
     word: str
     reason: str

@@ -1,7 +1,7 @@
 """Steadiness of each sensor.
 
-The criterion is that of the run, applied to traces instead of samples: the run evaluates all sensors together, this
-view shows which of them are not steady yet.
+The criterion is that of the run, applied to traces instead of samples. The run evaluates all sensors together; this
+view shows which of them are not yet steady.
 """
 
 from math import isfinite, tau
@@ -23,8 +23,8 @@ HARMONICS = 3
 """Number of fitted harmonics: enough for the fundamental and the peak of a trace with a few hundred bins per cycle."""
 
 SENSORS = MEASURED_BY
-"""Signals as measured by the sensors. u1 and drift are small differences of these: the clock error of a laser changes
-their amplitude, but only the phase of its own signal.
+"""Signals as measured by the sensors. u1 and drift are small differences between these: the clock error of a laser
+changes their amplitude, but only the phase of its own signal.
 """
 LASERS = (2, 3)
 
@@ -115,7 +115,7 @@ class SteadyView(QWidget):
         self.hide()
 
     def begin(self, run: Run) -> None:
-        """Prepare for a new run; one without the parameter `settle_tolerance` has no steady sines."""
+        """Prepare for a new run; a run without the parameter `settle_tolerance` has no steady sines."""
         tolerance = _tolerance(run)
         self._run, self._of, self._judged = run if tolerance else None, None, None
         if tolerance:

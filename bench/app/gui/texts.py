@@ -1,4 +1,4 @@
-"""Texts of the window."""
+"""Text of the window."""
 
 from bench.events import State
 
@@ -16,13 +16,13 @@ WORDS = {
     State.CLOSED: "CLOSED",
 }
 NO_SESSION, STARTING, PLANNING, NO_LINK = "NO RUN", "STARTING", "PLANNING", "NO LINK"
-NO_SESSION_WHY = "this window has started no run; choose a protocol"
+NO_SESSION_WHY = "no run has been started in this window; choose a protocol"
 RUN_ELSEWHERE, ATTACHING = "RUN ELSEWHERE", "ATTACHING"
 ELSEWHERE = "a run is under way on this machine: {run}; attach to see and stop it"
 ATTACHING_WHY = "waiting for the session: {run}"
 ATTACHED_RUN = "{owner}'s run: {run}."
-ATTACHED_READ_ONLY = "STOP acts from here; questions and Ramp out are with {owner}."
-ATTACHED_CONTROLS = "Its window is lost: this window answers its questions."
+ATTACHED_READ_ONLY = "STOP works here; questions and Ramp out are handled by {owner}."
+ATTACHED_CONTROLS = "Its window is lost; its questions can be answered in this window."
 OWNERS = {"window": "another window", "terminal": "a terminal"}
 OWN_RUN = "This window's run: {run}."
 ATTACH, ATTACH_TIP = "Attach", "Shows the run that is under way on this machine, with its STOP (Ctrl+Shift+A)."
@@ -38,10 +38,10 @@ GUARD = (
 STOP, STOP_NAME = "STOP\nF12", "STOP"
 STOP_AGAIN = "STOP\nagain: CUT"
 STOP_BY_MOUSE = "STOP\nby mouse"
-KEY_NEEDS_FOCUS = "F12 acts only while this window has the focus: click on it."
+KEY_NEEDS_FOCUS = "F12 works only while this window has the focus: click on it."
 STOP_TIP = (
-    "Ramps the output to zero fast and ends the run (F12, from everywhere). Pressed again after {after:g} s or "
-    "more: cuts the enable line."
+    "Ramps the output to zero fast and ends the run (F12, from anywhere). If pressed again after "
+    "{after:g} s or more, cuts the enable line."
 )
 LATCHED = "STOP was pressed: clear it first"
 STOPPED = "STOP was pressed"
@@ -59,7 +59,7 @@ INPUTS_TIP = (
 )
 
 CHECK = "Check the plan"
-CHECK_TIP = "Computes the whole run beforehand: prediction, margin to every limit, duration and disk space (Ctrl+K)."
+CHECK_TIP = "Computes the complete run in advance: prediction, margin to every limit, duration and disk space (Ctrl+K)."
 CHECKING = "Computing the plan …"
 START = "Start"
 START_TIP = "Starts the run (Ctrl+Return)."
@@ -69,14 +69,12 @@ START_UNCHECKED = "check the plan first"
 START_BAD = "a value is invalid: see the form"
 START_REFUSED = "the plan was refused"
 REALTIME, REALTIME_TIP = "&Real time", "Runs the simulated bench in real time, not as fast as possible."
-ASK, ASK_TIP = "Ask me", "Requests operator tasks even if the bench performs them itself."
+ASK, ASK_TIP = "Ask me", "Requests operator tasks even if the bench can perform them."
 ASK_REAL_TIP = (
-    "Every question waits for your answer. Unchecked, the run is unattended: every question is answered with yes, "
-    "as with --yes. Only for runs without operator tasks."
+    "Every question waits for your answer. If unchecked, the run is unattended: every question is "
+    "answered yes, as with --yes. Only for runs without operator tasks."
 )
-UNATTENDED = (
-    "Unattended: every question of this run is answered with yes. Complete all operator tasks before the start."
-)
+UNATTENDED = "Unattended: every question of this run is answered yes. Complete all operator tasks before the start."
 GO_ON = "Continue without this window"
 GO_ON_TIP = (
     "Without this option, a run ramps out when its window is closed, freezes or crashes; with it, the run continues "
@@ -89,7 +87,7 @@ OPERATOR_TIP = "Name of the operator; stored in the data file."
 DEFAULT_TIP = "If empty: {default}."
 MARGINS = ("quantity", "unit", "demand", "at 95 %", "limit", "margin at 95 % [%]", "where")
 MARGIN_TIP = (
-    "{margin:.1f} % for the nominal specimen; 95 % of the specimens within the uncertainty keep {likely:.1f} %."
+    "{margin:.1f} % for the nominal specimen; at least {likely:.1f} % for 95 % of the specimens within the uncertainty."
 )
 TIME_AND_DISK = "Expected duration {duration}. Disk: up to {needed:.0f} MB needed, {free:.0f} MB free."
 TIGHTEST = "Tightest: {name}, limited by {owner}."
@@ -98,13 +96,13 @@ NO_MARGINS = "This protocol does not predict margins."
 
 DONE, DECLINE = "Done, continue", "End the run"
 DONE_KEY, DECLINE_KEY = "Ctrl+Shift+Return", "Ctrl+Shift+Backspace"
-DONE_TIP = "The task is done: continues the run (Ctrl+Shift+Return)."
-DECLINE_TIP = "The task is not done: ends the run (Ctrl+Shift+Backspace)."
+DONE_TIP = "Confirms that the task is done and continues the run (Ctrl+Shift+Return)."
+DECLINE_TIP = "Reports that the task is not done and ends the run (Ctrl+Shift+Backspace)."
 PROMPT = "Operator task"
 PROMPT_PARTS = ("Why", "Checked afterwards")
 LEAVE_WINDOW, STAY = "Close the window", "Stay"
 LEAVE_RAMPS_OUT = "This window controls a run. If you close it, the output ramps out and the run ends."
-LEAVE_GOES_ON = "A run is under way. It continues without this window; a window that is opened later can stop it."
+LEAVE_GOES_ON = "A run is under way. It continues without this window; a window opened later can stop it."
 
 RAMP_OUT = "Ramp out and keep"
 RAMP_OUT_TIP = "Ends the run gently: the output ramps out and the data are kept (Ctrl+E)."
@@ -115,7 +113,7 @@ TRACES = (
     ("storey 2, u2", "mm", 1e3),
     ("drift, u2 − u1", "mm", 1e3),
 )
-"""Label, displayed unit, and displayed units per SI unit, of each trace."""
+"""Label, displayed unit, and displayed units per SI unit for each trace."""
 SECONDS = "seconds before now"
 ALPHA, PREDICTED = "gain α₂", "predicted"
 TWIN = "live model"
@@ -123,7 +121,7 @@ MODULATED = "hollow: modulated motion"
 OTHER_AXIS = "{name}: not drawn, needs another axis"
 BARE_SINE, BARE_RECORD = "ω = {omega:g} rad/s, bare frame", "{record}, bare frame"
 MEASURING, LAST_POINT = "measuring {point}", "last point, {status}: {point}"
-BAND = "Shaded: band from the uncertainty of the specimen's parameters (k = 2), where the motion is stable."
+BAND = "Shaded: band due to the uncertainty of the specimen's parameters (k = 2), where the motion is stable."
 BETA_AXIS = "stiffness ratio β [1]"
 OMEGA_AXIS, GAIN_AXIS = "circular frequency ω [rad/s]", "gain α₂ [1]"
 NO_GAIN, NO_RESULT, NO_GAIN_OF = "no gain yet", "no result yet", "no gain: {status}"
@@ -142,7 +140,7 @@ LOST = "{events} events and {traces} blocks of traces were not shown; the file c
 TRACES_OLD = "Traces and picture are not live: the newest sample is {age} old."
 DATA_AGE = "newest sample {age:.1f} s old"
 FRAME = "Bare frame: measured"
-FRAME_ONLY = "Frame: measured. Block (dashed): angle not known"
+FRAME_ONLY = "Frame: measured. Block (dashed): angle unknown"
 BLOCK_BY_LASER = "Storey 1: measured. Block: by laser 2, {height:.0f} mm above the table. Storey 2: unknown"
 NOT_LIVE = "not live for {age:.0f} s"
 NOT_LIVE_AXIS = "seconds before the newest sample, " + NOT_LIVE
@@ -162,7 +160,7 @@ RUN_FILES = "campaign (*.h5)"
 CONFIGURATION_FILES, SPECIMEN_FILES = "configuration (*.toml)", "specimen (*.json)"
 REMOVE, REMOVE_TIP = "Close file", "Removes the selected file from this page; the file itself is kept."
 PATH, FILES = "or type a path, Enter", "open files"
-FILES_TIP = "The selected file is shown. Ticked files are drawn together; the first of them is the reference."
+FILES_TIP = "The selected file is shown. Ticked files are drawn together; the first ticked file is the reference."
 GAINS, POINTS, COMPARISON, SAMPLES, FIGURE = "Points", "points", "Comparison", "Samples", "Figure"
 NO_FIGURE = "The run wrote no figure."
 POINT_TITLES = ("point", "quantity", "measured ± U", "predicted ± U", "difference", "verdict")
@@ -172,13 +170,13 @@ POINT_TIPS = (
     "measured value and expanded uncertainty (k = 2)",
     "predicted or nominal value; its expanded uncertainty (k = 2), or the interval expected for the measured value",
     "measured minus predicted",
-    "agrees: the difference is within the combined uncertainty, or the measured value within the predicted interval",
+    "agrees: the difference is within the combined uncertainty, or the measured value is within the predicted interval",
 )
 INTERVAL = "{value} ({low:.3g} to {high:.3g})"
 AGREES, DISAGREES = "✓ agrees", "▲ DISAGREES"
 YES, NO = "yes", "no"
 EVERYTHING, EVERYTHING_TIP = "All fields", "Shows every field of every point, with its unit (Ctrl+Shift+F)."
-COMPARISON_TIP = "Tick two or more files to compare the points of each with those of the first."
+COMPARISON_TIP = "Tick two or more files to compare their points with those of the first."
 DIFFERENCES = ("run", "point", "α₂, reference", "α₂", "difference", "uncertainty", "Eₙ", "verdict")
 DIFFERENCE_TIPS = (
     "the compared run",
@@ -207,13 +205,14 @@ ENDED = "The run was {status}: {reason}. Results are in {out}."
 REFUSED = "Nothing was started. {text}"
 FAILED_WORD = "FAILED"
 FAILED = (
-    "The session failed: {text}. Its file contains the data measured before. Look at the bench: if the table moves, "
-    "press the emergency stop."
+    "The session failed: {text}. Its file contains the data measured until then. Look at the bench: if "
+    "the table moves, press the emergency stop."
 )
 
 WELCOME = (
-    "Guided tour: this is the simulated bench, no hardware moves. The form contains one harmonic point, which runs "
-    "as fast as the computer allows; tick Real time for the speed of a real bench, about four minutes."
+    "Guided tour: this is the simulated bench; no hardware moves. The form contains one harmonic point, "
+    "which runs as fast as the computer allows; tick Real time for the speed of a real bench, about four "
+    "minutes."
 )
 TOUR = (
     "Check the plan (Ctrl+K)",
@@ -231,7 +230,7 @@ OWN_ERROR = "an error in the window, not in the bench: {error}. The run continue
 
 TROUBLE, TROUBLE_DETAILS, TROUBLE_CLOSE = "Needs attention", "Details", "Hide"
 TROUBLE_PARTS = ("Event", "Reaction of the bench", "Next step")
-TROUBLE_DETAILS_TIP = "The full error message, for the developers (Ctrl+Shift+I)."
+TROUBLE_DETAILS_TIP = "Shows the full error message, for the developers (Ctrl+Shift+I)."
 TROUBLE_CLOSE_TIP = "Hides this message; it stays in the log and in the file (Ctrl+Shift+H)."
 CONFIGURATION_TITLES = ("key", "value", "unit")
 OPEN_CONFIGURATION = "Open a configuration …"
@@ -243,7 +242,7 @@ OPEN_SPECIMEN_TIP = (
     "Uses identified parameters of the specimen instead of the assumed ones, like --specimen (Ctrl+Shift+P)."
 )
 IDENTIFIED = "Specimen: {path}"
-CONFIGURATION_KEPT = "{text}. The previous one stays in use."
+CONFIGURATION_KEPT = "{text}. The current one stays in use."
 MUST_BE = "It must be {allowed}."
 FIND = "Search for devices"
 FIND_TIP = (
@@ -265,14 +264,14 @@ CHECK_LOOP_ENDED = "{passed} passed, {failed} failed, {other} without verdict. {
 CHECK_IN = "Results are in {out}."
 CHECK_CUT = "The check was interrupted."
 CHECK_TABLE_TIP = "The tooltip of a failed line gives the remedy."
-ASK_CHECK_TIP = "The frame is clamped and unclamped by hand: on this bench the check always asks."
+ASK_CHECK_TIP = "The frame is clamped and unclamped by hand, so on this bench the check always asks."
 CHECK_TITLES = ("verdict", "of", "what", "measured", "U (k = 2)", "allowed")
 
 ADD, ADD_TIP = "Add to queue", "Appends the checked plan to the queue (Ctrl+J)."
 SAVE, SAVE_TIP = "Save in queue", "Replaces test {number} of the queue by the checked plan (Ctrl+J)."
 LEAVE, LEAVE_TIP = "Discard changes", "Ends the editing; the test in the queue stays unchanged (Esc)."
 TAKE_IN = "Take in"
-QUEUE_TIP = "Tests run from the top. Enter opens a pending test in the form."
+QUEUE_TIP = "Tests run from top to bottom. Enter opens a pending test in the form."
 QUEUE_TITLES = ("", "state", "protocol", "parameters", "results in", "result or options")
 STAGES = {
     "waiting": "○ waiting",
@@ -283,13 +282,13 @@ STAGES = {
 }
 QUEUE_EMPTY = "The queue is empty: check a plan on the Protocol page, then add it."
 QUEUE_STARTS, QUEUE_PAUSES = "Start the queue", "Pause after this test"
-QUEUE_STARTS_TIP = "Runs the pending tests from the top, each in a separate process (Ctrl+Shift+Q)."
+QUEUE_STARTS_TIP = "Runs the pending tests from top to bottom, each in a separate process (Ctrl+Shift+Q)."
 QUEUE_PAUSES_TIP = "The current test runs to its end; no further test begins (Ctrl+Shift+Q)."
 QUEUE_HOLDS = "the queue is running: pause it first"
 QUEUE_IDLE, QUEUE_GOING, QUEUE_LAST = "{n} waiting.", "Running; {n} waiting.", "Pausing after this test; {n} waiting."
 QUEUE_CHECKING = "Checking the plan of test {number}; {n} waiting."
 QUEUE_PAUSED = "▲ Paused: {why} {n} waiting."
-QUEUE_STOPPED = "STOP was pressed; clear it beside STOP."
+QUEUE_STOPPED = "STOP was pressed; clear it next to STOP."
 QUEUE_ENDED = "test {number} was {status}."
 QUEUE_REFUSED = "the plan of test {number} was refused."
 QUEUE_FILE = "Saved in {path}; `rockbench queue` runs the same file."

@@ -22,13 +22,15 @@ from drivers.clock import now
 SHOWN = ("drive", "acceleration", "u1", "u2", "drift")
 """The drawn columns, labelled by `texts.TRACES`."""
 WINDOW, BUCKETS = 10.0, 700
-"""Displayed duration [s], and its number of parts, drawn as two points each."""
+"""Displayed duration [s], and the number of its parts, each drawn as two points."""
 AHEAD = 0.5
 """Longest time [s] for which the axis scrolls without a new sample."""
 STALE = 2.0
 """Age of the newest sample above which the traces are marked as not live [s]."""
 HEADROOM, WIDE, LEAST = 1.15, 2.0, 1e-3
-"""Axis range relative to the largest value, ratio above which it is reduced, and its minimum in screen units."""
+"""Axis range relative to the largest value, ratio above which the range is reduced, and its minimum in displayed
+units.
+"""
 
 
 class TracePlot(QWidget):
@@ -76,7 +78,7 @@ class TracePlot(QWidget):
 
     @property
     def labels(self) -> tuple[tuple[str, str, float], ...]:
-        """Label, unit on the screen, and screen units per SI unit, of each trace."""
+        """Label, displayed unit, and displayed units per SI unit for each trace."""
         further = ((each.name.replace("_", " "), unit_text(each.unit), 1.0) for each in self._further)
         if self._face is None:
             return (*texts.TRACES, *further)
@@ -85,7 +87,7 @@ class TracePlot(QWidget):
         return cast(tuple[tuple[str, str, float], ...], (*lasers, *further))
 
     def watch_block(self, face: float | None) -> None:
-        """Label the traces for laser 2 on the block's face at this height [m]; None: on storey 2."""
+        """Label the traces for laser 2 on the block's face at this height [m]; None for storey 2."""
         if face != self._face:
             self._face = face
             self.use_theme(self._theme)
@@ -134,7 +136,7 @@ class TracePlot(QWidget):
         self._fresh = True
 
     def draw(self) -> None:
-        """Update the curves; without new samples they only scroll, and after a long time stop."""
+        """Update the curves; without new samples they only scroll, and stop after a while."""
         if self.stale != self._stale:
             self._stale = self.stale
             self.use_theme(self._theme)
@@ -154,7 +156,7 @@ class TracePlot(QWidget):
             self._fit(k, plot, line)
 
     def _fit(self, k: int, plot: Any, line: NDArray[np.float64]) -> None:
-        """Widen the axis at once, but reduce it only when much too wide, since every change redraws it."""
+        """Widen the axis at once, but narrow it only when it is much too wide, since every change redraws it."""
         most = max(float(np.nanmax(np.abs(line))) if np.isfinite(line).any() else 0.0, LEAST)
         if not most <= self._reach[k] <= WIDE * most:
             self._reach[k] = HEADROOM * most

@@ -46,8 +46,8 @@ NOW_LIMIT = (
     "check the margins of the plan and reduce the motion."
 )
 NOW_LATE = (
-    "The computer or the link to a device was too slow ({subject}): the motion was within its limits. Close other "
-    "programs, check cables and network, then start again."
+    "The computer or the link to a device was too slow ({subject}); the motion was within its limits. "
+    "Close other programs, check cables and network, then start again."
 )
 _NOW_DEVICE = (
     "Check power and cables of the device named above, then search for devices and run the loop check on the Setup "
@@ -84,7 +84,7 @@ OWN_NOW = "Reopen the window after the run, and report the details to the develo
 
 @dataclass(frozen=True)
 class Trouble:
-    """A fault report: event, reaction, next step; `details` are shown on request."""
+    """A fault report: event, reaction and next step; `details` are shown on request."""
 
     what: str
     did: str
@@ -186,8 +186,8 @@ Kind = type[BaseException]
 
 
 class OwnErrors(QObject):
-    """Reports uncaught errors of any thread in the window's thread, each error once. The log always gets the error; the
-    panel shows it unless it already has a report, which may concern the bench.
+    """Reports uncaught errors of any thread in the window's thread, each error once. The error is always logged; the
+    panel shows it unless it already shows a report, which may concern the bench.
     """
 
     _raised = Signal(object)

@@ -27,7 +27,7 @@ def set_level(label: QLabel, level: str) -> None:
 
 
 def typeset(text: str) -> str:
-    """Typeset a text of files and journals for the window: ω, α₂, ±, m/s²."""
+    """Typeset text from files and journals for the window: ω, α₂, ±, m/s²."""
     return typography.typeset(text).replace("Ω", "ω")
 
 
@@ -38,7 +38,7 @@ _NAME = re.compile(r"(?<=[A-Za-z0-9])_(?=[A-Za-z0-9])")
 
 
 def spaced(text: str) -> str:
-    """Typeset a text that contains names of fields or channels, with spaces for their underscores."""
+    """Typeset text that contains names of fields or channels, with spaces instead of underscores."""
     return typeset(_NAME.sub(" ", text))
 
 
@@ -72,7 +72,7 @@ def ignore_wheel(field: QWidget) -> None:
 
 
 FITTING = (860, 400)
-"""Size of the content of a page below which it scrolls [px]."""
+"""Size of a page's contents below which the page scrolls [px]."""
 
 
 def scrolling(content: QWidget, width: int, height: int) -> QScrollArea:
@@ -89,8 +89,8 @@ def scrolling(content: QWidget, width: int, height: int) -> QScrollArea:
 
 
 class _Holder(QWidget):
-    """Keeps `content` at its own size. It has no layout: with one, an area gives wrapped texts their preferred height,
-    and scrolls although the content would fit.
+    """Keeps `content` at its natural size. It has no layout, since with one an area gives wrapped text its preferred
+    height and scrolls although the contents would fit.
     """
 
     def __init__(self, content: QWidget, width: int, height: int) -> None:
@@ -129,7 +129,7 @@ def round_down(value: float) -> float:
 
 
 def why_no_dialog(controller: Controller) -> str:
-    """Why no dialog can be opened now; empty if one can."""
+    """Reason why no dialog can be opened now; empty if one can."""
     return texts.START_BUSY if controller.running else controller.held
 
 

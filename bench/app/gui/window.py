@@ -62,7 +62,7 @@ def restore(window: QMainWindow, pages: QTabWidget, settings: QSettings) -> None
 
 
 def _splitters(pages: QTabWidget) -> list[tuple[str, QSplitter]]:
-    """Each splitter with a name composed of its page, its index there, and its number of parts."""
+    """Each splitter, with a name composed of its page, its index on the page, and its number of parts."""
     return [
         (f"splitters/{pages.tabText(place)}/{number}-{splitter.count()}", splitter)
         for place in range(pages.count())
@@ -72,7 +72,7 @@ def _splitters(pages: QTabWidget) -> list[tuple[str, QSplitter]]:
 
 
 def free_tab_key(whole: QWidget) -> None:
-    """Make Tab move to the next field from everywhere, also from lists and texts."""
+    """Make Tab move to the next field from everywhere, including lists and text fields."""
     for view in whole.findChildren(QAbstractItemView):
         view.setTabKeyNavigation(False)
     for kind in (QPlainTextEdit, QTextEdit):
@@ -81,7 +81,7 @@ def free_tab_key(whole: QWidget) -> None:
 
 
 SMALLEST = (500, 260)
-"""Minimum size of the window [px]: that of a 1024x600 screen at 200 % scale, less the title bar."""
+"""Minimum size of the window [px]: a 1024x600 screen at 200 % scale, less the title bar."""
 FIRST = (1280, 800)
 
 

@@ -62,7 +62,7 @@ def test_text_and_figure(file: Path, tmp_path: Path, capsys: pytest.CaptureFixtu
 @pytest.mark.parametrize(
     ("arguments", "word"),
     [
-        ([], "give at least one record"),
+        ([], "specify at least one record"),
         (["missing.AT2"], "no such file"),
         (["{file}", "--unit", "cm/s2"], "states g"),
         (["{file}", "--plot", "a.bmp"], ".png, .pdf, .svg"),

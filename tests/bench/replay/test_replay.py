@@ -410,7 +410,7 @@ def checked(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_command_replays_a_run_of_the_command_line(checked: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["replay", str(checked), "--speed", "500"]) == 0
     shown = capsys.readouterr()
-    assert "Identical to the file in every bit" in shown.out
+    assert "Bit-identical to the file" in shown.out
     assert "passed" in shown.out
     assert "Remove the clamps" in shown.err
 

@@ -60,7 +60,7 @@ def test_the_file_replays_to_the_last_bit_and_its_hold_is_analysed_again(
 ) -> None:
     file = str(folder / "campaign.h5")
     assert main(["replay", file]) == 0
-    assert "Identical to the file in every bit" in "".join(capsys.readouterr())
+    assert "Bit-identical to the file" in "".join(capsys.readouterr())
     assert main(["analyse", file, "--json"]) == 0
     (again,) = json.loads(capsys.readouterr().out)["points"]
     assert again["status"] == "held"

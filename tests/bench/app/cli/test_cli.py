@@ -114,7 +114,7 @@ def test_help_and_version_are_an_end_in_themselves(capsys: pytest.CaptureFixture
         ("--config negative.toml", "negative.toml: specimen.frame.k1 = -1.0 is refused"),
         ("--protocol-file absent.toml", "--protocol-file = 'absent.toml' is refused: there is no such file"),
         ("--protocol-file negative.toml", "negative.toml: specimen = 'a table' is refused"),
-        ("--yes --ask", "give only one of them"),
+        ("--yes --ask", "use only one of them"),
         ("--out results", "--out = 'results' is refused: it already contains campaign.h5"),
         ("--out syntax.toml", "is a file"),
         ("--out syntax.toml/below", "is a file"),
@@ -241,7 +241,7 @@ def test_who_answers():
     unattended = choose(serves_itself=False, yes=True, ask=False, terminal=False)
     assert unattended.confirm("Mount the spring.")
     assert "--yes" in unattended.name
-    with pytest.raises(RockbenchError, match="give --yes"):
+    with pytest.raises(RockbenchError, match="use --yes"):
         choose(serves_itself=False, yes=False, ask=False, terminal=False)
 
 

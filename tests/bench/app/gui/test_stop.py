@@ -144,7 +144,7 @@ def test_the_bar_says_when_the_key_needs_the_focus(
     monkeypatch.setattr(qapp, "applicationState", lambda: Qt.ApplicationState.ApplicationInactive)
     qapp.applicationStateChanged.emit(Qt.ApplicationState.ApplicationInactive)
     assert "F12" not in header.stop.text()
-    assert "F12 acts only while this window has the focus" in header.reason.text()
+    assert "F12 works only while this window has the focus" in header.reason.text()
 
 
 @pytest.mark.parametrize("key", [Qt.Key.Key_Space, Qt.Key.Key_Return, Qt.Key.Key_Escape])
