@@ -326,7 +326,7 @@ def test_significant_digits() -> None:
         ("steady --csv taken", "--csv = 'taken' is refused: the file exists and is never overwritten"),
         ("steady --out taken", "--out = 'taken' is refused: the file exists and is never overwritten"),
         ("map --plot taken.png", "--plot = 'taken.png' is refused: the file exists and is never overwritten"),
-        ("steady --csv absent/points.csv", "its folder does not exist"),
+        ("steady --csv absent/points.csv", "the folder does not exist"),
         ("steady --csv same --out same", "--csv writes the same file"),
         ("modes --omega 16", "Unknown option"),
         ("nothing", "nothing"),
