@@ -1,8 +1,9 @@
 """Cache of results computed from the model, for later runs with the same inputs.
 
 The name of an entry is a hash of its inputs, of all source files of this program, and of the libraries and processor
-that affect the last digits. Entries are JSON, which preserves all digits and executes no code, in the folder of the
-compiled kernel, writable by this user only. An unreadable entry is computed again; a failure to write one is ignored.
+that affect the last digits. Entries are stored as JSON, which preserves all digits and executes no code, in the folder
+of the compiled kernel, which only this user can write. An unreadable entry is computed again; a failure to write one is
+ignored.
 """
 
 import json

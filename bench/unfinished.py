@@ -85,7 +85,7 @@ def forget_completed() -> None:
 def write_new(path: Path, write: Callable[[Path], None], *, overwrite: bool = False) -> None:
     """Writes a file under a temporary name in the folder of `path` and renames it when it is complete.
 
-    Raises InvalidInput when `path` exists and `overwrite` is False, or when its folder does not exist; RockbenchError
+    Raises InvalidInput if `path` exists and `overwrite` is False, or when its folder does not exist; RockbenchError
     when the disk fails.
     """
     if path.exists() and not overwrite:

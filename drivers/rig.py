@@ -208,6 +208,6 @@ class Rig(Protocol):
     def perform(self, work: OperatorTask, amount: float | None = None) -> None:
         """Register that the operator's task `work`, with its `amount` if any, was carried out on the stopped rig.
 
-        A simulated rig carries it out on its specimen; a real one does nothing. Raises RigError when armed.
+        A simulated rig carries it out on its specimen; a real one does nothing. Raises RigError if armed.
         """
         ...

@@ -150,7 +150,7 @@ def simulate_many(
     A single specimen, excitation, state or window applies to all runs. Everything is checked before the first run
     starts.
 
-    Raises InvalidInput when the sequences differ in length or a run is refused.
+    Raises InvalidInput if the sequences differ in length or a run is refused.
     """
     import_module("sim.kernel.members")  # compiled once, before the threads start
 

@@ -115,7 +115,7 @@ def _connected(scheduler: str) -> Generator[Any, None, None]:
         client: Any = distributed.Client(scheduler, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError) as error:
         raise SchedulerUnavailable(
-            f"scheduler = {scheduler!r} does not answer ({error}): start it, or give the address that it prints"
+            f"scheduler = {scheduler!r} does not respond ({error}): start it, or specify the address that it prints"
         ) from error
     with client:
         yield client

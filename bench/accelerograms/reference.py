@@ -84,7 +84,7 @@ class RecordReference:
         )
 
     def read(self) -> Accelerogram:
-        """The record. Raises InvalidInput."""
+        """Read or synthesise the record. Raises InvalidInput."""
         if self.path is not None:
             record = read_accelerogram(self.path, dt=self.dt, unit=self.unit, channel=self.channel, column=self.column)
         else:

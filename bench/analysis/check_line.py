@@ -76,15 +76,15 @@ def stated(subject: str, what: str, measured: float, unit: str, *, uncertainty: 
 
 
 def passed(subject: str, what: str) -> CheckLine:
-    """A line that passed without a number."""
+    """A passed line that has no number."""
     return CheckLine(subject=subject, what=what, verdict=Verdict.PASSED)
 
 
 def failed(subject: str, what: str, remedy: str) -> CheckLine:
-    """A line that failed without a number."""
+    """A failed line that has no number."""
     return CheckLine(subject=subject, what=what, verdict=Verdict.FAILED, remedy=remedy)
 
 
 def untested(subject: str, what: str, remedy: str) -> CheckLine:
-    """A line that could not be measured."""
+    """A line for something that could not be measured."""
     return CheckLine(subject=subject, what=what, verdict=Verdict.UNTESTED, remedy=remedy)

@@ -92,7 +92,7 @@ class BaseMotion:
 def base_motion(signals: Array, rest: Array, sample_rate: float) -> BaseMotion:
     """The table's motion in `signals` that begin and end at rest; `rest` is the noise, shapes (n or m, n_signals).
 
-    Raises InvalidInput when samples of a table sensor are missing.
+    Raises InvalidInput if samples of a table sensor are missing.
     """
     sensors = signals[:, [ACCELERATION, DISPLACEMENT]]
     if not (np.isfinite(sensors).all() and np.isfinite(rest[:, [ACCELERATION, DISPLACEMENT]]).all()):

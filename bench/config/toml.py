@@ -87,7 +87,7 @@ def former_keys(path: str | PathLike[str]) -> tuple[str, ...]:
 def problems_of(path: Path) -> list[InvalidInput]:
     """All errors of a configuration file, in single keys or their combination; empty for a valid file.
 
-    Raises InvalidInput when it is not TOML.
+    Raises InvalidInput if it is not TOML.
     """
     found = problems(BenchConfiguration, read_table(path, "configuration file"), _within(path))
     if found:
@@ -111,7 +111,7 @@ def _refusals(configuration: BenchConfiguration, path: Path) -> list[InvalidInpu
 def _with_specimen_file(configuration: BenchConfiguration, path: Path) -> BenchConfiguration:
     """Replace the name of the specimen file, which is relative to the folder of `path`, by its contents.
 
-    Raises InvalidInput when it cannot be read.
+    Raises InvalidInput if it cannot be read.
     """
     if configuration.specimen_file is None:
         return configuration
@@ -121,7 +121,7 @@ def _with_specimen_file(configuration: BenchConfiguration, path: Path) -> BenchC
 def _with_calibration_file(configuration: BenchConfiguration, path: Path) -> BenchConfiguration:
     """Replace the name of the calibration file, relative to the same folder, by its contents.
 
-    Raises InvalidInput when it cannot be read.
+    Raises InvalidInput if it cannot be read.
     """
     if configuration.laser_calibration is None:
         return configuration
@@ -130,7 +130,7 @@ def _with_calibration_file(configuration: BenchConfiguration, path: Path) -> Ben
 
 
 def with_identified(configuration: BenchConfiguration, identified: Identified) -> BenchConfiguration:
-    """The configuration with the given identified properties. Raises InvalidInput when the specimen is impossible."""
+    """The configuration with the given identified properties. Raises InvalidInput if the specimen is impossible."""
     identified.applied(configuration.specimen)
     return configuration.model_copy(update={"specimen_file": None, "identified": identified})
 

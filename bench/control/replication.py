@@ -76,7 +76,7 @@ class Replication:
             report = replication.learn(acceleration, displacement)
         volts = replication.best
 
-    The rig is at rest before each pass; sample i was taken when drive sample i began to act. Raises InvalidInput when
+    The rig is at rest before each pass; sample i was taken when drive sample i began to act. Raises InvalidInput if
     the model does not cover the target, or when the first drive exceeds a limit and scaling is not allowed.
     """
 

@@ -91,7 +91,7 @@ class TableModel(Parameters):
         return np.interp(frequency, self.frequency, self.noise)
 
     def require_fresh(self, now: datetime, longest: timedelta = LONGEST_AGE) -> None:
-        """Raise InvalidInput when the model is older than `longest`, or dated in the future."""
+        """Raise InvalidInput if the model is older than `longest`, or dated in the future."""
         age = now - self.date
         if not timedelta(0) <= age <= longest:
             hours = longest.total_seconds() / 3600.0

@@ -77,7 +77,7 @@ def let_go(file: File) -> None:
 
 
 def open_again(path: Path) -> AbstractContextManager[File]:
-    """Open a finished file for additions. Raises OSError when this program has it open."""
+    """Open a finished file for additions. Raises OSError if this program has it open."""
     return cast("AbstractContextManager[File]", h5py.File(path, "r+", libver=VERSIONS, locking=locking()))
 
 

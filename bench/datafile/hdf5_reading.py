@@ -104,12 +104,12 @@ def reading(what: str) -> Generator[None]:
 
 
 def dataset(parent: Group, path: str) -> Dataset:
-    """The dataset at `path` below `parent`. Raises DataFileError when there is none."""
+    """The dataset at `path` below `parent`. Raises DataFileError if there is none."""
     return cast(Dataset, _member(parent, path, h5py.Dataset))
 
 
 def group(parent: Group, path: str) -> Group:
-    """The group at `path` below `parent`. Raises DataFileError when there is none."""
+    """The group at `path` below `parent`. Raises DataFileError if there is none."""
     return cast(Group, _member(parent, path, h5py.Group))
 
 
@@ -152,13 +152,13 @@ def groups(parent: Group) -> Iterator[Group]:
 
 
 def names(parent: Group) -> list[str]:
-    """The names of the members of a group. Raises DataFileError when they cannot be read."""
+    """The names of the members of a group. Raises DataFileError if they cannot be read."""
     with reading(parent.name):
         return list(parent)
 
 
 def has(parent: Group, path: str) -> bool:
-    """Whether `path` exists below `parent`. Raises DataFileError when damage prevents the answer."""
+    """Whether `path` exists below `parent`. Raises DataFileError if damage prevents the answer."""
     with reading(f"{parent.name.rstrip('/')}/{path}"):
         return path in parent
 
@@ -195,13 +195,13 @@ def places_of_chunks(stored: Dataset) -> dict[int, tuple[int, int]]:
 
 
 def read(stored: Dataset, key: object = ()) -> Any:
-    """Values of a dataset, or the value of a scalar. Raises DataFileError when they cannot be read."""
+    """Values of a dataset, or the value of a scalar. Raises DataFileError if they cannot be read."""
     with reading(stored.name):
         return stored[key]
 
 
 def attribute(owner: Group | Dataset, name: str) -> Any:
-    """An attribute. Raises DataFileError when there is none, or it cannot be read."""
+    """An attribute. Raises DataFileError if there is none, or it cannot be read."""
     with reading(f"the attribute {name} of {owner.name}"):
         return owner.attrs[name]
 

@@ -27,7 +27,7 @@ _ERRNO = re.compile(rf"errno = {errno.EACCES}\b|\[Errno {errno.EACCES}\]")
 def keep_lockers_out(handle: int) -> None:
     """Lock the byte at `GUARD` of an open file until the handle is closed; no effect where locks are advisory.
 
-    Raises OSError when another program has locked the file.
+    Raises OSError if another program has locked the file.
     """
     if sys.platform != "win32":
         return

@@ -152,7 +152,7 @@ _ROWS_TOGETHER = 2**18
 def recover(path: Path, target: Path, progress: Progress = silent) -> Recovery:
     """Recover the contents of `path` to `target`.
 
-    Raises InvalidInput when `target` exists or `path` is not a data file, DataFileError when it is too damaged.
+    Raises InvalidInput if `target` exists or `path` is not a data file, DataFileError when it is too damaged.
     """
     with open_datafile(path, judging=True) as record:
         temporary = target.with_name(f"{target.name}.part")

@@ -46,7 +46,7 @@ class FileSync:
         sync_folder(path.parent)
 
     def sync(self) -> None:
-        """Flush the file to the disk. Raises OSError when the disk fails, DataFileError as `check` does."""
+        """Flush the file to the disk. Raises OSError if the disk fails, DataFileError as `check` does."""
         os.fsync(self._handle)
         self.check()
         self._size = os.fstat(self._handle).st_size
@@ -173,7 +173,7 @@ def _try_folder(folder: Path) -> None:
 class DataFileWriter:
     """Creates the file and appends to it.
 
-    If the disk fails, methods raise h5py's exceptions, mostly OSError. Raises InvalidInput when the file exists, cannot
+    If the disk fails, methods raise h5py's exceptions, mostly OSError. Raises InvalidInput if the file exists, cannot
     be created, or has contents that cannot be stored, and DataFileError when the disk fails during creation.
     """
 

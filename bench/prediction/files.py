@@ -42,7 +42,7 @@ def plain(values: NDArray[Any]) -> list[Any]:
 def write_csv(path: Path, table: Table) -> None:
     """Write a table as CSV: one header line, names ending in the unit, full precision, empty cells for absent values.
 
-    Raises InvalidInput when `path` exists, RockbenchError when the disk fails.
+    Raises InvalidInput if `path` exists, RockbenchError when the disk fails.
     """
     cells = [[csv_cell(_text(value)) for value in plain(column.values)] for column in table.values()]
 
@@ -58,7 +58,7 @@ def write_csv(path: Path, table: Table) -> None:
 def write_hdf5(path: Path, title: str, tables: Mapping[str, Table], metadata: Mapping[str, Any]) -> None:
     """Write tables, with units and descriptions of their columns, and `metadata` to an HDF5 file.
 
-    Raises InvalidInput when `path` exists, RockbenchError when the disk fails.
+    Raises InvalidInput if `path` exists, RockbenchError when the disk fails.
     """
     from bench.datafile import hdf5
     from bench.datafile import tables as stored

@@ -98,7 +98,7 @@ def write_analysis(original: Path, record: DataFile, analysis: Analysis, out: Pa
     """Write a new file, `<name>.analysis-<n>.h5` in the original's folder with the first free n, unless `out` is given.
     Returns its path.
 
-    Raises InvalidInput when `out` exists or cannot be created, DataFileError when the disk fails.
+    Raises InvalidInput if `out` exists or cannot be created, DataFileError when the disk fails.
     """
     digest = file_hash(original)
     for path in [out] if out is not None else _names(original):

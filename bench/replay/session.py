@@ -152,7 +152,7 @@ def replay(
 ) -> Replayed:
     """Carry out `plan` on the samples of an open file, with the recorded `configuration`, and compare.
 
-    `clock` begins at 0. Raises InvalidInput when the file cannot be replayed.
+    `clock` begins at 0. Raises InvalidInput if the file cannot be replayed.
     """
     recording, course = DataFileRecording(record), RecordedCourse(record)
     comparison, requests = Comparison(record, course), Requests()

@@ -78,7 +78,7 @@ def _serve(name: str, rate: float, daq: Daq, readings: IO[bytes]) -> None:
     from drivers.daqmx.connection import Connection
 
     connection = Connection.of(daq)
-    # never closed: that would clear the task of the program
+    # never closed, since that would clear the program's task
     stream = library.task(name, connection.attaching(name)).in_stream
     phase = 0.0
     while True:

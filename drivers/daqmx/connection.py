@@ -22,7 +22,7 @@ _PORT = 31763
 class Connection:
     """Options for new tasks, the only difference between this PC and a server.
 
-    Encrypted with `tls`; a `plain` connection may leave private networks. Raises DeviceNotFound when no server answers
+    Encrypted with `tls`; a `plain` connection may leave private networks. Raises DeviceNotFound if no server answers
     within 2 s, InvalidInput for an address without port, for a plain connection to a public network, and for
     certificates that cannot be read.
     """

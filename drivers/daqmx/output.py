@@ -58,7 +58,7 @@ class Output:
     def write(self, volts: NDArray[np.float64]) -> None:
         """Append samples, shape (n,) [V]; waits for free space while playing.
 
-        Raises DriveUnderflow when the output has run out of samples, DeviceTimeout if no space becomes free in time.
+        Raises DriveUnderflow if the output has run out of samples, DeviceTimeout if no space becomes free in time.
         """
         if not self._started and self._prefilled + volts.size > self._buffer:
             raise RigError(

@@ -101,7 +101,7 @@ _REFUSED = {
 
 
 class Watchdog:
-    """Opens `line` unless reset within `timeout` seconds. Raises InvalidInput when the device does not support it.
+    """Opens `line` unless reset within `timeout` seconds. Raises InvalidInput if the device does not support it.
 
     The watchdog is on the device of the line, or on `chassis` if that device is a module. A chassis also sets `output`
     to 0 V, and expires at once when its network connection is lost; after an expiry it does nothing until it is

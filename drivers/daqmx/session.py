@@ -121,7 +121,7 @@ class DaqSession:
     def write(self, volts: NDArray[np.float64]) -> None:
         """Append drive samples, shape (n,), finite and in range [V]; before `start` they are its first samples.
 
-        Raises DriveUnderflow when the output has run out of samples, DeviceTimeout if no space becomes free, RigError
+        Raises DriveUnderflow if the output has run out of samples, DeviceTimeout if no space becomes free, RigError
         when the session is not prepared.
         """
         with self._lock:

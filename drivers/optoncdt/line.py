@@ -39,7 +39,7 @@ _ENDING = 2.0
 class Line:
     """The process that reads `port` at `baud`; the port must be closed here. Methods may be called from any thread.
 
-    Raises DeviceNotFound when the port cannot be opened.
+    Raises DeviceNotFound if the port cannot be opened.
     """
 
     def __init__(self, who: str, port: str, baud: int) -> None:
@@ -63,7 +63,7 @@ class Line:
             raise
 
     def write(self, sent: bytes) -> None:
-        """Send bytes to the sensor. Raises OSError when the process has ended."""
+        """Send bytes to the sensor. Raises OSError if the process has ended."""
         self._input.write(sent)
         self._input.flush()
 

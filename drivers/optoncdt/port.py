@@ -30,7 +30,7 @@ def listed_ports() -> list[str]:
 def open_port(name: str, port: str, baud: int) -> Serial:
     """Open `port` for `name` with exclusive access, 8 data bits, no parity, one stop bit (manual, p. 84).
 
-    Raises DeviceNotFound when the port is absent, held by another program, not permitted or not a serial port.
+    Raises DeviceNotFound if the port is absent, held by another program, not permitted or not a serial port.
     """
     try:
         opened = Serial(port, baud, timeout=_READ_TIMEOUT, write_timeout=_WRITE_TIMEOUT, exclusive=True)

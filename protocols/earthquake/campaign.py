@@ -110,7 +110,7 @@ class EarthquakeCampaign(Prepared[EarthquakeParameters]):
 
 
 BETA_STEP = 0.05
-"""Step of the stiffness ratio of a curve."""
+"""Step of the stiffness ratio along a curve."""
 
 BETA_MARGIN = 0.15
 """Extension of a curve beyond the measured stiffnesses."""

@@ -60,9 +60,7 @@ class RockingPoint(Parameters):
     r_motion_uncertainty: float | None = quantity(None, "1", f"{_EXPANDED} of r_motion")
     r_amplitudes: float = quantity(..., "1", "restitution from the amplitudes of the swings alone")
     r_amplitudes_uncertainty: float = quantity(..., "1", f"{_EXPANDED} of r_amplitudes")
-    trend: float = quantity(
-        ..., "1", "change of r between zero impact velocity and that of a fall from the critical angle"
-    )
+    trend: float = quantity(..., "1", "change of r from zero impact velocity to that of a fall from the critical angle")
     trend_uncertainty: float = quantity(..., "1", f"{_EXPANDED} of the trend")
     alpha_rad: float = quantity(..., "rad", "critical angle from the motion")
     alpha_uncertainty_rad: float = quantity(..., "rad", f"{_EXPANDED} of alpha_rad, mainly from the laser's scale")

@@ -163,7 +163,7 @@ def _check_pull(parameters: FreeVibrationParameters, configuration: BenchConfigu
         *(0.5 * SHARE * min(configuration.limits.laser_range, 1.0) * half for half in configuration.laser_half_ranges),
     )
     if not LEAST <= parameters.pull <= room:
-        allowed = f"{LEAST:g} to {room:.3g} m: limits.drift and the lasers' ranges allow no more"
+        allowed = f"it must be {LEAST:g} to {room:.3g} m: limits.drift and the lasers' ranges allow no more"
         raise InvalidInput("pull", parameters.pull, allowed)
 
 

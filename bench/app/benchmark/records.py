@@ -1,6 +1,6 @@
 """Benchmarks of gain maps, by periodic orbits and by runs of 120 s, and of sampled records.
 
-The block is at rest under the record, rocks throughout, or has scattered parameters.
+In the record cases, the block stays at rest, rocks throughout, or has scattered parameters.
 """
 
 from math import pi

@@ -202,7 +202,7 @@ def run_benchmark(
 ) -> list[Section]:
     """Run the `parts` and write their results to the folder `out`, which is created if missing.
 
-    Every table is passed to `say` when complete. Returns the sections, the targets first. Raises InvalidInput when a
+    Every table is passed to `say` when complete. Returns the sections, the targets first. Raises InvalidInput if a
     result file exists or a part is unknown.
     """
     for name in parts:

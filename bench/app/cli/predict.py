@@ -77,7 +77,7 @@ def _sine(
     documentation: str,
     drawable: int | None = None,
 ) -> "Callable[..., int]":
-    """A command with the flags of a request; a `function` of `predict_sine` computes it. Its figure has room for
+    """A command with the flags of a request, computed by a `function` of `predict_sine`. Its figure has room for
     `drawable` points.
     """
 
@@ -114,7 +114,7 @@ def _sine(
 def _under_records(
     request_type: type[RecordsRequest], function: str, documentation: str, drawable: int
 ) -> "Callable[..., int]":
-    """A command with the flags of a request for records; a `function` of `predict_seismic` computes it. Its figure has
+    """A command with the flags of a request for records, computed by a `function` of `predict_seismic`. Its figure has
     room for `drawable` records.
     """
 
@@ -190,8 +190,8 @@ stability = _sine(
     "Stability boundaries of the rocking motions in frequency, on fixed ground and on a table.\n\nThe "
     "block pushes the table, which changes how a disturbance grows or decays: a motion may be stable on "
     "the table and unstable on fixed ground. The motion of the table is a sine up to --harmonics, under "
-    "a drive that does not react within a period. Lists the boundaries; --csv, --json and --plot have "
-    "the multipliers of every point.",
+    "a drive that does not react within a period. The boundaries are listed; --csv, --json and --plot "
+    "contain the multipliers of every point.",
 )
 attractor = _sine(
     AttractorRequest,

@@ -53,7 +53,7 @@ class SendQueue:
 
 
 RUNNING = (Estimate, RunningGain)
-"""Events on the current point or step, which its end supersedes."""
+"""Events about the current point or step, which are superseded when it ends."""
 
 
 class Broadcast:

@@ -214,7 +214,7 @@ class AnalogInput:
     def read(self, n: int, timeout: float, run: int) -> Seen:
         """The plant's counts at the next `n` samples of this run; fewer after a time-out.
 
-        Shape (n, channels). Waits; called without holding `changed`. Raises DaqmxFailure when samples were lost, or the
+        Shape (n, channels). Waits; called without holding `changed`. Raises DaqmxFailure if samples were lost, or the
         run has ended.
         """
         with self._reading:

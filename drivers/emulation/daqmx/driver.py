@@ -200,7 +200,7 @@ class Driver:
                 )
 
     def _require_direction(self, task: Task, job: LineTask) -> None:
-        """Raise DaqmxFailure when another task uses lines of one direction group in the other direction."""
+        """Raise DaqmxFailure if another task uses lines of one direction group in the other direction."""
         for other in self._reserved.values():
             theirs = other.job
             if other is task or not isinstance(theirs, LineTask) or theirs.outwards == job.outwards:

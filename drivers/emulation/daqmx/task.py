@@ -94,7 +94,7 @@ class Task:
 
     @property
     def required_job(self) -> Job:
-        """Its job. Raises DaqmxFailure when it has no channel yet."""
+        """Its job. Raises DaqmxFailure if it has no channel yet."""
         if self.job is None:
             raise DaqmxFailure(
                 DAQmxErrors.CAN_NOT_PERFORM_OP_WHEN_NO_CHANS_IN_TASK,
@@ -103,7 +103,7 @@ class Task:
         return self.job
 
     def doing(self, kind: type[J]) -> J:
-        """Its job, which must be of this kind. Raises DaqmxFailure when it is another."""
+        """Its job, which must be of this kind. Raises DaqmxFailure if it is another."""
         job = self.required_job
         if not isinstance(job, kind):
             raise DaqmxFailure(

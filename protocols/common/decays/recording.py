@@ -264,4 +264,4 @@ def _probing_duration(pulse: Pulse) -> float:
 
 
 def _reason(planned: PlannedPulse) -> str:
-    return "as requested" if planned.binds == "requested drift" else f"{planned.binds} is the limit"
+    return "as requested" if planned.binds == "requested drift" else f"limited by {planned.binds}"

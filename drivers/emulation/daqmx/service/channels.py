@@ -27,7 +27,7 @@ from drivers.emulation.daqmx.task import Job, Task
 
 
 def covering_range(ranges: Sequence[float], minimum: float, maximum: float, what: str) -> float:
-    """The narrowest of the device's ranges [V] that covers the limits. Raises DaqmxFailure when none does."""
+    """The narrowest of the device's ranges [V] that covers the limits. Raises DaqmxFailure if none does."""
     wanted = max(abs(minimum), abs(maximum))
     if minimum >= maximum or wanted > max(ranges):
         raise DaqmxFailure(
