@@ -17,33 +17,34 @@ from sim.table_orbit import TableOrbit, TablePeriod, corner, harmonics_of
 Array = NDArray[np.float64]
 
 TICKS, SUBSTEPS = 400, 1
-"""Intervals of a constant drive per period, and Runge-Kutta steps in each: the greatest peak differs by 0.2 % at most
-from that of 600 with two, less than between two stretches of a motion that does not repeat.
+"""Intervals of a constant drive per period, and Runge-Kutta steps in each: the greatest peak differs by at most 0.2 %
+from that with 600 intervals of two steps, less than between two sections of a motion that does not repeat.
 """
 
 LONGEST_PERIOD = 24
 """Longest period in the search [cycles]."""
 
 KEPT = 10 * LONGEST_PERIOD
-"""Number of last cycles that describe the long-term motion."""
+"""Number of final cycles that describe the long-term motion."""
 
 DISTURBANCE = 0.1
 """Relative disturbance of the block's angle at the start."""
 
 CONTROLLED, SHARE = 36, 0.5
-"""Cycles between corrections of the drive, and the share of the error of the table's mean harmonics that is corrected.
+"""Cycles between corrections of the drive, and the fraction of the error of the table's mean harmonics that is
+corrected.
 """
 
 REPEATED, ALIKE = 0.01, 0.05
-"""Largest change of a peak after a period of a periodic motion, relative to the largest peak and to the range of the
-peaks, since a slow spiral also returns close to its past.
+"""Largest changes of a peak over one period of a motion that counts as periodic, relative to the largest peak and to
+the range of the peaks; the latter is needed because a slow spiral also returns close to earlier states.
 """
 
 
 @dataclass(frozen=True, eq=False)
 class Attractor:
     """Peaks of u1 and drift [m] in the last `KEPT` cycles, shape (KEPT, 2). `fallen` is the number of cycles before the
-    block fell, and then `peaks` has no rows; None where it did not.
+    block fell, in which case `peaks` has no rows; None if it did not fall.
     """
 
     peaks: Array
@@ -51,7 +52,9 @@ class Attractor:
 
     @property
     def repeats(self) -> int:
-        """Number of cycles after which the motion repeats, up to `LONGEST_PERIOD`; 0 where it does not, or falls."""
+        """Number of cycles after which the motion repeats, up to `LONGEST_PERIOD`; 0 if it does not repeat, or if the
+        block falls.
+        """
         return period_of(self.peaks)
 
 

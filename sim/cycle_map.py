@@ -1,8 +1,8 @@
 """Linear map from cycle to cycle near a steady rocking motion, with the fundamental of the drive as its input.
 
 Cycle n lasts from one section to the next. It begins with the deviation x_n of the state from the orbit, shape (8,). In
-its first part the control blends from c_(n-1) to c_n, each a complex share of the table's acceleration, as a vector of
-real and imaginary part. With y_n, the Fourier coefficients of u1 and drift over the cycle,
+its first part the control blends from c_(n-1) to c_n, each a complex share of the table's acceleration, written as a
+vector of real and imaginary part. With y_n, the Fourier coefficients of u1 and drift over the cycle,
 
     x_(n+1) = M x_n + B1 c_(n-1) + B0 c_n
     y_n     = y* + C x_n + D1 c_(n-1) + D0 c_n.
@@ -23,22 +23,22 @@ OBSERVED = 3
 """Number of harmonics of u1 and of the drift in y."""
 
 STEP = 1e-4
-"""Step of the differences: states relative to their size, control as a share."""
+"""Step of the differences: for states relative to their scale, for control as a share."""
 
 RIGID = Shaker(moving_mass=1e8, friction=0.0, voltage_limit=1e12, current_limit=1e12)
 """A table that the block does not move."""
 
 TABLE = 2
-"""Number of states of the table, the first ones. A rigid table has none: its free motion would hardly decay."""
+"""Number of states of the table, the first ones. A rigid table has none, since its free motion would hardly decay."""
 
 
 @dataclass(frozen=True, eq=False)
 class CycleMap:
     """The map at `omega` [rad/s]; cycles begin at `phase` [rad] of the base's sine.
 
-    States are relative to their size on the orbit. Shapes: `transition` M (n, n), `inputs` B1, B0 (n, 2), `outputs`
-    C (12, n), `feedthrough` D1, D0 (12, 2), `orbit` y* (12,) [m]; n is 8, or 6 on a rigid table. `blend` is the part
-    of a cycle in which the control changes. The coefficients are ordered as by `coefficients`.
+    States are relative to their scale on the orbit. Shapes: `transition` M (n, n), `inputs` B1, B0 (n, 2), `outputs` C
+    (12, n), `feedthrough` D1, D0 (12, 2), `orbit` y* (12,) [m]; n is 8, or 6 on a rigid table. `blend` is the part of a
+    cycle in which the control changes. The coefficients are ordered as by `coefficients`.
     """
 
     omega: float
@@ -59,7 +59,7 @@ class CycleMap:
 
 
 def coefficients(u1: NDArray[np.complex128], drift: NDArray[np.complex128]) -> Array:
-    """The vector y, shape (12,), from complex harmonics, shape (OBSERVED,) at least, of u1 and drift [m].
+    """The vector y, shape (12,), from complex harmonics, of shape (OBSERVED,) or longer, of u1 and drift [m].
 
     A signal is the imaginary part of the sum of z_k exp(i k phi), with phi the phase of the base's sine.
     """
@@ -70,8 +70,8 @@ def coefficients(u1: NDArray[np.complex128], drift: NDArray[np.complex128]) -> A
 def cycle_map(fixed: Orbit, shaker: Shaker | None, harmonics: int, blend: float = 0.5) -> CycleMap:
     """The map near the orbit `fixed` on the table of `shaker`, which is controlled up to `harmonics`.
 
-    None is a rigid table. The control changes along a smoothstep in the first part `blend` of a cycle. Raises NoOrbit
-    as `sim.table_orbit.table_orbit` does.
+    `shaker` = None stands for a rigid table. The control changes along a smoothstep in the first part `blend` of a
+    cycle. Raises NoOrbit as `sim.table_orbit.table_orbit` does.
     """
     table = RIGID if shaker is None else shaker
     orbit = table_orbit(fixed, table, harmonics)
@@ -88,7 +88,7 @@ def cycle_map(fixed: Orbit, shaker: Shaker | None, harmonics: int, blend: float 
     sizes = period.scales(orbit.start)
 
     def response(state: Array, before: complex, now: complex) -> Array:
-        """State after the cycle in units of its size, and coefficients."""
+        """State after the cycle, relative to its scale, and coefficients."""
         change = ((before + (now - before) * done) * carrier).real
         after, samples = period.run(orbit.start + state * sizes, orbit.drive, change)
         u1, drift = samples[:, 2], samples[:, 3] - samples[:, 2]

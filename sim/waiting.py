@@ -1,4 +1,6 @@
-"""Waits of a main thread, in steps: on Windows before Python 3.14, Ctrl-C does not end a wait for a lock."""
+"""Waits of the main thread, in short steps, since on Windows before Python 3.14 Ctrl-C does not end a wait for a
+lock.
+"""
 
 import time
 from collections.abc import Callable
@@ -76,7 +78,7 @@ def sleep(seconds: float) -> None:
 
 
 def _repeat(wait_once: Callable[[float], object], timeout: float) -> bool:
-    """Call `wait_once(step)` until it is true; False after `timeout` [s]. It is called at least once."""
+    """Call `wait_once(step)`, at least once, until it is true; False after `timeout` [s]."""
     end = time.monotonic() + timeout
     remaining = timeout
     while True:

@@ -2,8 +2,8 @@
 
 The state of the cycle map (`sim.cycle_map`) is estimated by a Kalman filter and fed back by a linear-quadratic
 regulator. The filter does not know the orbit: the Fourier coefficients y* of the periodic motion are a random walk that
-it estimates as well, with steps large compared with the noise. So it reacts to differences between cycles only: any
-motion that repeats is taken for the orbit and receives no control, whatever the error of the model.
+it estimates as well, with steps large compared with the noise. It therefore reacts only to differences between cycles:
+any motion that repeats is taken for the orbit and receives no control, whatever the error of the model.
 
 A correction computed from cycle n takes effect at the beginning of cycle n + 2; cycle n + 1 is under way by then.
 """
@@ -24,13 +24,13 @@ DELAY = 2
 """Number of cycles from a measured cycle to the one in which its correction begins."""
 
 BLEND = 0.5
-"""Part of a cycle in which a correction blends in. A whole cycle weakens it by 20 to 30 %, as successive corrections
-have nearly opposite signs.
+"""Fraction of a cycle over which a correction is blended in. A full cycle would weaken it by 20 to 30 %, since
+successive corrections have nearly opposite signs.
 """
 
 COST = 100.0
-"""Cost of control, squared shares, against squared deviations of y relative to y*: cheap control saturates on every
-deviation and captures less often, dear control takes longer.
+"""Cost of control (squared shares) relative to that of squared deviations of y from y*: a low cost saturates the
+control on every deviation and captures less often; with a high cost capture takes longer.
 """
 
 READING, DISTURBANCE, WANDER = 3e-6, 1e-3, 1e-2
@@ -46,7 +46,7 @@ def observed(cycle: Cycle, turn: complex) -> Array:
 
 
 class Stabiliser:
-    """Determines the control of each cycle, a complex share of magnitude `authority` at most."""
+    """Determines the control of each cycle, a complex share with a magnitude of at most `authority`."""
 
     def __init__(self, cycle_map: CycleMap, authority: float) -> None:
         self._map, self._authority = cycle_map, authority
@@ -55,7 +55,7 @@ class Stabiliser:
         n, m = cycle_map.transition.shape[0], cycle_map.orbit.size
         self._state, self._orbit = np.zeros(n), np.zeros(m)
         self._begun = False
-        # controls of the cycle before the one that is measured next, of that one, and of the following one
+        # controls of the cycle before the one measured next, of that cycle, and of the following one
         self._before, self._now, self._next = np.zeros(2), np.zeros(2), np.zeros(2)
 
     @property
@@ -64,7 +64,9 @@ class Stabiliser:
         return float(np.linalg.norm(self._map.outputs @ self._state) / np.linalg.norm(self._map.orbit))
 
     def next(self, y: Array | None) -> complex:
-        """Control of the cycle after next, from the coefficients of the cycle just measured; None if it was lost."""
+        """Control of the cycle after next, from the coefficients of the cycle just measured; None stands for a lost
+        cycle.
+        """
         a, (b1, b0), c, (d1, d0) = (
             self._map.transition,
             self._map.inputs,
@@ -117,21 +119,23 @@ def _filter(found: CycleMap) -> Array:
 
 
 QUIET, CAPTURED = 0.01, 24
-"""Largest control of a captured motion, as a share, and number of successive cycles with no more."""
+"""Largest control of a captured motion, as a share, and number of successive cycles that must not exceed it."""
 
 LOST, ROUGH = 6, 0.5
-"""Number of cycles in which a captured motion is lost: each has at least this part of the authority as control."""
+"""Number of successive cycles after which a captured motion counts as lost, if each needs at least this fraction of the
+authority.
+"""
 
 MISSING = 3
 """Number of successive cycles without a measurement after which the hold ends."""
 
 ANSWER = 0.15
-"""Largest difference of the table's fundamental from that expected of the drive, as a share: that of a phase off by 9
-degrees, or of a gain off by 15 %.
+"""Largest difference of the table's fundamental from that expected of the drive, as a share; a phase error of 9 degrees
+or a gain error of 15 % causes it.
 """
 
 GROWTH = 1.1
-"""Largest peak of a cycle, relative to the largest of the free motion or of the limit's warning level."""
+"""Largest peak of a cycle, relative to the largest peak of the free motion or to the limit's warning level."""
 
 
 @dataclass
@@ -152,7 +156,7 @@ class HoldMonitor:
     _controls: deque[float] = field(default_factory=lambda: deque[float](maxlen=CAPTURED))
 
     def missed(self) -> str | None:
-        """Count a cycle without a measurement. Returns the reason to release, if there is one."""
+        """Count a cycle without a measurement. Returns the reason to release the hold, if any."""
         self.cycles += 1
         self._missing += 1
         if self._missing >= MISSING:
@@ -160,12 +164,14 @@ class HoldMonitor:
         return self._late()
 
     def push(self, control: complex, drift: float, played: complex, achieved: complex) -> str | None:
-        """Count a cycle with its `control`, peak `drift` [m], and shares of drive and table. Returns as `missed`."""
+        """Count a cycle with its `control`, peak `drift` [m], and shares of drive and table. Returns the same as
+        `missed`.
+        """
         self.cycles += 1
         self._missing = 0
         self._controls.append(abs(control))
         if drift > self.largest:
-            return f"the drift reached {1e3 * drift:.3g} mm, {1e3 * self.largest:.3g} mm are allowed"
+            return f"the drift reached {1e3 * drift:.3g} mm, but {1e3 * self.largest:.3g} mm are allowed"
         expected = self.answer * played
         if abs(achieved - expected) > ANSWER:
             ratio = achieved / expected

@@ -1,6 +1,6 @@
 # pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
 # pyright: reportUnknownArgumentType=false
-"""Members and attributes through the lower level of h5py, in a third of the time of its dictionaries.
+"""Members and attributes through the lower level of h5py, in a third of the time that its dictionaries take.
 
 A file has some 200 objects and 600 attributes, which are created before a run starts and read whenever it is opened.
 """
@@ -22,12 +22,14 @@ _TEXT_STORED, _SCALAR = h5py.h5t.py_create(_TEXT, logical=True), h5py.h5s.create
 
 
 def is_hard_link(parent: Any, name: str) -> bool:
-    """Whether the member `name` is stored in the file, rather than named by a link. Raises KeyError without one."""
+    """Whether the member `name` is stored in the file, rather than named by a link. Raises KeyError if there is no such
+    member.
+    """
     return parent.id.links.get_info(_encoded(name)).type == h5py.h5l.TYPE_HARD
 
 
 def stored_member(parent: Any, name: str, *, read_only: bool = False) -> Any:
-    """The member `name`, as `parent[name]`, which asks for the mode of the file each time.
+    """The member `name`, as `parent[name]` returns it, but without querying the mode of the file each time.
 
     In a `read_only` file, a dataset keeps its shape in memory.
     """
@@ -53,7 +55,7 @@ def attributes(owner: Any) -> dict[str, Any]:
 
 
 def describe(owner: Any, **texts: str) -> None:
-    """Give a new object attributes that are texts, as `owner.attrs` would."""
+    """Add string attributes to a new object, as `owner.attrs` would."""
     for name, text in texts.items():
         h5py.h5a.create(owner.id, name.encode(), _TEXT_STORED, _SCALAR).write(np.array(text, dtype=_TEXT))
 

@@ -1,9 +1,9 @@
-"""Other programs' locks on the data file while it is written.
+"""Locks of other programs on the data file while it is being written.
 
 On Windows locks are mandatory: while a reader with the usual locks of HDF5 has the file open, every write fails with
-errno 13, and HDF5 cannot repeat a flush that has failed. So the writer keeps such a reader out: it locks one byte far
-beyond the end of the file, which every lock of the whole file overlaps. Readers without locks, such as this program,
-are not affected.
+errno 13, and HDF5 cannot repeat a flush that has failed. Therefore the writer excludes such readers: it locks one byte
+far beyond the end of the file, which every lock of the whole file overlaps. Readers without locks, such as this
+program, are not affected.
 """
 
 import errno
@@ -15,7 +15,7 @@ from collections.abc import Callable
 from bench.datafile.hdf5_reading import DataFileError
 
 HELD = 10.0
-"""Time for which another program may hold the file, such as a virus scanner [s]; samples wait in memory meanwhile."""
+"""Time for which another program, such as a virus scanner, may hold the file [s]; samples meanwhile wait in memory."""
 PAUSE = 0.02
 """Pause between two attempts [s]."""
 GUARD = 2**62
@@ -53,7 +53,8 @@ def keep_lockers_out(handle: int) -> None:
 
 
 def wait_until_free(touch: Callable[[], None], held: float | None = None) -> None:
-    """Wait until `touch`, a write without effect, succeeds: before HDF5 writes, which it cannot repeat.
+    """Wait until `touch`, a write without effect, succeeds; called before HDF5 writes, because HDF5 cannot repeat a
+    write.
 
     Raises DataFileError after `held` [s], `HELD` by default; other errors of `touch` at once.
     """
@@ -76,6 +77,6 @@ def is_held(error: BaseException) -> bool:
 
 
 def in_use(error: BaseException) -> str:
-    """Message for an error for which `is_held` holds."""
+    """Message for an error for which `is_held` is true."""
     number = getattr(error, "errno", None) or errno.EACCES
-    return f"another program has locked it (errno {number}): close what displays or scans it"
+    return f"another program has locked it (errno {number}): close the program that displays or scans it"

@@ -1,4 +1,4 @@
-"""Stalls of the program: times in which the operating system did not run it."""
+"""Detection of stalls: periods in which the operating system did not run the program."""
 
 import threading
 from collections import deque
@@ -8,13 +8,13 @@ from drivers.clock import now
 from sim import waiting
 
 LONGEST = 0.1
-"""Shortest time without running that is noted [s]: the default lead of the drive."""
+"""Shortest recorded stall [s]: the default lead of the drive."""
 _PERIOD = 0.02
 _KEPT = 16
 
 
 class Stalls:
-    """Notes, in a thread while it is entered, when the program did not run: its short sleeps end much too late.
+    """Context manager whose thread records stalls, in which its short sleeps end much too late.
 
     A slow call, a slow disk or a long computation in another thread does not delay this thread; a stopped or suspended
     process, a computer without free processors and an exhausted memory do.
@@ -51,7 +51,7 @@ class Stalls:
 
 
 def in_words(seconds: float) -> str:
-    """A stall as the cause of what followed, with the remedy."""
+    """Message that states a stall as the cause, with the remedy."""
     return (
         f"the operating system did not run this program for {seconds:.2f} s (process stopped, computer suspended or"
         " overloaded): close other programs, and disable power saving"

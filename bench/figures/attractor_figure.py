@@ -1,5 +1,5 @@
 # pyright: reportUnknownMemberType=false
-"""Peaks of the cycles of long-term motions over the frequency: a panel for each stiffness."""
+"""Cycle peaks of long-term motions against frequency, one panel per stiffness."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -17,8 +17,9 @@ COLUMNS = 2
 
 
 def attractor_figure(points: Mapping[str, NDArray[Any]], gains: Sequence[NDArray[np.float64]]) -> "Figure":
-    """Arrays of the table of `bench.prediction.attractors`, and the gains of the last cycles at each of its rows, empty
-    after a fall. A dot is the peak of a cycle; the line is the orbit, dashed where it is unstable on the table.
+    """Arguments are the arrays of the table from `bench.prediction.attractors`, and the gains of the last cycles for
+    each of its rows, empty after a fall. A dot is the peak of a cycle; the line is the orbit, dashed where it is
+    unstable on the table.
     """
     betas = np.unique(points["beta"])
     across = min(COLUMNS, betas.size)

@@ -22,7 +22,7 @@ from sim.sweep import in_threads
 from sim.table_orbit import table_orbit
 
 SEED = 1
-"""Seed of the drawn specimens: a prediction is the same every time."""
+"""Seed of the drawn specimens, fixed so that predictions are reproducible."""
 
 RANGE = (0.025, 0.975)
 """Quantiles of the greatest peaks of the drawn specimens that enclose 95 % of them."""
@@ -32,11 +32,12 @@ CYCLES, MEMBERS = 1500, 16
 
 @dataclass(frozen=True, eq=False)
 class LongTerm:
-    """Long-term motion with the spring `beta` at `omega` [rad/s], beside the rocking orbit with the gain `orbit`.
+    """Long-term motion with the spring `beta` at `omega` [rad/s], together with the rocking orbit, whose gain is
+    `orbit`.
 
-    Where the orbit on the table is `stable`, the motion is the orbit. `gains`, shape (n,), are the gains of the peaks
-    of the last cycles; it is empty if the block falls, after `fallen` cycles. `low` and `high` enclose the greatest
-    peaks of 95 % of the drawn specimens that do not fall, and `falls` is the share of those that do; NaN without drawn
+    If the orbit on the table is `stable`, the motion is the orbit. `gains`, shape (n,), are the gains of the peaks of
+    the last cycles; it is empty if the block falls, after `fallen` cycles. `low` and `high` enclose the greatest peaks
+    of 95 % of the drawn specimens that do not fall, and `falls` is the fraction of those that do; NaN without drawn
     specimens.
     """
 
@@ -52,7 +53,7 @@ class LongTerm:
 
     @property
     def repeats(self) -> int:
-        """Number of cycles after which the motion repeats, 0 where it does not."""
+        """Number of cycles after which the motion repeats, 0 if it does not."""
         return 1 if self.stable else period_of(self.gains[:, None])
 
     def gain(self, of: Callable[[NDArray[np.float64]], np.float64]) -> float:
@@ -69,7 +70,7 @@ def long_term(
     cycles: int = CYCLES,
     members: int = MEMBERS,
 ) -> LongTerm:
-    """Long-term motion beside the rocking orbit of `layer`, after `cycles`, with `members` specimens from `known`.
+    """Long-term motion near the rocking orbit of `layer`, after `cycles`, with `members` specimens from `known`.
 
     The amplitude and the harmonics up to `harmonics` of the table's acceleration are those of the orbit. Raises NoOrbit
     when there is no such orbit on the table.
@@ -118,17 +119,23 @@ def attractors_table(found: Sequence[LongTerm]) -> Table:
     def numbers(values: Sequence[float], unit: str, description: str) -> Column:
         return Column(np.array(values, dtype=np.float64), unit, description)
 
-    repeats = "cycles after which the motion repeats, 0: it does not repeat, or the block falls"
+    repeats = "number of cycles after which the motion repeats; 0 if it does not repeat, or the block falls"
     return {
         "beta": numbers([each.beta for each in found], "1", "stiffness ratio k_C/k1 of the coupling spring"),
         "omega_rad_s": numbers([each.omega for each in found], "rad/s", "circular frequency of the base motion"),
         "alpha_2": numbers([each.orbit for each in found], "1", "gain of the peak drift on the orbit"),
-        "stable": Column(np.array([each.stable for each in found], dtype=bool), "", "the orbit on the table is stable"),
+        "stable": Column(
+            np.array([each.stable for each in found], dtype=bool), "", "whether the orbit on the table is stable"
+        ),
         "repeats_cycles": Column(np.array([each.repeats for each in found], dtype=np.int64), "1", repeats),
-        "alpha_2_least": numbers([each.gain(np.min) for each in found], "1", "gain of the least peak of a cycle"),
-        "alpha_2_mean": numbers([each.gain(np.mean) for each in found], "1", "mean gain of the peaks of the cycles"),
-        "alpha_2_greatest": numbers([each.gain(np.max) for each in found], "1", "gain of the greatest peak"),
-        "greatest_low": numbers([each.low for each in found], "1", "lower end of the range of 95 % of the specimens"),
-        "greatest_high": numbers([each.high for each in found], "1", "upper end of the range of 95 % of the specimens"),
-        "falls": numbers([each.falls for each in found], "1", "share of the drawn specimens whose block falls"),
+        "alpha_2_least": numbers([each.gain(np.min) for each in found], "1", "gain of the smallest cycle peak"),
+        "alpha_2_mean": numbers([each.gain(np.mean) for each in found], "1", "mean gain of the cycle peaks"),
+        "alpha_2_greatest": numbers([each.gain(np.max) for each in found], "1", "gain of the greatest cycle peak"),
+        "greatest_low": numbers(
+            [each.low for each in found], "1", "lower end of the range of the greatest peak for 95 % of the specimens"
+        ),
+        "greatest_high": numbers(
+            [each.high for each in found], "1", "upper end of the range of the greatest peak for 95 % of the specimens"
+        ),
+        "falls": numbers([each.falls for each in found], "1", "fraction of the drawn specimens whose block falls"),
     }

@@ -1,7 +1,7 @@
-"""Readings of the sample clock by a process of its own, through its own connection to a gRPC device server.
+"""Readings of the sample clock by a separate process, through a separate connection to a gRPC device server.
 
-The acquisition loop is not delayed by them, and they take the same time whatever it does: half the difference between
-the two ways of a call shifts every time found from it, and is the same in a check as in a run.
+They do not delay the acquisition loop and take the same time whatever it does. Half the difference between the two
+directions of a call shifts every time derived from it, equally in a check and in a run.
 """
 
 import struct
@@ -58,7 +58,7 @@ class ClockWatch:
         return [self._found.popleft() for _ in range(len(self._found))]
 
     def close(self) -> None:
-        """End the process; allowed any number of times."""
+        """End the process; may be called repeatedly."""
         with suppress(OSError):
             self._input.close()
         waiting.end(self._process, _ENDING)
@@ -104,7 +104,7 @@ if __name__ == "__main__":
     import os
     import signal
 
-    # requests of the operator go to the program, which ends this process
+    # the operator's requests go to the program, which ends this process
     for each in ("SIGINT", "SIGHUP", "SIGBREAK"):
         if hasattr(signal, each):
             signal.signal(getattr(signal, each), signal.SIG_IGN)
@@ -119,5 +119,5 @@ if __name__ == "__main__":
     try:
         _serve(sys.argv[1], float(sys.argv[2]), given, sys.stdout.buffer)
     except Exception:
-        # the program reads the clock itself then
+        # the program then reads the clock itself
         os._exit(1)

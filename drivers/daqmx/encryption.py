@@ -1,5 +1,5 @@
-"""Encryption of the connection to a gRPC device server, as the server offers it: TLS, and mutual TLS with a client's
-certificate (wiki of NI's grpc-device, "Server Security Support"). The server knows no other credentials.
+"""Encryption of the connection to a gRPC device server, as offered by the server: TLS, and mutual TLS with a client
+certificate (wiki of NI's grpc-device, "Server Security Support"). The server supports no other credentials.
 """
 
 import socket
@@ -17,8 +17,8 @@ _REMEDY = (
 
 
 def require_private(server: str) -> None:
-    """Raise InvalidInput for a server outside loopback, link-local and private networks. A name that is unknown passes:
-    nothing can be connected to.
+    """Raise InvalidInput for a server outside loopback, link-local and private networks. An unknown name is accepted,
+    since no connection to it is possible.
     """
     host = server.rpartition(":")[0].strip("[]")
     try:
@@ -32,14 +32,14 @@ def require_private(server: str) -> None:
 
 
 def credentials(tls: Tls) -> Any:
-    """Credentials of a channel. Raises InvalidInput for a file that cannot be read or is no PEM file, and for one of
-    certificate and key without the other.
+    """Credentials of a channel. Raises InvalidInput for a file that cannot be read or is not a PEM file, and for a
+    certificate without key or a key without certificate.
     """
     import grpc
 
     if (tls.client_certificate is None) != (tls.client_key is None):
         item = "hardware.daq.tls.client_key"
-        raise InvalidInput(item, tls.client_key, "give client_certificate and client_key, or neither")
+        raise InvalidInput(item, tls.client_key, "specify both client_certificate and client_key, or neither")
     names = ("root_certificate", "client_key", "client_certificate")
     given = {name: _content(name, getattr(tls, name)) for name in names}
     return cast(Any, grpc).ssl_channel_credentials(
@@ -54,7 +54,7 @@ def _content(name: str, path: str | None) -> bytes | None:
     try:
         content = Path(path).read_bytes()
     except OSError as error:
-        raise InvalidInput(item, path, f"it cannot be read: {error.strerror}") from None
+        raise InvalidInput(item, path, f"the file cannot be read: {error.strerror}") from None
     if b"-----BEGIN " not in content:
-        raise InvalidInput(item, path, "it is no PEM file: convert it with `openssl x509` or `openssl pkey`")
+        raise InvalidInput(item, path, "the file is not a PEM file: convert it with `openssl x509` or `openssl pkey`")
     return content

@@ -1,8 +1,8 @@
 """Ownership of the bench's devices: opening a device resets it, which would end the run of another program.
 
 Each device and serial port has a lock file on this machine. The operating system holds the lock and releases it when
-the process ends, however it ends; the holder's name is in a second file, since Windows does not let a locked file be
-read.
+the process ends, however it ends; the holder's name is in a second file, because a locked file cannot be read on
+Windows.
 """
 
 import getpass
@@ -22,7 +22,9 @@ from drivers.errors import DeviceNotFound
 from drivers.hardware.parameters import Hardware
 
 FOLDER = "ROCKBENCH_LOCKS"
-"""Environment variable with the folder of the locks; by default one for all users of this machine."""
+"""Environment variable that names the folder of the locks; the default folder is shared by all users of this
+machine.
+"""
 
 
 def devices_of(hardware: Hardware) -> list[str]:
@@ -35,7 +37,7 @@ def devices_of(hardware: Hardware) -> list[str]:
 
 @contextmanager
 def owned(devices: Iterable[str]) -> Generator[None]:
-    """Context manager that owns the `devices`. Raises DeviceNotFound naming the program that has one of them."""
+    """Context manager that owns the `devices`. Raises DeviceNotFound naming the program that holds one of them."""
     with ExitStack() as held:
         for device in devices:
             held.enter_context(_owned(device))
@@ -73,7 +75,7 @@ def _folder() -> Path:
     folder = Path(given or Path(shared or gettempdir(), "rockbench-devices"))
     with suppress(OSError):
         folder.mkdir(parents=True, exist_ok=True)
-        # other users lock the same files; in a sticky folder Linux would not let them
+        # other users must be able to lock the same files; in a sticky folder Linux would not allow it
         folder.chmod(0o777)
     return folder
 
@@ -92,6 +94,6 @@ def _holder(name: Path) -> str:
         with suppress(OSError):
             if text := name.read_text(encoding="utf-8", errors="replace")[:200]:
                 return text
-        # the holder writes its name just after it has locked
+        # the holder writes its name just after locking
         time.sleep(0.02)
     return "another program"

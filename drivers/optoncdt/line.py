@@ -1,7 +1,7 @@
-"""Line of a streaming sensor, read by a process of its own.
+"""Line of a streaming sensor, read by a separate process.
 
-A port keeps some thousand bytes, a tenth of a second at full rate. The process stamps the bytes on arrival and keeps
-them while this program does not run, so that no stall of it loses a value.
+A port buffers a few thousand bytes, a tenth of a second at full rate. The process stamps the bytes on arrival and keeps
+them while this program does not run, so that a stall of the program loses no values.
 
 Frames from the process: time of arrival on the machine's clock [s] (float64), number of bytes (uint32), the bytes. A
 frame without a time has the text of the error that ended the process; one without bytes reports the open port.
@@ -28,9 +28,9 @@ from sim import waiting
 
 _HEAD = struct.Struct("<dI")
 _PACE = 0.0025
-"""Pause between two reads of the line [s]: the cost of a read does not depend on the number of bytes.
+"""Pause between two reads of the line [s]; the cost of a read does not depend on the number of bytes.
 
-More frequent reads more often coincide with an arrival, which identifies the sensor's clock better.
+More frequent reads coincide with an arrival more often, which improves the identification of the sensor's clock.
 """
 _ENDING = 2.0
 """Longest wait for the end of the process [s]."""
@@ -68,11 +68,11 @@ class Line:
         self._input.flush()
 
     def chunks(self) -> Iterator[tuple[bytes, float]]:
-        """Received bytes and their arrival [s], until `close`. Raises ConnectionLost when the port has disappeared."""
+        """Received bytes and their arrival [s], until `close`. Raises ConnectionLost if the port has disappeared."""
         return self._frames()
 
     def close(self) -> None:
-        """End the process and release the port; allowed any number of times."""
+        """End the process and release the port; may be called repeatedly."""
         with suppress(OSError):
             self._input.close()
         waiting.end(self._process, _ENDING)
@@ -137,7 +137,7 @@ def _forward(commands: IO[bytes], port: Serial, over: threading.Event) -> None:
 
 
 if __name__ == "__main__":
-    # requests of the operator go to the program, which ends this process when the output is at zero
+    # the operator's requests go to the program, which ends this process when the output is at zero
     for name in ("SIGINT", "SIGHUP", "SIGBREAK"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)

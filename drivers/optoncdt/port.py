@@ -23,7 +23,7 @@ _WINDOWS_BUFFER = 1 << 18
 
 
 def listed_ports() -> list[str]:
-    """The serial ports that the system lists."""
+    """The serial ports listed by the system."""
     return sorted(port.device for port in list_ports.comports())
 
 
@@ -41,7 +41,7 @@ def open_port(name: str, port: str, baud: int) -> Serial:
 
 
 def has_baud(port: Serial, baud: int) -> bool:
-    """Set the baud rate of an open port; False when adapter or system does not support it."""
+    """Set the baud rate of an open port; False if adapter or system does not support it."""
     try:
         port.baudrate = baud
     except _PORT_ERRORS:

@@ -11,7 +11,7 @@ from drivers.rig import Alignment, RawValues
 
 @dataclass(frozen=True)
 class Marks:
-    """Counts of samples without a value: lost between two values, not arrived in time, implausible."""
+    """Numbers of samples without a value: lost between two values, not arrived in time, or implausible."""
 
     lost: int
     late: int
@@ -21,7 +21,7 @@ class Marks:
 class Resampler:
     """Interpolates about the last `capacity` readings: index, second of the sensor's clock, counts or fault mark.
 
-    Counts beyond +-`largest` are fault marks, `lost_mark` is that of missing values.
+    Counts beyond +-`largest` are fault marks, `lost_mark` is the mark of missing values.
     """
 
     def __init__(self, capacity: int, largest: int, lost_mark: int, late_mark: int) -> None:
@@ -55,7 +55,8 @@ class Resampler:
     def at(self, times: NDArray[np.float64]) -> NDArray[np.int16]:
         """Counts at sensor times, shape (n,), by linear interpolation between readings.
 
-        The fault mark where one of the two is not a distance, the mark of lost values where one of the two is missing.
+        Where one of the two is not a distance, its fault mark is returned; where one is missing, the mark of lost
+        values.
         """
         seen = np.full(times.shape, self._late_mark, dtype=np.int16)
         if self._end < 2:
@@ -75,16 +76,16 @@ class Resampler:
 
 
 RARE, RECOVERY = 3.0, 0.05
-"""Number of implausible values within a short time above which they are no faults of single values, and the decrease of
-that number with each plausible one.
+"""Number of implausible values within a short time above which they no longer count as single faults, and the decrease
+of that number with each plausible value.
 """
 
 
 class Plausibility:
-    """Marks single values farther from the last plausible one than `largest_step` for each measurement between them: a
-    flipped bit gives a valid distance elsewhere. Counts beyond +-`largest` are no values.
+    """Marks single values that differ from the last plausible one by more than `largest_step` for each measurement
+    between them, as when a flipped bit gives another valid distance. Counts beyond +-`largest` are not values.
 
-    Only rare values are marked: jumps that are frequent, or that last, are a motion, which the guard must judge.
+    Only rare values are marked: frequent or lasting jumps are a motion, which the guard must judge.
     """
 
     def __init__(self, largest: int, largest_step: float, mark: int) -> None:
@@ -94,7 +95,7 @@ class Plausibility:
         self.restart()
 
     def restart(self) -> None:
-        """Begin again after a restart of the sensor; the number is kept."""
+        """Start again after a restart of the sensor; the number of marked values is kept."""
         self._before: tuple[int, int] | None = None
         self._doubt = 0.0
 
@@ -142,7 +143,7 @@ def resampled(
     Values that had arrived too late for their block are included. `marked` converts the words of the sensor to counts
     of at most +-`largest`, or to fault marks beyond.
     """
-    # of repeated values the first counts
+    # of repeated values, the first one counts
     order = np.flatnonzero(raw.time > np.maximum.accumulate(np.concatenate(([-1], raw.time[:-1]))))
     resampler = Resampler(max(order.size, 2), largest, marks.lost, marks.late)
     resampler.add(raw.index[order], np.multiply(1e-6, raw.time[order], dtype=np.float64), marked(raw.code[order]))

@@ -31,7 +31,8 @@ from sim.shaker import Shaker
 from sim.steady import NoOrbit, Orbit
 
 PATIENCE = 200
-"""Cycles within which a motion must be captured, and then as many for the correction of the table and the measurement.
+"""Number of cycles within which a motion must be captured; as many again are allowed for the correction of the table
+and the measurement.
 """
 
 SLOW = 0.985
@@ -42,7 +43,7 @@ UPDATES = 8
 
 
 def prepared(orbit: Orbit | None, shaker: Shaker | None, harmonics: int) -> CycleMap | None:
-    """Cycle map for the stabiliser; None without an orbit on the table."""
+    """Cycle map for the stabiliser; None if there is no orbit on the table."""
     if orbit is None:
         return None
     try:
@@ -122,7 +123,9 @@ class _Hold:
         return (first + self._controls[-1] / self._table.answer, *others)
 
     def push(self, cycle: Cycle | None) -> str | None:
-        """Determine the next control from a cycle, None if it was lost. Returns the reason to release, if any."""
+        """Determine the next control from a cycle, None if it was lost. Returns the reason to release the hold, if
+        any.
+        """
         y = None if cycle is None else observed(cycle, self._table.turn)
         self._controls.append(self._stabiliser.next(y))
         control = self._controls[0]
@@ -138,7 +141,7 @@ class _Hold:
         return reason
 
     def _settle(self, cycle: Cycle, control: float) -> str | None:
-        """Correct the table until it is a sine, then collect cycles."""
+        """Correct the table until its motion is a sine, then collect cycles."""
         if self.monitor.cycles > 2 * PATIENCE:
             return f"the held motion was not steady within {2 * PATIENCE} cycles"
         self._since += 1
@@ -158,7 +161,7 @@ class _Hold:
         return None
 
     def measured(self) -> Held | None:
-        """The held motion, once its table is a sine and enough of its cycles are steady."""
+        """The held motion, once the table's motion is a sine and enough cycles are steady."""
         if len(self._used) < self._wanted:
             return None
         if not self._detector.judge(allowance=2.0).steady:

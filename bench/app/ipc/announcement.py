@@ -1,4 +1,4 @@
-"""Announcement of a session to the windows of this machine, and the listener by which they attach."""
+"""Announcement of a session to the windows on this machine, and the listener through which they attach."""
 
 import json
 import os
@@ -21,7 +21,7 @@ from sim import waiting
 @contextmanager
 def announced(server: SessionServer, run: Run, owner: str) -> Generator[None]:
     """Context manager in which clients can attach to the session of `server`, which carries out `run` for its `owner`,
-    "window" or "terminal". If that is impossible, the run has a warning, and no client but its owner.
+    "window" or "terminal". If that is impossible, the run has a warning, and its owner is the only client.
     """
     folder = sessions_folder()
     if folder is None:

@@ -1,4 +1,6 @@
-"""Queues between the engine's thread and the clients of a session: one for each client, who may join at any time."""
+"""Queues between the engine's thread and the clients of a session: one for each client; clients may join at any
+time.
+"""
 
 import threading
 from collections import deque
@@ -8,12 +10,12 @@ from bench.app.ipc.messages import FromSession, Opened, Preparing, Published, Qu
 from bench.events import Estimate, Event, LiveValue, PointFinished, RunningGain, StepStarted, TwinEstimate
 
 EVENTS, TRACES = 5000, 64
-"""Capacity for messages and for blocks of traces of 0.1 s each."""
+"""Capacity in messages and in blocks of traces of 0.1 s each."""
 
 
 class SendQueue:
-    """Queue between the engine's thread, which never waits, and the sender's. When full, it discards the oldest traces
-    and twin estimates, and the newest of other events, and counts the losses. The data file is complete nevertheless.
+    """Queue between the engine's thread, which never waits, and the sending thread. When full, it discards the oldest
+    traces and twin estimates and the newest other events, and counts the losses. The data file is complete regardless.
     """
 
     def __init__(self, events: int = EVENTS, traces: int = TRACES) -> None:
@@ -25,7 +27,7 @@ class SendQueue:
         self.lost_traces = 0
 
     def put(self, message: FromSession, *, always: bool = False) -> None:
-        """Append a message; with `always` even if the queue is full."""
+        """Append a message; with `always`, even if the queue is full."""
         with self._changed:
             if isinstance(message, Traces):
                 self._traces.append(message)
@@ -41,7 +43,7 @@ class SendQueue:
             self._changed.notify()
 
     def take(self, timeout: float) -> list[FromSession]:
-        """All messages, events first; empty if none arrives within `timeout` seconds."""
+        """All queued messages, events first; empty if none arrives within `timeout` seconds."""
         with self._changed:
             if not (self._events or self._twin or self._traces):
                 self._changed.wait(timeout)
@@ -57,8 +59,8 @@ RUNNING = (Estimate, RunningGain)
 
 
 class Broadcast:
-    """The messages of a session for all of its clients. A client that joins late first receives those that describe the
-    run so far: the rig, the events of the journal, up to `EVENTS` of them, and the last of each kind of running value.
+    """Distributes the messages of a session to all its clients. A client that joins late first receives the messages
+    that describe the run so far: the rig, up to `EVENTS` journal events, and the latest of each kind of running value.
     """
 
     def __init__(self) -> None:
@@ -74,7 +76,7 @@ class Broadcast:
         return bool(self._queues)
 
     def put(self, message: FromSession, *, always: bool = False) -> None:
-        """Append a message to the queue of every client; with `always` even to a full one."""
+        """Append a message to the queue of every client; with `always`, even to a full one."""
         with self._lock:
             self._store(message)
             for queue in self._queues:

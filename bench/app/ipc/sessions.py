@@ -1,7 +1,7 @@
 """Sessions under way on this machine: each announces itself in a folder of this user, for windows that attach to it.
 
 An announcement is a file that only this user can read, with the address and key of the session. It is locked for as
-long as the session lives: one without a lock is that of a process that ended abruptly, and is removed.
+long as the session lives; an unlocked announcement is from a process that ended abruptly, and is removed.
 """
 
 import json
@@ -16,7 +16,7 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 FOLDER = "ROCKBENCH_SESSIONS"
-"""Environment variable with the folder of the announcements; "off" for none."""
+"""Environment variable that names the folder of the announcements; "off" disables them."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class RunningSession:
 
     @property
     def title(self) -> str:
-        """The run in a few words: protocol, operator, and folder."""
+        """Short description of the run: protocol, operator and folder."""
         by = f" by {self.operator}" if self.operator else ""
         return f"{self.protocol}{by}, {self.out}"
 
@@ -77,7 +77,7 @@ def running_sessions() -> list[RunningSession]:
 
 
 def lock_of(path: Path) -> FileLock:
-    """Lock of an announcement, on a file of its own: on Windows a locked file cannot be read."""
+    """Lock of an announcement, on a separate file, since a locked file cannot be read on Windows."""
     return FileLock(path.with_suffix(".lock"), blocking=False, thread_local=False, fallback_to_soft=False)
 
 
