@@ -94,7 +94,7 @@ def test_an_error_of_hdf5_itself_gives_the_same_reason(tmp_path: Path) -> None:
 
     recorder._writer._file_sync.sync = fails  # type: ignore[method-assign]
     hand_over(recorder, 1)
-    with pytest.raises(DataFileError, match="close what displays or scans it"):
+    with pytest.raises(DataFileError, match="close the program that displays or scans it"):
         recorder.sync()
     recorder.close("failed")
 

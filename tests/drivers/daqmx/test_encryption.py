@@ -88,7 +88,7 @@ def test_a_certificate_that_cannot_be_read_is_named(certificates: Path) -> None:
     with pytest.raises(InvalidInput, match=r"hardware\.daq\.tls\.root_certificate.*cannot be read"):
         Connection("127.0.0.1:1", 1.0, tls(certificates, root_certificate="nowhere.pem"))
     (certificates / "der.crt").write_bytes(b"\x30\x82")
-    with pytest.raises(InvalidInput, match=r"no PEM file"):
+    with pytest.raises(InvalidInput, match=r"not a PEM file"):
         Connection("127.0.0.1:1", 1.0, tls(certificates, root_certificate=str(certificates / "der.crt")))
 
 
