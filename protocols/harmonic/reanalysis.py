@@ -17,6 +17,7 @@ from bench.control.sine import Sine, SineResponse
 from bench.datafile.reader import DataFile
 from bench.engine.steps import Arm, Calibrate, Dwell, Measured, Outcome, Publish, SetHarmonics, Step, Sweep
 from bench.events import Acquired, Estimate, Event, PointFinished
+from protocols.harmonic.free_prediction import with_free_prediction
 from protocols.harmonic.measurement import JUDGED, LASERS, REMAINING, TRANSIENT, Held, Settled, judge, predicted_fields
 from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, HarmonicSettings, PointStatus
 from sim.gain import predict_gain
@@ -56,6 +57,7 @@ class HarmonicFollower:
         self._rate = record.sample_rate
         self._cycles = settings.measured_cycles or parameters.measured_cycles
         self._tolerance = settings.settle_tolerance or parameters.settle_tolerance
+        self._amplitude = parameters.amplitude_factor * configuration.known_specimen.uplift_acceleration
         self._calibration = DriveCalibration.flat(1.0)
         self._read = 0
         self._last: Sweep | None = None
@@ -141,7 +143,7 @@ class HarmonicFollower:
         known = self._configuration.known_on_table
         bare = self._bare[omega]
         if point.status is PointStatus.OVERTURNED:
-            asked = self._parameters.amplitude_factor * self._configuration.known_specimen.uplift_acceleration
+            asked = self._amplitude
             layer = predict_gain(specimen, omega, asked, bare.peak.amplitude).rocking
             peaks = {"bare_drift_peak_m": bare.peak.drift, "bare_amplitude_m_s2": bare.peak.amplitude}
             return point.model_copy(update=predicted_fields("rocking", layer, known) | peaks)
@@ -151,6 +153,7 @@ class HarmonicFollower:
         settled = self._settled(tried)
         held = None if tried.held is None else self._held(tried.held, point)
         found = judge(settled, bare, omega, specimen, known, sensors, point.starts_tried, shaker, harmonics, held)
+        found = with_free_prediction(found, specimen, self._amplitude, self._configuration, harmonics)
         return found.model_copy(update={"start_chance": point.start_chance})
 
     def _unlike(self, series: _Series, point: HarmonicPoint) -> float:
