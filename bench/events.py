@@ -100,12 +100,15 @@ class Acquired(Event):
 
     `run` counts the armings of the rig; the block's `first` sample index is relative to the start of the run.
     `signals`, shape (n, n_signals), are in SI units, tared for the run, in the order of `bench.analysis.signals`.
+    `magnitudes` returns the largest of the quantities that the guard limits, by their keys, in SI units; a subscriber
+    may call it before it returns.
     """
 
     run: int
     block: Block
     drive: Array
     signals: Array = field(default_factory=lambda: np.empty((0, 0)))
+    magnitudes: Callable[[], Mapping[str, float]] = dict[str, float]
 
 
 @event(journalled=False)
@@ -430,6 +433,18 @@ class OperatorAnswered(Event):
     @property
     def line(self) -> str:
         return f"{self.request} (answered by {self.by})"
+
+
+@event(table="operator_notes", notice="note")
+class OperatorNote(Event):
+    """A note that the operator has written during the run."""
+
+    text: str = column("", "text of the note")
+    by: str = column("", "person who wrote it")
+
+    @property
+    def line(self) -> str:
+        return f"{self.text} ({self.by})"
 
 
 Subscriber = Callable[[Event], None]

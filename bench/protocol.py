@@ -172,6 +172,34 @@ class Reanalysis(Generic[P]):
 
 
 @dataclass(frozen=True)
+class Axis:
+    """An axis of the points of a campaign: the `parameter` with its values, the `field` of a point with the same
+    quantity, and the `heading` of a value, such as "β {:g}".
+    """
+
+    parameter: str
+    field: str
+    heading: str = "{}"
+
+    def text(self, value: object) -> str:
+        """Heading of a value."""
+        return self.heading.format(value)
+
+
+@dataclass(frozen=True)
+class RunView:
+    """What a run shows: `headline` is the field of a point whose value, prediction and verdict are shown largest,
+    by default the first one with an uncertainty. `labels` are the printed names of fields of a point, such as
+    "restitution rₑₓₚ"; without one, the first words of the description are used. `matrix` are the rows and columns of
+    the points, where their values are known beforehand.
+    """
+
+    headline: str = ""
+    labels: Mapping[str, str] = field(default_factory=dict[str, str])
+    matrix: tuple[Axis, Axis] | None = None
+
+
+@dataclass(frozen=True)
 class Protocol(Generic[P]):
     """An experiment. Flags, form, file metadata and documentation are generated from `parameters`, tables from `point`.
 
@@ -184,7 +212,7 @@ class Protocol(Generic[P]):
     without a flag. `log_line` formats a point as one log line: the run is then displayed as a log, not as a plot.
     Without a `reanalysis`, an analysis runs the plan with other parameters on the recorded samples. `report` returns
     the protocol's own sections of a report on its data file; if they include no table, the report lists all fields of
-    the points.
+    the points. `view` declares the names of its results, and what a run shows, for window and report.
     """
 
     name: str
@@ -200,6 +228,7 @@ class Protocol(Generic[P]):
     log_line: Callable[[Any], str] | None = None
     reanalysis: Reanalysis[P] | None = None
     report: "Callable[[Campaign], Sequence[Section]] | None" = None
+    view: RunView = field(default_factory=RunView)
 
 
 def deferred(reference: str) -> Callable[..., Any]:

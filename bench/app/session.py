@@ -55,11 +55,12 @@ def run_session(
     requests: Requests,
     realtime: bool,
     about: Mapping[str, str] | None = None,
-    opened: Callable[[Rig], None] = lambda _rig: None,
+    opened: Callable[[Rig, Subscriber], None] = lambda _rig, _publish: None,
     progress: Progress = silent,
 ) -> SessionResult:
     """Run a `prepared` protocol on its bench; write data file, figures and summary to the folder `out`. `opened` is
-    called with the rig before the table moves; the rig may be used only while the engine calls a subscriber. `about` is
+    called before the table moves, with the rig and a function that publishes an event of the run; both may be used
+    only while the engine calls a subscriber. `about` is
     stored in the data file with the metadata of the run: the operator's name, notes. `progress` reports the stages
     before the rig is opened and after it is closed. Raises InvalidInput before the table moves, or KeyboardInterrupt if
     an end was requested by then. Once the rig is armed, every ending is a result with a status.
@@ -106,7 +107,7 @@ def run_session(
         stream = EventStream(rig.clock, [recorder, *subscribers])
         status, reason = "failed", "the program failed"
         try:
-            opened(rig)
+            opened(rig, stream.publish)
             engine = configured_engine(rig, configuration, stream, requests, operator)
             strange = configuration.calibrated.strange(rig.description) if configuration.calibrated else ()
             for warning in (*strange, *preflight.warnings):

@@ -5,7 +5,7 @@ acquisition loop, and ends a run in three ways: *stop* (smooth ramp), *abort* (f
 now). Once a ramp has begun, nothing can raise the output until the guard is armed again.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,7 +31,7 @@ class Exchange:
     experiment, shape (n, n_signals; 0 without a signal map), and `drive` [V], shape (n,), the samples played meanwhile.
     `violation` is the first limit exceeded, if any, and `runaway` the first of the table itself. `warnings` are the
     limits whose warning level was reached for the first time since arming. `opened` names the open safety inputs; the
-    enable line is then cut.
+    enable line is then cut. `magnitudes` returns the largest of the watched quantities, by their keys, for display.
     """
 
     block: Block
@@ -42,6 +42,7 @@ class Exchange:
     warnings: tuple[Violation, ...] = ()
     opened: tuple[str, ...] = ()
     runaway: Violation | None = None
+    magnitudes: Callable[[], Mapping[str, float]] = dict[str, float]
 
 
 class Guard:
@@ -148,6 +149,7 @@ class Guard:
             tuple(near),
             opened,
             runaway,
+            self._motion.magnitudes,
         )
 
     def refusal(self, volts: NDArray[np.float64]) -> Violation | None:

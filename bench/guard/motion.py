@@ -1,6 +1,6 @@
 """Checks of every block against the limits of table motion, shaker load and specimen, sample by sample."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -89,8 +89,16 @@ class MotionWatch:
         self._quiet_below = {key: min(limit, self._warn_at[key]) for key, limit in self._limits.items()}
         self._counting = False
         self._warned: set[str] = set()
+        self._latest: tuple[NDArray[np.float64], Mapping[str, float]] | None = None
         self.drift_watched = False
         """Whether the drift is tared and the lasers are aimed at their storeys."""
+
+    def magnitudes(self) -> dict[str, float]:
+        """Largest magnitudes in the last block, by their keys in `WATCHED`; each laser and further channel by its name.
+
+        They are computed here, on request, since most blocks are not displayed.
+        """
+        return {} if self._latest is None else self._quantities.displayed(*self._latest)
 
     def check(
         self,
@@ -114,6 +122,8 @@ class MotionWatch:
         for each in self._further:
             # the converter is saturated
             sizes[each.name] = np.nan_to_num(np.abs(signals[:, each.column]), nan=np.inf)
+        peaks = {key: float(np.max(size, initial=0.0)) for key, size in sizes.items()}
+        self._latest = values, peaks
         for key, size in sizes.items():
             at = self._over[key].first(size > self._limits[key])
             if at is not None:
@@ -138,6 +148,7 @@ class MotionWatch:
             if not bound <= self._quiet_below[key]:
                 return False
         self._quantities.skip(values, bounds)
+        self._latest = values, bounds
         return True
 
     def _violation(self, key: str, size: NDArray[np.float64], limit: float, first: int, at: int) -> Violation:

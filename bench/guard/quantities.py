@@ -1,5 +1,6 @@
 """Magnitudes of the limited quantities of table motion, shaker load and lasers, block by block."""
 
+from collections.abc import Mapping
 from math import sqrt
 
 import numpy as np
@@ -37,6 +38,7 @@ class WatchedQuantities:
     def __init__(
         self, channels: tuple[Channel, ...], sample_rate: float, heating_time: float, shaker: ShakerModel | None
     ) -> None:
+        self._names = [channel.name for channel in channels]
         self._columns = {channel.name: column for column, channel in enumerate(channels)}
         self._shaker = shaker
         self._span = max(round(VELOCITY_WINDOW * sample_rate), 1)
@@ -96,6 +98,19 @@ class WatchedQuantities:
             found["laser_range"] = max(
                 [max(middle - extremes.low[k], extremes.high[k] - middle) / half for k, middle, half in self._places]
             )
+        return found
+
+    def displayed(self, values: Array, magnitudes: Mapping[str, float]) -> dict[str, float]:
+        """The `magnitudes` of a block for display: the current itself instead of its bound, the heating at its last
+        update, at most `MOST_SKIPPED` samples ago, and the place of each laser instead of the larger one.
+        """
+        found = {key: value for key, value in magnitudes.items() if key != "laser_range"}
+        if "current" in found and (current := self._load(values)[1]) is not None:
+            found["current"] = largest(np.nan_to_num(current))
+            found["heating"] = sqrt(max(float(self._heat[0]), 0.0) / self._forget) if self._forget > 0.0 else 0.0
+        for k, middle, half in self._places:
+            # a laser without a valid sample has no place
+            found[self._names[k]] = float(np.fmax.reduce(np.abs(values[:, k] - middle))) / half
         return found
 
     def skip(self, values: Array, bounds: dict[str, float]) -> None:

@@ -5,7 +5,7 @@ from typing import Annotated
 from pydantic import Field, field_validator
 
 from bench.analysis.check_line import CheckLine, Verdict
-from bench.protocol import Protocol, deferred
+from bench.protocol import Protocol, RunView, deferred
 from sim.parameters import Parameters, each_once, quantity
 
 Frequency = Annotated[float, Field(gt=0, le=60)]
@@ -93,4 +93,5 @@ PROTOCOL = Protocol(
     prepare=deferred("protocols.check.experiment:LoopCheck"),
     figures=("margins.png",),
     log_line=log_line,
+    view=RunView(headline="measured"),
 )

@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import Field, field_validator
 
-from bench.protocol import Protocol, deferred
+from bench.protocol import Protocol, RunView, deferred
 from protocols.common.decays.parameters import EXPANDED, DecayParameters, decay_field
 from sim.parameters import COUPLING, Parameters, each_once, quantity
 
@@ -82,4 +82,18 @@ PROTOCOL = Protocol(
     figures=("coupling_stiffness.png",),
     files=("specimen.json",),
     report=deferred("protocols.coupling_stiffness.results:springs_sections"),
+    view=RunView(
+        headline="k_c_n_m",
+        labels={
+            "k_c_n_m": "stiffness of the spring",
+            "beta": "β on the label",
+            "beta_mounted": "β as mounted",
+            "k1_with_spring_n_m": "stiffness k₁ with the spring",
+            "k2_n_m": "stiffness k₂",
+            "xi1": "damping ξ₁",
+            "xi2": "damping ξ₂",
+            "omega1_rad_s": "frequency ω₁",
+            "omega2_rad_s": "frequency ω₂",
+        },
+    ),
 )

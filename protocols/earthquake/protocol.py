@@ -5,7 +5,7 @@ from typing import Annotated
 
 from pydantic import Field, field_validator
 
-from bench.protocol import Protocol, deferred
+from bench.protocol import Axis, Protocol, RunView, deferred
 from sim.parameters import COUPLING, Parameters, each_once, quantity
 
 Stiffness = Annotated[float, Field(gt=0, le=100)]
@@ -194,4 +194,9 @@ PROTOCOL = Protocol(
     ),
     positional="records",
     report=deferred("protocols.earthquake.report:seismic_sections"),
+    view=RunView(
+        headline="alpha_2",
+        labels={"alpha_1": "α₁", "alpha_2": "α₂"},
+        matrix=(Axis("records", "record"), Axis("beta", "beta", "β {:g}")),
+    ),
 )

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, field_validator
 
-from bench.protocol import Protocol, deferred
+from bench.protocol import Protocol, RunView, deferred
 from sim.parameters import Parameters, each_once, quantity
 
 ALL = "all tilts"
@@ -100,4 +100,19 @@ PROTOCOL = Protocol(
     figures=("free_rocking.png",),
     files=("specimen.json",),
     report=deferred("protocols.free_rocking.results:rocking_sections"),
+    view=RunView(
+        headline="r_exp",
+        labels={
+            "r_exp": "restitution rₑₓₚ",
+            "r_th": "theoretical restitution rₜₕ",
+            "ratio": "restitution factor rₑₓₚ/rₜₕ",
+            "r_motion": "restitution r, from the motion",
+            "r_amplitudes": "restitution r, from the amplitudes",
+            "trend": "trend of r",
+            "alpha_rad": "critical angle α, from the motion",
+            "alpha_sides_rad": "critical angle α, from the sides",
+            "p_rad_s": "frequency parameter p, from the motion",
+            "p_sides_rad_s": "frequency parameter p, from the sides",
+        },
+    ),
 )

@@ -4,7 +4,7 @@ from typing import Literal
 
 from pydantic import model_validator
 
-from bench.protocol import Protocol, deferred
+from bench.protocol import Protocol, RunView, deferred
 from protocols.common.decays.parameters import DecayParameters, DecayPoint
 from sim.errors import InvalidInput
 from sim.parameters import quantity
@@ -45,4 +45,15 @@ PROTOCOL = Protocol(
     figures=("free_vibration.png",),
     files=("specimen.json",),
     report=deferred("protocols.free_vibration.report:vibration_sections"),
+    view=RunView(
+        headline="k1_n_m",
+        labels={
+            "k1_n_m": "stiffness k₁",
+            "k2_n_m": "stiffness k₂",
+            "xi1": "damping ξ₁",
+            "xi2": "damping ξ₂",
+            "omega1_rad_s": "frequency ω₁",
+            "omega2_rad_s": "frequency ω₂",
+        },
+    ),
 )

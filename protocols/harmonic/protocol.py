@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, field_validator
 
-from bench.protocol import Protocol, Reanalysis, deferred
+from bench.protocol import Axis, Protocol, Reanalysis, RunView, deferred
 from sim.parameters import COUPLING, Parameters, each_once, quantity
 
 Frequency = Annotated[float, Field(gt=0, le=40)]
@@ -222,4 +222,9 @@ PROTOCOL = Protocol(
     figures=("gain_spectra.png",),
     reanalysis=Reanalysis(HarmonicSettings, deferred("protocols.harmonic.reanalysis:HarmonicFollower")),
     report=deferred("protocols.harmonic.report:harmonic_sections"),
+    view=RunView(
+        headline="alpha_2",
+        labels={"alpha_2": "α₂", "alpha_2_orbit": "α₂ of the orbit", "multiplier": "multiplier"},
+        matrix=(Axis("beta", "beta", "β {:g}"), Axis("omega", "omega_rad_s", "{:g} rad/s")),
+    ),
 )

@@ -1,6 +1,6 @@
 """Identification of the table: acceleration per volt of drive against frequency."""
 
-from bench.protocol import Protocol, deferred
+from bench.protocol import Protocol, RunView, deferred
 from protocols.common.identification.parameters import IdentifyParameters
 from sim.parameters import Parameters, quantity
 
@@ -37,4 +37,8 @@ PROTOCOL = Protocol(
     prepare=deferred("protocols.identify.experiment:Identification"),
     figures=("table_response.png",),
     files=("table_model.json",),
+    view=RunView(
+        headline="gain_m_s2_v",
+        labels={"frequency_hz": "frequency", "gain_m_s2_v": "acceleration per drive", "noise_m_s2_hz": "noise"},
+    ),
 )

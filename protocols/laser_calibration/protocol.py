@@ -1,6 +1,6 @@
 """Calibration of both lasers against a common motion of the table with the frame locked."""
 
-from bench.protocol import Protocol, deferred
+from bench.protocol import Protocol, RunView, deferred
 from sim.parameters import Parameters, quantity
 
 
@@ -68,4 +68,5 @@ PROTOCOL = Protocol(
     prepare=deferred("protocols.laser_calibration.experiment:LaserCalibrationRun"),
     figures=("laser_errors.png",),
     files=("laser_calibration.json",),
+    view=RunView(headline="scale", labels={"scale": "scale", "delay_s": "delay"}),
 )

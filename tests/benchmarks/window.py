@@ -242,6 +242,7 @@ def hour(application: QApplication, controller: Controller, length: float) -> No
 def main(seconds: float, length: float) -> None:
     """Measure and print."""
     os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+    os.environ["ROCKBENCH_SESSIONS"] = "off"
     for name, code in (("window", OURS), ("peer: bare PySide6 and pyqtgraph", PEER)):
         wall, processor = start_up(code)
         print(

@@ -208,7 +208,7 @@ def carry_out(
                         requests=requests,
                         realtime=realtime,
                         about=about,
-                        opened=lambda rig: teller.opened(rig, prepared),
+                        opened=lambda rig, publish: teller.opened(rig, publish, prepared),
                         progress=progress.prepare,
                     )
                 last = ended_message(ended, out)

@@ -69,6 +69,13 @@ class Ring:
         values[1::2] = np.maximum.reduceat(self._high[kept], starts, axis=0)
         return np.repeat(self._time[kept][starts] - self.newest, 2), values
 
+    def newest_bins(self, seconds: float) -> tuple[NDArray[np.float64], NDArray[np.float32], NDArray[np.float32]]:
+        """Bench times of the bins of the last `seconds` [s], shape (n,), and their extremes, shape (n, n_signals)."""
+        first = self._end - self._size
+        first += int(np.searchsorted(self._time[first : self._end], self.newest - seconds)) if self._size else 0
+        kept = slice(first, self._end)
+        return self._time[kept], self._low[kept], self._high[kept]
+
     def at(self, time: float) -> NDArray[np.float64]:
         """Midpoints of the bin at bench time `time` [s], shape (n_signals,); outside the buffer the newest or oldest
         bin, zero without bins.

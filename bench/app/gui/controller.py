@@ -172,7 +172,9 @@ class Controller(QObject):
             return bench_status("no link", scene.state, scene.reason, self._quiet)
         if link.status == "linked" and scene.preparing and scene.state is State.IDLE:
             return Status(texts.PLANNING, scene.reason, "wait", "ring")
-        return bench_status(link.status, scene.state, scene.reason, link.silence)
+        # the reason of a change of state is over when the plan goes on
+        reason = scene.step if scene.state is State.RUNNING and scene.step else scene.reason
+        return bench_status(link.status, scene.state, reason, link.silence)
 
     def check_plan(self, asked: PlanCheck, by: object) -> None:
         """Request a plan check, also while a run is under way; `plan_checked` emits the result. It replaces an earlier
@@ -250,6 +252,12 @@ class Controller(QObject):
         """End the run gently."""
         if self._link is not None and self.controls:
             self._link.ask("stop")
+
+    def note(self, text: str) -> None:
+        """Add a note to log and file of the run."""
+        if self._link is not None and text.strip():
+            by = "" if self.run is None else self.run.about.get("operator", "")
+            self._link.note(text.strip(), by or texts.UNNAMED)
 
     def answer(self, *, agreed: bool) -> None:
         """Answer the open question."""

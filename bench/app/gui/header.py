@@ -1,7 +1,6 @@
 """The header, always visible: state of the bench, safety inputs, times, step, and STOP."""
 
 from collections.abc import Callable
-from textwrap import shorten
 from typing import cast
 
 from PySide6.QtCore import QEvent, QObject, QPoint, QPointF, QRectF, Qt
@@ -23,7 +22,7 @@ from bench.app.gui import texts
 from bench.app.gui.controller import DELIBERATE, Controller
 from bench.app.gui.palette import Theme
 from bench.app.gui.status import Shape
-from bench.app.gui.widgets import give_key, set_level, typeset
+from bench.app.gui.widgets import ElidingLabel, give_key, set_level, typeset
 
 KEY = Qt.Key.Key_F12
 
@@ -88,12 +87,8 @@ class StopFilter(QObject):
 
 STALE = 2.0
 """Age above which the safety inputs are unknown [s]."""
-STEP = 90
-"""Largest length of the displayed step; its tooltip shows the full text."""
-SIDE, HEIGHT, LOW = 56, 120, 72
-"""Side of the lamp, height of the header, and its height in a small window [px]; they are fixed, so that text never
-moves STOP.
-"""
+SIDE, HEIGHT, LOW = 56, 96, 72
+"""Side of the lamp, height of the header, and its height in a small window [px]: its text never moves STOP."""
 ROOMY, MEDIUM = (1150, 600), 700
 """Window size below which the header is low, and width below which it shows no times [px]."""
 
@@ -158,7 +153,7 @@ class Header(QWidget):
         self.word, self.reason = _label("word"), _label("faint")
         self.word.setAccessibleName(texts.NAMES["state"])
         self.reason.setWordWrap(True)
-        self.inputs, self.step, self.owner = _label(""), _label(""), _label("")
+        self.inputs, self.step, self.owner = ElidingLabel(), ElidingLabel(), ElidingLabel()
         self.elapsed, self.remaining = _label("value"), _label("value")
         self.inputs.setToolTip(texts.INPUTS_TIP.format(stale=STALE))
         self.progress = QProgressBar(maximum=1000, textVisible=False)
@@ -193,9 +188,6 @@ class Header(QWidget):
         for row, (name, value) in enumerate(rows):
             details.addWidget(_label("faint", name), row, 0)
             details.addWidget(value, row, 1)
-            value.setWordWrap(value is not self.owner)
-            # a long text is elided, so that it does not widen the label
-            value.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         details.addWidget(self.progress, len(rows), 0, 1, 2)
         details.setColumnStretch(1, 1)
         for part in (self.word, self.reason):
@@ -247,8 +239,7 @@ class Header(QWidget):
         self.remaining.setText(clock(scene.time_left if controller.running else float("nan")))
         now = (scene.step, scene.activity) if controller.running else ()
         step = " · ".join(typeset(part) for part in now if part)
-        self.step.setText(shorten(step, STEP, placeholder=" …") or "–")
-        self.step.setToolTip(step)
+        self.step.setText(step or "–")
         self.progress.setValue(round(1000 * scene.fraction))
         again = controller.latched and controller.running
         self.stop.setText(texts.STOP_AGAIN if again else texts.STOP if key_acts else texts.STOP_BY_MOUSE)
@@ -265,7 +256,6 @@ class Header(QWidget):
     def _show_owner(self) -> None:
         controller = self._controller
         self.owner.setText(controller.owner or "–")
-        self.owner.setToolTip(controller.owner)
         attached = controller.attached is not None and controller.running
         self.attach.setVisible(attached or (controller.elsewhere is not None and not controller.running))
         self.attach.setText(texts.DETACH if attached else texts.ATTACH)

@@ -68,6 +68,7 @@ def style_sheet(theme: Theme) -> str:
     QPushButton {{ min-height: 32px; padding: 2px 14px; }}
     QLineEdit, QComboBox {{ min-height: 26px; }}
     QTabBar::tab {{ min-height: 32px; min-width: 76px; }}
+    QTabWidget#motion QTabBar::tab {{ min-height: 24px; min-width: 40px; padding: 0px 6px; }}
     QLabel[role="word"] {{ font-size: {BANNER}pt; font-weight: bold; }}
     QLabel[role="value"] {{ font-size: {VALUE}pt; font-weight: bold; }}
     QLabel[role="faint"] {{ color: {theme.faint}; }}
@@ -79,7 +80,7 @@ def style_sheet(theme: Theme) -> str:
     QFrame#trouble, QFrame#leave {{ border: 3px solid {theme.alarm}; background: {theme.raised}; }}
     QFrame#welcome {{ border: 1px solid {theme.faint}; background: {theme.raised}; }}
     QPushButton#stop {{ background: #b30000; color: white; font-size: {BANNER}pt; font-weight: bold;
-        min-width: 250px; min-height: 84px; padding: 2px; border: 3px solid {theme.text}; border-radius: 8px; }}
+        min-width: 250px; min-height: 72px; padding: 2px; border: 3px solid {theme.text}; border-radius: 8px; }}
     QPushButton#stop[low="yes"] {{ font-size: {SMALL}pt; min-width: 130px; min-height: 50px; }}
     QPushButton#stop:pressed {{ background: #700000; }}
     QLabel[role="word"][low="yes"] {{ font-size: {VALUE}pt; }}

@@ -7,11 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QKeyEvent, QPainter, QPaintEvent, QPen, QPolygonF, QWheelEvent
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QSpinBox, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QSpinBox, QVBoxLayout, QWidget
 
 from bench.app.gui import texts
 from bench.app.gui.palette import Theme
 from bench.app.gui.status import Arrangement
+from bench.app.gui.widgets import ElidingLabel
 from bench.app.ipc.messages import TRACES
 from sim.block_face import displacement, rotation
 from sim.specimen import Specimen
@@ -148,8 +149,7 @@ class PhysicalPicture(QWidget):
         self.factor = QSpinBox(minimum=1, maximum=LARGEST, value=FACTOR, prefix="× ")
         self.factor.setAccessibleName(texts.FACTOR)
         self.factor.setToolTip(texts.FACTOR_TIP)
-        self.source = QLabel(texts.FRAME)
-        self.source.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self.source = ElidingLabel(texts.FRAME)
         self.canvas.factor = self.factor
         self.factor.valueChanged.connect(self._draw)
         row = QHBoxLayout()
@@ -222,7 +222,6 @@ class PhysicalPicture(QWidget):
             text = texts.FRAME_AND_BLOCK if self._angle is not None else texts.FRAME_ONLY
         age = "" if self._age is None else f" ({texts.NOT_LIVE.format(age=self._age)})"
         self.source.setText(text + age)
-        self.source.setToolTip(text + age)
 
 
 class _Canvas(QWidget):

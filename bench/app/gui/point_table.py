@@ -12,6 +12,7 @@ from bench.app.gui.widgets import in_screen_unit, label, spaced, typeset
 from bench.datafile.tables import Column
 from bench.document.typography import first_words
 
+NO_LABELS: Mapping[str, str] = {}
 _UNCERTAINTY, _PREDICTED = "_uncertainty", ("_predicted", "_nominal")
 _GOOD = ("", "steady", "held", "measured", "resting")
 """States of a point that are not displayed next to its verdict."""
@@ -22,7 +23,7 @@ class Measured:
     """A measured quantity of a point in the SI `unit`; expanded uncertainties (k = 2). NaN where there is no value.
 
     `agrees` is None without a comparison; `low` and `high` bound a predicted interval that is stated instead of an
-    uncertainty. `status` describes the point.
+    uncertainty. `status` describes the point, `field` is the name of the quantity in it.
     """
 
     point: str
@@ -36,6 +37,20 @@ class Measured:
     high: float = nan
     agrees: bool | None = None
     status: str = ""
+    field: str = ""
+
+    @property
+    def sentence(self) -> str:
+        """The result as a sentence: value, prediction, verdict and point."""
+        _, name, value, predicted, off, verdict = self.cells
+        words = [f"{name} {value}"]
+        if isfinite(self.predicted):
+            words.append(f"{texts.PREDICTED} {predicted}")
+            if self.agrees is None:
+                words.append(texts.DIFFERENCE.format(off=off))
+        if verdict != ABSENT:
+            words.append(verdict)
+        return " · ".join([*words, self.point])
 
     @property
     def cells(self) -> tuple[str, ...]:
@@ -63,8 +78,12 @@ class Measured:
         return typeset(", ".join(words)) or ABSENT
 
 
-def rows_of(results: Mapping[str, Column], points: Sequence[Mapping[str, Any]]) -> list[Measured]:
-    """Quantities of all points: those with an uncertainty or, if there are none, all numbers."""
+def rows_of(
+    results: Mapping[str, Column], points: Sequence[Mapping[str, Any]], labels: Mapping[str, str] = NO_LABELS
+) -> list[Measured]:
+    """Quantities of all points: those with an uncertainty, or where there is none, every number. `labels` are the
+    printed names of fields.
+    """
     stems = {name: _stem(name, column.unit) for name, column in results.items()}
     if {"measured", "expected", "unit"} <= results.keys():
         return [_line(point) for point in points]
@@ -73,7 +92,7 @@ def rows_of(results: Mapping[str, Column], points: Sequence[Mapping[str, Any]]) 
     if not found:
         numbers = [name for name, column in results.items() if column.unit and not name.endswith("uncertainty")]
         found = [name for name in numbers[1:] if any(isinstance(point[name], float) for point in points)] or numbers
-    return [row for point in points for row in _rows(point, found, stems, named, results)]
+    return [row for point in points for row in _rows(point, found, stems, named, results, labels)]
 
 
 def every_field(
@@ -94,6 +113,7 @@ def _rows(
     stems: Mapping[str, str],
     named: Mapping[str, str],
     results: Mapping[str, Column],
+    labels: Mapping[str, str],
 ) -> Iterator[Measured]:
     def value(stem: str) -> float:
         found = point.get(named.get(stem, ""))
@@ -111,7 +131,7 @@ def _rows(
         if isfinite(own) or stem == "alpha_2":
             yield Measured(
                 where,
-                _quantity(stem, results[name].description),
+                labels.get(name) or _quantity(stem, results[name].description),
                 results[name].unit,
                 own,
                 its,
@@ -121,6 +141,7 @@ def _rows(
                 value(f"{stem}_high") if isfinite(predicted) else nan,
                 None if agrees is None else bool(agrees),
                 status,
+                name,
             )
 
 

@@ -1,46 +1,48 @@
-"""The Run page: live traces, running gain with its prediction, steadiness, picture, gain plot and log."""
+"""The Run page: meters of the limits, verdict, the protocol's plot, picture, traces, points and log."""
 
-from math import isfinite
 from typing import Any
 
 from PySide6.QtCore import Qt, QTimer
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QHBoxLayout,
-    QLabel,
-    QPlainTextEdit,
     QPushButton,
-    QSizePolicy,
     QSplitter,
     QStackedWidget,
+    QTabWidget,
     QVBoxLayout,
     QWidget,
 )
 
 from bench.analysis.uncertainty import COVERAGE
 from bench.app.catalogue import load_protocol
-from bench.app.formatting import ABSENT, clock, difference, measurement, number, plus_minus
+from bench.app.formatting import ABSENT, clock, measurement
 from bench.app.gui import texts
 from bench.app.gui.buffers import BlockAngle
+from bench.app.gui.campaign_matrix import MatrixView
 from bench.app.gui.controller import PERIOD, Controller
 from bench.app.gui.gain_plot import GainPlot
 from bench.app.gui.live_plot import LivePlot
+from bench.app.gui.log_panel import LogPanel
+from bench.app.gui.meters import MetersView
+from bench.app.gui.motion_plot import KINDS, MotionPlot
 from bench.app.gui.palette import Theme
 from bench.app.gui.picture import PhysicalPicture
 from bench.app.gui.status import Arrangement
 from bench.app.gui.steadiness import SteadyView
 from bench.app.gui.traces import TracePlot
+from bench.app.gui.verdict import VerdictLabel, running_verdict, verdict_of
 from bench.app.gui.widgets import (
     FITTING,
+    ElidingLabel,
     give_key,
     in_screen_unit,
     label,
     scrolling,
     set_level,
     typeset,
-    unit_text,
 )
 from bench.app.ipc.messages import Opened, Run, Traces
-from bench.app.run_display import Notice
 from bench.datafile.tables import Table
 from bench.events import (
     Estimate,
@@ -56,11 +58,12 @@ from bench.events import (
 )
 from bench.protocol import Protocol
 
-LOG_LINES = 2000
 GAINS_HEIGHT, LOWEST = 150, 540
-"""Minimum heights of the gain plot, for a readable axis, and of the page, for a complete picture [px]."""
+"""Minimum heights of the plot of the protocol, for a readable axis, and of the page, for a whole picture [px]."""
 OLD = 0.5
-"""Age of the newest sample above which that age is shown during a run [s]."""
+"""Age of the newest sample above which it is shown during a run [s]."""
+SHARES = (20, 50, 30)
+"""Widths of meters, verdict with plot, and picture with traces, in per cent."""
 
 
 class RunPage(QWidget):
@@ -70,24 +73,21 @@ class RunPage(QWidget):
         super().__init__()
         self._controller = controller
         self.traces, self.gains, self.steady = TracePlot(theme), GainPlot(theme), SteadyView()
+        self.motion = tuple(MotionPlot(theme, kind) for kind in KINDS)
         self.live, self.shown_plot = LivePlot(theme), QStackedWidget()
         for plot in (self.gains, self.live):
             self.shown_plot.addWidget(plot)
         self._protocol: Protocol[Any] | None = None
+        self._has_live_value = False
         self.picture, self.block = PhysicalPicture(theme), BlockAngle()
         self.arrangement = Arrangement()
-        self.point, self.alpha = QLabel(), QLabel(texts.NO_GAIN)
-        # a long name is truncated, so that it does not widen the page
-        self.point.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
-        self.alpha.setProperty("role", "value")
-        self.alpha.setAccessibleName(texts.NAMES["alpha"])
-        self.predicted, self.lost = QLabel(wordWrap=True), QLabel(wordWrap=True)
-        self.twin = QLabel()
-        # always one line, so that the content below does not move
-        self.twin.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
-        self.log = QPlainTextEdit(readOnly=True, maximumBlockCount=LOG_LINES)
-        self.log.setMinimumHeight(50)
-        self.log.setAccessibleName(texts.NAMES["log"])
+        self.meters, self.matrix = MetersView(theme), MatrixView(theme)
+        self.panel = LogPanel(controller)
+        self.log = self.panel.text
+        self.point, self.verdict = ElidingLabel(), VerdictLabel()
+        self.verdict.say(texts.NO_GAIN)
+        # always one line, so that they neither widen the page nor move the content below
+        self.lost, self.twin = ElidingLabel(), ElidingLabel()
         self.ramp_out = QPushButton(texts.RAMP_OUT)
         self.ramp_out.setToolTip(texts.RAMP_OUT_TIP)
         give_key(self.ramp_out, "Ctrl+E")
@@ -97,7 +97,6 @@ class RunPage(QWidget):
         controller.opened.connect(self._open)
         controller.traced.connect(self._trace)
         controller.event_received.connect(self._tell)
-        controller.noticed.connect(self._note)
         controller.changed.connect(self._refresh)
         controller.began.connect(self._begin)
         self._timer = QTimer(self, interval=PERIOD, timerType=Qt.TimerType.PreciseTimer)
@@ -107,98 +106,136 @@ class RunPage(QWidget):
 
     def use_theme(self, theme: Theme) -> None:
         """Use the colours of another theme."""
-        for part in (self.traces, self.gains, self.live, self.picture):
+        for part in (self.traces, self.gains, self.live, self.picture, self.meters, self.matrix, *self.motion):
             part.use_theme(theme)
 
     def predict(self, prediction: Table) -> None:
         """Show the predicted lines of the next run."""
         self.gains.predict(prediction)
 
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Choose the size of the verdict."""
+        super().resizeEvent(event)
+        self.verdict.allow(max(self.height(), LOWEST))
+
     def _arrange(self) -> None:
-        right = QSplitter(Qt.Orientation.Vertical)
-        numbers = QWidget()
-        column = QVBoxLayout(numbers)
-        column.setContentsMargins(0, 0, 0, 0)
+        left, middle, right = QWidget(), QWidget(), QSplitter(Qt.Orientation.Vertical)
+        column = QVBoxLayout(left)
+        column.addWidget(self.meters, 1)
+        column.addWidget(self.steady)
+        column = QVBoxLayout(middle)
         row = QHBoxLayout()
-        row.addWidget(self.alpha, 1)
+        row.addWidget(self.point, 1)
         row.addWidget(self.ramp_out)
-        column.addWidget(self.point)
         column.addLayout(row)
-        for part in (self.predicted, self.twin, self.steady, self.lost):
-            column.addWidget(part)
+        column.addWidget(self.verdict)
         self.shown_plot.setMinimumHeight(GAINS_HEIGHT)
-        for part in (self.shown_plot, self.picture, self.log):
-            right.addWidget(part)
-        right.setSizes([280, 260, 90])
-        column.addWidget(right, 1)
+        column.addWidget(self.shown_plot, 1)
+        column.addStretch(0)
+        for part in (self.twin, self.lost):
+            column.addWidget(part)
+        self.tabs = QTabWidget()
+        self.tabs.setObjectName("motion")
+        self.tabs.addTab(self.traces, texts.TRACES_TAB)
+        for plot in self.motion:
+            number = self.tabs.addTab(plot, plot.kind)
+            self.tabs.setTabToolTip(number, texts.MOTION_NAMES[plot.kind])
+        right.addWidget(self.picture)
+        right.addWidget(self.tabs)
+        right.setSizes([200, 320])
+        upper, lower = QSplitter(), QSplitter()
+        upper.addWidget(left)
+        upper.addWidget(middle)
+        upper.setSizes([SHARES[0] * 12, SHARES[1] * 12])
+        lower.addWidget(self.matrix)
+        lower.addWidget(self.panel)
+        lower.setSizes([400, 500])
+        stacked = QSplitter(Qt.Orientation.Vertical)
+        stacked.addWidget(upper)
+        stacked.addWidget(lower)
+        stacked.setSizes([420, 120])
         whole = QSplitter()
-        whole.addWidget(self.traces)
-        whole.addWidget(numbers)
-        whole.setSizes([600, 660])
+        whole.addWidget(stacked)
+        whole.addWidget(right)
+        whole.setSizes([(SHARES[0] + SHARES[1]) * 12, SHARES[2] * 12])
+        for splitter in (upper, lower, stacked, whole, right):
+            splitter.setChildrenCollapsible(False)
+        for part in (left, middle):
+            layout = part.layout()
+            if layout is not None:
+                layout.setContentsMargins(0, 0, 0, 0)
+                layout.setSpacing(4)
         QVBoxLayout(self).addWidget(scrolling(whole, FITTING[0], LOWEST))
 
     def _begin(self, run: Run) -> None:
         self.traces.clear()
-        self.log.clear()
-        self._protocol = load_protocol(run.protocol)
-        has_gain = "alpha_2" in self._protocol.point.model_fields
+        for plot in self.motion:
+            plot.forget()
+        self.panel.clear()
+        protocol = self._protocol = load_protocol(run.protocol)
+        has_gain = "alpha_2" in protocol.point.model_fields
         self.live.forget()
         self.shown_plot.setCurrentWidget(self.gains if has_gain else self.live)
         # without a gain there is nothing to draw before the first result
         self.shown_plot.setVisible(has_gain)
+        self._has_live_value = False
         self._show_point("")
-        self.alpha.setText(texts.NO_GAIN if has_gain else texts.NO_RESULT)
-        self.predicted.setText("")
+        self.verdict.say(texts.NO_GAIN if has_gain else texts.NO_RESULT)
         self.arrangement = Arrangement()
         self.picture.use(run.configuration.known_specimen)
         self.traces.watch_block(None)
         self.steady.begin(run)
         self.block = BlockAngle()
+        self.meters.use(run.configuration)
+        self.matrix.begin(protocol, run)
 
     def _open(self, opened: Opened) -> None:
         self.traces.use_further(opened.further)
+        if self._controller.run is not None and opened.margins:
+            self.meters.use(self._controller.run.configuration, opened.margins)
         if self._controller.attached is not None:
             self.gains.predict(opened.prediction)
 
     def _trace(self, traces: list[Traces]) -> None:
         self.traces.add(traces)
         self.steady.add(traces)
+        self.meters.add(traces)
         for block in traces:
             self.block.place(block)
         # immediately, not at the next tick
         self._draw()
 
     def _draw(self) -> None:
-        if self.isVisible():
-            self.traces.draw()
-            moment = self.block.nearest(self.traces.moment)
-            self.picture.move_to(self.traces.ring.at(moment), self.block.at(moment))
-            self.picture.show_age(self.traces.stale)
+        if not self.isVisible():
+            return
+        shown = self.tabs.currentWidget()
+        self.traces.draw()
+        if isinstance(shown, MotionPlot):
+            shown.draw(self.traces.ring)
+        moment = self.block.nearest(self.traces.moment)
+        self.picture.move_to(self.traces.ring.at(moment), self.block.at(moment))
+        self.picture.show_age(self.traces.stale)
+        self.meters.show_live(live=self.traces.stale is None and self._controller.running)
 
     def _tell(self, event: Event) -> None:
+        self.matrix.follow(event, self._controller.scene.time_left)
         match event:
             case Estimate():
                 self._show_point(texts.MEASURING.format(point=_sine(event.omega, event.beta)))
-                self._show(event.alpha_2, event.uncertainty, event.predicted, texts.CYCLES.format(cycles=event.cycles))
+                self.verdict.say(running_verdict(event))
                 self.gains.show_running(event)
                 self.steady.point(event.omega, event.beta)
+                for plot in self.motion:
+                    plot.omega = event.omega
                 self._couple(event.beta)
             case RunningGain():
                 self._show_point(texts.MEASURING.format(point=_under(event.record, event.beta)))
-                self._show(
-                    event.alpha_2,
-                    None,
-                    event.predicted,
-                    texts.SO_FAR.format(seconds=event.seconds, record=event.record),
-                )
+                self.verdict.say(running_verdict(event))
                 self.gains.show_running(event)
                 self._couple(event.beta)
             case LiveValue():
-                value = measurement(event.value, event.uncertainty, unit_text(event.unit))
-                self.alpha.setText(f"{typeset(event.label)}  {value}")
-                off = difference(event.value, event.predicted)
-                predicted = f"{texts.PREDICTED} {number(event.predicted)}, difference {off}"
-                self.predicted.setText(predicted if isfinite(event.predicted) else "")
+                self._has_live_value = True
+                self.verdict.say(running_verdict(event))
             case PointFinished():
                 self._finish(event)
             case FitFinished() | TableIdentified() if self.shown_plot.currentWidget() is self.live:
@@ -207,8 +244,12 @@ class RunPage(QWidget):
                 self._show_result(event)
             case StepStarted():
                 self.steady.over()
+                for plot in self.motion:
+                    plot.omega = None
             case TwinEstimate():
                 self.block.add(event)
+                for plot in self.motion:
+                    plot.add(event)
             case SpecimenMounted():
                 self.arrangement.follow(event)
                 self.picture.show_arrangement(self.arrangement)
@@ -218,38 +259,35 @@ class RunPage(QWidget):
 
     def _finish(self, event: PointFinished) -> None:
         """Show the result of a point, with the uncertainty that the log and the file state."""
-        point = event.point.model_dump()
+        point, protocol = event.point.model_dump(), self._protocol
+        if protocol is None:
+            return
+        if protocol.log_line is not None:
+            self.verdict.say(typeset(protocol.log_line(event.point)))
+        elif protocol.view.headline or not self._has_live_value:
+            # a protocol that declares no headline has said it with its live value
+            self.verdict.say(verdict_of(protocol.view, event.point))
         if "alpha_2" not in point:
-            if self._protocol is not None and self._protocol.log_line is not None:
-                self.predicted.setText(typeset(self._protocol.log_line(event.point)))
             return
         self.shown_plot.setCurrentWidget(self.gains)
         self.shown_plot.show()
         self.gains.add(point)
-        status, value = str(point.get("status", "")), point["alpha_2"]
-        predicted, omega, beta = point.get("alpha_2_predicted"), point.get("omega_rad_s"), point.get("beta")
+        omega, beta = point.get("omega_rad_s"), point.get("beta")
         where = _under(point["record"], beta) if "record" in point else "" if omega is None else _sine(omega, beta)
-        self._show_point(texts.LAST_POINT.format(status=status, point=where))
-        if value is None:
-            self.alpha.setText(texts.NO_GAIN_OF.format(status=status))
-            self.predicted.setText(typeset(str(point.get("reason") or "")))
-        else:
-            self.alpha.setText(f"{texts.ALPHA}  {plus_minus(value, point.get('alpha_2_uncertainty'))}")
-            off = difference(value, predicted)
-            self.predicted.setText(f"{texts.PREDICTED} {number(predicted)}, difference {off}")
+        self._show_point(texts.LAST_POINT.format(status=point.get("status", ""), point=where))
 
     def _show_result(self, event: FitFinished | TableIdentified) -> None:
-        self.predicted.setText(typeset(event.text))
         if isinstance(event, FitFinished) and event.parameters:
             name, found = next(iter(event.parameters.items()))
             factor, unit = in_screen_unit(found.unit)
             value = measurement(factor * found.value, COVERAGE * factor * found.uncertainty, unit)
-            self._show_point(typeset(event.name))
-            self.alpha.setText(f"{label(name)}  {value}")
+            self.verdict.say(f"{label(name)} {value}")
+            self._show_point(f"{typeset(event.name)}: {typeset(event.text)}")
+        else:
+            self._show_point(typeset(event.text))
 
     def _show_point(self, text: str) -> None:
         self.point.setText(text)
-        self.point.setToolTip(text)
 
     def _couple(self, beta: float | None) -> None:
         coupled = beta is not None
@@ -257,19 +295,10 @@ class RunPage(QWidget):
             self.arrangement.block = self.arrangement.spring = coupled
             self.picture.show_arrangement(self.arrangement)
 
-    def _show(self, value: float, uncertainty: float | None, predicted: float, effort: str) -> None:
-        known = isfinite(value)
-        self.alpha.setText(f"{texts.ALPHA}  {plus_minus(value, uncertainty)}" if known else texts.NO_GAIN)
-        beside = f"{texts.PREDICTED} {number(predicted)}, difference {difference(value, predicted)}, {effort}"
-        self.predicted.setText(beside if known else effort)
-
-    def _note(self, notice: Notice) -> None:
-        mark = "▲ " if notice.grave else ""
-        self.log.appendPlainText(f"{clock(notice.time):>8}  {mark}{notice.kind}: {typeset(notice.text)}")
-
     def _refresh(self) -> None:
         events, traces = self._controller.lost
-        said = [texts.LOST.format(events=events, traces=traces)] if events or traces else []
+        lost = [text.format(n=n) for n, text in zip((events, traces), texts.LOST_PARTS, strict=True) if n]
+        said = [texts.LOST.format(what=texts.AND.join(lost))] if lost else []
         if self._controller.armed and self.traces.age > OLD:
             said.append(texts.DATA_AGE.format(age=self.traces.age))
         elif self.traces.stale is not None:

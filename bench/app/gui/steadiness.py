@@ -8,13 +8,13 @@ from math import isfinite, tau
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QWidget
+from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 
 from bench.analysis.cycles import fit_cycle
 from bench.analysis.signals import MEASURED_BY
 from bench.analysis.steady import SPREAD, WINDOW, Steadiness, SteadyDetector
 from bench.app.gui import texts
-from bench.app.gui.widgets import set_level
+from bench.app.gui.widgets import ElidingLabel, set_level
 from bench.app.ipc.messages import TRACES, Run, Traces
 
 NEEDED = 2 * WINDOW
@@ -106,12 +106,12 @@ class SteadyView(QWidget):
         self._of: tuple[float, float | None] | None = None
         self._judged: SensorSteadiness | None = None
         self._shown = -1
-        self.labels = {name: QLabel() for name in SENSORS}
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
-        for label in self.labels.values():
-            label.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
-            row.addWidget(label, 1)
+        self.labels = {name: ElidingLabel() for name in SENSORS}
+        grid = QGridLayout(self)
+        grid.setContentsMargins(4, 0, 0, 0)
+        grid.setSpacing(0)
+        for place, label in enumerate(self.labels.values()):
+            grid.addWidget(label, place, 0)
         self.hide()
 
     def begin(self, run: Run) -> None:
@@ -166,7 +166,7 @@ def _show(label: QLabel, called: str, found: Steadiness, judged: SensorSteadines
         kind, said = "settling", f"{texts.SETTLING}, {_change(found)}"
     else:
         kind, said = "gathering", texts.GATHERING.format(done=min(judged.cycles, NEEDED), needed=NEEDED)
-    label.setText(f"{MARKS[kind]} {called}\n{said}")
+    label.setText(f"{MARKS[kind]} {called}: {said}")
     set_level(label, {"steady": "good", "gathering": "calm"}.get(kind, "wait"))
 
 

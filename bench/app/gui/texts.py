@@ -24,6 +24,7 @@ ATTACHED_RUN = "{owner}'s run: {run}."
 ATTACHED_READ_ONLY = "STOP works here; questions and Ramp out are handled by {owner}."
 ATTACHED_CONTROLS = "Its window is lost; its questions can be answered in this window."
 OWNERS = {"window": "another window", "terminal": "a terminal"}
+UNNAMED = "operator at the window"
 OWN_RUN = "This window's run: {run}."
 ATTACH, ATTACH_TIP = "Attach", "Shows the run that is under way on this machine, with its STOP (Ctrl+Shift+A)."
 DETACH, DETACH_TIP = "Detach", "Leaves the run, which is not affected (Ctrl+Shift+A)."
@@ -115,7 +116,7 @@ TRACES = (
 )
 """Label, displayed unit, and displayed units per SI unit for each trace."""
 SECONDS = "seconds before now"
-ALPHA, PREDICTED = "gain α₂", "predicted"
+ALPHA, PREDICTED, DIFFERENCE = "α₂", "predicted", "difference {off}"
 TWIN = "live model"
 MODULATED = "hollow: modulated motion"
 OTHER_AXIS = "{name}: not drawn, needs another axis"
@@ -136,7 +137,8 @@ STEADY_TIP = (
     "For each sensor, the mean cycles of two windows of {window} cycles are compared; steady means that they agree "
     "within a third of {tolerance:g} % (settle_tolerance). Computed from the traces; the run evaluates the samples."
 )
-LOST = "{events} events and {traces} blocks of traces were not shown; the file contains all of them."
+LOST_PARTS, AND = ("{n} events", "{n} blocks of traces"), " and "
+LOST = "{what} were not shown; the file contains all of them."
 TRACES_OLD = "Traces and picture are not live: the newest sample is {age} old."
 DATA_AGE = "newest sample {age:.1f} s old"
 FRAME = "Bare frame: measured"
@@ -312,7 +314,53 @@ OPTIONS = {
     "unattended": "unattended",
     "keep_going": "continues without the window",
 }
+POINT_WAITS, POINT_MEASURED, POINT_DONE = "waiting", "measuring", "done"
+POINT_MARKS = {
+    POINT_WAITS: ("○", "calm"),
+    POINT_MEASURED: ("▶", "wait"),
+    POINT_DONE: ("●", "good"),
+    "modulated": ("◆", "wait"),
+    "held": ("■", "wait"),
+    "overturned": ("✕", "alarm"),
+    "not played": ("–", "calm"),
+}
+"""Mark of a point and level of its style, by its status; that of a finished point for any other."""
+EXPECTED = "≈ {time:%H:%M}"
+METERS = {
+    "displacement": "table displacement",
+    "velocity": "table velocity",
+    "acceleration": "table acceleration",
+    "force": "force on the table",
+    "current": "coil current",
+    "heating": "coil heating",
+    "laser_1": "laser 1, of its range",
+    "laser_2": "laser 2, of its range",
+    "drift": "drift",
+}
+MOTION_AXES = {
+    "spectrum": ("frequency [Hz]", "drift [mm]"),
+    "phase": ("drift [mm]", "drift velocity [mm/s]"),
+    "Poincaré": ("drift [mm]", "drift velocity [mm/s]"),
+}
+"""Labels of the horizontal and the vertical axis."""
+MOTION_NAMES = {
+    "spectrum": "amplitude spectrum of the drift",
+    "phase": "phase plane of the drift; grey: live model",
+    "Poincaré": "Poincaré section of the drift, once per period of the sine",
+}
+TRACES_TAB = "traces"
+LOG_FILTER, LOG_FILTER_TIP = "filter the log", "Shows only the lines with this text (Ctrl+Shift+L)."
+NOTE_FIELD, NOTE_ADD = "note for log and file, Enter", "Note"
+NOTE_ADD_TIP = "Adds the text to the log and to the data file, with the bench time (Ctrl+Shift+N)."
+NO_VALUE = "–"
+TIME_TO_LIMIT = "limit in {seconds:.0f} s"
+METER_TIP = (
+    "{name}: {text} (largest magnitude in the last block, and limit). Line: peak of the run, {peak}. Triangle: "
+    "planned, 95 % of the specimens stay below {planned}."
+)
 NAMES = {
+    "meters": "meters of the limits",
+    "matrix": "points of the campaign",
     "state": "state of the bench",
     "alpha": "running result",
     "live": "last result",

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from PySide6.QtCore import QEvent, QObject, Qt
-from PySide6.QtGui import QKeySequence, QResizeEvent, QShortcut
-from PySide6.QtWidgets import QAbstractButton, QFileDialog, QFrame, QLabel, QScrollArea, QWidget
+from PySide6.QtGui import QKeySequence, QPainter, QPaintEvent, QResizeEvent, QShortcut
+from PySide6.QtWidgets import QAbstractButton, QFileDialog, QFrame, QLabel, QScrollArea, QSizePolicy, QWidget
 
 from bench.app.gui import texts
 from bench.app.gui.controller import Controller
@@ -24,6 +24,31 @@ def set_level(label: QLabel, level: str) -> None:
         label.setProperty("level", level)
         label.style().unpolish(label)
         label.style().polish(label)
+
+
+class ElidingLabel(QLabel):
+    """A line that ends with an ellipsis where its space ends, and has its tooltip then. It never widens a page."""
+
+    def __init__(self, text: str = "") -> None:
+        super().__init__(text)
+        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+
+    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002 - the signature is Qt's
+        """Draw the part that fits."""
+        painter = QPainter(self)
+        area = self.contentsRect()
+        shown = self.fontMetrics().elidedText(self.text(), Qt.TextElideMode.ElideRight, area.width())
+        if not self.toolTip() and shown != self.text():
+            self.setToolTip(self.text())
+        painter.setPen(self.palette().color(self.foregroundRole()))
+        painter.drawText(area, int(self.alignment()), shown)
+        painter.end()
+
+    def setText(self, text: str) -> None:
+        """Show another text."""
+        if text != self.text():
+            super().setText(text)
+            self.setToolTip("")
 
 
 def typeset(text: str) -> str:

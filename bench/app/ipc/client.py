@@ -13,7 +13,7 @@ from multiprocessing import AuthenticationError
 from multiprocessing.connection import Client, Connection, Listener
 from pathlib import Path
 from queue import SimpleQueue
-from typing import Literal
+from typing import Literal, cast
 
 from bench.app.ipc.messages import (
     SILENCE,
@@ -24,11 +24,13 @@ from bench.app.ipc.messages import (
     FromClient,
     FromSession,
     Leave,
+    Note,
     PlanCheck,
     PlanChecked,
     Refused,
     Run,
     Traces,
+    receive,
 )
 from bench.app.ipc.sessions import RunningSession
 from bench.results import SUMMARY
@@ -72,6 +74,10 @@ class ClientConnection:
         """Answer question `number`."""
         self._outgoing.put(Answer(number, agreed))
 
+    def note(self, text: str, by: str) -> None:
+        """Add a note of the operator `by` name to log and file."""
+        self._outgoing.put(Note(text, by))
+
     def take(self) -> list[FromSession]:
         """Messages since the last call, in order."""
         return [self._received.popleft() for _ in range(len(self._received))]
@@ -107,10 +113,11 @@ class ClientConnection:
         sender.start()
         try:
             while True:
-                message = connection.recv()
+                message = receive(connection)
                 self._heard, self._begun = now(), True
-                self._keep(message)
-                self._tell()
+                if message is not None:
+                    self._keep(cast(FromSession, message))
+                    self._tell()
         finally:
             self._outgoing.put(None)
             sender.join(SILENCE)

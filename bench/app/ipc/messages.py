@@ -1,7 +1,9 @@
 """Messages between a session and its clients, pickled over connections that only this user's processes can open."""
 
+import pickle
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from multiprocessing.connection import Connection
 from pathlib import Path
 
 import numpy as np
@@ -63,6 +65,14 @@ class Answer:
 
     number: int
     agreed: bool
+
+
+@dataclass(frozen=True)
+class Note:
+    """A note of the operator for log and file, by the person of this name."""
+
+    text: str
+    by: str
 
 
 @dataclass(frozen=True)
@@ -168,7 +178,7 @@ class Traces:
 
     The first bin begins at bench time `begin` [s]; the signals are `bench.app.ipc.messages.TRACES`. `read` is the
     second of the machine's clock (`drivers.clock.now`) at which the block had been read, `origin` the bench time of the
-    run's first sample [s].
+    run's first sample [s]. `magnitudes` are those of `bench.events.Acquired`.
     """
 
     run: int
@@ -178,6 +188,7 @@ class Traces:
     high: NDArray[np.float32]
     read: float
     origin: float = 0.0
+    magnitudes: Mapping[str, float] = field(default_factory=dict[str, float])
 
 
 @dataclass(frozen=True)
@@ -237,7 +248,18 @@ FromSession = (
     | Ended
     | Refused
 )
-FromClient = Ask | Answer | Alive | Leave
+FromClient = Ask | Answer | Note | Alive | Leave
+
+
+def receive(connection: Connection) -> object | None:
+    """The next message; None for one that only another version of the program knows, which can be stopped nevertheless.
+    Raises EOFError or OSError at the end of the connection.
+    """
+    data = connection.recv_bytes()
+    try:
+        return pickle.loads(data)
+    except Exception:
+        return None
 
 
 TRACES = ("drive", "acceleration", "displacement", "u1", "u2", "drift")
@@ -284,4 +306,5 @@ class Reduction:
         )
         low, high = extremes(chosen, self._width)
         begin = self._origin + event.block.first / self._rate
-        return Traces(event.run, begin, self._width / self._rate, low, high, now(), self._origin)
+        step = self._width / self._rate
+        return Traces(event.run, begin, step, low, high, now(), self._origin, event.magnitudes())

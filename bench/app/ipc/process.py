@@ -94,7 +94,7 @@ def _run(asked: Run, host: SessionServer, requests: Requests) -> FromSession:
         out=asked.out,
         operator=RemoteOperator(host, requests) if asked.person else Unattended(_policy(configuration)),
         subscribers=[teller],
-        opened=lambda rig: teller.opened(rig, prepared),
+        opened=lambda rig, publish: teller.opened(rig, publish, prepared),
         progress=teller.prepare,
         requests=requests,
         realtime=asked.realtime,

@@ -24,6 +24,7 @@ from bench.app.ipc.messages import (
     Ended,
     FromSession,
     Leave,
+    Note,
     Opened,
     PlanChecked,
     Preparing,
@@ -32,10 +33,11 @@ from bench.app.ipc.messages import (
     Reduction,
     Refused,
     SafetyInputs,
+    receive,
 )
 from bench.app.session import SessionResult
 from bench.engine.interface import Requests
-from bench.events import Acquired, Event, State, StateChanged, ValuesReceived, Warned
+from bench.events import Acquired, Event, OperatorNote, State, StateChanged, ValuesReceived, Warned
 from bench.preflight.margins import bounds, margins
 from bench.protocol import Prepared
 from drivers.clock import now
@@ -105,6 +107,9 @@ class SessionServer:
         self.outbox = Broadcast()
         self.inputs = SafetyWatch(self.outbox)
         self.answers = SimpleQueue[Answer]()
+        self._notes = SimpleQueue[Note]()
+        self.publish: Callable[[Event], None] | None = None
+        """Publishes an event of the run, in the engine's thread; None before its file exists."""
         self.connected = True
         """Whether the owner is present."""
         self._attached: list[SendQueue] = []
@@ -131,6 +136,12 @@ class SessionServer:
         self._time = max(self._time, event.time)
         if isinstance(event, StateChanged):
             self._state, self._reason = event.after, event.reason
+
+    def publish_notes(self) -> None:
+        """Publish the notes of the operator; to be called in the engine's thread."""
+        while self.publish is not None and not self._notes.empty():
+            note = self._notes.get()
+            self.publish(OperatorNote(note.text, note.by))
 
     def close(self, last: FromSession, timeout: float) -> None:
         """Send the queues and then `last`; gives up after `timeout` seconds."""
@@ -167,7 +178,7 @@ class SessionServer:
         try:
             while True:
                 if owner.poll(PATIENCE):
-                    message = owner.recv()
+                    message = receive(owner)
                     self._find(present=True)
                     self._heed(message)
                 else:
@@ -177,9 +188,9 @@ class SessionServer:
 
     def _hear_attached(self, connection: Connection, queue: SendQueue) -> None:
         with suppress(EOFError, OSError):
-            while not isinstance(message := connection.recv(), Leave):
+            while not isinstance(message := receive(connection), Leave):
                 # the run is the owner's while the owner is present; STOP is everybody's
-                if not self.connected or message in (Ask("abort"), Ask("halt")):
+                if not self.connected or isinstance(message, Note) or message in (Ask("abort"), Ask("halt")):
                     self._heed(message)
         self._attached.remove(queue)
         self.outbox.leave(queue)
@@ -206,6 +217,8 @@ class SessionServer:
                     interrupt_main(signal.SIGTERM)
             case Answer():
                 self.answers.put(message)
+            case Note():
+                self._notes.put(message)
             case Leave():
                 self._lose("the client was closed")
             case _:
@@ -233,6 +246,7 @@ class RemoteOperator:
                         return answer.agreed
                 # the engine's thread waits while a person works at the bench
                 self._host.inputs.look()
+                self._host.publish_notes()
             return False
         finally:
             self._host.outbox.answered()
@@ -252,8 +266,11 @@ class Publisher:
             self._phase, self._prepared = phase, now()
             self._host.outbox.put(Preparing(phase, done, total))
 
-    def opened(self, rig: Rig, prepared: Prepared[Any] | None = None) -> None:
-        """Start to send traces of the run that was `prepared`; None if its plan is not known."""
+    def opened(self, rig: Rig, publish: Callable[[Event], None], prepared: Prepared[Any] | None = None) -> None:
+        """Start to send traces of the run that was `prepared`; None if its plan is not known. `publish` publishes an
+        event of the run.
+        """
+        self._host.publish = publish
         self._reduction = Reduction(rig.sample_rate)
         names = tuple(channel.name for channel in rig.channels)
         opened = Opened(names, rig.sample_rate, rig.description, further_of(rig.channels))
@@ -266,6 +283,7 @@ class Publisher:
 
     def __call__(self, event: Event) -> None:
         self._host.note(event)
+        self._host.publish_notes()
         if isinstance(event, Acquired):
             if self._reduction is not None and self._host.outbox.heard:
                 self._trace(self._reduction, event)

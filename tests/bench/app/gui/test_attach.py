@@ -1,11 +1,13 @@
 """A window beside a run of another window or of a terminal: it shows whose it is, and can stop it."""
 
 import os
+import pickle
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Generator
+from multiprocessing import Pipe
 from pathlib import Path
 
 import pytest
@@ -16,9 +18,13 @@ from pytestqt.qtbot import QtBot
 from bench.app.gui.controller import Controller
 from bench.app.gui.palette import LIGHT, dress
 from bench.app.gui.window import Window
+from bench.app.ipc.messages import Ask, Attached, receive
+from bench.app.ipc.server import SessionServer
 from bench.app.ipc.sessions import running_sessions
 from bench.datafile.reader import open_datafile
-from tests.bench.app.ipc.experiment import SHAKING, bench
+from bench.engine.interface import Requests
+from bench.events import StepStarted
+from tests.bench.app.ipc.experiment import SHAKING, bench, order
 
 ROOT = Path(__file__).parents[4]
 LONG = 60_000
@@ -107,3 +113,23 @@ def test_a_folder_that_others_can_enter_is_not_used(tmp_path: Path, monkeypatch:
     (tmp_path / "open" / "1-abcd.json").write_text("{}")
     assert running_sessions() == []
     assert (tmp_path / "open" / "1-abcd.json").exists()
+
+
+def test_a_session_of_another_version_can_be_stopped(tmp_path: Path) -> None:
+    """Its unknown messages are left out, in both directions."""
+    here, there = Pipe()
+    requests = Requests()
+    server = SessionServer(None, requests, lambda _why: None)
+    server.attach(there, Attached(order(tmp_path), "", "terminal", 0.0))
+    unknown = pickle.dumps(StepStarted("x")).replace(b"StepStarted", b"StepUnknown")
+    here.send_bytes(unknown)
+    here.send(Ask("abort"))
+    while requests.strongest is None:
+        time.sleep(0.01)
+    assert requests.strongest == "abort"
+    assert isinstance(receive(here), Attached)
+    there.send_bytes(unknown)
+    received = list[object]()
+    while None not in received:
+        received.append(receive(here))
+    here.close()

@@ -55,17 +55,15 @@ def test_its_form_its_run_and_its_live_number(window: Window, qtbot: QtBot, tmp_
     qtbot.mouseClick(page.start, Qt.MouseButton.LeftButton)
 
     def measured() -> bool:
-        return run.alpha.isVisible() and run.alpha.text().startswith("gain of the table")
+        return run.verdict.isVisible() and run.verdict.sentence.startswith("gain of the table")
 
     qtbot.waitUntil(measured, timeout=LONG)
     assert window.pages.currentWidget() is run
     assert window.header.word.text() == "RUNNING"
-    assert run.predicted.isVisible()
-    shown, predicted = run.alpha.text(), run.predicted.text()
+    shown, predicted, _difference = run.verdict.sentence.split(" · ")
     qtbot.waitUntil(lambda: window.pages.currentWidget() is window.results, timeout=LONG)
     summary = json.loads((tmp_path / "run" / "summary.json").read_text(encoding="utf-8"))
     (point,) = summary["points"]
     gain = measurement(point["gain_m_s2_v"], point["gain_uncertainty"], "m/s²/V")
     assert shown == f"gain of the table  {gain}"
     assert predicted.startswith("predicted ")
-    assert "difference " in predicted

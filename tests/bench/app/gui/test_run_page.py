@@ -37,7 +37,7 @@ from drivers.clock import now
 from drivers.rig import OperatorTask
 from protocols.earthquake.protocol import EarthquakePoint
 from protocols.earthquake.protocol import PointStatus as PointOutcome
-from protocols.harmonic.protocol import HarmonicPoint, PointStatus
+from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, PointStatus
 from sim.specimen import Specimen
 from tests.bench.app.gui.conftest import ScriptedClient
 from tests.bench.app.ipc.experiment import order
@@ -270,8 +270,8 @@ def test_the_running_gain_and_the_finished_point(window: Window, link: ScriptedC
     )
     link.said = [Published(Estimate(16.0, 0.4, 12, 0.01, 0.24, 0.0041, 0.2, time=1.0))]
     window._controller._look()
-    assert "0.2400 ± 0.0041" in window.run.alpha.text()
-    assert "+20.0 %" in window.run.predicted.text()
+    assert "0.2400 ± 0.0041" in window.run.verdict.sentence
+    assert "+20.0 %" in window.run.verdict.sentence
     link.said = [Published(PointFinished(point, time=2.0)), Published(Warned("drift comes near", time=3.0))]
     window._controller._look()
     assert window.run.gains.measured == [(16.0, 0.21)]
@@ -293,16 +293,16 @@ def test_the_large_gain_names_its_point_and_its_uncertainty_is_that_of_the_file(
     link.said = [Published(PointFinished(point, time=2.0))]
     window._controller._look()
     assert "last point, steady: ω = 16 rad/s, β = 0.4" in run.point.text()
-    assert run.alpha.text().endswith("0.239 ± 0.011")
+    assert run.verdict.sentence.startswith("α₂ 0.239 ± 0.011 · ")
     nan = float("nan")
     link.said = [Published(Estimate(17.0, None, 1, 0.01, nan, nan, nan, time=3.0))]
     window._controller._look()
     assert "ω = 17 rad/s, bare frame" in run.point.text()
-    assert "0.239" not in run.alpha.text()
+    assert "0.239" not in run.verdict.sentence
     fallen = point.model_copy(update={"alpha_2": None, "status": PointStatus.OVERTURNED})
     link.said = [Published(PointFinished(fallen, time=4.0))]
     window._controller._look()
-    assert "overturned" in run.alpha.text()
+    assert "overturned" in run.verdict.sentence
 
 
 def test_a_protocol_without_a_gain_shows_its_fits_instead_of_an_empty_gain_plot(
@@ -313,7 +313,7 @@ def test_a_protocol_without_a_gain_shows_its_fits_instead_of_an_empty_gain_plot(
     window._controller._look()
     window._controller.start(replace(order(Path("never")), protocol="free-vibration"))
     assert run.shown_plot.isHidden()
-    assert "gain" not in run.alpha.text()
+    assert "gain" not in run.verdict.sentence
     time = np.linspace(0.0, 1.0, 100)
     columns = {
         "time": Series(time, "s", ""),
@@ -330,10 +330,10 @@ def test_a_protocol_without_a_gain_shows_its_fits_instead_of_an_empty_gain_plot(
     assert run.live.drawn == ["laser_1", "laser_1_fitted"]
     curve = run.live.getPlotItem().listDataItems()[0]
     assert curve.getData()[1].max() == pytest.approx(1.0), "in mm"
-    assert "(1234.5 ± 3.0) N/m" in run.alpha.text()
-    assert "±" in run.predicted.text()
+    assert "(1234.5 ± 3.0) N/m" in run.verdict.sentence
+    assert "±" in run.point.text()
     window._controller._over(Ended("completed", "", {}, "", Path("never")), Notice(0.0, "end", ""))
-    window._controller.start(replace(order(Path("never")), protocol="harmonic"))
+    window._controller.start(replace(order(Path("never")), protocol="harmonic", parameters=HarmonicParameters()))
     assert run.shown_plot.currentWidget() is run.gains
     assert run.live.drawn == []
 
@@ -349,7 +349,7 @@ def test_combinations_that_were_left_out_are_in_the_log_with_the_reason(window: 
     assert "β = 0.97 is left out" in log
     assert "Kobe, β 0.97: not played" in log
     assert log.count("limits.drift") == 2
-    assert "no gain: not played" in window.run.alpha.text()
+    assert "no gain: not played" in window.run.verdict.sentence
     assert "Kobe, β = 0.97" in window.run.point.text()
 
 
@@ -449,8 +449,7 @@ def test_no_dialog_can_be_opened_while_armed(window: Window, link: ScriptedClien
 def test_a_live_value_is_shown_with_its_unit_and_prediction(window: Window, link: ScriptedClient) -> None:
     link.said = [Published(LiveValue("period", 0.6412, "s", 0.0031, 0.6389, time=3.0))]
     window._controller._look()
-    assert window.run.alpha.text() == "period  (0.6412 ± 0.0031) s"
-    assert window.run.predicted.text() == "predicted 0.6389, difference +0.4 %"
+    assert window.run.verdict.sentence == "period  (0.6412 ± 0.0031) s · predicted 0.6389 · +0.4 %"
     link.said = [Published(LiveValue("cycles", 12.0, "1", time=4.0))]
     window._controller._look()
-    assert (window.run.alpha.text(), window.run.predicted.text()) == ("cycles  12.00", "")
+    assert window.run.verdict.sentence == "cycles  12.00"

@@ -103,13 +103,13 @@ def test_mark_word_and_number_say_the_same(qtbot: QtBot) -> None:
     view.point(OMEGA, 0.4)
     assert run.configuration.laser_reference == "ground"
     view.add(_blocks(4.5 * PERIOD, beside_table=True))
-    assert view.labels["laser_1"].text() == f"{MARKS['gathering']} laser 1\n4 of {NEEDED} cycles"
+    assert view.labels["laser_1"].text() == f"{MARKS['gathering']} laser 1: 4 of {NEEDED} cycles"
     view.point(OMEGA, 0.4)
     view.add(_blocks((NEEDED + 3) * PERIOD, run=2, beside_table=True))
     said = {name: label.text() for name, label in view.labels.items()}
-    assert said["table_displacement"] == f"{MARKS['steady']} table displ.\nsteady, < 0.01 %"
-    assert said["laser_1"].startswith(f"{MARKS['settling']} laser 1\nsettling, ")
-    assert said["laser_2"] == f"{MARKS['repeats']} laser 2\nrepeats every 2 cycles"
+    assert said["table_displacement"] == f"{MARKS['steady']} table displ.: steady, < 0.01 %"
+    assert said["laser_1"].startswith(f"{MARKS['settling']} laser 1: settling, ")
+    assert said["laser_2"] == f"{MARKS['repeats']} laser 2: repeats every 2 cycles"
     assert view.labels["table_displacement"].property("level") == "good"
     view.begin(order(Path("never")))
     view.point(OMEGA, 0.4)

@@ -53,7 +53,7 @@ def rig() -> Wired:
 @pytest.fixture
 def teller(host: SessionServer, rig: Wired) -> Publisher:
     told = Publisher(host)
-    told.opened(cast(Rig, rig))
+    told.opened(cast(Rig, rig), told)
     return told
 
 

@@ -1,0 +1,113 @@
+# pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false
+# pyright: reportMissingTypeStubs=false
+"""Spectrum, phase plane and Poincaré section of the last seconds of the drift, computed from the displayed traces."""
+
+from math import pi
+from typing import Any, Literal
+
+import numpy as np
+import pyqtgraph as pg
+from numpy.typing import NDArray
+
+from bench.app.gui import texts
+from bench.app.gui.buffers import Ring
+from bench.app.gui.palette import Theme
+from bench.app.gui.widgets import colour_axes
+from bench.app.ipc.messages import TRACES
+from bench.events import TWIN_TRACE, TwinEstimate
+
+Kind = Literal["spectrum", "phase", "Poincaré"]
+KINDS: tuple[Kind, ...] = ("spectrum", "phase", "Poincaré")
+SECONDS: dict[Kind, float] = {"spectrum": 20.0, "phase": 3.0, "Poincaré": 60.0}
+"""Displayed length of the motion [s]."""
+HIGHEST = 10.0
+"""Highest displayed frequency [Hz]."""
+MODELLED = 3.0
+"""Displayed length of the live model's motion [s]."""
+SMOOTH = np.full(5, 0.2)
+"""Weights of the bins for the velocity: the noise of the lasers is larger than the motion within a bin."""
+_DRIFT = TRACES.index("drift")
+_T, _U1, _U2 = (TWIN_TRACE.index(name) for name in ("seconds", "u1", "u2"))
+
+
+def spectrum(time: NDArray[np.float64], drift: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Frequencies [Hz] and amplitudes of the drift, in its unit, of equally spaced samples, both shape (n,); a sine has
+    its amplitude at its line (Hann window).
+    """
+    window = np.hanning(drift.size)
+    lines: NDArray[np.float64] = np.abs(np.fft.rfft((drift - drift.mean()) * window)) * 2.0 / window.sum()
+    return np.asarray(np.fft.rfftfreq(drift.size, float(time[1] - time[0])), dtype=np.float64), lines
+
+
+def stroboscopic(time: NDArray[np.float64], values: NDArray[np.float64], omega: float) -> NDArray[np.float64]:
+    """Values, shape (n, m), once per period of `omega` [rad/s], at multiples of the period, shape (k, m)."""
+    period = 2.0 * pi / omega
+    at = period * np.arange(np.ceil(time[0] / period), np.floor(time[-1] / period) + 1.0)
+    return np.column_stack([np.interp(at, time, column) for column in values.T])
+
+
+class MotionPlot(pg.PlotWidget):
+    """Plot of one kind; the live model's motion is drawn behind that of the specimen in the phase plane."""
+
+    def __init__(self, theme: Theme, kind: Kind) -> None:
+        super().__init__()
+        self.kind: Kind = kind
+        self.omega: float | None = None
+        """Circular frequency of the base motion [rad/s]; None outside a steady sine."""
+        self._model = np.zeros((0, 3))
+        self._item: Any = self.getPlotItem()
+        self._item.setMenuEnabled(False)
+        self._item.hideButtons()
+        self._item.showGrid(x=True, y=True, alpha=0.25)
+        self.setAccessibleName(texts.MOTION_NAMES[kind])
+        self._behind, self._line = pg.PlotCurveItem(), pg.PlotCurveItem()
+        self._points = pg.ScatterPlotItem(size=6, pen=None)
+        for item in (self._behind, self._line, self._points):
+            self.addItem(item)
+        if kind == "spectrum":
+            self._item.setXRange(0.0, HIGHEST, padding=0.0)
+        self.use_theme(theme)
+
+    def use_theme(self, theme: Theme) -> None:
+        """Use the colours of another theme."""
+        self.setBackground(theme.raised)
+        colour_axes(self._item, theme)
+        below, left = texts.MOTION_AXES[self.kind]
+        self._item.setLabel("bottom", below, color=theme.text)
+        self._item.setLabel("left", left, color=theme.text)
+        self._line.setPen(pg.mkPen(theme.lines[1], width=1))
+        self._behind.setPen(pg.mkPen(theme.faint, width=3))
+        self._points.setBrush(pg.mkBrush(theme.lines[2]))
+
+    def forget(self) -> None:
+        """Clear for a new run."""
+        self.omega, self._model = None, np.zeros((0, 3))
+        for item in (self._behind, self._line, self._points):
+            item.setData([], [])
+
+    def add(self, estimate: TwinEstimate) -> None:
+        """Append a part of the live model's motion."""
+        if self.kind == "phase" and len(estimate.trace):
+            joined = np.concatenate((self._model, estimate.trace[:, (_T, _U1, _U2)]))
+            self._model = joined[joined[:, 0] > joined[-1, 0] - MODELLED]
+
+    def draw(self, ring: Ring) -> None:
+        """Draw the motion in the buffer."""
+        time, low, high = ring.newest_bins(SECONDS[self.kind])
+        drift = 1e3 * 0.5 * (low[:, _DRIFT].astype(np.float64) + high[:, _DRIFT])
+        known = np.isfinite(drift)
+        time, drift = time[known], drift[known]
+        if time.size < 64:
+            return
+        if self.kind == "spectrum":
+            self._line.setData(*spectrum(time, drift))
+            return
+        speed = np.gradient(np.convolve(drift, SMOOTH, "same"), time)
+        if self.kind == "phase":
+            self._line.setData(drift[3:-3], speed[3:-3])
+            if len(self._model) > 2:
+                model = 1e3 * (self._model[:, 2] - self._model[:, 1])
+                self._behind.setData(model, np.gradient(model, self._model[:, 0]))
+        elif self.omega is not None:
+            section = stroboscopic(time[3:-3], np.column_stack((drift, speed))[3:-3], self.omega)
+            self._points.setData(section[:, 0], section[:, 1])

@@ -1,0 +1,140 @@
+"""The verdict of a run in one sentence, as large as its space allows."""
+
+from collections.abc import Mapping, Sequence
+from math import isfinite, nan
+
+import numpy as np
+from PySide6.QtCore import QRect, QSize, Qt
+from PySide6.QtGui import QFont, QFontMetrics, QPainter, QPaintEvent, QResizeEvent
+from PySide6.QtWidgets import QLabel, QSizePolicy
+
+from bench.app.formatting import difference, measurement, number, plus_minus
+from bench.app.gui import texts
+from bench.app.gui.point_table import rows_of
+from bench.app.gui.widgets import typeset, unit_text
+from bench.datafile.tables import Column
+from bench.events import Estimate, LiveValue, RunningGain
+from bench.protocol import RunView
+from sim.parameters import Parameters, unit_of
+
+LARGEST, SMALLEST = 48, 14
+"""Range of the font size [px]."""
+STRETCH = 80
+"""Width of the letters relative to the usual one [%]."""
+UNBROKEN = 24
+"""Length of a part of the sentence up to which it is not broken."""
+SPACE = 0.31
+"""Largest share of the page's height."""
+
+
+def verdict_of(view: RunView, finished: Parameters) -> str:
+    """The result of a finished point: value, prediction, verdict and point, or why it has no value."""
+    point = finished.model_dump()
+    rows = rows_of(_columns(type(finished)), [point], view.labels)
+    found = next((row for row in rows if row.field == view.headline), rows[0] if rows else None)
+    if found is not None and isfinite(found.value):
+        return found.sentence.replace(" = ", " ")
+    status, reason = str(point.get("status") or texts.NO_VALUE), str(point.get("reason") or "")
+    return " · ".join(part for part in (texts.NO_GAIN_OF.format(status=status), typeset(reason)) if part)
+
+
+def running_verdict(event: Estimate | RunningGain | LiveValue) -> str:
+    """A running value, with its prediction, difference and effort."""
+    if isinstance(event, LiveValue):
+        label = typeset(event.label)
+        value, effort = f"{label}  {measurement(event.value, event.uncertainty, unit_text(event.unit))}", ""
+        own, predicted = event.value, event.predicted
+    else:
+        own, predicted = event.alpha_2, event.predicted
+        uncertainty = event.uncertainty if isinstance(event, Estimate) else nan
+        value = f"{texts.ALPHA} {plus_minus(own, uncertainty)}" if isfinite(own) else texts.NO_GAIN
+        effort = (
+            texts.CYCLES.format(cycles=event.cycles)
+            if isinstance(event, Estimate)
+            else texts.SO_FAR.format(seconds=event.seconds, record=event.record)
+        )
+    words = [value]
+    if isfinite(own) and isfinite(predicted):
+        words += [f"{texts.PREDICTED} {number(predicted)}", difference(own, predicted)]
+    return " · ".join([*words, effort] if effort else words)
+
+
+def _columns(point: type[Parameters]) -> Mapping[str, Column]:
+    return {
+        name: Column(np.zeros(0), unit_of(declared), declared.description or "")
+        for name, declared in point.model_fields.items()
+    }
+
+
+FLAGS = int(Qt.TextFlag.TextWordWrap | Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft)
+
+
+class VerdictLabel(QLabel):
+    """Wrapped text in the largest size with which it fits; its tooltip has all of it."""
+
+    def __init__(self) -> None:
+        super().__init__(wordWrap=True)
+        self.setAccessibleName(texts.NAMES["alpha"])
+        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+        self.setAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+        self._space = 3 * LARGEST
+        self.sentence = ""
+        self._size = LARGEST
+
+    def say(self, sentence: str) -> None:
+        """Show a sentence."""
+        if sentence != self.sentence:
+            self.sentence = sentence
+            self.setText(" · ".join(_unbroken(part) for part in sentence.split(" · ")))
+            self.setToolTip(sentence)
+            self._fit()
+
+    def allow(self, page: int) -> None:
+        """Use at most a share of the height of the `page` [px]."""
+        self._space = round(SPACE * page)
+        self._fit()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Choose the size again in another width."""
+        super().resizeEvent(event)
+        if event.size().width() != event.oldSize().width():
+            self._fit()
+
+    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002 - the signature is Qt's
+        """Draw the sentence; a style sheet could not narrow the font."""
+        painter = QPainter(self)
+        painter.setFont(_font(self.font(), self._size))
+        painter.setPen(self.palette().color(self.foregroundRole()))
+        painter.drawText(self.contentsRect(), FLAGS, self.text())
+        painter.end()
+
+    def sizeHint(self) -> QSize:
+        return QSize(0, self._needed(self.pixels))
+
+    @property
+    def pixels(self) -> int:
+        """Largest size of the font with which the text fits [px]."""
+        sizes: Sequence[int] = range(LARGEST, SMALLEST, -2)
+        return next((size for size in sizes if self._needed(size) <= self._space), SMALLEST)
+
+    def _needed(self, pixels: int) -> int:
+        box = QRect(0, 0, max(self.width(), 1), 10_000)
+        return QFontMetrics(_font(self.font(), pixels)).boundingRect(box, FLAGS, self.text()).height()
+
+    def _fit(self) -> None:
+        self._size = self.pixels
+        self.setFixedHeight(min(self._needed(self._size), self._space))
+        self.update()
+
+
+def _unbroken(part: str) -> str:
+    """A short part without places for a line break."""
+    joined = part.replace(" ", "\N{NO-BREAK SPACE}").replace("/", "/\N{WORD JOINER}")
+    return joined if len(part) <= UNBROKEN else part
+
+
+def _font(font: QFont, pixels: int) -> QFont:
+    large = QFont(font)
+    large.setPixelSize(pixels)
+    large.setStretch(STRETCH)
+    return large
