@@ -40,14 +40,12 @@ class Connected:
 
 
 _SAMPLES = 40.0 + 5.0 / 512.0
-_KNOWN = {"9234": 2.6e-6, "9237": 4.5e-6, "9239": 3.3e-6}
-"""Input delay of delta-sigma modules that have no property for it: (40 + 5/512) samples plus this time [s], from their
-specifications and NI's knowledge base, kA00Z0000004A0YSAU.
-"""
 _FIGURE = 1.0e-6
-"""Standard uncertainty of a delay from specifications [s]: rounding to two digits, and tolerance of analogue
-filters.
-"""
+"""Standard uncertainty of a delay in specifications [s]: rounding to two digits, and tolerance of analogue filters."""
+_KNOWN = {"9234": (2.6e-6, 5.0e-6), "9237": (4.5e-6, _FIGURE), "9239": (3.3e-6, _FIGURE)}
+"""Input delay of delta-sigma modules without a property for it: (40 + 5/512) samples and this time [s] with its
+standard uncertainty [s], from their specifications and NI's knowledge base, kA00Z0000004A0YSAU. No document of NI was
+found that gives this time for the NI 9234: it is assumed to be among those of its relatives."""
 _CLOCKED = 1.0e-7
 """Standard uncertainty of a time determined by the device's clock [s], a few ticks."""
 _DELTA_SIGMA_BITS = 24
@@ -108,7 +106,9 @@ def _filter_delay(channel: InputChannel, device: Connected, rate: float) -> Inpu
             raise
     model = re.search(r"\bNI[ -]?(\d{4})", device.product)
     if model is not None and (constant := _KNOWN.get(model[1])) is not None:
-        return InputDelay(_SAMPLES / rate + constant, _FIGURE, f"specifications of the {device.product}")
+        seconds, uncertainty = constant
+        source = "specifications" if uncertainty == _FIGURE else "assumed from the relatives"
+        return InputDelay(_SAMPLES / rate + seconds, uncertainty, f"{source} of the {device.product}")
     if channel.ai_resolution >= _DELTA_SIGMA_BITS:
         return InputDelay(0.0, inf, f"unknown for {device.product}")
     return InputDelay(0.0, _CLOCKED, "simultaneous inputs")

@@ -41,6 +41,7 @@ from bench.protocol import Plan, Prepared, Result, Sources
 from drivers.rig import OperatorTask
 from protocols.check.lines import (
     Sines,
+    allowed_delay,
     delay_lines,
     drive_lines,
     expected_drive,
@@ -155,7 +156,9 @@ def _motion(parameters: CheckParameters, configuration: BenchConfiguration) -> G
     on_ground = configuration.laser_reference == "ground"
     yield from _publish(drive_lines(sines, parameters, configuration))
     yield from _publish(scale_lines(sines, parameters, lasers=on_ground))
-    yield from _publish(table_delay_lines(sines, parameters, configuration.sample_rate, lasers=on_ground))
+    most = allowed_delay(configuration.known_specimen, parameters.highest_omega, parameters.u1_error)
+    rate = configuration.sample_rate
+    yield from _publish(table_delay_lines(sines, parameters, rate, lasers=on_ground, most=most))
     if on_ground:
         yield from _publish(delay_lines(sines, parameters, configuration))
     else:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from math import isinf
+from math import inf, isinf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -134,13 +134,12 @@ def input_lines(channels: Sequence[Channel]) -> Iterator[CheckLine]:
 
 
 def table_delay_lines(
-    sines: Sines, parameters: CheckParameters, sample_rate: float, *, lasers: bool
+    sines: Sines, parameters: CheckParameters, sample_rate: float, *, lasers: bool, most: float = inf
 ) -> Iterator[CheckLine]:
-    """A line for the accelerometer against the table's displacement sensor.
+    """A line for the accelerometer against the table's displacement sensor, and one for each laser on the ground
+    against the accelerometer, at most `most` [s]: with those of `delay_lines`, every pair of channels is compared.
 
-    If their delays differ, also a line for each laser on the ground against the accelerometer, to find which of the two
-    differs from the others. Otherwise the delays of these pairs follow from the lasers' delays against the
-    displacement. An acceleration that follows each step of the held output lags by half a sample.
+    An acceleration that follows each step of the held output lags by half a sample.
     """
     if parameters.delay_tolerance is None:
         return
@@ -162,11 +161,14 @@ def table_delay_lines(
         expected=0.0,
         uncertainty=COVERAGE * pair.uncertainty,
     )
-    if lowest <= pair.delay <= highest:
-        return
     for name, one in against.items():
-        what = f"delay against {TABLE_ACCELERATION}"
-        yield stated(name, what, one.delay, "s", uncertainty=COVERAGE * one.uncertainty)
+        what, expanded = f"delay against {TABLE_ACCELERATION}", COVERAGE * one.uncertainty
+        if isinf(most):
+            yield stated(name, what, one.delay, "s", uncertainty=expanded)
+            continue
+        allowed = -most - 0.5 / sample_rate, most
+        remedy = "compare the other delay lines: they tell whether the accelerometer or this laser differs"
+        yield judged(name, what, one.delay, allowed, "s", remedy, expected=0.0, uncertainty=expanded)
 
 
 def _delay_between(omega: NDArray[np.float64], first: Amplitudes, second: Amplitudes) -> CommonMotion:

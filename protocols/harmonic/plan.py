@@ -22,6 +22,7 @@ from bench.engine.steps import Arm, Calibrate, Fallen, OperatorAction, Outcome, 
 from bench.events import Estimate, PointFinished, Progress, StepStarted, Warned
 from drivers.rig import OperatorTask, RigError
 from protocols.common.calibrate import calibrate_drive, harmonic_frequencies
+from protocols.harmonic.free_prediction import with_free_prediction
 from protocols.harmonic.holding import SLOW, hold, prepared
 from protocols.harmonic.measurement import Held, Report, Settled, judge, predicted_fields, settle_and_measure
 from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, PointStatus
@@ -178,6 +179,7 @@ class HarmonicPlan:
             shaker, harmonics = self._configuration.simulated_shaker, self._parameters.harmonics
             bare = self._bare[omega]
             point = judge(settled, bare, omega, specimen, known, sensors, tried, shaker, harmonics, held)
+            point = with_free_prediction(point, specimen, self._amplitude, self._configuration, harmonics)
             point = point.model_copy(update={"start_chance": start.chance})
             if point.status in (PointStatus.STEADY, PointStatus.HELD) or not point.predicted_stable:
                 return point
@@ -228,16 +230,14 @@ class HarmonicPlan:
             return Held(None, "the table's sine is not known")
         sine = Sine(omega, self._amplitude, calibration)
         free = settled.peak.drift if settled.motion is None else settled.motion.greatest
-        limits = self._configuration.limits
-        largest = min(GROWTH * free, limits.warning.drift * limits.drift)
         report = self._report(omega, specimen)
         return (
             yield from hold(
                 sine,
                 settled.table,
                 found,
-                specimen.label or 0.0,
-                largest,
+                specimen.label,
+                GROWTH * free,
                 self._parameters,
                 self._configuration.analysis,
                 report,

@@ -105,6 +105,23 @@ class HarmonicPoint(Parameters):
         "gain of the largest peak of a cycle, for an unsteady free motion; it is alpha_2 unless the point was held",
     )
     alpha_2_mean: float | None = quantity(None, "1", "gain of the mean cycle peak of an unsteady motion")
+    alpha_2_greatest_predicted: float | None = quantity(
+        None,
+        "1",
+        "predicted gain of the largest peak of the long-term free motion, where the orbit is unstable on the simulated "
+        "table; absent if the model's block falls",
+    )
+    alpha_2_greatest_low: float | None = quantity(
+        None, "1", "lower end of the range of that gain for 95 % of the specimens within the uncertainty"
+    )
+    alpha_2_greatest_high: float | None = quantity(None, "1", "upper end of that range")
+    repeats_predicted: int | None = quantity(
+        None, "1", "predicted number of cycles after which the free motion repeats; absent: it does not repeat"
+    )
+    falls_predicted: float | None = quantity(None, "1", "share of those specimens whose block falls in a free motion")
+    free_agrees: bool | None = quantity(
+        None, "1", "whether alpha_2_greatest lies in the range, extended by its own uncertainty"
+    )
     alpha_2_orbit: float | None = quantity(
         None, "1", "gain of the mean cycle of a motion that revolves about a periodic one: the gain of the orbit"
     )
@@ -118,11 +135,9 @@ class HarmonicPoint(Parameters):
     multiplier: float | None = quantity(
         None,
         "1",
-        "measured modulus of the slowest multiplier of an unsteady motion, or of a held one after its release; below "
-        "1, the motion becomes periodic",
+        "measured modulus of the slowest multiplier of an unsteady motion; below 1, the motion becomes periodic",
     )
     multiplier_uncertainty: float | None = quantity(None, "1", "expanded uncertainty of the multiplier (k = 2)")
-    multiplier_angle_rad: float | None = quantity(None, "rad", "its measured argument: angle of the spiral in a cycle")
     dominating: str = quantity("", "", "largest contribution to the uncertainty of alpha_2")
     uncertainty_parts: str = quantity("", "", "standard uncertainty of alpha_2 by contribution, largest first, as JSON")
     alpha_2_predicted: float | None = quantity(None, "1", "predicted gain at the achieved amplitude")

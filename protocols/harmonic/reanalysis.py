@@ -7,7 +7,7 @@ from math import tau
 import numpy as np
 
 from bench.analysis.cycles import Cycle, CycleAnalyser, mean_amplitude
-from bench.analysis.free_motion import CYCLES, KEPT, Rate, free_motion, orbit_peak
+from bench.analysis.free_motion import CYCLES, KEPT, free_motion, orbit_peak
 from bench.analysis.gain import modulated_peak, steady_peak
 from bench.analysis.signals import ACCELERATION, SIGNALS
 from bench.analysis.steady import SteadyDetector
@@ -16,7 +16,8 @@ from bench.control.oscillator import DriveCalibration
 from bench.control.sine import Sine, SineResponse
 from bench.datafile.reader import DataFile
 from bench.engine.steps import Arm, Calibrate, Dwell, Measured, Outcome, Publish, SetHarmonics, Step, Sweep
-from bench.events import Acquired, Estimate, Event, PointFinished, StepStarted
+from bench.events import Acquired, Estimate, Event, PointFinished
+from protocols.harmonic.free_prediction import with_free_prediction
 from protocols.harmonic.measurement import JUDGED, LASERS, REMAINING, TRANSIENT, Held, Settled, judge, predicted_fields
 from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, HarmonicSettings, PointStatus
 from sim.gain import predict_gain
@@ -25,7 +26,7 @@ from sim.gain import predict_gain
 @dataclass
 class _Series:
     """Consecutive dwells at one frequency. `recent` are the cycles since the last change of the drive; of a `hold`, in
-    which the drive changes in every cycle, all until it is `released`. `held` is the hold of the same motion.
+    which the drive changes in every cycle, all. `held` is the hold of the same motion.
     """
 
     sine: Sine
@@ -39,7 +40,6 @@ class _Series:
     trimmed: bool = False
     measured: tuple[Cycle, ...] = ()
     hold: bool = False
-    released: bool = False
     held: "_Series | None" = None
 
 
@@ -57,6 +57,7 @@ class HarmonicFollower:
         self._rate = record.sample_rate
         self._cycles = settings.measured_cycles or parameters.measured_cycles
         self._tolerance = settings.settle_tolerance or parameters.settle_tolerance
+        self._amplitude = parameters.amplitude_factor * configuration.known_specimen.uplift_acceleration
         self._calibration = DriveCalibration.flat(1.0)
         self._read = 0
         self._last: Sweep | None = None
@@ -105,8 +106,6 @@ class HarmonicFollower:
                 series.updates += 1
                 series.recent.clear()
                 series.trimmed = True
-            case Publish(event=StepStarted()) if series is not None:
-                series.released = True
             case Publish(event=Estimate(beta=beta)) if series is not None:
                 series.tested, series.beta = True, beta
             case Publish(event=PointFinished(point=HarmonicPoint() as point)):
@@ -121,7 +120,7 @@ class HarmonicFollower:
         if not isinstance(event, Acquired):
             return
         self._read = event.block.first + len(event.block)
-        if not self._dwelling or (series := self._series) is None or (series.hold and series.released):
+        if not self._dwelling or (series := self._series) is None:
             return
         cycles = series.analyser.push(np.column_stack((event.signals[:, : len(SIGNALS)], event.drive)))
         if series.turn is None and cycles:
@@ -144,7 +143,7 @@ class HarmonicFollower:
         known = self._configuration.known_on_table
         bare = self._bare[omega]
         if point.status is PointStatus.OVERTURNED:
-            asked = self._parameters.amplitude_factor * self._configuration.known_specimen.uplift_acceleration
+            asked = self._amplitude
             layer = predict_gain(specimen, omega, asked, bare.peak.amplitude).rocking
             peaks = {"bare_drift_peak_m": bare.peak.drift, "bare_amplitude_m_s2": bare.peak.amplitude}
             return point.model_copy(update=predicted_fields("rocking", layer, known) | peaks)
@@ -154,6 +153,7 @@ class HarmonicFollower:
         settled = self._settled(tried)
         held = None if tried.held is None else self._held(tried.held, point)
         found = judge(settled, bare, omega, specimen, known, sensors, point.starts_tried, shaker, harmonics, held)
+        found = with_free_prediction(found, specimen, self._amplitude, self._configuration, harmonics)
         return found.model_copy(update={"start_chance": point.start_chance})
 
     def _unlike(self, series: _Series, point: HarmonicPoint) -> float:
@@ -180,7 +180,6 @@ class HarmonicFollower:
             control=point.control_share or 0.0,
             captured=point.captured_cycles,
             cycles=len(series.recent),
-            rate=_rate(point),
         )
 
     def _settled(self, series: _Series) -> Settled:
@@ -209,11 +208,3 @@ class HarmonicFollower:
             motion,
             None if motion is None else orbit_peak(constant, motion, omega),
         )
-
-
-def _rate(point: HarmonicPoint) -> Rate | None:
-    """The recorded multiplier of a point."""
-    modulus, uncertainty, angle = point.multiplier, point.multiplier_uncertainty, point.multiplier_angle_rad
-    if modulus is None or uncertainty is None or angle is None:
-        return None
-    return Rate(modulus, 0.5 * uncertainty, angle)

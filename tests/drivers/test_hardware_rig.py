@@ -74,6 +74,7 @@ class Wired:
 
 
 @SERIAL
+@pytest.mark.milliseconds
 class TestSerial(Wired, RigConformance):
     connection = "serial"
     # it judges clocks, and so listens: see below
@@ -81,6 +82,7 @@ class TestSerial(Wired, RigConformance):
 
 
 @SERIAL
+@pytest.mark.milliseconds
 class TestSerialClocks(Wired):
     connection = "serial"
     listening = 1.0
@@ -178,6 +180,7 @@ def serial() -> Iterator[Laboratory]:
 
 
 @SERIAL
+@pytest.mark.milliseconds
 class TestSerialFaults:
     def test_an_unplugged_laser_ends_the_run_and_the_relay_is_open(self, serial: Laboratory) -> None:
         with HardwareRig(serial.hardware, lead=LONG_LEAD) as rig:

@@ -10,10 +10,13 @@ import sys
 import time
 import tomllib
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import chdir, contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
+from io import StringIO
 from pathlib import Path
+from unittest.mock import patch
 
+from bench.app.cli.main import main
 from tests.bench.accelerograms.real import CAMPAIGN as CAMPAIGN_RECORDS
 from tests.pages.blocks import ROOT, Block, Command, blocks
 
@@ -66,13 +69,20 @@ def furnish(folder: Path, specimen: str) -> None:
         shutil.copy(records / source, folder / name)
 
 
-def failures(block: Block, folder: Path) -> Iterator[Failure]:
-    """Execute a block in `folder`; yields what does not agree with the page."""
+Execute = Callable[[list[str], Path], subprocess.CompletedProcess[str]]
+"""Executes a command of the program, given its arguments, in a folder."""
+
+
+def failures(block: Block, folder: Path, execute: Execute | None = None) -> Iterator[Failure]:
+    """Execute a block in `folder`; yields what does not agree with the page.
+
+    Without `execute`, each command of the program is a process of its own.
+    """
     if block.language in ("sh", "console"):
         with _servers(block, folder):
             for command in block.commands:
                 if command.arguments[0] == "rockbench" and command.arguments[1] not in SERVERS:
-                    yield from _run(block, command, folder)
+                    yield from _run(block, command, folder, execute or command_process)
     elif block.language == "toml":
         yield from _parsed(block, tomllib.loads)
     elif block.language == "json":
@@ -100,8 +110,8 @@ def _match(shown: list[str], printed: list[str]) -> bool:
     return same and _match(shown[1:], printed[1:])
 
 
-def _run(block: Block, command: Command, folder: Path) -> Iterator[Failure]:
-    done = process([sys.executable, "-m", "bench", *command.arguments[1:]], folder)
+def _run(block: Block, command: Command, folder: Path, execute: Execute) -> Iterator[Failure]:
+    done = execute([*command.arguments[1:]], folder)
     if done.returncode != 0:
         last = (done.stderr.strip() or done.stdout.strip() or "no output").splitlines()[-1]
         yield Failure(block.where, command.line, f"exit code {done.returncode}: {last}")
@@ -114,6 +124,19 @@ def _parsed(block: Block, parse: Callable[[str], object]) -> Iterator[Failure]:
         parse(block.text)
     except ValueError as error:
         yield Failure(block.where, block.language, str(error))
+
+
+def command_process(arguments: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
+    """Run a command of the program in a process of its own."""
+    return process([sys.executable, "-m", "bench", *arguments], folder)
+
+
+def command_here(arguments: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
+    """Run a command of the program in this process, without the second that a start takes."""
+    out, err = StringIO(), StringIO()
+    with chdir(folder), patch.dict(os.environ, COLUMNS="200"), redirect_stdout(out), redirect_stderr(err):
+        code = main(arguments)
+    return subprocess.CompletedProcess(arguments, code, out.getvalue(), err.getvalue())
 
 
 def process(arguments: list[str], folder: Path) -> subprocess.CompletedProcess[str]:

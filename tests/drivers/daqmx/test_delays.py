@@ -64,13 +64,21 @@ def test_two_modules_in_one_task_have_each_their_own() -> None:
     assert found == pytest.approx([0.0, SAMPLES / RATE + 3.3e-6, -14e-6, 0.0], abs=1e-9)
 
 
-@pytest.mark.parametrize(("module", "rate", "constant"), [("9239", 2000.0, 3.3e-6), ("9234", 2048.0, 2.6e-6)])
-def test_a_filter_without_a_property_has_its_known_delay(module: str, rate: float, constant: float) -> None:
+@pytest.mark.parametrize(
+    ("module", "rate", "constant", "uncertainty", "source"),
+    [
+        ("9239", 2000.0, 3.3e-6, 1e-6, "specifications of"),
+        ("9234", 2048.0, 2.6e-6, 5e-6, "assumed from the relatives of"),
+    ],
+)
+def test_a_filter_without_a_property_has_its_known_delay(
+    module: str, rate: float, constant: float, uncertainty: float, source: str
+) -> None:
     with session_on(build("cDAQ-9174", (module, "9263")), ["cDAQ1Mod1/ai0"], rate) as session:
         (delay,) = session.delays
         assert delay.seconds == pytest.approx(SAMPLES / rate + constant, abs=1e-9)
-        assert delay.uncertainty == 1e-6
-        assert module in delay.source
+        assert delay.uncertainty == uncertainty
+        assert delay.source == f"{source} the NI {module}"
 
 
 def test_a_filter_with_properties_is_read_and_not_removed_by_the_device() -> None:

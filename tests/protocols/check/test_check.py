@@ -64,7 +64,6 @@ def test_the_simulated_bench_passes_every_line(check: Check, seed: int, tmp_path
             "[simulation.bench.displacement_sensor]\nscale_error = -0.06\n",
             ("table_displacement", "scale against table_acceleration"),
         ),
-        ("[simulation.bench.laser_1]\nlatency = 4\n", ("laser_1", "delay against table_displacement")),
         # a storey out of range: all but a few measurements are none
         ("[simulation.bench.laser_2]\nnoise = 20.0\n", ("laser_2", "valid samples at rest")),
         ("[simulation.bench.displacement_sensor]\nnoise_density = 5e-5\n", ("table_displacement", "noise at rest")),
@@ -73,6 +72,15 @@ def test_the_simulated_bench_passes_every_line(check: Check, seed: int, tmp_path
 def test_what_is_wrong_fails_on_exactly_its_line(check: Check, configuration: str, line: tuple[str, str]) -> None:
     code, lines = check(configuration)
     assert failures(lines) == [line]
+    assert code == 1
+
+
+def test_a_late_laser_fails_against_both_sensors_of_the_table(check: Check) -> None:
+    code, lines = check("[simulation.bench.laser_1]\nlatency = 4\n")
+    assert sorted(failures(lines)) == [
+        ("laser_1", "delay against table_acceleration"),
+        ("laser_1", "delay against table_displacement"),
+    ]
     assert code == 1
 
 

@@ -134,7 +134,7 @@ def test_on_an_unknown_table_the_drive_is_not_predicted_and_says_why() -> None:
     found = _by_quantity(_compiled(PARAMETERS, BenchConfiguration(backend="hardware")))
     for quantity in ("drive_voltage", "drive_slew", "force", "current", "heating"):
         assert found[quantity].value is None
-        assert "not known" in found[quantity].where or "unknown table" in found[quantity].where
+        assert "unknown" in found[quantity].where
     assert found["drift"].value is not None
 
 
@@ -210,7 +210,7 @@ def test_a_campaign_beyond_a_limit_is_refused_before_anything_is_opened(
     assert main([*command, "--yes", "--out", str(out)]) == 2
     shown = capsys.readouterr()
     assert shown.out == ""
-    assert "limits.acceleration = 1.6 is refused: start 1 of beta = 0.4 at omega = 16 rad/s takes" in shown.err
+    assert "limits.acceleration = 1.6 is refused: start 1 of beta = 0.4 at omega = 16 rad/s" in shown.err
     assert main([*command, "--dry-run", "--json", "--out", str(out)]) == 2
     content = json.loads(capsys.readouterr().out)
     assert content["would_run"] is False

@@ -1,0 +1,88 @@
+"""Comparison of a free motion with the long-term motion of the model, where the orbit on the table is unstable."""
+
+from math import isfinite
+from typing import Any
+
+from bench.config.model import BenchConfiguration
+from bench.prediction.attractors import CYCLES, LongTerm, long_term
+from bench.result_cache import cached
+from protocols.harmonic.protocol import HarmonicPoint
+from sim.gain import predict_gain
+from sim.specimen import Specimen
+from sim.steady import NoOrbit
+
+MEMBERS = 8
+"""Number of specimens drawn for the range of the greatest peak."""
+
+
+def with_free_prediction(
+    point: HarmonicPoint, specimen: Specimen, amplitude: float, configuration: BenchConfiguration, harmonics: int
+) -> HarmonicPoint:
+    """The point of an unsteady free motion with the predicted one at `amplitude` [m/s2]; others are unchanged.
+
+    Without a model of the table, or where disturbances of the orbit decay on it, nothing is added: the free motion then
+    tends to the orbit.
+    """
+    greatest, multiplier = point.alpha_2_greatest, point.table_multiplier
+    if greatest is None or multiplier is None or multiplier <= 1.0:
+        return point
+    found = _predicted(specimen, point.omega_rad_s, amplitude, configuration, harmonics)
+    if found is None:
+        return point
+    agrees, low, high = None, found["low"], found["high"]
+    if low is not None and point.alpha_2 and point.alpha_2_uncertainty is not None:
+        doubt = greatest * point.alpha_2_uncertainty / point.alpha_2
+        agrees = low - doubt <= greatest <= high + doubt
+    fields: dict[str, Any] = {
+        "alpha_2_greatest_predicted": found["greatest"],
+        "alpha_2_greatest_low": low,
+        "alpha_2_greatest_high": high,
+        "repeats_predicted": found["repeats"] or None,
+        "falls_predicted": found["falls"],
+        "free_agrees": agrees,
+    }
+    return point.model_copy(update=fields | {"reason": "; ".join(filter(None, (point.reason, _remark(found, agrees))))})
+
+
+def _predicted(
+    specimen: Specimen, omega: float, amplitude: float, configuration: BenchConfiguration, harmonics: int
+) -> dict[str, Any] | None:
+    """Numbers of the long-term motion, from the cache if possible; None without a rocking orbit on the table."""
+    shaker, known = configuration.simulated_shaker, configuration.known_on_table
+    if shaker is None:
+        return None
+    inputs = [each.model_dump(mode="json") for each in (specimen, known, shaker)]
+
+    def compute() -> dict[str, Any] | None:
+        layer = predict_gain(specimen, omega, amplitude).rocking
+        try:
+            return None if layer is None else _numbers(long_term(layer, known, shaker, harmonics, members=MEMBERS))
+        except NoOrbit:
+            return None
+
+    return cached("long_term", [*inputs, omega, amplitude, harmonics, CYCLES, MEMBERS], compute)
+
+
+def _numbers(motion: LongTerm) -> dict[str, Any]:
+    """The numbers of a motion that is not the orbit, as JSON content; absent ones are None."""
+
+    def known(value: float) -> float | None:
+        return value if isfinite(value) else None
+
+    return {
+        "greatest": float(motion.gains.max()) if motion.gains.size else None,
+        "repeats": motion.repeats,
+        "low": known(motion.low),
+        "high": known(motion.high),
+        "falls": known(motion.falls),
+    }
+
+
+def _remark(found: dict[str, Any], agrees: bool | None) -> str:
+    if found["greatest"] is None:
+        return "the model's free motion ends with a fall"
+    repeats = f"repeats every {found['repeats']} cycles" if found["repeats"] else "does not repeat"
+    text = f"the model's free motion {repeats}, with peaks up to alpha_2 = {found['greatest']:.3f}"
+    if found["low"] is not None:
+        text += f", between {found['low']:.3f} and {found['high']:.3f} for 95 % of the specimens"
+    return text if agrees is not False else f"{text}: the measured peak differs"

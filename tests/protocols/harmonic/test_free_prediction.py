@@ -1,0 +1,46 @@
+"""The free motion of an unstable point beside that of the model."""
+
+import pytest
+
+from bench.config.model import BenchConfiguration
+from protocols.harmonic import free_prediction
+from protocols.harmonic.free_prediction import with_free_prediction
+from protocols.harmonic.protocol import HarmonicPoint, PointStatus
+
+CONFIGURATION = BenchConfiguration()
+SPECIMEN = CONFIGURATION.known_specimen.coupled(0.97)
+AMPLITUDE = 1.01 * SPECIMEN.uplift_acceleration
+
+
+def free(greatest: float, multiplier: float | None = 1.046) -> HarmonicPoint:
+    return HarmonicPoint(
+        omega_rad_s=15.0,
+        beta=0.97,
+        status=PointStatus.MODULATED,
+        layer="rocking",
+        alpha_2=greatest,
+        alpha_2_uncertainty=0.01 * greatest,
+        alpha_2_greatest=greatest,
+        table_multiplier=multiplier,
+        reason="not steady",
+    )
+
+
+@pytest.mark.parametrize(("greatest", "agrees"), [(0.86, True), (2.0, False)])
+def test_the_greatest_peak_is_compared_with_the_range_of_the_specimens(
+    greatest: float, agrees: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(free_prediction, "MEMBERS", 3)
+    found = with_free_prediction(free(greatest), SPECIMEN, AMPLITUDE, CONFIGURATION, 5)
+    # the attractor on fixed ground was computed elsewhere: nine cycles, peaks up to 0.862; the table adds little
+    assert found.alpha_2_greatest_predicted == pytest.approx(0.862, rel=0.01)
+    assert found.repeats_predicted == 9
+    assert found.free_agrees is agrees
+    assert found.reason.startswith("not steady; the model's free motion repeats every 9 cycles")
+    assert found.reason.endswith("the measured peak differs") is not agrees
+
+
+@pytest.mark.parametrize("multiplier", [None, 0.999])
+def test_a_motion_that_tends_to_the_orbit_has_no_other_prediction(multiplier: float | None) -> None:
+    point = free(0.4, multiplier)
+    assert with_free_prediction(point, SPECIMEN, AMPLITUDE, CONFIGURATION, 5) is point
