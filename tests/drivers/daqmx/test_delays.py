@@ -102,7 +102,7 @@ def test_a_module_that_nobody_knows_says_so() -> None:
     with session_on((chassis, replace(module, product="NI 9999"), output), ["cDAQ1Mod1/ai0"]) as session:
         (delay,) = session.delays
         assert delay.uncertainty == np.inf
-        assert "not known" in session.description["input delays"]
+        assert "unknown" in session.description["input delays"]
 
 
 def test_the_skew_of_two_modules_is_gone_within_a_microsecond() -> None:
