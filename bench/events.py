@@ -113,7 +113,7 @@ class Acquired(Event):
 
 @event(journalled=False)
 class ValuesReceived(Event):
-    """Values of sensors with their own clocks, as received in `run` since the previous such event."""
+    """Values of sensors with free-running clocks, received in `run` since the previous event of this kind."""
 
     run: int
     raw: tuple[RawValues, ...]

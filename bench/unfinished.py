@@ -129,7 +129,7 @@ def _is_renamed(temporary: Path, path: Path) -> bool:
 
 
 def _discard(path: Path) -> None:
-    """Remove an unfinished result; one that is complete has another name, or is `whole`."""
+    """Remove an unfinished result; a complete one has another name, or is marked as `whole`."""
     if _names.get(path) == path or not path.exists():
         return
     # an older file with the final name is not the result

@@ -164,8 +164,8 @@ class TablePeriod:
     def run(self, start: Array, drive: NDArray[np.complex128], change: Array | None = None) -> tuple[Array, Array]:
         """State after one period, and the samples, see `advance`.
 
-        `change`, shape (ticks,), is added to the commands of the period. Raises NoOrbit if the block does not rock on
-        the corner of the start at its end.
+        `change`, shape (ticks,), is added to the commands of the period. Raises NoOrbit if, at the end, the block does
+        not rock on the corner at which it started.
         """
         commands, y, mode = self.commands(drive), start.copy(), corner(start)
         if change is not None:

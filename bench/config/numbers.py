@@ -5,7 +5,7 @@
     range    12:21:4   2:4:5Hz     start:stop:count, ascending, decimal ends exact
 
 Command line, form, configuration and protocol files read every number through this module and therefore accept the same
-texts. A comma is never a separator: 0,25 would otherwise be 0 and 25.
+input. A comma is never a separator: 0,25 would otherwise be 0 and 25.
 
 pint converts units, except between frequencies in Hz and angular frequencies, which are converted explicitly with 2 pi:
 pint treats the radian as a pure number.

@@ -83,11 +83,11 @@ CLEAR = 2.0
 class Pass:
     """A pass; errors are relative to the target [1], with both filtered by the target's window.
 
-    `error` is the measured root mean square; `floor` is its non-repeatable part: measurement noise, and after a second
-    play of a drive every difference. `repeatable` is the rest, which a correction can remove. `peak_error` is the
-    largest error over the target's peak, `spectrum_error` the largest deviation of the response spectrum. A pass is
-    `accepted` when its error is the smallest so far; otherwise the drive is rolled back. `replayed`: the best drive was
-    played again; `gain` and `verdict` are those of the preceding correction.
+    `error` is the measured root mean square; `floor` is its non-repeatable part: measurement noise and, after a drive
+    has been played twice, every difference between the two plays. `repeatable` is the remainder, which a correction can
+    remove. `peak_error` is the largest error divided by the target's peak, `spectrum_error` the largest deviation of
+    the response spectrum. A pass is `accepted` when its error is the smallest so far; otherwise the drive is rolled
+    back. `replayed`: the best drive was played again; `gain` and `verdict` are those of the preceding correction.
     """
 
     number: int

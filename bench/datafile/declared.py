@@ -197,7 +197,7 @@ RAW_VALUES = tuple(
         ("arrival", "us", "time of its arrival on the computer's clock since the rig was armed"),
     )
 )
-"""Values of sensors with their own clocks as received, before their resampling."""
+"""Values of sensors with free-running clocks, as received, before resampling."""
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Column:
-    """One column: `values` of shape (n,) are numbers, booleans or texts; `unit` is "1" for a pure number."""
+    """A column: `values` of shape (n,) are numbers, booleans or strings; `unit` is "1" for a pure number."""
 
     values: NDArray[Any]
     unit: str

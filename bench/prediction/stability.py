@@ -46,7 +46,7 @@ def multipliers_table(
     def numbers(values: Sequence[float], unit: str, description: str) -> Column:
         return Column(np.array(values, dtype=np.float64), unit, description)
 
-    moduli = "greatest |Floquet multiplier|: remaining share of a disturbance after a period,"
+    moduli = "greatest |Floquet multiplier|: fraction of a disturbance that remains after a period,"
     angles = "argument of that multiplier: 0 fold, pi flip, between them Neimark-Sacker,"
     return {
         "beta": numbers([beta for beta, _, _ in layers], "1", "stiffness ratio k_C/k1 of the coupling spring"),

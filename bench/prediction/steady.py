@@ -25,7 +25,7 @@ from sim.steady import Orbit
 from sim.sweep import Done, sweep
 
 RUN_DURATION = 120.0
-"""Length of a simulation [s], as in the paper."""
+"""Duration of a simulation [s], as in the paper."""
 
 
 @dataclass(frozen=True)

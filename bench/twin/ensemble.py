@@ -73,7 +73,7 @@ class Ensemble:
 
 
 _CYCLES = 5.0
-"""Cycles of a sine over which peak and amplitude are taken."""
+"""Number of cycles of a sine over which peak and amplitude are taken."""
 
 
 @dataclass(frozen=True)

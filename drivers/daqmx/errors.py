@@ -135,7 +135,7 @@ def code_of(error: DaqError) -> int:
 
 
 def translation(doing: str, error: Error) -> RigError:
-    """The rig's error for a driver's error raised while `doing`."""
+    """The rig error for a driver error that was raised during the operation `doing`."""
     if isinstance(error, DaqNotFoundError | DaqNotSupportedError):
         return DeviceNotFound(
             f"{doing} failed: there is no NI-DAQmx driver on this PC; install NI-DAQmx, or set hardware.daq.server to"

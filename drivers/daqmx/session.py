@@ -190,9 +190,9 @@ class DaqSession:
     def cut(self) -> bool:
         """Open the enable relay now, in one call, from any thread and in every state, even during a read.
 
-        True when the device confirmed it. False if there is no enable line or the device did not respond, in which case
-        only the emergency stop remains. Never raises. The sample clock runs until `stop`; the watchdog is no longer
-        reset.
+        Returns True if the device confirmed it. False if there is no enable line or the device did not respond, in
+        which case only the emergency stop remains. Never raises. The sample clock runs until `stop`; the watchdog is no
+        longer reset.
         """
         self._cut = True
         return self._tasks.relay is not None and self._tasks.relay.cut()

@@ -172,7 +172,7 @@ def _line(connection: socket.socket, deadline: float) -> bytes:
         except TimeoutError:
             continue
         if not part:
-            raise ConnectionResetError("it closed the connection without an answer")
+            raise ConnectionResetError("it closed the connection without a reply")
         received += part
     return received
 

@@ -46,7 +46,7 @@ class HardwareRig(RigBase):
         with ExitStack() as opened:
             self._ownership = opened.enter_context(ExitStack())
             self._ownership.enter_context(owned(devices_of(hardware)))
-            # the DAQ first: opening it makes the bench safe after any earlier program
+            # the DAQ comes first: opening it brings the bench into a safe state after any earlier program
             self._daq = DaqSession(hardware.daq, inputs, hardware.sample_rate, lead)
             opened.callback(self._daq.close)
             scaled = analogue_channels(hardware, self._daq.scalings, self._daq.description, further)

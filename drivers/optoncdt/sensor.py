@@ -30,7 +30,10 @@ def require_sensor(
         allowed = f"{who} has a range of {info.measuring_range:g} m: correct it here, or the port of this laser"
         raise InvalidInput(f"hardware.{name}.measuring_range", measuring_range, allowed)
     if serial_number is not None and serial_number != info.serial:
-        allowed = f"{who} is the sensor {info.serial or 'without serial number'}: swap the ports, or correct it here"
+        allowed = (
+            f"{who} is the sensor {info.serial or 'without serial number'}: swap the ports, or correct this "
+            "serial number"
+        )
         raise InvalidInput(f"hardware.{name}.serial_number", serial_number, allowed)
 
 

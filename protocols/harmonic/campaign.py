@@ -246,7 +246,7 @@ def _cells(row: dict[str, Any]) -> list[str]:
         return ABSENT if value is None else yes if value else no
 
     measured, predicted = row.get("alpha_2"), row.get("alpha_2_predicted")
-    # a motion that is not steady is not on the predicted orbit
+    # an unsteady motion is not on the predicted orbit
     compared = row.get("status") in ("steady", "resting", "held")
     return [
         number("beta", ".3f"),

@@ -52,9 +52,9 @@ class TableState:
 @dataclass(frozen=True)
 class Settled:
     """A measured dwell: its peak, its steadiness, and its settling time [s]. `amplitude_error` (relative) and
-    `phase_error` [rad] are those of the table, after `updates` corrections of its drive. `motion` describes one that is
-    not steady, and `orbit` is the peak of its mean cycle where it turns about a periodic motion. `table` is the state
-    in which the dwell leaves the table; None where it is not known.
+    `phase_error` [rad] are those of the table, after `updates` corrections of its drive. `motion` describes an unsteady
+    motion, and `orbit` is the peak of its mean cycle if it revolves about a periodic motion. `table` is the state in
+    which the dwell leaves the table; None where it is not known.
     """
 
     peak: SteadyPeak
@@ -197,10 +197,10 @@ def judge(
     """Point of a dwell, compared with the branch with the nearest peaks of drift and u1.
 
     `reference` is the bare frame's dwell at the same frequency, `known` the uncertainty of the `specimen`. The gains
-    agree when they differ by no more than their combined expanded uncertainty, |E_n| <= 1 of ISO 13528. Where the
-    motion is not steady, or the orbit is unstable, its stability is predicted on the table of `shaker` too, which is
-    controlled up to the harmonic `harmonics`. If the motion was then `held` on the rocking orbit, gain and comparison
-    are those of the held motion, and the free one is described beside them.
+    agree when they differ by no more than their combined expanded uncertainty, |E_n| <= 1 of ISO 13528. If the motion
+    is not steady or the orbit is unstable, stability is also predicted on the table of `shaker`, which is controlled up
+    to the harmonic `harmonics`. If the motion was then `held` on the rocking orbit, gain and comparison are those of
+    the held motion, and the free one is described beside them.
     """
     peak, bare = settled.peak, reference.peak
     layers = predict_gain(specimen, omega, peak.amplitude, bare.amplitude).layers

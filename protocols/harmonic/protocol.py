@@ -57,8 +57,8 @@ class HarmonicParameters(Parameters):
         0.002, "1", "relative change that may remain in a channel that counts as steady", gt=0, le=0.1
     )
     settle_limit: float = quantity(240.0, "s", "longest wait for the steady state", gt=0, le=3600)
-    measured_cycles: int = quantity(24, "1", "measured cycles of a steady point", ge=4, le=1000)
-    starts: int = quantity(6, "1", "number of starts before a point is abandoned", ge=1, le=32)
+    measured_cycles: int = quantity(24, "1", "number of cycles measured at a steady point", ge=4, le=1000)
+    starts: int = quantity(6, "1", "number of starts tried before a point is abandoned", ge=1, le=32)
     hold: bool = quantity(
         True, "", "whether a motion that is unstable or does not become steady is held on its orbit and measured again"
     )
@@ -96,13 +96,11 @@ class HarmonicPoint(Parameters):
     captured_cycles: int | None = quantity(
         None, "1", "number of cycles from the beginning of the hold to the capture of the motion"
     )
-    alpha_2_least: float | None = quantity(
-        None, "1", "gain of the smallest peak of a cycle, for an unsteady free motion"
-    )
+    alpha_2_least: float | None = quantity(None, "1", "gain of the smallest cycle peak of an unsteady free motion")
     alpha_2_greatest: float | None = quantity(
         None,
         "1",
-        "gain of the largest peak of a cycle, for an unsteady free motion; it is alpha_2 unless the point was held",
+        "gain of the largest cycle peak of an unsteady free motion; equal to alpha_2 unless the point was held",
     )
     alpha_2_mean: float | None = quantity(None, "1", "gain of the mean cycle peak of an unsteady motion")
     alpha_2_greatest_predicted: float | None = quantity(

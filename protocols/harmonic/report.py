@@ -212,8 +212,8 @@ def _conditions(points: Sequence[Mapping[str, Any]]) -> Table:
             ]
         )
     caption = (
-        "Conditions of the points. The scales of the lasers cancel in α₂, and with them most of the uncertainty of the "
-        "peaks; that of the accelerometer is common to both tests"
+        "Conditions of the points. The scales of the lasers cancel in α₂, and with them most of the "
+        "uncertainty of the peaks; the scale of the accelerometer is common to both tests"
     )
     return Table(caption, columns, rows)
 

@@ -90,7 +90,7 @@ class RockingFit:
 
     @cached_property
     def trend_gain(self) -> Array:
-        """Sensitivity of the trend, fitted jointly with the others, shape (n,) [1/m]."""
+        """Sensitivity of the trend, fitted jointly with the values, to errors of the displacement, shape (n,) [1/m]."""
         return np.asarray(np.linalg.pinv(self.jacobian)[-1], dtype=np.float64)
 
     @property

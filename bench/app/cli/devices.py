@@ -75,7 +75,7 @@ def devices(
 
 
 def _daq(server: str | None, tls: "Tls | None", *, plain: bool) -> "tuple[list[FoundDevice], str | None]":
-    """The NI devices; an empty list and the reason when the search failed."""
+    """The NI devices, or an empty list and the reason if the search failed."""
     try:
         require("ni", "the search for NI devices")
         from drivers.daqmx.devices import find_devices

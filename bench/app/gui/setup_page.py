@@ -222,7 +222,7 @@ class SetupPage(QWidget):
         self._refresh()
 
     def open_configuration(self, path: Path) -> None:
-        """Use the configuration in a file; after a refusal, which is shown, the current one stays in use."""
+        """Use the configuration in a file; if it is invalid, the reason is shown and the current one stays in use."""
         try:
             configuration = read_configuration(path)
         except RockbenchError as error:

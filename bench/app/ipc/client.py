@@ -182,7 +182,7 @@ class SessionClient(ClientConnection):
         threading.Thread(target=self._wait, args=(key,), name="session's process", daemon=True).start()
 
     def leave(self) -> None:
-        """Disconnect: a run ramps out, unless it is to continue without a client. A plan check is cancelled."""
+        """Disconnect. A run ramps out, unless it is set to continue without a client; a plan check is cancelled."""
         super().leave()
         if self._checks_plan:
             self.process.kill()
@@ -192,7 +192,7 @@ class SessionClient(ClientConnection):
         return self.process.poll() is None
 
     def _talk(self, assignment: PlanCheck) -> None:
-        """Body of the receiving thread, which starts and ends the sending one."""
+        """Body of the receiving thread, which starts and ends the sending thread."""
         with suppress(OSError, EOFError):
             with self._listener:
                 connection = self._listener.accept()
@@ -205,7 +205,7 @@ class SessionClient(ClientConnection):
         code = self.process.wait()
         with suppress(OSError, EOFError):
             Client(self._address, authkey=key).close()
-        # its last messages may not have been received yet
+        # its last messages may still be on the way
         self._talking.join(SILENCE)
         self._errors.seek(0)
         last_words = self._errors.read().decode(errors="replace").strip()

@@ -213,7 +213,7 @@ class SessionServer:
             case Ask("halt" | "abort" | "stop" as end):
                 {"halt": self._requests.halt, "abort": self._requests.abort, "stop": self._requests.stop}[end]()
                 if self._requests.rig_closed or self._pending():
-                    # planning does not poll requests: the handler of this signal interrupts it
+                    # planning does not poll for requests: the handler of this signal interrupts it
                     interrupt_main(signal.SIGTERM)
             case Answer():
                 self.answers.put(message)

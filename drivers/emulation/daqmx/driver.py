@@ -129,7 +129,7 @@ class Driver:
             self._tasks.pop(task.name, None)
 
     def reset_device(self, device: DeviceModel) -> None:
-        """Abort its tasks, set outputs to 0 V and lines low. The stopped tasks remain."""
+        """Abort the device's tasks, set its outputs to 0 V and its lines low. The stopped tasks remain."""
         with self.changed:
             for name in {device.name, *device.modules}:
                 part = self.catalogue.device(name)

@@ -113,7 +113,7 @@ class LineTask:
 
     @property
     def all_lines(self) -> tuple[Line, ...]:
-        """Its lines, channel after channel."""
+        """The lines of the job, channel after channel."""
         return tuple(line for channel in self._made for line in channel.lines)
 
     @property
