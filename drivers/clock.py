@@ -16,7 +16,7 @@ def now() -> float:
 
 
 class Clock(Protocol):
-    """Clock with an arbitrary origin, and a sleep on the same clock."""
+    """Clock with an arbitrary origin, with a sleep that uses the same clock."""
 
     def now(self) -> float:
         """Seconds since the clock's origin; never decreases."""

@@ -78,7 +78,7 @@ def read_configuration(path: str | PathLike[str]) -> BenchConfiguration:
 
 
 def former_keys(path: str | PathLike[str]) -> tuple[str, ...]:
-    """A notice for each key of a configuration file that has its name of an earlier version."""
+    """A notice for each key of a configuration file that still has the name used by an earlier version."""
     file = Path(path)
     found = former_names(BenchConfiguration, read_table(file, "configuration file"))
     return tuple(f"{_within(file)(old)} is now called {new}; rename it" for old, new in found)

@@ -126,7 +126,13 @@ class AttractorRequest(OnTableRequest):
 
     omega: tuple[Frequency, ...] = _frequencies((12.5, 15.0))
     beta: tuple[Stiffness, ...] = _stiffnesses((0.64, 0.97))
-    cycles: int = quantity(1500, "1", "cycles before the motion is described, and its peaks taken", ge=300, le=100_000)
+    cycles: int = quantity(
+        1500,
+        "1",
+        "number of cycles simulated before the motion is described and its peaks are taken",
+        ge=300,
+        le=100_000,
+    )
     members: int = quantity(
         16, "1", "specimens drawn for the range of the greatest peak and the share of falls", ge=0, le=10_000
     )

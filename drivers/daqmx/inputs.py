@@ -121,7 +121,7 @@ class Inputs:
                 return False
 
     def start(self) -> None:
-        """Start the sample clock, also of the output."""
+        """Start the sample clock, which also clocks the output."""
         with translated("starting the inputs"):
             self._task.start()
 

@@ -23,11 +23,11 @@ class Line:
     rate: float
 
     def seconds_at(self, time: float) -> float:
-        """Second of the second clock at `time` of the first [s]."""
+        """Time on the second clock at `time` on the first [s]."""
         return self.seconds + self.rate * (time - self.time)
 
     def time_at(self, seconds: float) -> float:
-        """Second of the first clock at `seconds` of the second [s]."""
+        """Time on the first clock at `seconds` on the second [s]."""
         return self.time + (seconds - self.seconds) / self.rate
 
 

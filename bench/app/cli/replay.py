@@ -125,7 +125,7 @@ def _text(replayed: "Replayed", table: str) -> str:
 
 def _software(replayed: "Replayed") -> str:
     if replayed.changed:
-        return f"Since the recording: {'; '.join(replayed.changed)}"
+        return f"Changed since the recording: {'; '.join(replayed.changed)}"
     return "The software is that of the recording: git hash and all versions are the same"
 
 

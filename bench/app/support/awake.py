@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 from sim import waiting
 
 CONTINUOUS, SYSTEM_REQUIRED = 0x80000000, 0x00000001
-"""Flags of SetThreadExecutionState: until changed, and no sleep."""
+"""Flags of SetThreadExecutionState: valid until changed, and no sleep."""
 ENDING = 1.0
 """Longest wait for the end of the inhibiting program [s]."""
 
@@ -28,7 +28,7 @@ COMMANDS = {
 
 @contextmanager
 def awake(system: str = sys.platform) -> Generator[bool]:
-    """Context manager in which the computer does not fall asleep by itself. Yields whether this was possible."""
+    """Context manager that keeps the computer from going to sleep. Yields whether this was possible."""
     if system == "win32":
         with _thread_required(_windows_state()) as required:
             yield required

@@ -139,7 +139,7 @@ def power(governor: Path = Path("/sys/devices/system/cpu/cpu0/cpufreq/scaling_go
 
 
 def sleep(which: Callable[[str], str | None] = shutil.which, system: str = sys.platform) -> Finding:
-    """Check whether a run can keep the computer from falling asleep."""
+    """Check whether a run can keep the computer from going to sleep."""
     item = "sleep"
     if system == "win32":
         return Finding(item, Health.GOOD, "a run keeps the computer awake; closing the lid still suspends it")
