@@ -27,7 +27,7 @@ os.environ.setdefault("ROCKBENCH_SESSIONS", "off")
 
 pytest.register_assert_rewrite("bench.testing.conformance")
 
-REAL_TIME = (
+INSTRUMENTS = (
     "tests/drivers/daqmx/",
     "tests/drivers/emulation/",
     "tests/drivers/hardware/",
@@ -36,13 +36,20 @@ REAL_TIME = (
     "tests/faults/emulated/",
     "tests/bench/app/cli/test_devices.py",
     "tests/bench/app/cli/test_emulate.py",
+    "tests/protocols/check/",
+)
+"""Tests that emulated instruments pace, to milliseconds: one after the other, or they hold each other up."""
+
+PEOPLE = (
     "tests/bench/app/cli/test_interrupts.py",
     "tests/protocols/test_interrupt.py",
-    "tests/protocols/check/",
     "tests/bench/app/ipc/",
     "tests/bench/app/gui/",
 )
-"""Tests that emulated instruments or a person's clock pace: one after the other, or they hold each other up."""
+"""Tests that a person's clock paces, to tenths of a second: one after the other, beside those of the instruments."""
+
+REAL_TIME = {"instruments": INSTRUMENTS, "people": PEOPLE}
+"""Groups that stay in one process each; both mostly wait."""
 
 LATENESS = pytest.StashKey[Lateness]()
 
@@ -79,18 +86,23 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:  # noqa: ARG001 - the hook's signature
-    """One process more than processors: the one with the tests of REAL_TIME mostly waits."""
+    """One process more than processors: those with the tests of REAL_TIME mostly wait."""
     return (os.cpu_count() or 1) + 1
+
+
+def _paced_by(nodeid: str) -> str | None:
+    """The group of REAL_TIME that has a test; None for one that no clock paces."""
+    return next((group for group, places in REAL_TIME.items() if nodeid.startswith(places)), None)
 
 
 _gives_way = False
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Beside others, a process with tests that no clock paces gives way to the one with those of REAL_TIME."""
+    """Beside others, a process with tests that no clock paces gives way to those with the tests of REAL_TIME."""
     global _gives_way
     beside = "PYTEST_XDIST_WORKER" in os.environ and hasattr(os, "nice")
-    if beside and not _gives_way and not item.nodeid.startswith(REAL_TIME):
+    if beside and not _gives_way and _paced_by(item.nodeid) is None:
         os.nice(10)
         _gives_way = True
 
@@ -117,14 +129,14 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, Any, Any]:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> object:
-    """A file stays in one process, so that what its fixtures made is made once; all of REAL_TIME stays in one too."""
+    """A file stays in one process, so that what its fixtures made is made once; so does each group of REAL_TIME."""
     from xdist.scheduler import LoadScopeScheduling
 
     class Together(LoadScopeScheduling):
         def _split_scope(self, nodeid: str) -> str:
             if nodeid.startswith(SPREAD):
                 return nodeid
-            return "real time" if nodeid.startswith(REAL_TIME) else nodeid.split("::")[0]
+            return _paced_by(nodeid) or nodeid.split("::")[0]
 
     return Together(config, log)
 
