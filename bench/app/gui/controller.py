@@ -170,8 +170,11 @@ class Controller(QObject):
         if link.status == "linked" and scene.state in DRIVEN and self._quiet > self._longest_quiet:
             # the process runs but its engine does not respond: the last known state may be outdated
             return bench_status("no link", scene.state, scene.reason, self._quiet)
-        if link.status == "linked" and scene.preparing and scene.state is State.IDLE:
-            return Status(texts.PLANNING, scene.reason, "wait", "ring")
+        planning = scene.preparing and scene.state is State.IDLE
+        if planning and (link.status == "linked" or (link.status == "no link" and link.lives)):
+            # no rig is open: a busy computer may delay the messages of a process that plans
+            late = "" if link.status == "linked" else f" ({texts.PLANNING_LATE.format(age=link.silence)})"
+            return Status(texts.PLANNING, f"{scene.reason}{late}", "wait", "ring")
         # the reason of a change of state is over when the plan goes on
         reason = scene.step if scene.state is State.RUNNING and scene.step else scene.reason
         return bench_status(link.status, scene.state, reason, link.silence)

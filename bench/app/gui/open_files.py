@@ -5,7 +5,7 @@ The plot shows one channel of one run at screen resolution, and is reloaded afte
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum, auto
 from functools import partial
 from pathlib import Path
@@ -26,6 +26,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from bench.app.catalogue import load_protocol
 from bench.app.formatting import clock
 from bench.app.gui import texts
 from bench.app.gui.background import Reader
@@ -35,6 +36,7 @@ from bench.app.gui.widgets import colour_axes, in_screen_unit, label
 from bench.app.ipc.messages import extremes
 from bench.datafile.tables import Column, Table
 from bench.document.typography import moment
+from sim.errors import RockbenchError
 
 DRIVE = "drive"
 CHUNK = 1_000_000
@@ -55,6 +57,8 @@ class RunFile:
     channels: Mapping[str, str]
     """Name and unit of every channel, the drive last."""
     runs: Mapping[int, float]
+    labels: Mapping[str, str] = field(default_factory=dict[str, str])
+    """Printed names of fields of a point, as declared by the protocol."""
 
     @property
     def has_gains(self) -> bool:
@@ -97,7 +101,16 @@ def read_file(path: Path) -> RunFile:
             record.tables.get("prediction", {}),
             {**{channel.name: channel.unit for channel in record.channels}, DRIVE: "V"},
             {run.number: len(run.rows) / record.sample_rate for run in record.runs},
+            _labels(str(record.metadata.get("protocol", ""))),
         )
+
+
+def _labels(protocol: str) -> Mapping[str, str]:
+    """Printed names of the results of a protocol; none for one that is not installed."""
+    try:
+        return load_protocol(protocol).view.labels
+    except RockbenchError:
+        return {}
 
 
 def read_stretch(path: Path, run: int, channel: str, begin: float, end: float, parts: int) -> Stretch:
@@ -234,9 +247,9 @@ class HistoryView(QWidget):
         self.curve: Any = self._item.plot()
         self.use_theme(theme)
         row = QHBoxLayout()
-        for name, field in ((texts.RUN, self.run), (texts.CHANNEL, self.channel)):
+        for name, choice in ((texts.RUN, self.run), (texts.CHANNEL, self.channel)):
             row.addWidget(QLabel(name))
-            row.addWidget(field)
+            row.addWidget(choice)
         row.addWidget(self.whole)
         row.addWidget(self.message, 1)
         column = QVBoxLayout(self)
@@ -262,17 +275,17 @@ class HistoryView(QWidget):
         """Show the samples of this file."""
         self._file = file
         kept = self.channel.currentData()
-        for field in (self.run, self.channel):
-            field.blockSignals(True)
-            field.clear()
+        for choice in (self.run, self.channel):
+            choice.blockSignals(True)
+            choice.clear()
         if file is not None:
             self.run.addItems([texts.RUN_ITEM.format(number=run, seconds=length) for run, length in file.runs.items()])
             for name in file.channels:
                 self.channel.addItem(label(name), name)
             chosen = kept if kept in file.channels else next(iter(file.channels), DRIVE)
             self.channel.setCurrentIndex(self.channel.findData(chosen))
-        for field in (self.run, self.channel):
-            field.blockSignals(False)
+        for choice in (self.run, self.channel):
+            choice.blockSignals(False)
         self.curve.setData([], [])
         self.shown = None
         self.show_whole()

@@ -55,14 +55,21 @@ def read_only(name: str) -> QTableWidget:
 
 
 def show_points(
-    table: QTableWidget, results: Mapping[str, Column], points: Sequence[Mapping[str, object]], *, everything: bool
+    table: QTableWidget,
+    results: Mapping[str, Column],
+    points: Sequence[Mapping[str, object]],
+    labels: Mapping[str, str],
+    *,
+    everything: bool,
 ) -> None:
-    """Show the quantities of every point with prediction and verdict; with `everything`, every field of the file."""
+    """Show the quantities of every point with prediction and verdict; with `everything`, every field of the file.
+    `labels` are the printed names of fields.
+    """
     if everything:
         headings, rows = every_field(results, points)
         _fill(table, headings, [of.description for of in results.values()], rows)
     else:
-        _fill(table, texts.POINT_TITLES, texts.POINT_TIPS, [each.cells for each in rows_of(results, points)])
+        _fill(table, texts.POINT_TITLES, texts.POINT_TIPS, [each.cells for each in rows_of(results, points, labels)])
     header = table.horizontalHeader()
     header.setSectionResizeMode(QHeaderView.ResizeMode.Interactive)
     if not everything:
@@ -195,7 +202,8 @@ class ResultsPage(QWidget):
         file = self.files.chosen
         results: Mapping[str, Column] = {} if file is None else file.results
         points = [] if file is None else file.points
-        show_points(self.table, results, points, everything=self.everything.isChecked())
+        labels: Mapping[str, str] = {} if file is None else file.labels
+        show_points(self.table, results, points, labels, everything=self.everything.isChecked())
 
     def _draw(self) -> None:
         """Draw the gains of all ticked files, with the predicted lines of the first."""

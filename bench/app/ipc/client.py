@@ -92,14 +92,14 @@ class ClientConnection:
         """State of the connection: "no link" when the session has died or is silent before its final message."""
         if self._over:
             return "over"
-        if not self._lives:
+        if not self.lives:
             return "no link"
         if not self._begun:
             return "starting"
         return "linked" if self.silence <= SILENCE else "no link"
 
     @property
-    def _lives(self) -> bool:
+    def lives(self) -> bool:
         """Whether the session can still send messages."""
         raise NotImplementedError
 
@@ -188,7 +188,7 @@ class SessionClient(ClientConnection):
             self.process.kill()
 
     @property
-    def _lives(self) -> bool:
+    def lives(self) -> bool:
         return self.process.poll() is None
 
     def _talk(self, assignment: PlanCheck) -> None:
@@ -224,7 +224,7 @@ class AttachedClient(ClientConnection):
         self._talking.start()
 
     @property
-    def _lives(self) -> bool:
+    def lives(self) -> bool:
         return self._talking.is_alive()
 
     def _talk(self, session: RunningSession) -> None:

@@ -40,6 +40,7 @@ class ScriptedClient:
         self.said: list[FromSession] = []
         self.asked: list[object] = []
         self.status, self.silence, self.beats = "linked", 0.0, 0
+        self.lives = True
         ScriptedClient.latest = self
 
     def alive(self) -> None:

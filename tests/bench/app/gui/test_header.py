@@ -196,3 +196,16 @@ def test_closing_asks_nothing_when_the_run_is_over(window: Window, link: Scripte
 @pytest.mark.usefixtures("window")
 def test_the_main_loop_keeps_the_link_alive(link: ScriptedClient, qtbot: QtBot) -> None:
     qtbot.waitUntil(lambda: link.beats >= 3, timeout=3000)
+
+
+def test_a_session_that_plans_on_a_busy_computer_is_not_lost(window: Window, link: ScriptedClient) -> None:
+    """No rig is open: the state is known. A process that has died is lost."""
+    link.said = [Preparing("simulating starts", 1, 4)]
+    window._controller._look()
+    link.status, link.silence = "no link", 2.4
+    window.header.refresh()
+    assert window.header.word.text() == "PLANNING"
+    assert "no message for 2 s" in window.header.reason.text()
+    link.lives = False
+    window.header.refresh()
+    assert window.header.word.text() == "NO LINK"

@@ -6,6 +6,7 @@ import numpy as np
 
 from bench.app.gui.point_table import every_field, rows_of
 from bench.datafile.tables import Column
+from protocols.free_rocking.protocol import PROTOCOL as FREE_ROCKING
 
 NONE = np.zeros(0)
 
@@ -59,3 +60,14 @@ def test_a_line_of_the_loop_check_has_its_own_unit() -> None:
             "measured": 1.5, "uncertainty": None, "expected": None}  # fmt: skip
     (row,) = rows_of(columns, [line])
     assert row.cells == ("laser 1", "delay against table displacement", "1.500 m/s²", "-", "-", "passed")
+
+
+def test_a_declared_name_replaces_the_formula_of_a_description() -> None:
+    columns = _columns(
+        part=("", "the tilt"),
+        ratio=("1", "r_exp / r_th, the restitution factor"),
+        ratio_uncertainty=("1", "expanded uncertainty of the ratio"),
+    )
+    point = {"part": "all tilts", "ratio": 1.01, "ratio_uncertainty": 0.02}
+    (row,) = rows_of(columns, [point], FREE_ROCKING.view.labels)
+    assert row.cells[1] == "restitution factor rₑₓₚ/rₜₕ"
