@@ -73,6 +73,9 @@ class Guard:
         self._waiting = np.zeros(0)
         self._command = self._sent = 0.0
         self._held: float | None = None
+        self._sending = False
+        self._owed = self._zeros = 0
+        """Samples that may be queued in the rig beyond the known ones, and samples read since these were all zero."""
         self._make_watches()
         self._ramp_samples: int | None = None
         self._ramp_done = 0
@@ -90,7 +93,7 @@ class Guard:
     @property
     def at_zero(self) -> bool:
         """Whether a ramp has ended and every sample queued in the rig is zero."""
-        return self.ramping and self._gain(0) == 0.0 and not self._waiting.any()
+        return self.ramping and self._gain(0) == 0.0 and not self._waiting.any() and self._zeros > self._owed
 
     def arm(self) -> None:
         """Arm the rig with zeros queued. Raises RigError while a safety input is open."""
@@ -98,6 +101,7 @@ class Guard:
             raise SafetyInputOpen(f"arming is refused: {', '.join(opened)} open; close it, then begin again", opened)
         self._ramp_samples, self._ramp_done, self._ramp_from = None, 0, 1.0
         self._command, self._sent, self._held, self._expected = 0.0, 0.0, None, 0
+        self._sending, self._owed, self._zeros = False, 0, 0
         self._first_block = True
         self._make_watches()
         self._waiting = np.zeros(self._rig.lead)
@@ -110,16 +114,26 @@ class Guard:
         Commands from the first one beyond the limits on are not sent: the last valid value is ramped to zero along the
         fast ramp.
         """
+        if self._sending and self._held is None:
+            # the last exchange ended before its block was noted: the block's commands are lost, and the next ones would
+            # follow with a step
+            self._held = self._command
+            self._owed = volts.size
+        self._sending = True
         refused = self.refusal(volts) if self._held is None else None
         if refused is not None:
             self._held = self._command
             self.abort()
         if self._held is not None:
             volts = np.full(volts.shape, self._held)
-        self._command = float(volts[-1])
-        sent = self._ramped(volts)
+        # everything is allocated before the rig is written to, and noted just after: when memory is exhausted at any of
+        # these lines, the next block, of the ramp, continues from what was really sent
+        command, sent = float(volts[-1]), self._ramped(volts)
+        last, queue = float(sent[-1]), np.concatenate((self._waiting, sent))
         self._rig.write(sent)
-        queue = np.concatenate((self._waiting, sent))
+        self._waiting, self._command, self._sent, self._sending = queue, command, last, False
+        if self._ramp_samples is not None:
+            self._ramp_done += volts.size
         block = self._rig.read(volts.size)
         if block.first != self._expected or len(block) != volts.size:
             expected = f"{self._expected}-{self._expected + volts.size - 1}"
@@ -127,6 +141,8 @@ class Guard:
             raise RigError(f"samples are missing: expected {expected}, received {received}")
         self._expected += len(block)
         played, self._waiting = queue[: volts.size], queue[volts.size :]
+        over = self.ramping and self._gain(0) == 0.0 and not self._waiting.any()
+        self._zeros = self._zeros + volts.size if over else 0
         values, extremes = self._conversion.of(block.counts)
         signals = self._signals_of(values)
         exceeded, near = self._motion.check(block.first, values, signals, extremes)
@@ -242,9 +258,7 @@ class Guard:
 
     def _ramped(self, volts: NDArray[np.float64]) -> NDArray[np.float64]:
         if self._ramp_samples is not None:
-            volts = self._slewed(volts * self._gain(np.arange(1, volts.size + 1)))
-            self._ramp_done += volts.size
-        self._sent = float(volts[-1])
+            return self._slewed(volts * self._gain(np.arange(1, volts.size + 1)))
         return volts
 
     def _slewed(self, volts: NDArray[np.float64]) -> NDArray[np.float64]:

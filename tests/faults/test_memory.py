@@ -3,6 +3,7 @@
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 from bench.control.oscillator import DriveCalibration, Leg
@@ -56,6 +57,43 @@ def test_a_subscriber_without_memory_is_ramped_out(again: bool) -> None:
 
     bench = LoopbackBench(subscriber=subscriber)
     _check(bench, bench.run(plan()))
+
+
+@pytest.mark.parametrize("moment", ["before the write", "after the write", "before the read"])
+def test_memory_that_ends_between_the_rig_and_the_guard_is_ramped_out_without_a_step(moment: str) -> None:
+    """The ramp continues from what the rig was really sent, and every sample that it plays is accounted for."""
+    bench = LoopbackBench()
+    rig = bench.rig
+    at = list[int]()
+    call, left = ("read" if "read" in moment else "write"), [1]
+    real = getattr(rig, call)
+
+    def fails(given: object) -> object:
+        now = bench.engine.state is State.RUNNING and abs(rig.played[-1]) > 0.1 and left[0]
+        if now:
+            at.append(rig.played.size)
+        if now and "before" in moment:
+            left[0] = 0
+            raise MemoryError
+        done = real(given)
+        if now:
+            left[0] = 0
+            raise MemoryError
+        return done
+
+    setattr(rig, call, fails)
+
+    def plan() -> Plan:
+        yield from _driven()
+        yield Dwell(20)
+
+    _check(bench, bench.run(plan()))
+    assert not left[0]
+    played = np.asarray(rig.played)
+    steps = np.abs(np.diff(played))
+    # the ramp adds to the slew of the drive; what a rig took and did not report is left out once, within the limit
+    slew = 400.0 if moment == "after the write" else np.pi / 2.0 * np.abs(played).max() / 0.5
+    assert steps[at[0] :].max() <= 1.1 * steps[: at[0] + rig.lead].max() + slew / rig.sample_rate
 
 
 _HOG = """
