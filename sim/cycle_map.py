@@ -57,6 +57,16 @@ class CycleMap:
         found = complex(multipliers[int(np.argmax(np.abs(multipliers)))])
         return complex(found.real, abs(found.imag))
 
+    @property
+    def sensitive(self) -> complex:
+        """Unit control of a single cycle that excites the slowest pair of multipliers most."""
+        multipliers, vectors = np.linalg.eig(self.transition)
+        at = int(np.argmax(np.abs(multipliers)))
+        before, now = self.inputs
+        effect = np.linalg.inv(vectors)[at] @ (multipliers[at] * now + before)
+        _, _, directions = np.linalg.svd(np.stack((effect.real, effect.imag)))
+        return complex(directions[0, 0], directions[0, 1])
+
 
 def coefficients(u1: NDArray[np.complex128], drift: NDArray[np.complex128]) -> Array:
     """The vector y, shape (12,), from complex harmonics, of shape (OBSERVED,) or longer, of u1 and drift [m].

@@ -134,8 +134,8 @@ ANSWER = 0.15
 or a gain error of 15 % causes it.
 """
 
-GROWTH = 1.1
-"""Largest peak of a cycle, relative to the largest peak of the free motion or to the limit's warning level."""
+GROWTH = 1.5
+"""Largest peak of a cycle relative to the largest of the free motion."""
 
 
 @dataclass

@@ -2,18 +2,20 @@
 
 from collections import deque
 from collections.abc import Generator
+from dataclasses import replace
 from math import nan, sqrt
 
 import numpy as np
 
 from bench.analysis.cycles import Cycle
+from bench.analysis.free_motion import SHORTEST, Rate, free_motion
 from bench.analysis.gain import SensorAccuracy, steady_peak
 from bench.analysis.signals import DRIFT
 from bench.analysis.steady import WINDOW, SteadyDetector
 from bench.control.sine import Sine, SineControl, SineResponse, Tolerance
 from bench.control.stabiliser import BLEND, DELAY, HoldMonitor, Stabiliser, observed
 from bench.engine.steps import Dwell, Fallen, Measured, Outcome, Publish, SetHarmonics, Step
-from bench.events import HoldCycle
+from bench.events import HoldCycle, StepStarted
 from protocols.harmonic.measurement import (
     AIM,
     INTERVAL,
@@ -41,6 +43,14 @@ SLOW = 0.985
 UPDATES = 8
 """Largest number of corrections of the table while a motion is held."""
 
+RELEASED, GROWN = 120, 0.3
+"""Largest number of cycles observed after the release, and the relative deviation of a peak that ends them."""
+
+KICK, FADING = 0.003, 12
+"""Control of a single cycle after the measurement, as a share, without which the deviation would grow from the noise
+for a hundred cycles; and number of cycles after it in which other multipliers fade.
+"""
+
 
 def prepared(orbit: Orbit | None, shaker: Shaker | None, harmonics: int) -> CycleMap | None:
     """Cycle map for the stabiliser; None if there is no orbit on the table."""
@@ -56,7 +66,7 @@ def hold(
     sine: Sine,
     table: TableState,
     found: CycleMap,
-    beta: float | None,
+    beta: float,
     largest: float,
     parameters: HarmonicParameters,
     accuracy: SensorAccuracy,
@@ -83,9 +93,35 @@ def hold(
             yield SetHarmonics(run.command, run.monitor.cycles - 1 + DELAY, BLEND)
         if run.monitor.cycles % INTERVAL == 0 and run.recent:
             yield from report(list(run.recent))
-        if (held := run.measured()) is not None:
-            yield SetHarmonics(run.shares)
-            return held
+        if (held := run.measured()) is not None and held.peak is not None:
+            first, *others = run.shares
+            kicked = (first + KICK * found.sensitive / table.answer, *others)
+            yield SetHarmonics(kicked, run.monitor.cycles + 1, BLEND)
+            yield SetHarmonics(run.shares, run.monitor.cycles + 2, BLEND)
+            free = yield from _released(sine, beta, held.peak.drift, run.monitor.cycles)
+            return free if isinstance(free, Fallen) else replace(held, rate=free)
+
+
+def _released(sine: Sine, beta: float, drift: float, cycles: int) -> Generator[Step, Outcome, Rate | Fallen | None]:
+    """Rate at which the deviation changes without control, while it is small; `drift` [m] is the peak on the orbit."""
+    yield Publish(StepStarted(f"beta = {beta:g} at {sine.omega:g} rad/s: released, observing the deviation"))
+    found = list[Cycle]()
+    for count in range(1, RELEASED + 1):
+        outcome = yield Dwell(1)
+        if not isinstance(outcome, Measured):
+            return Fallen()
+        for cycle in outcome.cycles:
+            deviation = float(cycle.extreme[DRIFT]) / drift - 1.0
+            yield Publish(HoldCycle(sine.omega, beta, cycles + count, float(cycle.extreme[DRIFT]), abs(deviation), 0.0))
+            if count > DELAY + FADING:
+                found.append(cycle)
+            if abs(deviation) > GROWN and len(found) > SHORTEST:
+                return _rate(found)
+    return _rate(found)
+
+
+def _rate(cycles: list[Cycle]) -> Rate | None:
+    return free_motion(cycles).rate if cycles else None
 
 
 class _Hold:

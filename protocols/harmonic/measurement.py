@@ -7,7 +7,7 @@ from math import hypot, log, tau
 from typing import Any
 
 from bench.analysis.cycles import Cycle
-from bench.analysis.free_motion import CYCLES, KEPT, FreeMotion, free_motion, orbit_peak
+from bench.analysis.free_motion import CYCLES, KEPT, FreeMotion, Rate, free_motion, orbit_peak
 from bench.analysis.gain import SensorAccuracy, SteadyPeak, gain, modulated_peak, steady_peak
 from bench.analysis.sensor_accuracy import SensorUncertainty
 from bench.analysis.signals import ACCELERATION, DISPLACEMENT, LASER_1, LASER_2
@@ -73,7 +73,8 @@ class Held:
     """Result of a hold: the peak of the held motion, errors of the table as in `Settled`, after `updates` corrections.
 
     `control` is the rms of the control over the measured cycles, as a share of the amplitude, and `captured` the number
-    of cycles until the capture. `peak` is None where the hold was released for a `reason`.
+    of cycles until the capture. `peak` is None where the hold was released for a `reason`. `rate` is that of the
+    deviation without control after the measurement.
     """
 
     peak: SteadyPeak | None
@@ -84,6 +85,7 @@ class Held:
     control: float = 0.0
     captured: int | None = None
     cycles: int = 0
+    rate: Rate | None = None
 
 
 JUDGED = (ACCELERATION, DISPLACEMENT, LASER_1, LASER_2)
@@ -285,6 +287,7 @@ def _held_point(
             "uncertainty_parts": measured.budget.as_json,
             **prediction,
             "agrees": agrees,
+            **_rate_fields(held.rate),
             "control_share": held.control,
             "captured_cycles": held.captured,
             "drift_peak_m": peak.drift,
@@ -317,9 +320,18 @@ def _free_fields(motion: FreeMotion | None, bare: float) -> dict[str, Any]:
         "alpha_2_mean": motion.mean / bare,
         "repeats_cycles": motion.repeats or None,
     }
-    if motion.rate is not None:
-        found |= {"multiplier": motion.rate.modulus, "multiplier_uncertainty": 2.0 * motion.rate.uncertainty}
-    return found
+    return found | _rate_fields(motion.rate)
+
+
+def _rate_fields(rate: Rate | None) -> dict[str, Any]:
+    """Fields of the measured multiplier."""
+    if rate is None:
+        return {}
+    return {
+        "multiplier": rate.modulus,
+        "multiplier_uncertainty": 2.0 * rate.uncertainty,
+        "multiplier_angle_rad": rate.angle,
+    }
 
 
 def _orbit_fields(

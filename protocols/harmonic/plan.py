@@ -230,14 +230,16 @@ class HarmonicPlan:
             return Held(None, "the table's sine is not known")
         sine = Sine(omega, self._amplitude, calibration)
         free = settled.peak.drift if settled.motion is None else settled.motion.greatest
+        limits = self._configuration.limits
+        largest = min(GROWTH * free, limits.warning.drift * limits.drift)
         report = self._report(omega, specimen)
         return (
             yield from hold(
                 sine,
                 settled.table,
                 found,
-                specimen.label,
-                GROWTH * free,
+                specimen.label or 0.0,
+                largest,
                 self._parameters,
                 self._configuration.analysis,
                 report,

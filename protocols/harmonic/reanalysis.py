@@ -7,7 +7,7 @@ from math import tau
 import numpy as np
 
 from bench.analysis.cycles import Cycle, CycleAnalyser, mean_amplitude
-from bench.analysis.free_motion import CYCLES, KEPT, free_motion, orbit_peak
+from bench.analysis.free_motion import CYCLES, KEPT, Rate, free_motion, orbit_peak
 from bench.analysis.gain import modulated_peak, steady_peak
 from bench.analysis.signals import ACCELERATION, SIGNALS
 from bench.analysis.steady import SteadyDetector
@@ -16,7 +16,7 @@ from bench.control.oscillator import DriveCalibration
 from bench.control.sine import Sine, SineResponse
 from bench.datafile.reader import DataFile
 from bench.engine.steps import Arm, Calibrate, Dwell, Measured, Outcome, Publish, SetHarmonics, Step, Sweep
-from bench.events import Acquired, Estimate, Event, PointFinished
+from bench.events import Acquired, Estimate, Event, PointFinished, StepStarted
 from protocols.harmonic.free_prediction import with_free_prediction
 from protocols.harmonic.measurement import JUDGED, LASERS, REMAINING, TRANSIENT, Held, Settled, judge, predicted_fields
 from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, HarmonicSettings, PointStatus
@@ -26,7 +26,7 @@ from sim.gain import predict_gain
 @dataclass
 class _Series:
     """Consecutive dwells at one frequency. `recent` are the cycles since the last change of the drive; of a `hold`, in
-    which the drive changes in every cycle, all. `held` is the hold of the same motion.
+    which the drive changes in every cycle, all until it is `released`. `held` is the hold of the same motion.
     """
 
     sine: Sine
@@ -40,6 +40,7 @@ class _Series:
     trimmed: bool = False
     measured: tuple[Cycle, ...] = ()
     hold: bool = False
+    released: bool = False
     held: "_Series | None" = None
 
 
@@ -106,6 +107,8 @@ class HarmonicFollower:
                 series.updates += 1
                 series.recent.clear()
                 series.trimmed = True
+            case Publish(event=StepStarted()) if series is not None:
+                series.released = True
             case Publish(event=Estimate(beta=beta)) if series is not None:
                 series.tested, series.beta = True, beta
             case Publish(event=PointFinished(point=HarmonicPoint() as point)):
@@ -120,7 +123,7 @@ class HarmonicFollower:
         if not isinstance(event, Acquired):
             return
         self._read = event.block.first + len(event.block)
-        if not self._dwelling or (series := self._series) is None:
+        if not self._dwelling or (series := self._series) is None or (series.hold and series.released):
             return
         cycles = series.analyser.push(np.column_stack((event.signals[:, : len(SIGNALS)], event.drive)))
         if series.turn is None and cycles:
@@ -180,6 +183,7 @@ class HarmonicFollower:
             control=point.control_share or 0.0,
             captured=point.captured_cycles,
             cycles=len(series.recent),
+            rate=_rate(point),
         )
 
     def _settled(self, series: _Series) -> Settled:
@@ -208,3 +212,11 @@ class HarmonicFollower:
             motion,
             None if motion is None else orbit_peak(constant, motion, omega),
         )
+
+
+def _rate(point: HarmonicPoint) -> Rate | None:
+    """The recorded multiplier of a point."""
+    modulus, uncertainty, angle = point.multiplier, point.multiplier_uncertainty, point.multiplier_angle_rad
+    if modulus is None or uncertainty is None or angle is None:
+        return None
+    return Rate(modulus, 0.5 * uncertainty, angle)

@@ -51,8 +51,11 @@ def test_the_file_has_every_cycle_of_the_hold(held: dict[str, Any], folder: Path
     assert list(cycles["cycle"]) == list(range(1, len(cycles["cycle"]) + 1))
     controls, peaks = np.array(cycles["control"]), np.array(cycles["drift_peak"])
     assert controls.max() == pytest.approx(0.1, rel=1e-6)
-    assert np.sqrt(np.mean(controls[-24:] ** 2)) == pytest.approx(held["control_share"], rel=1e-6)
-    assert peaks[-24:].mean() < 0.2 * peaks[:12].max()
+    # the last cycles are those after the release
+    measured = slice(int(np.flatnonzero(controls)[-1]) - 23, int(np.flatnonzero(controls)[-1]) + 1)
+    assert np.sqrt(np.mean(controls[measured] ** 2)) == pytest.approx(held["control_share"], rel=1e-6)
+    assert peaks[measured].mean() < 0.2 * peaks[:12].max()
+    assert np.ptp(peaks[-10:]) > 10.0 * np.ptp(peaks[measured])
 
 
 def test_the_file_replays_to_the_last_bit_and_its_hold_is_analysed_again(
@@ -65,6 +68,11 @@ def test_the_file_replays_to_the_last_bit_and_its_hold_is_analysed_again(
     (again,) = json.loads(capsys.readouterr().out)["points"]
     assert again["status"] == "held"
     assert again["alpha_2"] == pytest.approx(held["alpha_2"], rel=2e-3)
+
+
+def test_the_multiplier_is_measured_after_the_release(held: dict[str, Any]) -> None:
+    assert held["multiplier"] == pytest.approx(held["table_multiplier"], abs=max(0.005, held["multiplier_uncertainty"]))
+    assert np.degrees(held["multiplier_angle_rad"]) == pytest.approx(166.0, abs=1.5)
 
 
 def test_without_a_hold_only_the_free_motion_is_measured(tmp_path: Path) -> None:
