@@ -133,8 +133,8 @@ class HarmonicPoint(Parameters):
     multiplier: float | None = quantity(
         None,
         "1",
-        "measured modulus of the slowest multiplier of an unsteady motion, or of a held one after its release; below 1, "
-        "the motion becomes periodic",
+        "measured modulus of the slowest multiplier of an unsteady motion, or of a held one after its release; below "
+        "1, the motion becomes periodic",
     )
     multiplier_uncertainty: float | None = quantity(None, "1", "expanded uncertainty of the multiplier (k = 2)")
     multiplier_angle_rad: float | None = quantity(None, "rad", "its measured argument: angle of the spiral in a cycle")
