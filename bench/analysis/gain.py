@@ -1,13 +1,15 @@
 """Gain coefficient from measured cycles, with its uncertainty (GUM, and the Monte Carlo method of GUM Supplement 1)."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from math import hypot, sqrt
+from dataclasses import dataclass, replace
+from math import hypot, sqrt, tau
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bench.analysis.cycles import Cycle, Waves, mean_amplitude, mean_waves
+from bench.analysis.linearity import Checks, Harmonics, LinearFrame
+from bench.analysis.remaining_transient import remaining_transient
 from bench.analysis.sensor_accuracy import Draws, PeakReadings, SensorUncertainty, SharedDraws
 from bench.analysis.sensor_accuracy import SensorAccuracy as SensorAccuracy
 from bench.analysis.signals import ACCELERATION, DRIFT, LASER_1, LASER_2, U1
@@ -20,7 +22,13 @@ DRAWS, SEED = 4000, 1
 """
 
 ZERO_PLACES = 32
-"""Number of points that represent the mean over a cycle."""
+"""Number of points that represent a cycle."""
+
+CHECK_PLACES = 64
+"""Number of points of a cycle whose readings check the linearity of a laser."""
+
+FRAME_SHARE = 0.3
+"""Standard uncertainty of a harmonic of the bare frame computed from that of the table, relative."""
 
 PEAK_HARMONICS = 5
 """Highest harmonic used for the peak of a steady drift. An impact acts on the second storey through two springs and two
@@ -42,9 +50,9 @@ class SteadyPeak:
     """The drift over measured cycles.
 
     `drift` [m] is its peak, `scatter` [m] the standard uncertainty of that peak from the cycles themselves, and
-    `transient` [m] that from a remaining transient; `u1` [m] is the first storey's peak; `amplitude` [m/s2] is the
+    `transient` [m] that of a remaining transient; `u1` [m] is the first storey's peak; `amplitude` [m/s2] is the
     table's and `harmonics` the relative rms of its harmonics; `readings` are those of the lasers at the peak, `cycles`
-    the number of cycles.
+    the number of cycles, `checks` the harmonics of both readings in a test of the bare frame.
     """
 
     drift: float
@@ -55,6 +63,7 @@ class SteadyPeak:
     harmonics: float
     readings: PeakReadings
     cycles: int
+    checks: Checks | None = None
 
 
 @dataclass(frozen=True)
@@ -70,20 +79,32 @@ class Gain:
         return self.budget.expanded
 
 
-def steady_peak(cycles: Sequence[Cycle], omega: float, residual: float = 0.0) -> SteadyPeak:
+def steady_peak(
+    cycles: Sequence[Cycle],
+    omega: float,
+    residual: float = 0.0,
+    before: Sequence[Cycle] = (),
+    frame: LinearFrame | None = None,
+) -> SteadyPeak:
     """Peak of the mean cycle at `omega` [rad/s], counted from the mean over the cycle.
 
     Over a period of a steady motion the second storey gains no momentum, so the force k2 drift that alone drives it has
-    zero mean, whatever the block does: the mean is a better zero of the sensors than a rest before the test, which
-    contains one rounding error of each laser, and the larger of the two sides does not include that error. The scatter
-    is that of the cycles at the peak, corrected for the correlation of neighbours, M_eff = M (1 - r1) / (1 + r1).
-    `residual`, the relative bound of a remaining transient, is taken as a rectangular distribution.
+    zero mean, whatever the block does: the mean is a better zero of the sensors than a rest before the test, which has
+    one rounding error of each laser. The larger of both sides then does not include that error. The scatter is that of
+    the cycles at the peak, corrected for the correlation of neighbours, M_eff = M (1 - r1) / (1 + r1). A remaining
+    transient is estimated from `cycles` and those `before` them at the same drive; `residual`, the relative bound of a
+    further systematic effect, is taken as a rectangular distribution. The harmonics of the readings of a linear
+    `frame` check the linearity of the lasers.
     """
+    waves = mean_waves([*before, *cycles], {DRIFT: PEAK_HARMONICS})
+    series = waves.there[:, DRIFT]
     waves = mean_waves(cycles, {DRIFT: PEAK_HARMONICS})
     drift = float(waves.peaks[DRIFT])
-    scatter, transient = _standard_error(waves.there[:, DRIFT]), residual * drift / sqrt(3.0)
+    scatter = _standard_error(waves.there[:, DRIFT])
+    transient = hypot(remaining_transient(series, len(cycles)), residual * drift / sqrt(3.0))
     readings = _readings(waves, omega, drift, at_rest=False)
-    return _peak(cycles, waves, readings, scatter, transient, float(waves.peaks[U1]))
+    checks = None if frame is None else _checks(cycles, waves, omega, frame)
+    return replace(_peak(cycles, waves, readings, scatter, transient, float(waves.peaks[U1])), checks=checks)
 
 
 def modulated_peak(cycles: Sequence[Cycle], omega: float) -> SteadyPeak:
@@ -117,19 +138,43 @@ def _peak(
 def _readings(waves: Waves, omega: float, drift: float, *, at_rest: bool) -> PeakReadings:
     """Readings of the lasers at the peak of the mean cycle."""
     lasers = waves.waveform[:, [LASER_1, LASER_2]].T
-    speeds = omega * waves.rates[waves.at[DRIFT], [LASER_1, LASER_2]]
-    at = lasers[:, waves.at[DRIFT]]
+    peak = waves.at[DRIFT]
+    speeds = omega * waves.rates[peak, [LASER_1, LASER_2]]
+    at = lasers[:, peak]
     swings = np.ptp(lasers, axis=1)
+    step = max(lasers.shape[1] // ZERO_PLACES, 1)
+    places: NDArray[np.float64] = np.arange(0.0, lasers.shape[1], step)
+    angles = (places - peak) * (tau / lasers.shape[1])
+    orders = np.arange(1, PEAK_HARMONICS + 1)
     return PeakReadings(
         drift=drift,
-        sign=float(np.sign(waves.waveform[waves.at[DRIFT], DRIFT])),
+        sign=float(np.sign(waves.waveform[peak, DRIFT])),
         lasers=(float(at[0]), float(at[1])),
         speeds=(float(speeds[0]), float(speeds[1])),
-        zero=np.zeros((2, 1)) if at_rest else lasers[:, :: max(lasers.shape[1] // ZERO_PLACES, 1)],
+        zero=np.zeros((2, 1)) if at_rest else lasers[:, ::step],
         swings=(float(swings[0]), float(swings[1])),
         terms=PEAK_ROUNDINGS,
         at_rest=at_rest,
+        weights=None if at_rest else (2.0 / angles.size) * np.cos(np.outer(angles, orders)).sum(axis=1),
     )
+
+
+def _checks(cycles: Sequence[Cycle], waves: Waves, omega: float, frame: LinearFrame) -> Checks:
+    """Harmonics of the readings of both lasers, without those due to the table."""
+    fitted = min((cycle.coefficients.shape[0] - 1) // 2 for cycle in cycles)
+    table = np.array([cycle.harmonics(ACCELERATION)[1:fitted] for cycle in cycles]).mean(axis=0)
+    orders = range(2, table.size + 2)
+    moved = np.array([frame.readings(k * omega, complex(z)) for k, z in zip(orders, table, strict=True)]).reshape(-1, 2)
+    found = list[Harmonics]()
+    for column, real in zip((LASER_1, LASER_2), moved.T, strict=True):
+        each = np.array([cycle.harmonics(column)[1:fitted] for cycle in cycles])
+        scatter = np.sqrt(0.5 * np.mean(np.abs(each - each.mean(axis=0)) ** 2, axis=0) / max(len(cycles) - 1, 1))
+        readings = waves.waveform[:, column]
+        step = max(readings.size // CHECK_PLACES, 1)
+        # Im(z exp(i k phase)) is Re(c exp(-i k phase)) with c = i z*
+        error = 1j * (each.mean(axis=0) - real).conj()
+        found.append(Harmonics(readings[::step], error, np.hypot(scatter, FRAME_SHARE * np.abs(real))))
+    return found[0], found[1]
 
 
 def _standard_error(series: NDArray[np.float64]) -> float:
@@ -165,17 +210,20 @@ def gain(
     effect of a scale error.
 
     `amplitude_slope` is d ln alpha_2 / d ln amplitude: the effect of a scale error of the table's acceleration on the
-    gain at the stated amplitude; it cancels for a proportional response.
+    gain at the stated amplitude; it cancels for a proportional response. The bare test checks the linearity of the
+    lasers, unless `sensors` has the checks of several.
 
     With `shared` draws the uncertainty differs by at most 1e-9, relative, and takes a fraction of the time.
     """
     alpha = coupled.drift / bare.drift
     draws = Draws(np.random.default_rng(SEED), DRAWS) if shared is None else shared.again()
+    if bare.checks is not None and not sensors.checks:
+        sensors = replace(sensors, checks=(bare.checks,))
     errors = sensors.drift_errors((bare.readings, coupled.readings), draws)
     parts = {name: float(np.std(each[1] / coupled.drift - each[0] / bare.drift)) for name, each in errors.items()}
     parts |= {
         "scatter of the cycles": hypot(coupled.scatter / coupled.drift, bare.scatter / bare.drift),
-        "transient that may remain": hypot(coupled.transient / coupled.drift, bare.transient / bare.drift),
+        "remaining transient": hypot(coupled.transient / coupled.drift, bare.transient / bare.drift),
         "amplitude of the table": abs(amplitude_slope) * sensors.table_scale,
     }
     return Gain(alpha, Budget({name: alpha * value for name, value in parts.items()}))

@@ -3,28 +3,22 @@
 Two tests share their sensors, so every draw has one pair of lasers for both (GUM Supplement 1): common
 errors cancel in the ratio of their drifts to the extent that they are equal.
 
-A laser's linearity error is a smooth curve over its range R, of a few periods and at most `laser_linearity` R: it is
-modelled as a sine of unknown phase. The error of a reading relative to a zero is the difference of two of its values.
-The slope may therefore have a larger error over small motions than over large ones. For a calibrated laser the curve
-applies beyond the covered readings; within them the uncertainty of the calibration applies.
+The shape of a laser's linearity error is unknown (`bench.analysis.linearity`); the bare frame's test checks it. For a
+calibrated laser the data sheet applies beyond the covered readings; within them the uncertainty of the calibration.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import pi
 from typing import Any
 
 import numpy as np
-from numpy.polynomial.chebyshev import chebvander
 from numpy.typing import NDArray
 
 from bench.analysis.laser_calibration import LaserCalibration
+from bench.analysis.linearity import SMOOTH, Checks, Effect, LinearityErrors, linearity_errors
 from sim.parameters import Parameters, quantity
 
 Array = NDArray[np.float64]
-
-WAVES = (0.5, 2.0)
-"""Minimum and maximum number of periods of a linearity error within the range."""
 
 LINEARITY, SCALES, TIMING, STEPS = (
     "linearity of the lasers",
@@ -63,10 +57,14 @@ class SensorAccuracy(Parameters):
 class PeakReadings:
     """Readings of both lasers at the peak of a drift, from the rest position of the storeys.
 
-    drift, sign : the peak [m], and its side, 1 or -1. lasers, speeds : reading of each laser [m] and its rate [m/s].
-    zero : readings [m] whose mean is the zero of the peak, shape (2, n): (0, 0) for a zero taken at rest. swings : span
-    of each laser's readings [m] in the fit of the peak; `terms`: number of independent rounding errors in the peak, 1
-    for a mean. at_rest : whether the zero was taken at rest, where the rounding is not averaged.
+    drift, sign : the peak [m], and its side, 1 or -1.
+    lasers, speeds : reading of each laser [m] and its rate [m/s].
+    zero : readings [m] whose mean is the zero of the peak, shape (2, n): (0, 0) for a zero taken at rest.
+    swings : span of each laser's readings [m] in the fit of the peak; `terms`: number of independent rounding errors in
+    the peak: 1 for a mean.
+    at_rest : whether the zero was taken at rest, where the rounding is not averaged.
+    weights : derivatives of the peak with respect to the readings at the places of `zero`, shape (n,), for a peak of a
+    fitted cycle; None for the reading at the peak minus the mean of `zero`.
     """
 
     drift: float
@@ -77,18 +75,29 @@ class PeakReadings:
     swings: tuple[float, float]
     terms: float
     at_rest: bool
+    weights: Array | None = None
+
+    def effect(self, laser: int) -> Effect:
+        """Effect on the peak of the error of laser 0 or 1."""
+        zero = self.zero[laser]
+        if self.weights is not None:
+            return Effect(zero, self.weights)
+        means = np.full(zero.size, -1.0 / zero.size)
+        return Effect(np.append(zero, self.lasers[laser]), np.append(means, 1.0))
 
 
 @dataclass(frozen=True, eq=False)
 class SensorUncertainty:
     """Uncertainty of the sensors from data sheets or a calibration.
 
-    `ranges` are the lasers' measuring ranges [m].
+    `ranges` are the lasers' measuring ranges [m]; `checks` are the harmonics of their readings in tests of the bare
+    frame.
     """
 
     accuracy: SensorAccuracy
     ranges: tuple[float, float]
     calibration: LaserCalibration | None = None
+    checks: tuple[Checks, ...] = ()
 
     @property
     def table_scale(self) -> float:
@@ -111,25 +120,57 @@ class SensorUncertainty:
 
     def linearity(self, laser: int, seen: Sequence[PeakReadings], draws: "Draws") -> Array:
         """Errors [m] of one laser, 0 or 1, in each test, shape (tests, n)."""
-        whole = self.ranges[laser]
-        curve = draws.curve(self.accuracy.laser_linearity * whole, whole)
+        normal = draws.normal(len(seen))
         if self.calibration is None:
-            return np.array([curve.between(each.zero[laser], each.lasers[laser]) for each in seen])
+            return self.shape(laser, seen).draws(normal)
         found = self.calibration.lasers[laser]
         low, high = found.lowest - found.rest, found.highest - found.rest
-        at, zero = ([each.lasers[laser] for each in seen], [each.zero[laser] for each in seen])
-        beyond = np.array([curve.between(np.clip(a, low, high), a) for a in at])
-        beyond -= np.array([curve.between(np.clip(z, low, high), z) for z in zero])
-        return beyond + found.uncertainty * draws.normal(len(seen))
+        beyond = [_beyond(each.effect(laser), low, high) for each in seen]
+        errors = found.uncertainty * draws.normal(len(seen))
+        if not any(each.weights.size for each in beyond):
+            return errors
+        whole = self.ranges[laser]
+        limit = self.accuracy.laser_linearity * whole
+        return errors + linearity_errors(beyond, _shares(seen), limit, whole).draws(normal)
+
+    def shape(self, laser: int, seen: Sequence[PeakReadings]) -> LinearityErrors:
+        """Errors of laser 0 or 1, not calibrated, and the number of waves of its curve."""
+        whole = self.ranges[laser]
+        checks = [each[laser].rounded(self.accuracy.laser_resolution) for each in self.checks]
+        effects = [each.effect(laser) for each in seen]
+        return linearity_errors(effects, _shares(seen), self.accuracy.laser_linearity * whole, whole, checks)
+
+    def rough(self, seen: Sequence[PeakReadings]) -> tuple[str, ...]:
+        """Remarks on lasers whose linearity error the bare frame has shown not to be smooth."""
+        if self.calibration is not None or not self.checks or self.accuracy.laser_linearity == 0.0:
+            return ()
+        waves = [self.shape(laser, seen).waves for laser in (0, 1)]
+        return tuple(
+            f"the linearity error of laser_{laser} is not smooth, it has about {each:.1f} waves over the range: "
+            "`rockbench run laser-calibration` removes it"
+            for laser, each in enumerate(waves, 1)
+            if each > SMOOTH
+        )
 
     def _common(self, seen: Sequence[PeakReadings], draws: "Draws") -> Array | float:
         """Error of the reference sensor of the calibration, common to both lasers [m], shape (tests, n)."""
         if self.calibration is None:
             return 0.0
-        curve = draws.curve(self.calibration.common_linearity, min(self.ranges))
-        return np.array(
-            [curve.between(each.zero[1], each.lasers[1]) - curve.between(each.zero[0], each.lasers[0]) for each in seen]
-        )
+        effects = list[Effect]()
+        for each in seen:
+            first, second = each.effect(0), each.effect(1)
+            places = np.append(first.places, second.places)
+            effects.append(Effect(places, np.append(-first.weights, second.weights)))
+        # what remains in the corrected readings of the bare frame checks the reference
+        curves, step = self.calibration.lasers, self.accuracy.laser_resolution
+        checks = [
+            each.rounded(step).widened(curve.uncertainty)
+            for test in self.checks
+            for each, curve in zip(test, curves, strict=True)
+        ]
+        limit = self.calibration.common_linearity
+        errors = linearity_errors(effects, _shares(seen), limit, min(self.ranges), checks)
+        return errors.draws(draws.normal(len(seen)))
 
     def late(self, seen: PeakReadings, laser: int, draws: "Draws") -> Array:
         """Errors [m] due to the delay of a laser with a free clock, uniform within one measuring period; shape (n,)."""
@@ -147,18 +188,18 @@ class SensorUncertainty:
         return step * (np.sqrt(variance) * draws.normal() + zero)
 
 
-class Curve:
-    """Smooth curves of a given height [m]: sines of `turns` [rad/m] and `phase` [rad], shape (n,) each."""
+def _shares(seen: Sequence[PeakReadings]) -> Array:
+    """Derivatives of the logarithm of the last peak over the first, or of a single one, with respect to the peaks."""
+    shares = np.array([each.sign / each.drift for each in seen])
+    shares[:-1] *= -1.0
+    return shares
 
-    def __init__(self, height: float, turns: Array, phase: Array) -> None:
-        self._height, self._turns, self._phase = height, turns, phase
 
-    def between(self, zero: Array, place: Array | float) -> Array:
-        """Difference of each curve at `place` and its mean over `zero`, shape (n,); both [m]."""
-        return self._mean(np.atleast_1d(place)) - self._mean(np.atleast_1d(zero))
-
-    def _mean(self, places: Array) -> Array:
-        return self._height * np.sin(np.outer(places, self._turns) + self._phase).mean(axis=0)
+def _beyond(effect: Effect, low: float, high: float) -> Effect:
+    """Part of an effect due to errors that differ from those at the ends of the readings from `low` to `high` [m]."""
+    out = (effect.places < low) | (effect.places > high)
+    places, weights = effect.places[out], effect.weights[out]
+    return Effect(np.append(places, np.clip(places, low, high)), np.append(weights, -weights))
 
 
 class Draws:
@@ -175,51 +216,15 @@ class Draws:
         """Standard normal numbers, shape (*rows, n)."""
         return self._random.standard_normal((*rows, self.n))
 
-    def curve(self, height: float, whole: float) -> Curve:
-        """Smooth curves of a given height [m] over `whole` [m]."""
-        turns = 2.0 * pi / whole * self.uniform(*WAVES)
-        return Curve(height, turns, self.uniform(0.0, 2.0 * pi))
-
-
-NODES = 24
-"""Number of Chebyshev points in the range of WAVES. The mean of exp(i w x) over places x, all within the measuring
-range of the zero, is interpolated at w with a relative error of 1e-14.
-"""
-
-
-class InterpolatedCurve(Curve):
-    """Curves of `turns` between those of the WAVES over `whole` [m], shared by many peaks.
-
-    The mean of sin(w x + phase) over places x is the imaginary part of exp(i phase) times the mean of exp(i w x). The
-    latter is smooth in w: it is computed at a few w and interpolated at those of the draws.
-    """
-
-    def __init__(self, height: float, turns: Array, phase: Array, whole: float) -> None:
-        super().__init__(height, turns, phase)
-        least, most = (2.0 * pi / whole * each for each in WAVES)
-        points = np.cos(pi * (np.arange(NODES) + 0.5) / NODES)
-        self._at = 0.5 * (least + most) + 0.5 * (most - least) * points
-        share = (2.0 * turns - least - most) / (most - least)
-        weights = np.linalg.solve(chebvander(points, NODES - 1).T, chebvander(share, NODES - 1).T).T
-        self._weights = height * np.hstack((np.sin(phase)[:, None] * weights, np.cos(phase)[:, None] * weights))
-
-    def between(self, zero: Array, place: Array | float) -> Array:
-        waves = self._waves(np.atleast_1d(place)) - self._waves(np.atleast_1d(zero))
-        return self._weights @ np.concatenate((waves.real, waves.imag))
-
-    def _waves(self, places: Array) -> NDArray[np.complex128]:
-        return np.exp(1j * np.outer(self._at, places)).mean(axis=1)
-
 
 class SharedDraws(Draws):
-    """Identical draws for every pair of peaks, made once by a new generator; curves are interpolated."""
+    """Equal draws for every pair of peaks: those of a new generator, made once."""
 
     def __init__(self, seed: int, n: int) -> None:
         super().__init__(np.random.default_rng(seed), n)
         self._seed = seed
         self._asked: tuple[tuple[str, tuple[Any, ...]], ...] = ()
         self._kept: dict[object, Array] = {}
-        self._curves: dict[object, Curve] = {}
 
     def again(self) -> "SharedDraws":
         """These draws, restarted from the first one."""
@@ -231,13 +236,6 @@ class SharedDraws(Draws):
 
     def normal(self, *rows: int) -> Array:
         return self._repeated("standard_normal", (*rows, self.n))
-
-    def curve(self, height: float, whole: float) -> Curve:
-        turns, phase = 2.0 * pi / whole * self.uniform(*WAVES), self.uniform(0.0, 2.0 * pi)
-        key = self._asked, height, whole
-        if key not in self._curves:
-            self._curves[key] = InterpolatedCurve(height, turns, phase, whole)
-        return self._curves[key]
 
     def _repeated(self, kind: str, *arguments: Any) -> Array:
         self._asked += ((kind, arguments),)

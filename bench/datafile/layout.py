@@ -14,7 +14,7 @@ from bench.datafile import hdf5, tables
 from bench.datafile.checksums import Checksums
 from bench.datafile.declared import COUNTED, FIXED_ENTRIES, FIXED_GROUPS, FIXED_INSTRUMENTS, TABLES
 from bench.datafile.fields import Growing, Rows, fields_of, rows_of
-from bench.datafile.opening import FORMAT, FORMAT_VERSION, WORDING
+from bench.datafile.opening import FORMAT, FORMAT_VERSION, INTERVALS, WORDING
 from bench.datafile.samples import Samples, chunk_of, companions, create_plot
 from bench.datafile.tables import Table
 from drivers.rig import Channel
@@ -89,7 +89,7 @@ def build(file: hdf5.File, skeleton: Skeleton) -> Parts:
     """Create every group and dataset of a checked skeleton."""
     file.attrs["NX_class"], file.attrs["default"] = "NXroot", "entry"
     file.attrs["format"], file.attrs["format_version"] = FORMAT, FORMAT_VERSION
-    file.attrs["wording"] = WORDING
+    file.attrs["wording"], file.attrs["intervals"] = WORDING, INTERVALS
     entry = hdf5.create_group(file, "entry", "NXentry")
     entry.attrs["default"] = "data"
     hdf5.write_text(entry, "title", skeleton.title)

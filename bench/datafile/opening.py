@@ -61,6 +61,9 @@ FORMAT, FORMAT_VERSION = "rocking-bench record", 2
 WORDING = 5
 """Version of the sentences in journal and results; replay compares them with those of a file of the same version."""
 
+INTERVALS = 2
+"""Version of the evaluation of uncertainties; replay compares them with those of a file of the same version."""
+
 ANALYSIS, ANALYSIS_VERSION = "rocking-bench analysis", 1
 """Format of a re-analysis file, stored next to the campaign file."""
 

@@ -104,6 +104,11 @@ class DataFile(SampleReader):
         return int(hdf5.attribute(self._file, "wording")) if "wording" in self._file.attrs else 1
 
     @property
+    def intervals(self) -> int:
+        """Version of the evaluation of uncertainties, see `bench.datafile.opening.INTERVALS`."""
+        return int(hdf5.attribute(self._file, "intervals")) if "intervals" in self._file.attrs else 1
+
+    @property
     def file(self) -> hdf5.File:
         """The open HDF5 file."""
         return self._file

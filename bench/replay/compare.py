@@ -24,6 +24,9 @@ DRIVE_ROUNDING = 1e-6
 
 ROWS_AT_ONCE = 2**16
 
+OF_INTERVALS = ("uncertainty", "dominating", "agrees", "alpha_1_low", "alpha_1_high", "alpha_2_low", "alpha_2_high")
+"""Parts of the names of columns that depend on the evaluation of uncertainties."""
+
 DRIVE, JOURNAL, POINTS, ENDING = "drive samples", "journal entries", "points", "ending"
 """Parts that are compared in addition to the other tables."""
 
@@ -85,8 +88,8 @@ class Comparison:
         found = Found()
         self._drive.report(found)
         entries = Counter(kind for kind, *_ in self._compare_journal(found, broken_off))
-        same_wording = self._course.same_wording
-        _compare_rows(found, POINTS, self._record.points, self._points, same_wording)
+        same = self._course.same_wording, self._course.same_intervals
+        _compare_rows(found, POINTS, self._record.points, self._points, *same)
         for kind, rows in self._own.items():
             if kind is TwinEstimate and not self._course.twin_in_time:
                 continue
@@ -101,7 +104,7 @@ class Comparison:
             elif broken_off is not None and kind in ENTRY_TABLES:
                 common = entries[kind.__name__]
             name = EVENT_TABLES[kind].name.replace("_", " ")
-            _compare_rows(found, name, stored[:common], rows[:common], same_wording)
+            _compare_rows(found, name, stored[:common], rows[:common], *same)
         return found
 
     def _compare_journal(self, found: Found, broken_off: str | None) -> list[tuple[str, str, int]]:
@@ -182,15 +185,20 @@ def _compare_rows(
     stored: Sequence[Mapping[str, Any]],
     came: Sequence[Mapping[str, Any]],
     same_wording: bool,
+    same_intervals: bool,
 ) -> None:
-    """Compare the rows of a table field by field, except bench times."""
+    """Compare the rows of a table field by field, except bench times, and what an older evaluation of uncertainties or
+    wording differs in.
+    """
     found.compared[what] = len(came)
     if len(stored) != len(came):
         found.differences.append(Difference(f"{len(stored)} rows of {what} recorded, {len(came)} replayed", what))
     largest = 0.0
     for number, (was, now) in enumerate(zip(stored, came, strict=False), 1):
         for name in (now.keys() & was.keys()) - {"time"}:
-            if not same_wording and _are_sentences(was[name], now[name]):
+            if not (same_wording and same_intervals) and _are_sentences(was[name], now[name]):
+                continue
+            if not same_intervals and any(part in name for part in OF_INTERVALS):
                 continue
             apart = _apart(was[name], now[name])
             if apart > ROUNDING:

@@ -15,7 +15,7 @@ from bench.config.model import BenchConfiguration
 from bench.config.sections import Twin
 from bench.config.validation import dotted, former_names, with_present_names
 from bench.datafile.declared import ENTRY_TABLES
-from bench.datafile.opening import WORDING, columns_from
+from bench.datafile.opening import INTERVALS, WORDING, columns_from
 from bench.datafile.reader import DataFile
 from bench.datafile.tables import as_rows
 from bench.events import (
@@ -216,6 +216,8 @@ class RecordedCourse:
         self._block_times = blocks["time"]
         self.same_wording = record.wording == WORDING
         """Whether sentences can be compared."""
+        self.same_intervals = record.intervals == INTERVALS
+        """Whether uncertainties can be compared."""
         self._rows = {kind.__name__: as_rows(columns) for kind in ENTRY_TABLES if (columns := record.columns_of(kind))}
         entries = self._entries()
         members = record.columns_of(TwinEstimate).get("members", ())

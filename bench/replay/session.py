@@ -120,6 +120,7 @@ class Replayed:
     found: Found
     changed: tuple[str, ...]
     same_wording: bool
+    same_intervals: bool
     returned: object = None
 
     def parted(self, part: str) -> str | None:
@@ -187,6 +188,7 @@ def replay(
         found=found,
         changed=_changed(record.metadata),
         same_wording=course.same_wording,
+        same_intervals=course.same_intervals,
         returned=engine.returned,
     )
 

@@ -21,7 +21,6 @@ from protocols.harmonic.measurement import (
     INTERVAL,
     JUDGED,
     LASERS,
-    REMAINING,
     TRANSIENT,
     Held,
     Report,
@@ -206,7 +205,7 @@ class _Hold:
         table = SineResponse.of(used, self._sine, self._table.turn)
         controls = np.array([control for _, control in self._used])[-self._parameters.measured_cycles :]
         return Held(
-            peak=steady_peak(used, self._sine.omega, REMAINING * self._parameters.settle_tolerance),
+            peak=steady_peak(used, self._sine.omega),
             amplitude_error=table.amplitude_error,
             phase_error=table.phase_error,
             updates=self._updates,

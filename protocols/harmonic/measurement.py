@@ -1,17 +1,19 @@
 """Measurement of a steady state, and its comparison with the prediction."""
 
 from collections import deque
-from collections.abc import Callable, Generator, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from math import hypot, log, tau
 from typing import Any
 
 from bench.analysis.cycles import Cycle
 from bench.analysis.free_motion import CYCLES, KEPT, FreeMotion, Rate, free_motion, orbit_peak
 from bench.analysis.gain import SensorAccuracy, SteadyPeak, gain, modulated_peak, steady_peak
+from bench.analysis.linearity import LinearFrame
 from bench.analysis.sensor_accuracy import SensorUncertainty
 from bench.analysis.signals import ACCELERATION, DISPLACEMENT, LASER_1, LASER_2
 from bench.analysis.steady import WINDOW, Steadiness, SteadyDetector
+from bench.config.model import BenchConfiguration
 from bench.control.sine import Sine, SineControl, SineResponse, Tolerance
 from bench.engine.steps import Dwell, Fallen, Measured, Outcome, SetHarmonics, Step
 from bench.prediction.bands import expanded_uncertainty
@@ -99,19 +101,24 @@ LASERS = (2, 3)
 SHORTEST = 10.0
 """Shortest wait [s]: at high frequencies two windows of cycles are shorter than the transient of the frame."""
 
-REMAINING = 1.2
-"""Remaining transient, in tolerances, at which the detector reports a steady state (see `SteadyDetector`)."""
+PRECEDING = 96
+"""Largest number of cycles before the measured ones from which the remaining transient is estimated."""
 
 Report = Callable[[list[Cycle]], Generator[Step, Outcome, None]]
 """Callback that publishes the running gain at each check, from the cycles of the last window."""
 
 
 def settle_and_measure(
-    sine: Sine, parameters: HarmonicParameters, accuracy: SensorAccuracy, report: Report
+    sine: Sine,
+    parameters: HarmonicParameters,
+    accuracy: SensorAccuracy,
+    report: Report,
+    frame: LinearFrame | None = None,
 ) -> Generator[Step, Outcome, Settled | Fallen]:
     """Hold the table at `sine` until every signal is steady, then measure.
 
-    A motion that does not become steady within the settle limit is measured as modulated.
+    A motion that is not steady within the settle limit is measured as modulated. Without block, the `frame` checks the
+    lasers.
     """
     detector = SteadyDetector(parameters.settle_tolerance, JUDGED, LASERS, sine.omega * accuracy.laser_timing)
     control = SineControl(
@@ -149,7 +156,7 @@ def settle_and_measure(
                 table = SineResponse.of(used, sine, turn)
                 motion = orbit = None
                 if steadiness.steady:
-                    peak = steady_peak(used, sine.omega, REMAINING * parameters.settle_tolerance)
+                    peak = steady_peak(used, sine.omega, before=preceding(list(constant), used), frame=frame)
                 else:
                     kept = list(constant)
                     peak, motion = modulated_peak(kept[-CYCLES:], sine.omega), free_motion(kept)
@@ -168,6 +175,22 @@ def settle_and_measure(
             updates += 1
             detector.restart()
             constant.clear()
+
+
+def linear_frame(configuration: BenchConfiguration) -> LinearFrame:
+    """The bare frame, whose tests check the lasers."""
+    grounded = configuration.laser_reference == "ground"
+    return LinearFrame(configuration.known_specimen.bare(), grounded)
+
+
+def checked(sensors: SensorUncertainty, references: Iterable[Settled]) -> SensorUncertainty:
+    """Sensors whose linearity the steady tests of the bare frame have checked."""
+    return replace(sensors, checks=tuple(each.peak.checks for each in references if each.peak.checks is not None))
+
+
+def preceding(constant: Sequence[Cycle], used: Sequence[Cycle]) -> Sequence[Cycle]:
+    """Cycles before the `used` ones at the end of those at a constant drive."""
+    return constant[: -len(used)][-PRECEDING:]
 
 
 _ROCKING = "rocking"
@@ -244,7 +267,12 @@ def judge(
         phase_error_rad=settled.phase_error,
         table_harmonics=peak.harmonics,
         table_updates=settled.updates,
-        reason="; ".join(_reasons(settled, reference, name, layers, agrees, on_table, orbit)),
+        reason="; ".join(
+            (
+                *_reasons(settled, reference, name, layers, agrees, on_table, orbit),
+                *sensors.rough((bare.readings, peak.readings)),
+            )
+        ),
     )
     return point if held is None else _held_point(point, held, reference, specimen, known, sensors)
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from bench.analysis.cycles import Cycle
 from bench.analysis.gain import gain, shared_draws, steady_peak
+from bench.analysis.sensor_accuracy import SensorUncertainty
 from bench.config.model import BenchConfiguration
 from bench.control.oscillator import DriveCalibration, Leg
 from bench.control.sine import Sine
@@ -24,7 +25,16 @@ from drivers.rig import OperatorTask, RigError
 from protocols.common.calibrate import calibrate_drive, harmonic_frequencies
 from protocols.harmonic.free_prediction import with_free_prediction
 from protocols.harmonic.holding import SLOW, hold, prepared
-from protocols.harmonic.measurement import Held, Report, Settled, judge, predicted_fields, settle_and_measure
+from protocols.harmonic.measurement import (
+    Held,
+    Report,
+    Settled,
+    checked,
+    judge,
+    linear_frame,
+    predicted_fields,
+    settle_and_measure,
+)
 from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, PointStatus
 from sim.cycle_map import CycleMap
 from sim.gain import predict_gain
@@ -175,7 +185,7 @@ class HarmonicPlan:
             yield from self._end_test(specimen, fast=isinstance(held, Fallen))
             if isinstance(held, Fallen):
                 held = Held(None, "the block fell")
-            known, sensors = self._configuration.known_on_table, self._configuration.sensors
+            known, sensors = self._configuration.known_on_table, self._sensors
             shaker, harmonics = self._configuration.simulated_shaker, self._parameters.harmonics
             bare = self._bare[omega]
             point = judge(settled, bare, omega, specimen, known, sensors, tried, shaker, harmonics, held)
@@ -252,7 +262,8 @@ class HarmonicPlan:
         """Settle and measure; publishes the running alpha_2 with the predicted one."""
         sine = Sine(omega, self._amplitude, calibration)
         report = self._report(omega, specimen)
-        return settle_and_measure(sine, self._parameters, self._configuration.analysis, report)
+        frame = linear_frame(self._configuration) if specimen is None else None
+        return settle_and_measure(sine, self._parameters, self._configuration.analysis, report, frame)
 
     def _report(self, omega: float, specimen: Specimen | None) -> Report:
         """Callback that publishes the running gain."""
@@ -270,13 +281,17 @@ class HarmonicPlan:
             peak = steady_peak(cycles, omega)
             alpha_2 = uncertainty = float("nan")
             if bare is not None and specimen is not None:
-                running = gain(peak, bare, self._configuration.sensors, shared=self._draws)
+                running = gain(peak, bare, self._sensors, shared=self._draws)
                 alpha_2, uncertainty = running.alpha_2, running.uncertainty
             beta = specimen.label if specimen else None
             yield Publish(Estimate(omega, beta, evaluated, peak.drift, alpha_2, uncertainty, predicted))
             yield Publish(self._pace.progress(f"settling at {omega:g} rad/s", omega, evaluated))
 
         return report
+
+    @property
+    def _sensors(self) -> SensorUncertainty:
+        return checked(self._configuration.sensors, self._bare.values())
 
 
 def _to_be_held(settled: Settled, found: CycleMap) -> bool:

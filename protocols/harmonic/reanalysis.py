@@ -18,7 +18,18 @@ from bench.datafile.reader import DataFile
 from bench.engine.steps import Arm, Calibrate, Dwell, Measured, Outcome, Publish, SetHarmonics, Step, Sweep
 from bench.events import Acquired, Estimate, Event, PointFinished, StepStarted
 from protocols.harmonic.free_prediction import with_free_prediction
-from protocols.harmonic.measurement import JUDGED, LASERS, REMAINING, TRANSIENT, Held, Settled, judge, predicted_fields
+from protocols.harmonic.measurement import (
+    JUDGED,
+    LASERS,
+    TRANSIENT,
+    Held,
+    Settled,
+    checked,
+    judge,
+    linear_frame,
+    preceding,
+    predicted_fields,
+)
 from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, HarmonicSettings, PointStatus
 from sim.gain import predict_gain
 
@@ -150,7 +161,8 @@ class HarmonicFollower:
             layer = predict_gain(specimen, omega, asked, bare.peak.amplitude).rocking
             peaks = {"bare_drift_peak_m": bare.peak.drift, "bare_amplitude_m_s2": bare.peak.amplitude}
             return point.model_copy(update=predicted_fields("rocking", layer, known) | peaks)
-        sensors, shaker = self._configuration.sensors, self._configuration.simulated_shaker
+        sensors = checked(self._configuration.sensors, self._bare.values())
+        shaker = self._configuration.simulated_shaker
         harmonics = self._parameters.harmonics
         tried = min(self._tries, key=lambda series: self._unlike(series, point))
         settled = self._settled(tried)
@@ -175,9 +187,7 @@ class HarmonicFollower:
         omega, used = series.sine.omega, series.recent[-self._cycles :]
         table = SineResponse.of(used, series.sine, series.turn or 1.0 + 0.0j)
         return Held(
-            peak=modulated_peak(used, omega)
-            if self._settings.peak == "largest"
-            else steady_peak(used, omega, REMAINING * self._tolerance),
+            peak=modulated_peak(used, omega) if self._settings.peak == "largest" else steady_peak(used, omega),
             amplitude_error=table.amplitude_error,
             phase_error=table.phase_error,
             control=point.control_share or 0.0,
@@ -202,8 +212,10 @@ class HarmonicFollower:
         if not steadiness.steady and self._settings.measured_cycles is None:
             used = constant[-CYCLES:]
         motion = None if steadiness.steady else free_motion(constant[-KEPT:])
+        frame = linear_frame(self._configuration) if series.beta is None else None
+        before = preceding(constant, used) if steadiness.steady else ()
         return Settled(
-            steady_peak(used, omega, REMAINING * self._tolerance) if mean else modulated_peak(used, omega),
+            steady_peak(used, omega, before=before, frame=frame) if mean else modulated_peak(used, omega),
             steadiness,
             series.waited,
             table.amplitude_error,

@@ -17,7 +17,7 @@ the table's sensors and each laser are compared.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from math import pi, sqrt
+from math import sqrt
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from bench.analysis.cycles import Cycle, mean_waves
 from bench.analysis.laser_calibration import LaserCalibration, LaserCurve
-from bench.analysis.sensor_accuracy import WAVES, SensorAccuracy
+from bench.analysis.sensor_accuracy import SensorAccuracy
 from bench.analysis.signals import ACCELERATION, DISPLACEMENT, LASER_1, LASER_2
 
 Array = NDArray[np.float64]
@@ -205,13 +205,10 @@ def calibration(
 def _span_uncertainty(span: float, accuracy: SensorAccuracy, whole: float) -> float:
     """Relative standard uncertainty of a `span` [m] measured by one laser with the range `whole` [m].
 
-    The contribution of the scale is half the variance of the difference of two lasers; that of the linearity is
-    modelled as a sine of random phase with w waves over the range R: the difference of two of its values, one span
-    apart, is 2 sin(pi w span / R) cos(phase) times its amplitude.
+    The contribution of the scale is half the variance of the difference of two lasers. The shape of the linearity error
+    is unknown: the errors at both ends of the span, each with the variance of a sine, are taken as independent.
     """
-    waves = np.linspace(*WAVES, 101)
-    bent = sqrt(2.0 * float(np.mean(np.sin(pi * waves * span / whole) ** 2)))
-    return float(np.hypot(accuracy.laser_linearity * whole * bent / span, accuracy.laser_mismatch / sqrt(2.0)))
+    return float(np.hypot(accuracy.laser_linearity * whole / span, accuracy.laser_mismatch / sqrt(2.0)))
 
 
 def _rescaled(curve: ErrorCurve, factor: float) -> Array:

@@ -11,7 +11,7 @@ from pathlib import Path
 import h5py
 import pytest
 
-from tests.first_edition.command import DATA, Rockbench
+from tests.first_edition.command import DATA, Rockbench, differences
 
 NAMES = sorted(path.name.removesuffix(".h5.xz") for path in DATA.glob("*.h5.xz"))
 LONGEST = {"harmonic_springs"}
@@ -89,7 +89,7 @@ def test_it_is_analysed_again(file: Path, rockbench: Rockbench, same_arithmetic:
     assert found["recorded"] == recorded(file)["points"]
     assert len(found["points"]) == len(found["recorded"])
     if same_arithmetic:
-        assert found["points"] == found["recorded"]
+        assert not sorted(differences(found["recorded"], found["points"]))
     assert rockbench("file", "verify", again).code == 0
 
 

@@ -12,7 +12,7 @@ import h5py
 import pytest
 
 from tests.first_edition import inventory
-from tests.first_edition.command import DATA, Rockbench
+from tests.first_edition.command import DATA, EXCEPTED, Rockbench, differences
 
 COMMANDS = {words[-1]: words[1:] for words in map(shlex.split, (DATA / "commands.txt").read_text("utf-8").splitlines())}
 QUICK = {
@@ -23,9 +23,6 @@ QUICK = {
     "harmonic_point",
     "harmonic_springs",
 }
-
-EXCEPTED = {"elapsed_s", "software", "plan_hash", "file", "figure", "further_figures"}
-"""What holds a time, a version, a hash over both and over every key of the configuration, or a path."""
 
 RENAMED: dict[str, str] = {}
 """What keys and texts of the first edition are called today, by each part of them that was renamed, with the reason."""
@@ -73,21 +70,6 @@ def run(
     assert done.code == 0, done.err
     yield Run(name, json.loads(done.out), folder / name)
     shutil.rmtree(folder)
-
-
-def differences(old: object, new: object, where: str = "") -> Iterator[str]:
-    """What of `old` is not in `new`, digit for digit; `new` may have more keys."""
-    if isinstance(old, dict) and isinstance(new, dict):
-        for key in old.keys() - EXCEPTED:
-            if key in new:
-                yield from differences(old[key], new[key], f"{where}.{key}")
-            else:
-                yield f"{where}.{key} is missing"
-    elif isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
-        for index, (one, other) in enumerate(zip(old, new, strict=True)):
-            yield from differences(one, other, f"{where}[{index}]")
-    elif type(old) is not type(new) or old != new:
-        yield f"{where} was {old!r} and is {new!r}"
 
 
 def only_here(same_arithmetic: bool) -> None:

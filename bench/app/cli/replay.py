@@ -111,6 +111,8 @@ def _text(replayed: "Replayed", table: str) -> str:
     compared = ", ".join(f"{count} {part}" for part, count in replayed.found.compared.items() if count)
     if not replayed.same_wording:
         lines.append("The file is from an older version; its sentences were not compared")
+    if not replayed.same_intervals:
+        lines.append("The file is from an older version; its uncertainties were not compared")
     if replayed.identical:
         there = " up to there" if replayed.ended is not None else ""
         lines.append(f"Bit-identical to the file{there}: {compared}")
@@ -143,6 +145,7 @@ def _content(replayed: "Replayed") -> dict[str, Any]:
         "breaks_off": replayed.ended,
         "abort_in_place_of": list(replayed.in_place),
         "wording_compared": replayed.same_wording,
+        "uncertainties_compared": replayed.same_intervals,
         "compared": replayed.found.compared,
         "samples": {"played": replayed.played, "recorded": replayed.rows},
         "differences": [{"text": each.text, "rounding": each.rounding} for each in replayed.found.differences],

@@ -129,10 +129,10 @@ def test_accuracies_and_specimen_are_those_that_were_given(
     stiffer = 1.1 * BENCH.specimen.frame.k2
     point = _analysed(campaign, capsys, *(f"analysis.{name}=0" for name in exact), f"specimen.frame.k2={stiffer}")
     assert point["alpha_2"] == old["alpha_2"]
-    # what is left is the transient that the tolerance leaves in both tests, 1.2 tolerances, as a rectangle (k = 2)
-    left = 2.0 * float(str(point["alpha_2"])) * np.sqrt(2.0) * 1.2 * ASKED.settle_tolerance / np.sqrt(3.0)
-    assert point["alpha_2_uncertainty"] == pytest.approx(left, rel=0.05)
-    assert point["alpha_2_uncertainty"] != old["alpha_2_uncertainty"]
+    left = {name: part for name, part in json.loads(str(point["uncertainty_parts"])).items() if part > 0.0}
+    assert set(left) == {"scatter of the cycles", "remaining transient"}
+    assert point["alpha_2_uncertainty"] == pytest.approx(2.0 * np.hypot(*left.values()), rel=0.01)
+    assert float(str(point["alpha_2_uncertainty"])) < float(str(old["alpha_2_uncertainty"]))
     frame = Frame(**(BENCH.specimen.frame.model_dump() | {"k2": stiffer}))
     specimen = Specimen(frame=frame, beta=BETA)
     layers = predict_gain(

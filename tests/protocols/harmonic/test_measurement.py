@@ -54,7 +54,7 @@ SENSORS = SensorUncertainty(SensorAccuracy(), RANGES)
 EXACT = SensorAccuracy(laser_linearity=0.0, laser_mismatch=0.0, laser_resolution=0.0, table_scale=0.0)
 
 
-@pytest.mark.parametrize("accuracy", [EXACT, SensorAccuracy(laser_linearity=0.002)])
+@pytest.mark.parametrize("accuracy", [EXACT, EXACT.model_copy(update={"table_scale": 0.005})])
 @pytest.mark.parametrize("known", [KNOWN, SpecimenKnowledge(stiffness=0.01)])
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 def test_a_difference_beyond_the_uncertainties_of_both_is_flagged(

@@ -1,0 +1,63 @@
+"""Linearity errors of unknown shape, against curves drawn by hand."""
+
+from math import tau
+
+import numpy as np
+import pytest
+
+from bench.analysis.linearity import SMOOTH, Effect, Harmonics, linearity_errors
+
+LIMIT, WHOLE = 0.00016, 0.2
+PHASE = np.arange(64) * (tau / 64)
+BARE, COUPLED = 0.040 * np.sin(PHASE), 0.012 * np.sin(PHASE) + 0.001 * np.sin(3.0 * PHASE)
+SHARES = np.array([-1.0 / 0.05, 1.0 / 0.015])
+NOISE = 5e-7
+
+
+def peak(readings: np.ndarray) -> Effect:
+    """Effect on the fundamental of a fitted cycle."""
+    return Effect(readings, np.sin(PHASE) / 32.0)
+
+
+def curve(waves: float, phase: float, x: np.ndarray) -> np.ndarray:
+    return LIMIT * np.sin(tau * waves * x / WHOLE + phase)
+
+
+def check(waves: float, phase: float, random: np.random.Generator) -> Harmonics:
+    """Harmonics 2 to 10 of the reading of a pure sine."""
+    spectrum = np.fft.fft(curve(waves, phase, BARE))[2:11].conj() / 32.0
+    noise = NOISE * (random.standard_normal(9) + 1j * random.standard_normal(9))
+    return Harmonics(BARE, spectrum + noise, np.full(9, NOISE))
+
+
+@pytest.mark.parametrize("waves", [0.5, 1.0, 2.0, 4.0, 6.0, 10.0])
+def test_without_a_check_no_curve_within_the_data_sheet_is_left_out(waves: float) -> None:
+    effects = [peak(BARE), peak(COUPLED)]
+    found = linearity_errors(effects, SHARES, LIMIT, WHOLE)
+    stated = np.sqrt(SHARES @ found.moments @ SHARES)
+    phases = np.arange(24) * (tau / 24)
+    errors = [SHARES @ [each.weights @ curve(waves, phase, each.places) for each in effects] for phase in phases]
+    assert np.abs(errors).max() <= 2.0 * stated
+
+
+@pytest.mark.parametrize("waves", [0.7, 1.5, 3.0, 4.0, 6.0])
+def test_harmonics_of_the_bare_frame_size_the_error(waves: float) -> None:
+    effects, random = [peak(BARE), peak(COUPLED)], np.random.default_rng(5)
+    worst = linearity_errors(effects, SHARES, LIMIT, WHOLE)
+    off, sizes, numbers = [], [], []
+    for phase in np.arange(24) * (tau / 24):
+        found = linearity_errors(effects, SHARES, LIMIT, WHOLE, [check(waves, phase, random)])
+        sizes.append(np.sqrt(SHARES @ found.moments @ SHARES))
+        off.append(float(SHARES @ [each.weights @ curve(waves, phase, each.places) for each in effects]) / sizes[-1])
+        numbers.append(found.waves)
+    assert 0.6 < np.sqrt(np.mean(np.square(off))) < 1.15
+    assert np.mean(np.abs(off) <= 2.0) >= 0.95
+    assert np.mean(sizes) < 0.95 * np.sqrt(SHARES @ worst.moments @ SHARES)
+    assert (np.mean(numbers) > SMOOTH) == (waves > 2.0)
+
+
+def test_equal_motions_have_equal_errors() -> None:
+    found = linearity_errors([peak(BARE), peak(BARE)], SHARES, LIMIT, WHOLE)
+    first, second = found.draws(np.random.default_rng(1).standard_normal((2, 100)))
+    np.testing.assert_array_equal(first, second)
+    assert np.std(first) > 0.0

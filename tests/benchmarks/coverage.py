@@ -1,0 +1,297 @@
+"""Coverage of the stated uncertainty of alpha_2: many benches, each with other sensors and another specimen.
+
+    python -m tests.benchmarks.coverage [--benches 40] [--points 16,0.40 20,0.25] [--only default "short waves"]
+    python -m tests.benchmarks.coverage --budget          # sources switched off one by one
+    python -m tests.benchmarks.coverage --record l-aquila
+
+Each bench draws a specimen from the assumed uncertainty, lasers (scale, linearity, clock, rest, noise), the scale of
+the table's sensors, and the harmonics and amplitude that the control of the table leaves. The exact motion of the
+specimen approaches its steady state from a point near it; criterion, measurement and budget are those of the harmonic
+protocol. The error e over the standard uncertainty u, the rms of e/u, its mean, and the share of the intervals (k = 2)
+that cover the truth are printed for two truths: the gain of the true specimen at the stated amplitude, by the exact
+steady solver, and the ratio of the peaks of the simulated motions during the measurement.
+"""
+
+import argparse
+import json
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import tau
+
+import numpy as np
+
+from bench.accelerograms.reference import RecordReference
+from bench.analysis.cycles import Cycle
+from bench.analysis.gain import steady_peak
+from bench.analysis.laser_calibration import LaserCalibration
+from bench.analysis.linearity import LinearFrame
+from bench.analysis.sensor_accuracy import SensorUncertainty
+from bench.analysis.steady import Steadiness, SteadyDetector
+from bench.analysis.table_motion import at_rest_in_the_end, table_motion
+from bench.config.model import BenchConfiguration
+from protocols.earthquake.measurement import observe
+from protocols.earthquake.uncertainty import drift_errors
+from protocols.harmonic.measurement import INTERVAL, JUDGED, LASERS, SHORTEST, TRANSIENT, Settled, judge
+from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint
+from sim.excitation import SampledRecord
+from sim.gain import predict_gain
+from sim.linear import steady_response
+from sim.rocking import State, simulate
+from sim.specimen import Specimen
+from tests.benchmarks.coverage_sensors import (
+    ACCURACY,
+    CASES,
+    LEAD,
+    RANGES,
+    RATE,
+    REST,
+    SOURCES,
+    Array,
+    Case,
+    Motion,
+    Sensors,
+    approach,
+    cycles_of,
+    rms,
+)
+
+POINTS = ((16.0, 0.40), (17.5, 0.97), (20.0, 0.25), (20.0, 0.64))
+"""Frequency [rad/s] and stiffness ratio."""
+
+PERTURBED = 0.03
+"""Standard deviation of the first state relative to the steady one."""
+
+LONGEST = 200
+"""Cycles of a test, settling included."""
+
+ASKED, CONFIGURATION = HarmonicParameters(), BenchConfiguration()
+NOMINAL = CONFIGURATION.known_specimen
+LEVEL = ASKED.amplitude_factor * NOMINAL.uplift_acceleration
+
+
+@dataclass(frozen=True, eq=False)
+class Observed:
+    """One test: all its cycles until the end of the measurement, and the peak drift during it [m]."""
+
+    cycles: Sequence[Cycle]
+    waited: int
+    drift: float
+
+
+@dataclass(frozen=True, eq=False)
+class Bench:
+    """Both tests of a bench at one point, its true specimen, and its calibration."""
+
+    omega: float
+    specimen: Specimen
+    clock: float
+    scale: float
+    bare: Observed
+    coupled: Observed
+    calibration: LaserCalibration | None
+
+
+def bench(seed: int, case: Case, omega: float, beta: float) -> Bench | None:
+    """Both tests of a bench; None where the true motion is not stable, or does not become steady."""
+    random, sensors = np.random.default_rng([seed, 3]), Sensors(seed, case)
+    specimen = NOMINAL.coupled(beta)
+    if "truth" not in case.off:
+        [specimen] = CONFIGURATION.known.draws(specimen, 1, random)
+    true = omega / (1.0 + case.clock)
+    layer = predict_gain(specimen, true, LEVEL).rocking
+    if layer is None or not layer.stable:
+        return None
+    found = sensors.calibrated() if case.calibrated else None
+    phase, *start = (float(value) for value in layer.orbit.section)
+    moved = np.array([*start[:4], 0.0, start[4]])
+    amplitudes = np.array(steady_response(specimen.bare(), true, LEVEL))
+    steady = [c.imag for c in (*amplitudes, *(1j * true * amplitudes))]
+    still = np.array([*steady, 0.0, 0.0])
+    sizes = np.array([*np.abs(amplitudes), *(true * np.abs(amplitudes)), 0.0, 0.0])
+    if "transient" not in case.off:
+        moved = moved * (1.0 + PERTURBED * random.standard_normal(6))
+        still = still + PERTURBED * sizes * random.standard_normal(6)
+    tests: list[Observed] = []
+    for state, start_phase, which in ((still, 0.0, specimen.bare()), (moved, phase, specimen)):
+        try:
+            motion = approach(which, State.from_array(state), start_phase, omega, LEVEL, LONGEST, sensors)
+        except RuntimeError:
+            return None
+        test = _observed(motion, cycles_of(sensors.signals(motion, found), omega), omega)
+        if test is None:
+            return None
+        tests.append(test)
+    scale = sensors.table * (found.table_acceleration if found else 1.0)
+    return Bench(omega, specimen, case.clock, scale, *tests, found)
+
+
+def _observed(motion: Motion, cycles: Sequence[Cycle], omega: float) -> Observed | None:
+    """Wait and measure as the protocol does."""
+    detector = SteadyDetector(ASKED.settle_tolerance, JUDGED, LASERS, omega * ACCURACY.laser_timing)
+    measured, done = ASKED.measured_cycles, 0
+    while done + measured <= len(cycles):
+        if done * tau / omega >= SHORTEST and detector.judge().steady:
+            for cycle in cycles[done : done + measured]:
+                detector.push(cycle)
+            if detector.judge(allowance=2.0).steady:
+                per, first = tau / omega * RATE, LEAD
+                window = slice(first + round(done * per), first + round((done + measured) * per))
+                drift = motion.u2[window] - motion.u1[window]
+                return Observed(cycles[: done + measured], done, float(np.abs(drift).max()))
+            done += measured
+            continue
+        for cycle in cycles[done : done + INTERVAL]:
+            detector.push(cycle)
+        done += INTERVAL
+    return None
+
+
+@dataclass(frozen=True)
+class Score:
+    """Relative errors against both truths, relative standard uncertainty, and the point."""
+
+    specimen: float
+    motion: float
+    u: float
+    point: HarmonicPoint
+
+
+def _settled(test: Observed, omega: float, *, linear: bool) -> Settled:
+    cycles = list(test.cycles)
+    measured = ASKED.measured_cycles
+    frame = LinearFrame(NOMINAL.bare(), grounded=True) if linear else None
+    peak = steady_peak(cycles[-measured:], omega, before=cycles[TRANSIENT:-measured], frame=frame)
+    return Settled(peak, Steadiness(True, 0.0, 0.0, 1), test.waited * tau / omega, 0.0, 0.0, 0)
+
+
+def score(each: Bench) -> Score:
+    """Measure with the program, and compare with the truth."""
+    sensors = SensorUncertainty(ACCURACY, RANGES, each.calibration)
+    tests = [_settled(test, each.omega, linear=test is each.bare) for test in (each.bare, each.coupled)]
+    specimen = NOMINAL.coupled(each.specimen.label or 0.0)
+    point = judge(tests[1], tests[0], each.omega, specimen, CONFIGURATION.known, sensors, 1)
+    assert point.alpha_2 is not None
+    assert point.alpha_2_uncertainty is not None
+    stated = predict_gain(each.specimen, each.omega, tests[1].peak.amplitude, tests[0].peak.amplitude).rocking
+    assert stated is not None
+    return Score(
+        specimen=point.alpha_2 / stated.alpha_2 - 1.0,
+        motion=point.alpha_2 * each.bare.drift / each.coupled.drift - 1.0,
+        u=0.5 * point.alpha_2_uncertainty / point.alpha_2,
+        point=point,
+    )
+
+
+def harmonic(benches: int, first: int, points: Sequence[tuple[float, float]], cases: Sequence[Case]) -> None:
+    print(
+        "case                     point          n   U [%]  covered   rms e/u  bias/u   "
+        "| ratio of the motion: covered, rms e/u | largest parts [%]"
+    )
+    for case in cases:
+        for omega, beta in points:
+            found = [each for seed in range(first, first + benches) if (each := bench(seed, case, omega, beta))]
+            print(f"{case.name:24s} {omega:5.1f} {beta:5.2f}  {summary([score(each) for each in found])}", flush=True)
+
+
+def summary(scores: Sequence[Score]) -> str:
+    u = np.array([each.u for each in scores])
+    errors, moved = (np.array([getattr(each, name) for each in scores]) / u for name in ("specimen", "motion"))
+    parts = [{n: p / (each.point.alpha_2 or 1.0) for n, p in _parts(each.point).items()} for each in scores]
+    means = {name: 100.0 * rms([each.get(name, 0.0) for each in parts]) for name in parts[0]}
+    largest = sorted(means.items(), key=lambda part: -part[1])[:5]
+    return (
+        f"{u.size:4d}  {200.0 * rms(u):5.2f}  {np.mean(np.abs(errors) <= 2.0):6.1%}   {rms(errors):6.2f}   "
+        f"{errors.mean():+6.2f}   | {np.mean(np.abs(moved) <= 2.0):6.1%} {rms(moved):5.2f} | "
+        + ", ".join(f"{name} {size:.3f}" for name, size in largest)
+    )
+
+
+def _parts(point: HarmonicPoint) -> dict[str, float]:
+    return {name: float(size) for name, size in json.loads(point.uncertainty_parts).items()}
+
+
+LOWEST, STRENGTH = 0.8, 1.3
+"""Lowest frequency of a record [Hz], and its peak over the uplift acceleration."""
+
+
+def table_record(acceleration: Array, dt: float) -> Array:
+    """What a table with a short stroke makes of a record: without the motion below LOWEST, at rest in the end."""
+    from scipy import signal
+
+    high = signal.butter(4, LOWEST, "highpass", fs=1.0 / dt, output="sos")
+    quiet = np.zeros(round(2.0 / dt))
+    return at_rest_in_the_end(signal.sosfiltfilt(high, np.concatenate((quiet, acceleration, quiet))), dt)
+
+
+def seismic(trials: int, name: str) -> None:
+    record = RecordReference.parse(f"synthetic:{name}").read()
+    specimen = Specimen()
+    acceleration = table_record(record.acceleration, record.dt)
+    acceleration *= STRENGTH * specimen.uplift_acceleration / np.abs(acceleration).max()
+    motions = {
+        beta: _under(specimen if beta is None else specimen.coupled(beta), acceleration, record.dt)
+        for beta in (None, *HarmonicParameters().beta)
+    }
+    for calibrated in (False, True):
+        print("\nwith a calibration" if calibrated else "\nby the data sheets alone")
+        for beta in HarmonicParameters().beta:
+            bare, coupled = motions[None], motions[beta]
+            true, sizes, errors, largest = coupled.drift / bare.drift, [], [], Counter[str]()
+            for seed in range(trials):
+                each = Sensors(seed)
+                one = each.calibrated() if calibrated else None
+                seen = tuple(observe(each.signals(motion, one), REST, RATE).drift for motion in (bare, coupled))
+                drawn = drift_errors((seen[0], seen[1]), SensorUncertainty(ACCURACY, RANGES, one), 4000, seed)
+                parts = {part: float(np.std((1 + e[1]) / (1 + e[0]))) for part, e in drawn.items()}
+                together = np.sum(list(drawn.values()), axis=0)
+                u = float(np.std((1.0 + together[1]) / (1.0 + together[0])))
+                largest[max(parts, key=lambda part: parts[part])] += 1
+                sizes.append(2.0 * u)
+                errors.append((seen[1].peak.value / seen[0].peak.value / true - 1.0) / u)
+            print(
+                json.dumps(
+                    {
+                        "record": name,
+                        "beta": beta,
+                        "alpha_2": round(true, 4),
+                        "U [%]": round(100.0 * float(np.mean(sizes)), 3),
+                        "largest": largest.most_common(1)[0][0],
+                        "rms error/u": round(rms(errors), 2),
+                        "held": round(float(np.mean(np.abs(errors) <= 2.0)), 3),
+                    }
+                )
+            )
+
+
+def _under(specimen: Specimen, acceleration: Array, dt: float) -> Motion:
+    t = np.arange(0.0, (acceleration.size - 1) * dt, 1.0 / RATE)
+    a = np.interp(t, np.arange(acceleration.size) * dt, acceleration)
+    moved = simulate(specimen, SampledRecord(acceleration, dt), sample_times=t, tolerance=1e-9).samples
+    assert moved is not None
+    assert len(moved) == len(t), "the block topples"
+    velocity, displacement = table_motion(a, 1.0 / RATE)
+    return Motion(displacement, velocity, a, *(moved[:, k] for k in range(4)))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--benches", type=int, default=40)
+    parser.add_argument("--first", type=int, default=0, help="number of the first bench: seeds follow it")
+    parser.add_argument("--points", nargs="+", default=[f"{omega},{beta}" for omega, beta in POINTS])
+    parser.add_argument("--only", nargs="+", choices=list(CASES), default=list(CASES), help="cases")
+    parser.add_argument("--budget", action="store_true", help="the default sensors, sources switched off one by one")
+    parser.add_argument("--record", help="under this synthetic record instead of under sines")
+    asked = parser.parse_args()
+    if asked.record is not None:
+        seismic(asked.benches, asked.record)
+        return
+    points = [(float(omega), float(beta)) for omega, beta in (each.split(",") for each in asked.points)]
+    cases = [CASES[name] for name in asked.only]
+    if asked.budget:
+        cases = [replace(CASES["default"], name=f"only {name}", off=frozenset(SOURCES) - {name}) for name in SOURCES]
+    harmonic(asked.benches, asked.first, points, cases)
+
+
+if __name__ == "__main__":
+    main()
