@@ -40,7 +40,7 @@ def result(future: Future[Result]) -> Result:
             return future.result(STEP)
         except NotYet:
             if future.done():
-                # the exception of the work itself
+                # an exception raised by the work itself
                 return future.result(0.0)
 
 

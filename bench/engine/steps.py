@@ -114,7 +114,7 @@ class Play:
 class RampOut:
     """End the test: ramp to zero, smoothly or fast, then stop the rig.
 
-    Returns `Fallen` when the block fell during the ramp, else `Done`.
+    Returns `Fallen` if the block fell during the ramp, else `Done`.
     """
 
     fast: bool = False

@@ -206,7 +206,7 @@ class RigConformance:
     def test_close_is_allowed_in_every_state_any_number_of_times_and_leaves_nothing_behind(
         self, make_rig: RigFactory
     ) -> None:
-        # after the first rig, the resources exist that libraries never release
+        # once the first rig has been opened, the resources that libraries never release are already counted
         make_rig().close()
         before = held()
         for state in (armed, playing, halted, starved):

@@ -10,7 +10,7 @@ _TOLERANCE = 0.25
 integers, the bounds of a reader in step with the clock wander by a fraction of a period.
 """
 _RECENT = 2.0
-"""Longest time over which two bounds can be compared without the rate [s]."""
+"""Longest time over which two bounds can be compared without knowing the clock rate [s]."""
 _CONTRADICTION = 200e-6
 """Smallest contradiction of such bounds [s]: clocks that differ by 50 ppm drift apart by 100 us in that time."""
 

@@ -84,7 +84,7 @@ are not smooth.
 """
 
 CLOCK = 50e-6
-"""Largest relative difference between the laser's clock and that of the samples: two quartz clocks."""
+"""Largest relative difference between the laser's clock and the sample clock, both quartz clocks."""
 
 _NUMBERS, _RATES, _PHASES = 24, 12, 12
 """Numbers of equally likely values of periods, clock differences and initial delays."""

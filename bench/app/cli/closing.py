@@ -21,8 +21,8 @@ _kept: list[Any] = []
 
 
 def handler(interrupt: Callable[[int], object], number: int) -> Callable[[int], bool]:
-    """The console's handler, called in a thread of its own: `interrupt(number)` for a console that goes away, then it
-    waits for the end of the process. Other events are left to Python.
+    """The console's event handler, called in a separate thread. If the console is closed, it calls `interrupt(number)`
+    and waits for the end of the process; other events are left to Python.
     """
 
     def handle(event: int) -> bool:

@@ -159,7 +159,7 @@ def usb_suspend(devices: Path = Path("/sys/bus/usb/devices"), system: str = sys.
     ours = [device.name for device in suspended if _read(device / "idVendor") in _VENDORS]
     if not ours:
         return Finding(item, Health.GOOD, "no device of NI and no serial adapter is suspended")
-    remedy = f"write on to power/control of each in {devices}, or a rule of udev that does"
+    remedy = f"write on to power/control of each in {devices}, or add a udev rule that does so"
     return Finding(item, Health.BAD, f"may be suspended: {', '.join(ours)}", remedy)
 
 

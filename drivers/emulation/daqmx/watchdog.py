@@ -16,7 +16,7 @@ Expire = Callable[[Sequence[DeviceModel], dict[str, bool], dict[str, float]], No
 
 
 class Watchdog:
-    """A `Job`. The watchdog of a simulated device, or with a time-out of -1, never expires.
+    """The `Job` of a watchdog. The watchdog of a simulated device, or one with a time-out of -1, never expires.
 
     `parts` are the device and its modules; `expire` sets their outputs to the given levels and volts, `release` permits
     writes to the lines again.
