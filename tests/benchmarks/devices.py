@@ -14,6 +14,7 @@ import tempfile
 from pathlib import Path
 
 from bench.config.toml import as_toml
+from sim.errors import InvalidInput
 from tests.emulated import emulated
 from tests.lateness import Lateness
 
@@ -52,7 +53,7 @@ def checked(device: str, modules: tuple[str, ...], lasers: str) -> tuple[bool, s
             command = [sys.executable, "-m", "bench", "check", "--config", str(file), "--yes", "--json"]
             done = subprocess.run([*command, "--out", f"{folder}/check"], capture_output=True, text=True, check=False)
             excuse = lateness.excuse or ""
-    except RuntimeError as error:
+    except (RuntimeError, InvalidInput) as error:
         return False, str(error)
     if done.returncode not in (0, 1) or not done.stdout.strip():
         return False, (done.stderr.strip().splitlines() or ["no answer"])[-1]
