@@ -226,7 +226,9 @@ class Header(QWidget):
         self.word.setText(shown.word)
         set_level(self.word, shown.level)
         key_acts = application().applicationState() == Qt.ApplicationState.ApplicationActive
-        said = ([texts.STOPPED + "."] if controller.latched else []) + [typeset(shown.reason)]
+        # a roomy header has the step at its own place
+        reason = "" if shown.reason == scene.step and self.details.isVisibleTo(self) else shown.reason
+        said = ([texts.STOPPED + "."] if controller.latched else []) + [typeset(reason)]
         if controller.attached is not None and controller.running:
             # whose run it is has priority over the rest of the reason
             said.insert(0, controller.owner)

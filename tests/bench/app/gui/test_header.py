@@ -44,7 +44,7 @@ def test_state_step_time_and_inputs_are_shown(window: Window, link: ScriptedClie
     ]
     window._controller._look()
     assert (header.word.text(), header.lamp.shape) == ("RUNNING", "disc")
-    assert header.reason.text() == "bare frame at 16 rad/s", "not the reason of a change that is over"
+    assert header.reason.text() == "", "neither the reason of a change that is over, nor the step twice"
     assert header.step.text() == "bare frame at 16 rad/s · settling"
     assert header.remaining.text() == "2:05"
     assert header.inputs.text() == "end switch good, enable OPEN"

@@ -1,0 +1,109 @@
+"""Texts of the window that are clipped on a screen: `python -m tests.bench.app.gui.pixels WIDTH HEIGHT [THEME]`.
+
+The screen has this size in physical pixels; `QT_SCALE_FACTOR` scales the window. With the argument `grid` alone, every
+size, scale and theme of `SCREENS`, `SCALES` and `THEMES` is shown, in one process each.
+"""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+from PySide6.QtCore import QPoint, QRect
+from PySide6.QtWidgets import QAbstractButton, QApplication, QLabel, QScrollArea, QWidget
+
+from bench.app.catalogue import all_protocols
+from bench.app.gui.controller import Controller
+from bench.app.gui.palette import DARK, LIGHT, dress
+from bench.app.gui.widgets import ElidingLabel
+from bench.app.gui.window import SMALLEST, Window
+from bench.app.ipc.messages import Run
+from bench.config.model import BenchConfiguration
+from protocols.harmonic.protocol import HarmonicParameters
+
+SCREENS = ((1024, 600), (1366, 768), (1920, 1080), (3840, 2160))
+SCALES = ("1", "1.5", "2")
+THEMES = {"light": LIGHT, "dark": DARK}
+TITLE_BAR = 28
+"""Height of the title bar and its panel [logical px]."""
+
+
+def clipped(window: Window) -> list[str]:
+    """What of the window cannot be seen in full: STOP, and texts of buttons and labels that neither wrap nor scroll."""
+    found: list[str] = []
+    stop = window.header.stop
+    if not window.rect().contains(_place(stop, window)):
+        found.append("STOP")
+    for part in window.findChildren(QWidget):
+        if not part.isVisible() or not isinstance(part, QLabel | QAbstractButton) or not part.text():
+            continue
+        if isinstance(part, ElidingLabel) or part.toolTip() or _scrolls(part):
+            continue
+        if isinstance(part, QLabel) and part.wordWrap():
+            too_small = part.heightForWidth(part.width()) > part.height() + 1
+        else:
+            too_small = part.width() + 1 < part.minimumSizeHint().width()
+        if too_small:
+            found.append(f"{type(part).__name__} {part.text()!r}")
+    return found
+
+
+def _place(part: QWidget, window: QWidget) -> QRect:
+    return QRect(part.mapTo(window, QPoint(0, 0)), part.size())
+
+
+def _scrolls(part: QWidget) -> bool:
+    """Whether the widget is in an area that scrolls at present."""
+    parent = part.parentWidget()
+    while parent is not None:
+        if isinstance(parent, QScrollArea) and (
+            parent.verticalScrollBar().maximum() > 0 or parent.horizontalScrollBar().maximum() > 0
+        ):
+            return True
+        parent = parent.parentWidget()
+    return False
+
+
+def main(width: int, height: int, theme: str) -> int:
+    """Show every page on a screen of this size [px]; prints and counts what is clipped."""
+    os.environ["ROCKBENCH_SESSIONS"] = "off"
+    application = QApplication([])
+    dress(application, THEMES[theme])
+    controller = Controller()
+    window = Window(controller, BenchConfiguration(), all_protocols()[0], THEMES[theme])
+    scale = window.devicePixelRatioF()
+    window.resize(max(int(width / scale), SMALLEST[0]), max(int(height / scale) - TITLE_BAR, SMALLEST[1]))
+    window.show()
+    run = Run("harmonic", HarmonicParameters(omega=(14.0, 16.0), beta=(0.25, 0.4)), BenchConfiguration(), Path("never"))
+    controller.began.emit(run)
+    wrong: list[str] = []
+    for number in range(window.pages.count()):
+        window.pages.setCurrentIndex(number)
+        for _ in range(3):
+            application.processEvents()
+        wrong += [f"{window.pages.tabText(number)}: {each}" for each in clipped(window)]
+        if len(sys.argv) > 4:
+            window.grab().save(f"{sys.argv[4]}-{width}-{scale:g}-{theme}-{number}.png")
+    print("\n".join(wrong))
+    window.leave()
+    return len(wrong)
+
+
+def grid() -> int:
+    """Every screen, scale and theme."""
+    wrong = 0
+    for width, height in SCREENS:
+        for scale in SCALES:
+            for theme in THEMES:
+                command = [sys.executable, "-m", "tests.bench.app.gui.pixels", str(width), str(height), theme]
+                environment = {"QT_QPA_PLATFORM": "offscreen", **os.environ, "QT_SCALE_FACTOR": scale}
+                done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+                wrong += done.returncode != 0
+                print(f"{width}x{height}, scale {scale}, {theme}: {done.stdout.strip() or 'whole'}", flush=True)
+    return wrong
+
+
+if __name__ == "__main__":
+    if sys.argv[1:] == ["grid"]:
+        sys.exit(min(grid(), 1))
+    sys.exit(min(main(int(sys.argv[1]), int(sys.argv[2]), sys.argv[3] if len(sys.argv) > 3 else "light"), 1))
