@@ -11,11 +11,13 @@ from bench.document.campaign import Campaign
 from bench.document.document import Column, Listing, Notice, Part, Picture, Section, Table
 from bench.document.gain_map import map_section
 from bench.document.typography import ABSENT, counted, percent, plain, typeset, with_uncertainty, yes_or_no
+from bench.events import HoldCycle
 from bench.figures.budget_figure import budget_figure
 from bench.figures.map_figure import MapPoint
 from bench.figures.spectra_figure import gain_spectra
 from bench.prediction.bands import expanded_uncertainty
 from protocols.harmonic.report_cycles import Dwells, MeasuredMotion, measured_figure
+from protocols.harmonic.report_hold import hold_figure
 from sim.errors import InvalidInput
 from sim.gain import Layer, predict_gain
 
@@ -39,6 +41,7 @@ def harmonic_sections(campaign: Campaign) -> list[Section]:
         _results_section(campaign),
         _spectra_section(campaign),
         map_section(campaign.specimen, campaign.amplitude_factor, measured),
+        _holds_section(campaign),
         _histories_section(campaign),
     ]
     return [section for section in found if section is not None]
@@ -80,6 +83,24 @@ def _spectra_section(campaign: Campaign) -> Section | None:
         "Gain of the peak drift (logarithmic) against frequency, one panel per stiffness ratio.",
     )
     return Section("spectra", "Gain spectra (as Fig. 6 of the paper)", [picture])
+
+
+def _holds_section(campaign: Campaign) -> Section | None:
+    """Deviation and control of every held point; None without one."""
+    held = [row for row in campaign.harmonic_points if row["status"] == "held"]
+    cycles = campaign.record.columns_of(HoldCycle)
+    if not held or not cycles.get("cycle"):
+        return None
+    parts: list[Part] = [
+        Picture(
+            hold_figure(cycles, row["omega_rad_s"], row["beta"]),
+            f"Hold at β = {row['beta']:g}, Ω = {row['omega_rad_s']:g} rad/s: peak drift and control of each cycle, "
+            "from the free motion to the release.",
+            "Peak drift and control against the number of the cycle, both logarithmic.",
+        )
+        for row in held
+    ]
+    return Section("holds", "Motions held on their orbits", parts)
 
 
 def _histories_section(campaign: Campaign) -> Section | None:

@@ -9,6 +9,10 @@ from pathlib import Path
 
 from matplotlib.testing.compare import compare_images
 
+from bench.datafile.reader import open_datafile
+from bench.events import HoldCycle
+from bench.figures.style import write_figure
+from protocols.harmonic.report_hold import hold_figure
 from tests.pages.blocks import ROOT
 from tests.pages.execute import process
 
@@ -72,6 +76,16 @@ def _window(name: str) -> Callable[[Path], Path]:
     return make
 
 
+def _hold(folder: Path) -> Path:
+    """The figure of a hold."""
+    options = ("harmonic", "--omega", "15", "--beta", "0.97", "--settle-limit", "40")
+    _figure("campaign.h5", *options)(folder)
+    with open_datafile(folder / "run" / "campaign.h5") as record:
+        figure = hold_figure(record.columns_of(HoldCycle), 15.0, 0.97)
+    write_figure(folder / "hold.png", figure)
+    return folder / "hold.png"
+
+
 PICTURES = (
     Picture("README.md", "docs/images/gain_spectra.png", _figure("gain_spectra.png", "harmonic")),
     Picture("docs/identify.md", "docs/images/table_response.png", _figure("table_response.png", "identify")),
@@ -81,6 +95,7 @@ PICTURES = (
         "docs/images/attractor.png",
         _plot("attractor.png", "attractor", "--omega", "14:15.6:65", "--beta", "0.97", "--members", "0"),
     ),
+    Picture("docs/harmonic.md", "docs/images/hold.png", _hold),
     *(
         Picture("docs/window.md", f"docs/images/{name}", _window(name), repeats=False)
         for name in ("window-run.png", "window-queue.png", "window-compare.png")
