@@ -66,7 +66,7 @@ def test_what_is_typed_is_what_is_asked(qtbot: QtBot) -> None:
         ("omega", "12.5, 16", "separate values by spaces"),
         ("harmonics", "2.5", "whole number"),
         ("ramp_time", "soon", "a number"),
-        ("ramp_time", "4 mm", "not of the dimension of s"),
+        ("ramp_time", "4 mm", "not have the dimension of s"),
     ],
 )
 def test_a_refused_value_stays_as_typed_and_says_why(name: str, text: str, said: str, qtbot: QtBot) -> None:
