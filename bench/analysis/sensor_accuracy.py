@@ -147,7 +147,7 @@ class SensorUncertainty:
         waves = [self.shape(laser, seen).waves for laser in (0, 1)]
         return tuple(
             f"the linearity error of laser_{laser} is not smooth, it has about {each:.1f} waves over the range: "
-            "`rockbench run laser-calibration` removes it"
+            "`rockbench run laser-calibration` measures it"
             for laser, each in enumerate(waves, 1)
             if each > SMOOTH
         )
