@@ -29,7 +29,7 @@ def sensors() -> list[Fault]:
     for column, name in enumerate(CHANNELS):
         table = name.startswith("table")
         # without its table channels nothing says that the table stands: the enable line is cut after the ramp
-        status, says = ("halted", name.replace("_", " ")) if table else ("aborted", f"valid sample of {name}")
+        status, says = ("halted", name.replace("_", " ")) if table else ("aborted", f"valid sample from {name}")
         found += [
             of_samples(f"{name} invalid", invalid(column), status, says, stays, may=True),
             of_samples(f"{name} at its rail", at_rail(column), status, says, stays, may=True),

@@ -182,7 +182,7 @@ def cables() -> list[WiredFault]:
     found: list[WiredFault] = []
     for column, name in enumerate(("table_displacement", "table_acceleration", "laser_1", "laser_2")):
         table = name.startswith("table")
-        status, says = ("halted", name.replace("_", " ")) if table else ("aborted", f"valid sample of {name}")
+        status, says = ("halted", name.replace("_", " ")) if table else ("aborted", f"valid sample from {name}")
         stuck = f"constant count of {name}"
         found += [
             WiredFault(f"{name} at its rail", _cable(column, lambda: rail), status, says, stays, True),
