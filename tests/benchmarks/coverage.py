@@ -33,7 +33,7 @@ from bench.config.model import BenchConfiguration
 from protocols.earthquake.measurement import observe
 from protocols.earthquake.uncertainty import drift_errors
 from protocols.harmonic.measurement import INTERVAL, JUDGED, LASERS, SHORTEST, TRANSIENT, Settled, judge
-from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint
+from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, PointStatus
 from sim.excitation import SampledRecord
 from sim.gain import predict_gain
 from sim.linear import steady_response
@@ -191,7 +191,9 @@ def harmonic(benches: int, first: int, points: Sequence[tuple[float, float]], ca
     for case in cases:
         for omega, beta in points:
             found = [each for seed in range(first, first + benches) if (each := bench(seed, case, omega, beta))]
-            print(f"{case.name:24s} {omega:5.1f} {beta:5.2f}  {summary([score(each) for each in found])}", flush=True)
+            # a motion that has come to rest on the other branch is not that of the truth
+            scores = [one for each in found if (one := score(each)).point.status is PointStatus.STEADY]
+            print(f"{case.name:24s} {omega:5.1f} {beta:5.2f}  {summary(scores)}", flush=True)
 
 
 def summary(scores: Sequence[Score]) -> str:
