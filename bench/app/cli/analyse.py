@@ -66,9 +66,7 @@ def analyse(
     ] = None,
     out: Annotated[
         Path | None,
-        Parameter(
-            name="--out", metavar="FILE", help="File to write.", show_default="<name>.analysis-<n>.h5 next to it"
-        ),
+        Parameter(name="--out", metavar="FILE", help="File to write.", show_default="<name>.analysis-<n>.h5 beside it"),
     ] = None,
     list_: Annotated[
         bool, Parameter(name="--list", negative=(), show_default=False, help="List the settings and exit.")

@@ -60,7 +60,7 @@ def gui(
         Parameter(
             metavar="FILE",
             help="Configuration of the bench (TOML).",
-            show_default="the paper's specimen on the simulated bench, with a guided tour",
+            show_default="the paper's specimen on the simulated bench, with a first minute that is guided",
         ),
     ] = None,
     seed: Seed = None,
