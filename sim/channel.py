@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 TABLE_DISPLACEMENT, TABLE_ACCELERATION = "table_displacement", "table_acceleration"
 TABLE_FORCE, COIL_CURRENT = "table_force", "coil_current"
 STOREYS = ("laser_1", "laser_2")
-"""Names of the channels by the motion they measure, whatever the instrument: table and coil, first and second storey.
+"""Names of the channels by what they measure, whatever the instrument: table and coil, first and second storey.
 """
 
 Counts = NDArray[np.int16 | np.int32]

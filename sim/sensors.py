@@ -192,7 +192,7 @@ class Converter(Parameters):
         return -(2 ** (self.bits - 1)), 2 ** (self.bits - 1) - 1
 
     def counts(self, volts: Array, random: Generator) -> NDArray[np.int16]:
-        """Counts of the voltages of all channels, shape (n, n_channels) as given."""
+        """Counts of the voltages of all channels, in the same shape (n, n_channels)."""
         noisy = random.standard_normal(volts.shape)
         noisy *= self.noise
         noisy += volts

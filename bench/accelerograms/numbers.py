@@ -107,7 +107,7 @@ def _refuse_gaps(text: RecordText, first: int, lengths: list[int]) -> None:
 
 
 def _refuse_junk(text: RecordText, first: int, lines: list[str], width: int | None) -> None:
-    """Raise InvalidInput for the first line that contains anything but numbers, separated by blanks, signs or column
+    """Raise InvalidInput for the first line that contains anything but numbers separated by blanks, signs or column
     width.
     """
     run = re.compile(rf"(?:\s*{NUMBER}(?=[\s+-]|$))+")

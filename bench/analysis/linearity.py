@@ -46,7 +46,7 @@ swing hardly tell their number.
 """
 
 LEAST = 1e-5
-"""Smallest uncertainty of a harmonic relative to the limit of the data sheet, so that exact ones can be used."""
+"""Smallest uncertainty of a harmonic, relative to the limit of the data sheet; it admits exact harmonics."""
 
 ROUNDING = 1e-12
 """Smallest share of a variance that is not due to rounding."""

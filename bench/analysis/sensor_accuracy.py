@@ -196,7 +196,9 @@ def _shares(seen: Sequence[PeakReadings]) -> Array:
 
 
 def _beyond(effect: Effect, low: float, high: float) -> Effect:
-    """Part of an effect due to errors that differ from those at the ends of the readings from `low` to `high` [m]."""
+    """Part of an effect due to errors outside the readings from `low` to `high` [m], relative to those at the nearer
+    end.
+    """
     out = (effect.places < low) | (effect.places > high)
     places, weights = effect.places[out], effect.weights[out]
     return Effect(np.append(places, np.clip(places, low, high)), np.append(weights, -weights))

@@ -49,7 +49,7 @@ def mean_of_repeats(values: ArrayLike, variances: ArrayLike) -> Repeats:
 
 
 def enlarged(covariance: Array, scatter: Array) -> Array:
-    """`covariance` of a mean, shape (n, n), enlarged by the `scatter`, shape (n,); keeps correlations."""
+    """`covariance` of a mean, shape (n, n), enlarged by the `scatter`, shape (n,); the correlations are kept."""
     own = np.diag(covariance)
     larger = np.sqrt(1.0 + scatter**2 / np.where(own > 0.0, own, np.inf))
     return np.outer(larger, larger) * covariance

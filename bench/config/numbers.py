@@ -59,7 +59,7 @@ def _root(unit: str) -> tuple[float, str]:
         factor, root = _registry().get_root_units(_registry().parse_units(_as_pint(unit)))
     except (pint.PintError, ValueError, TypeError, ArithmeticError, AttributeError):
         raise ValueError(f"{unit!r} is an unknown unit: write it as mm, N/mm, m/s^2, Hz or deg") from None
-    # pint's base unit of mass is the gram; SI users expect the kilogram, and the factor cancels
+    # pint's base unit of mass is the gram; SI users expect the kilogram, and the factor of 1000 cancels
     text = str(root).replace("gram", "kilogram")
     return float(factor), "" if text == "dimensionless" else text
 

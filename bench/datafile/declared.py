@@ -130,10 +130,10 @@ FINDINGS = (
     Field("standard_uncertainty", Kind.REAL, "of the row", "standard uncertainty (k = 1)"),
     Field("unit", Kind.TEXT, "", "SI unit of value and standard uncertainty"),
     Field("source", Kind.TEXT, "", "source of the value"),
-    Field("date", Kind.TEXT, "", "date of the measurement, ISO 8601 with zone"),
+    Field("date", Kind.TEXT, "", "date of the measurement, ISO 8601 with time zone"),
 )
 CORRELATIONS = (
-    Field("number", Kind.WHOLE, "1", "number of earlier sets, as for the findings of this correlation"),
+    Field("number", Kind.WHOLE, "1", "number of earlier sets of findings, as in the rows of the two findings"),
     Field("first", Kind.TEXT, "", "name of a finding"),
     Field("second", Kind.TEXT, "", "name of another finding"),
     Field("coefficient", Kind.REAL, "1", "correlation coefficient of their errors; 0 for other pairs"),

@@ -150,12 +150,12 @@ class DataFile(SampleReader):
 
     @property
     def start_time(self) -> str:
-        """Time of the file's creation, ISO 8601 with zone."""
+        """Time of the file's creation, ISO 8601 with time zone."""
         return hdf5.read_text(self._entry, "start_time")
 
     @property
     def end_time(self) -> str:
-        """Time of its closing, ISO 8601 with zone; empty when it was not closed."""
+        """Time of its closing, ISO 8601 with time zone; empty when it was not closed."""
         return hdf5.read_text(self._entry, "end_time")
 
     @property

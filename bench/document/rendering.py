@@ -100,7 +100,7 @@ def _save_pdf(figure: "Figure", path: Path) -> None:
     """Saves a figure no larger than a page; if the width is reduced, the height is reduced by the square root of the
     same factor.
 
-    The figure is drawn at that size rather than scaled, so that letters keep their size.
+    The figure is drawn at that size rather than scaled, so that its text keeps its size.
     """
     import matplotlib
 

@@ -92,7 +92,7 @@ class Engine:
         output = self._output
         ending = output.ending_of(lambda: self._carry_out(plan)) or Ending("completed", "the plan was carried out")
         if output.driven:
-            # the rig still works after an error of data file, plan or analysis: stop smoothly
+            # the rig still works after an error in data file, plan or analysis: stop smoothly
             ending = ending.then(
                 output.ending_of(lambda: self._loop.ramp_out(State.ABORTING, ending.reason, ending.cause))
             )

@@ -105,7 +105,7 @@ class Residual:
         self._largest = 0.0
 
     def push(self, measured: Array, model: Array, low: Array, high: Array) -> tuple[float, float]:
-        """Relative rms of measured minus modelled drift and of the excess over the band, after further samples [m],
+        """Relative rms of measured minus modelled drift, and of the excess outside the band, after further samples [m],
         shape (n,).
 
         NaN until the window is full, and while more than half of its values are missing.

@@ -309,7 +309,7 @@ def _attached(connection: Connection, name: str) -> library.Task | None:
 
 
 def _is_written(task: library.Task) -> bool:
-    """Whether a client appends samples to an output."""
+    """Whether a client is appending samples to an output."""
     clock = WallClock()
     end = clock.now() + _WATCH
     try:

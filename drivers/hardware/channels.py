@@ -127,7 +127,7 @@ def _analogue(
     zero: float,
     volts: tuple[float, float] | None = None,
 ) -> Channel:
-    """A channel with value = (volts - zero) * slope in `unit`; outside the range `volts` [V] it is invalid."""
+    """A channel with value = (volts - zero) * slope in `unit`; a value outside the range `volts` [V] is invalid."""
     c0, c1, *higher = scaling.coefficients
     valid = scaling.lowest, scaling.highest
     if volts is not None:

@@ -60,7 +60,7 @@ class ClockedSensor(Protocol):
 
     @property
     def silent(self) -> bool:
-        """Whether no value has arrived for so long that blocks do not wait for the sensor."""
+        """Whether no value has arrived for so long that blocks no longer wait for the sensor."""
         ...
 
     def start(self) -> None:
@@ -151,7 +151,7 @@ class Tracks:
 
     def raw(self) -> tuple[RawValues, ...]:
         """The values received since the last call, or since the run began, as sent by the sensors."""
-        # of a sensor that has failed, those before
+        # if a sensor has failed, the values received before
         with suppress(RigError):
             self._take()
         taken, self._raw = self._raw, [[] for _ in self._tracks]

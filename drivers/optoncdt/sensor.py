@@ -243,7 +243,7 @@ class SerialLaser:
         self.close()
 
     def _require_counted_rate(self, stream: Stream) -> None:
-        """Count the values of a sensor that does not report its rate. Raises InvalidInput for another rate."""
+        """Count the values of a sensor that does not report its rate. Raises InvalidInput if it is not the set rate."""
         began, counted = now(), [stream.take()]
         while now() - began < _COUNTING:
             stream.wait(_COUNTING)

@@ -75,7 +75,7 @@ _GRID = 41
 _RESOLUTION = 1e-7
 """Mean delay below which readings count as exact [s]."""
 _FAR = 5.0
-"""A delay of this many typical ones is a stall of the machine and excluded as an outlier."""
+"""A delay of this many times the typical one is a stall of the machine and is excluded as an outlier."""
 _QUARTER = 8
 """Minimum number of readings in a quarter of the history for the test."""
 _CHANCE = 4.0

@@ -356,7 +356,7 @@ def _reason(channel: Channel, invalid: Counts) -> str:
     if (remedy := _OF_THE_LINE.get(most)) is not None and most in channel.faults:
         return f"{why}: {remedy}"
     if channel.name in STOREYS:
-        return f"{why}: check that the laser is on and the storey rests in the middle of its range"
+        return f"{why}: check that the laser is on and that the storey rests in the middle of the laser's range"
     return f"{why}: check the sensor's supply, its cable, and the terminal and range of the input"
 
 

@@ -282,7 +282,7 @@ def _budget(rows: list[dict[str, Any]]) -> list[Part]:
         "Contributions to the uncertainty of r: each bar is the expanded uncertainty (k = 2), divided in "
         "proportion to the contributions to the variance."
     )
-    return [Picture(figure, text, "Horizontal bars of the expanded uncertainty, divided by contribution.")]
+    return [Picture(figure, text, "Horizontal bars of the expanded uncertainty, split by contribution.")]
 
 
 def _recorded_impacts(campaign: Campaign, tilts: list[dict[str, Any]]) -> list[Impacts]:

@@ -13,6 +13,7 @@ from bench.analysis.steady import WINDOW
 from bench.config.model import BenchConfiguration
 from bench.control.starts import OVERSHOOTS, Start, plan_starts
 from bench.datafile.tables import Column, Table, arrays
+from bench.document.typography import counted
 from bench.figures.summary import PointLike, plain
 from bench.figures.text_table import TextColumn, text_table
 from bench.prediction.bands import bands
@@ -268,10 +269,11 @@ def _cells(row: dict[str, Any]) -> list[str]:
 def _remarks(rows: list[dict[str, Any]]) -> list[str]:
     compared = [row["agrees"] for row in rows if row.get("agrees") is not None]
     disagreeing = len(compared) - sum(compared)
-    lines = ["", f"{len(compared)} of {len(rows)} points compared with the prediction, {disagreeing} disagree."]
+    verdict = counted(disagreeing, "disagrees", "disagree")
+    lines = ["", f"{len(compared)} of {len(rows)} points compared with the prediction, {verdict}."]
     if orbits := [row["orbit_agrees"] for row in rows if row.get("orbit_agrees") is not None]:
-        differing = len(orbits) - sum(orbits)
-        lines.append(f"{len(orbits)} more compared by the orbit about which the motion revolves, {differing} disagree.")
+        verdict = counted(len(orbits) - sum(orbits), "disagrees", "disagree")
+        lines.append(f"{len(orbits)} more compared by the orbit about which the motion revolves, {verdict}.")
     known = [row for row in rows if row.get("dominating") and row.get("alpha_2")]
     if known:
         shares = [100.0 * row["alpha_2_uncertainty"] / row["alpha_2"] for row in known]

@@ -53,9 +53,9 @@ def _results_section(campaign: Campaign) -> Section:
     compared = [row["agrees"] for row in points if row["agrees"] is not None]
     parts: list[Part] = [
         f"{counted(len(points), 'point was', 'points were')} tested; {len(compared)} of them had a steady "
-        f"motion that can be compared, and {sum(compared)} of those agree with the prediction. Both gains are "
-        "for the achieved amplitudes of the table and for the branch of the point. They agree when they "
-        "differ by no more than their combined uncertainty (root sum of squares). The uncertainty of a "
+        f"motion that can be compared, and {counted(sum(compared), 'of those agrees', 'of those agree')} with the "
+        "prediction. Both gains are for the achieved amplitudes of the table and for the branch of the point. They "
+        "agree when they differ by no more than their combined uncertainty (root sum of squares). The uncertainty of a "
         "measured gain is expanded (k = 2) and includes sensors and scatter; that of a predicted one (k = 2, "
         "to first order) follows from the uncertainty of the specimen.",
         _gains(campaign, points),
@@ -265,7 +265,7 @@ def _budget_parts(points: Sequence[Mapping[str, Any]]) -> list[Part]:
         budget_figure(labels[:MOST], [found for _, found in known[:MOST]], expanded[:MOST]),
         "Contributions to the uncertainty of α₂: each bar is the expanded uncertainty (k = 2), divided in "
         "proportion to the contributions to the variance.",
-        "Horizontal bars of the expanded uncertainty at every point, divided by contribution.",
+        "Horizontal bars of the expanded uncertainty at every point, split by contribution.",
     )
     return [Table(caption, columns, rows), picture]
 

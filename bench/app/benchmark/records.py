@@ -145,7 +145,7 @@ def records(quick: bool, members: int) -> Section:
     rock, rocking = _rocking(20 if quick else 60, 2.0 if quick else 10.0)
     many, scattered, overturned = _scatter(members, 1 if quick else 3)
     notes = (
-        f"Records of {DURATION:g} s at dt {DT:g} s; all with peaks. Errors of end states in SI units.",
+        f"Records of {DURATION:g} s at dt {DT:g} s, all computed with peaks. Errors of end states in SI units.",
         f"In the scatter case, {overturned} of {members} members overturn; the error is the greatest relative "
         "difference in peak drift over the first members.",
     )

@@ -205,7 +205,7 @@ def _hand_out(configuration: "BenchConfiguration", laboratory: "Laboratory", pat
 
 @contextmanager
 def _until_asked() -> Generator[threading.Event]:
-    """Event that is set by Ctrl-C, SIGTERM and a closed terminal, instead of their default actions."""
+    """Event that Ctrl-C, SIGTERM and the closing of the terminal set instead of their default actions."""
     over = threading.Event()
 
     def handle(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - the signature is Python's

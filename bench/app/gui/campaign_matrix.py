@@ -95,7 +95,7 @@ class Campaign:
 
 
 class MatrixView(QTableWidget):
-    """Table of the points; hidden in a protocol whose points are not known beforehand."""
+    """Table of the points; hidden for a protocol whose points are not known beforehand."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()

@@ -148,7 +148,8 @@ def damage_notice(campaign: Campaign) -> list[Notice]:
         )
         return [Notice(text)]
     if found.unchecked:
-        return [Notice(f"{counted(len(found.unchecked), 'dataset')} of the file have no checksum to verify.")]
+        lacking = counted(len(found.unchecked), "dataset of the file has", "datasets of the file have")
+        return [Notice(f"{lacking} no checksum to verify.")]
     return []
 
 

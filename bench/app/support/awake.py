@@ -37,7 +37,7 @@ def awake(system: str = sys.platform) -> Generator[bool]:
     process = None
     if command is not None:
         with suppress(OSError):
-            # a session of its own: Ctrl-C is for this program alone
+            # in a session of its own: Ctrl-C is to reach this program alone
             process = subprocess.Popen(
                 command,
                 stdin=subprocess.PIPE,

@@ -39,7 +39,7 @@ class Settings:
     value.
     """
     reduction: int = 1
-    """Output reduction: one of this number of measurements is sent."""
+    """Output reduction: one in this number of measurements is sent."""
     reduced: tuple[str, ...] = ("RS422",)
     """The outputs to which the reduction applies."""
     trigger: Literal["NONE", "EDGE", "PULSE", "SOFTWARE"] = "NONE"

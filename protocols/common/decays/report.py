@@ -30,7 +30,7 @@ def budget_parts(quantity: str, labels: list[str], shares: list[dict[str, float]
         f"Contributions to the uncertainty of {quantity}: each bar is the expanded uncertainty, divided in proportion "
         "to the contributions to the variance."
     )
-    return [Table(caption, columns, rows), Picture(figure, text, "Horizontal bars divided by contribution.")]
+    return [Table(caption, columns, rows), Picture(figure, text, "Horizontal bars split by contribution.")]
 
 
 def relative_parts(parts: str, value: float) -> dict[str, float]:
