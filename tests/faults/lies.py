@@ -208,7 +208,7 @@ def channels() -> list[Lie]:
         for field, value in fields
     ]
     for name, value in {"None": None, "none": (), "texts": ("laser_1",), "a number": 4}.items():
-        lies.append(Lie(f"channels: {name}", lambda v=value: LyingRig(answers={"channels": v}), "channels", opens=True))
+        lies.append(Lie(f"channels: {name}", lambda v=value: LyingRig(answers={"channels": v}), "channel", opens=True))
     return lies
 
 

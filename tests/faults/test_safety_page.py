@@ -22,7 +22,7 @@ def test_every_state_goes_where_the_page_says(state: State) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", sorted(set(Limits.model_fields) - {"warning", "debounce", "heating_time", "confirmed"})
+    "name", sorted(set(Limits.model_fields) - {"warning", "debounce", "heating_time", "confirmed", "cut"})
 )
 def test_every_limit_has_its_default_on_the_page(name: str) -> None:
     (row,) = [row for row in ROWS if row[0] == f"`limits.{name}`"]
@@ -34,6 +34,8 @@ def test_every_limit_has_its_default_on_the_page(name: str) -> None:
 
 def test_numbers_in_the_text() -> None:
     assert "`limits.confirmed`" in PAGE
+    assert "`limits.cut`" in PAGE
+    assert Limits().cut == ()
     assert f"`ramps.stop` = {Ramps().stop:g} s" in PAGE
     assert f"`ramps.abort` = {Ramps().abort:g} s" in PAGE
     assert sorted(getattr(Warnings(), name) for name in Warnings.model_fields)[4] == 0.9

@@ -302,7 +302,7 @@ def test_an_interrupt_leaves_an_aborted_file_with_the_output_at_zero(tmp_path: P
 
     threading.Thread(target=interrupt, daemon=True).start()
     before = signal.getsignal(signal.SIGINT)
-    with pytest.raises(KeyboardInterrupt, match="has its results"):
+    with pytest.raises(KeyboardInterrupt, match="its results are in"):
         bench.run("harmonic", QUICK, out=folder)
     assert signal.getsignal(signal.SIGINT) is before
     with bench.open(folder) as campaign:

@@ -327,7 +327,7 @@ def test_significant_digits() -> None:
         ("steady --out taken", "--out = 'taken' is refused: the file exists and is never overwritten"),
         ("map --plot taken.png", "--plot = 'taken.png' is refused: the file exists and is never overwritten"),
         ("steady --csv absent/points.csv", "the folder does not exist"),
-        ("steady --csv same --out same", "--csv writes the same file"),
+        ("steady --csv same --out same", "--csv would write the same file"),
         ("modes --omega 16", "Unknown option"),
         ("nothing", "nothing"),
     ],

@@ -175,7 +175,7 @@ def test_a_session_says_what_is_wired_and_what_is_not(open_session: OpenSession)
 @pytest.mark.parametrize(
     ("daq", "item", "remedy"),
     [
-        ({"emergency_stop": {"line": "Dev1/port0/LINE0"}}, "emergency_stop.line", "enable_line uses this line"),
+        ({"emergency_stop": {"line": "Dev1/port0/LINE0"}}, "emergency_stop.line", "enable_line already uses this line"),
         ({"over_travel": {"line": "/Dev1/port0/line3"}, "over_travel_2": {}}, "over_travel_2.line", "over_travel.line"),
         ({"amplifier_ready": {"line": "Dev1/port0/line5"}, "heartbeat": {}}, "heartbeat.line", "amplifier_ready.line"),
         ({"heartbeat": {}, "enable_line": None}, "heartbeat.line", "requires enable_line"),

@@ -233,7 +233,7 @@ def test_what_would_have_no_effect_is_refused(values: dict[str, object], item: s
 
 def test_a_weighing_that_the_specimen_file_overrules_is_refused_and_other_masses_are_told(tmp_path: Path) -> None:
     weighed = Identified(findings=(before("m1", 1.0624, 0.0004), before("m2", TRUE.m2, 0.0004)))
-    with pytest.raises(InvalidInput, match=r"m1 = 1\.0624 kg .*omit it") as refusal:
+    with pytest.raises(InvalidInput, match=r"m1 = 1\.0624 kg .*omit this parameter") as refusal:
         prepared(FreeVibrationParameters(mass_uncertainty=0.05), bench(identified=weighed))
     assert refusal.value.item == "mass_uncertainty"
     parameters = FreeVibrationParameters(excitation="hand", repeats=1, window=5.0)

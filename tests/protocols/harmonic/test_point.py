@@ -141,4 +141,4 @@ def test_a_specimen_that_is_not_as_assumed_is_flagged(tmp_path: Path) -> None:
     _, folder = _run(tmp_path / "run", "--config", str(configuration))
     (point,) = _summary(folder)["points"]
     assert point["agrees"] is False
-    assert "differs from the prediction" in point["reason"]
+    assert "difference from the prediction exceeds" in point["reason"]

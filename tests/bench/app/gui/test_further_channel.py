@@ -221,4 +221,4 @@ def test_a_dry_run_says_that_its_limit_is_not_predicted(tmp_path: Path, capsys: 
     ]
     assert main(["run", "harmonic", *asked, "--dry-run"]) == 0
     said = capsys.readouterr()
-    assert f"the limit of {NAME} ends a run" in " ".join((said.out + said.err).split())
+    assert f"the limit on {NAME} ends a run" in " ".join((said.out + said.err).split())

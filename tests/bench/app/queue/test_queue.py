@@ -202,7 +202,7 @@ def _raising(error: BaseException) -> Callable[[Requests], None]:
         ("aborted", None, 1, Stage.FAILED, "aborted: why it ended"),
         ("completed", _raising(RigError("the rig went away")), 1, Stage.FAILED, "failed: the rig went away"),
         ("completed", _raising(InvalidInput("omega", 2.0, "too slow")), 1, Stage.FAILED, "refused: omega = 2.0"),
-        ("completed", _raising(KeyboardInterrupt()), 130, Stage.FAILED, "ended before anything moved"),
+        ("completed", _raising(KeyboardInterrupt()), 130, Stage.FAILED, "before anything moved"),
     ],
 )
 def test_what_waits_goes_on_waiting_after_a_test_that_did_not_end_well(
