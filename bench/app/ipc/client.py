@@ -138,8 +138,11 @@ class ClientConnection:
         """Report a session that ended without a final message: by its files if it wrote them, else with `text`."""
         if self._over:
             return
-        ended = self._by_the_files() if by_files else None
-        self._keep(ended or Refused(text, failed=True, details=details))
+        if by_files and (ended := self._by_the_files()) is not None:
+            self._keep(ended)
+        else:
+            # not a message of the session: the status stays "no link"
+            self._received.append(Refused(text, failed=True, details=details))
         self._tell()
 
     def _by_the_files(self) -> Ended | None:
