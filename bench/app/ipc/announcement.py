@@ -9,9 +9,10 @@ from collections.abc import Generator
 from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from multiprocessing import AuthenticationError
-from multiprocessing.connection import Client, Listener
+from multiprocessing.connection import Client, Connection, Listener, answer_challenge, deliver_challenge
+from typing import cast
 
-from bench.app.ipc.messages import Attached, Published, Run
+from bench.app.ipc.messages import PATIENCE, Attached, Published, Run
 from bench.app.ipc.server import SessionServer
 from bench.app.ipc.sessions import RunningSession, lock_of, remove, sessions_folder
 from bench.events import Warned
@@ -32,7 +33,7 @@ def announced(server: SessionServer, run: Run, owner: str) -> Generator[None]:
     lock = lock_of(path)
     try:
         lock.acquire()
-        listener = Listener(authkey=key)
+        listener = Listener()
         session = RunningSession(
             os.getpid(),
             str(listener.address),
@@ -55,14 +56,30 @@ def announced(server: SessionServer, run: Run, owner: str) -> Generator[None]:
         return
     over = threading.Event()
 
+    def admit(connection: Connection) -> None:
+        """Attach a client that has the key."""
+        try:
+            _authenticate(connection, key)
+        except (OSError, EOFError, AuthenticationError, ValueError, AssertionError):
+            # another program of this user, or a client that left at once
+            connection.close()
+            return
+        if over.is_set():
+            connection.close()
+        else:
+            server.attach(connection, Attached(run, operator, owner, time.time() - began))
+
     def accept() -> None:
         with listener:
             while not over.is_set():
-                # another program of this user, or a client that left at once
-                with suppress(OSError, EOFError, AuthenticationError):
+                with suppress(OSError, EOFError):
                     connection = listener.accept()
-                    if not over.is_set():
-                        server.attach(connection, Attached(run, operator, owner, time.time() - began))
+                    # a client that sends nothing must delay neither the others nor the end of the session
+                    threading.Thread(target=admit, args=(connection,), name="admitting", daemon=True).start()
+
+    def wake() -> None:
+        with suppress(OSError, EOFError):
+            Client(listener.address).close()
 
     thread = threading.Thread(target=accept, name="attaching", daemon=True)
     thread.start()
@@ -71,6 +88,27 @@ def announced(server: SessionServer, run: Run, owner: str) -> Generator[None]:
     finally:
         remove(path, lock)
         over.set()
-        with suppress(OSError, EOFError, AuthenticationError):
-            Client(listener.address, authkey=key).close()
+        threading.Thread(target=wake, name="end of attaching", daemon=True).start()
         waiting.join(thread, 1.0)
+
+
+class _Limited:
+    """A connection whose other side must send each message within `PATIENCE`; otherwise raises TimeoutError."""
+
+    def __init__(self, connection: Connection) -> None:
+        self._connection = connection
+        self.send_bytes = connection.send_bytes
+
+    def recv_bytes(self, maxlength: int | None = None) -> bytes:
+        if not self._connection.poll(PATIENCE):
+            raise TimeoutError
+        return self._connection.recv_bytes(maxlength)
+
+
+def _authenticate(connection: Connection, key: bytes) -> None:
+    """Exchange proofs of the key, as `Listener.accept` does. Raises OSError, EOFError or AuthenticationError; after an
+    unexpected message AssertionError or ValueError.
+    """
+    limited = cast(Connection, _Limited(connection))
+    deliver_challenge(limited, key)
+    answer_challenge(limited, key)

@@ -113,6 +113,7 @@ class SessionServer:
         self.connected = True
         """Whether the owner is present."""
         self._attached: list[SendQueue] = []
+        self._attending: set[SendQueue] = set()
         self._sending: list[threading.Event] = []
         self._state, self._reason, self._time = State.IDLE, "", 0.0
         self._noted = now()
@@ -122,12 +123,13 @@ class SessionServer:
     @property
     def attended(self) -> bool:
         """Whether a client may answer questions."""
-        return self.connected or bool(self._attached)
+        return self.connected or bool(self._attending)
 
     def attach(self, connection: Connection, introduction: Attached) -> None:
         """Serve another client."""
         queue = self.outbox.join(introduction, Control(not self.connected))
         self._attached.append(queue)
+        self._attending.add(queue)
         self._serve(connection, queue, lambda: self._hear_attached(connection, queue))
 
     def note(self, event: Event) -> None:
@@ -187,15 +189,27 @@ class SessionServer:
             self._lose("the client has disconnected")
 
     def _hear_attached(self, connection: Connection, queue: SendQueue) -> None:
-        with suppress(EOFError, OSError):
-            while not isinstance(message := receive(connection), Leave):
-                # the run is the owner's while the owner is present; STOP is everybody's
-                if not self.connected or isinstance(message, Note) or message in (Ask("abort"), Ask("halt")):
-                    self._heed(message)
-        self._attached.remove(queue)
-        self.outbox.leave(queue)
-        with suppress(OSError):
-            connection.close()
+        try:
+            with suppress(EOFError, OSError):
+                while True:
+                    if not connection.poll(PATIENCE):
+                        # a frozen window answers no question
+                        self._attending.discard(queue)
+                        continue
+                    message = receive(connection)
+                    self._attending.add(queue)
+                    if isinstance(message, Leave):
+                        break
+                    # the run is the owner's while the owner is present; STOP is everybody's
+                    stops = isinstance(message, Ask) and message.end in ("abort", "halt")
+                    if not self.connected or isinstance(message, Note) or stops:
+                        self._heed(message)
+        finally:
+            self._attached.remove(queue)
+            self._attending.discard(queue)
+            self.outbox.leave(queue)
+            with suppress(OSError):
+                connection.close()
 
     def _lose(self, why: str) -> None:
         self._find(present=False)
