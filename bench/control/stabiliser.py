@@ -45,14 +45,31 @@ def observed(cycle: Cycle, turn: complex) -> Array:
     return coefficients(cycle.harmonics(U1) / by, cycle.harmonics(DRIFT) / by)
 
 
+@dataclass(frozen=True, eq=False)
+class StabiliserDesign:
+    """Gains of a stabiliser for the orbit of `cycle_map`: `regulator`, shape (2, n + 2), and `filter`, shape
+    (n + m, m), for n states and m coefficients.
+    """
+
+    cycle_map: CycleMap
+    regulator: Array
+    filter: Array
+
+    @staticmethod
+    def of(cycle_map: CycleMap) -> "StabiliserDesign":
+        """Solve the two Riccati equations, which takes up to half a second. Raises numpy.linalg.LinAlgError or
+        ValueError if no control stabilises the orbit.
+        """
+        return StabiliserDesign(cycle_map, _regulator(cycle_map), _filter(cycle_map))
+
+
 class Stabiliser:
     """Determines the control of each cycle, a complex share with a magnitude of at most `authority`."""
 
-    def __init__(self, cycle_map: CycleMap, authority: float) -> None:
-        self._map, self._authority = cycle_map, authority
-        self._regulator = _regulator(cycle_map)
-        self._filter = _filter(cycle_map)
-        n, m = cycle_map.transition.shape[0], cycle_map.orbit.size
+    def __init__(self, design: StabiliserDesign, authority: float) -> None:
+        self._map, self._authority = design.cycle_map, authority
+        self._regulator, self._filter = design.regulator, design.filter
+        n, m = self._map.transition.shape[0], self._map.orbit.size
         self._state, self._orbit = np.zeros(n), np.zeros(m)
         self._begun = False
         # controls of the cycle before the one measured next, of that cycle, and of the following one
@@ -101,7 +118,11 @@ def _regulator(found: CycleMap) -> Array:
     weight[:n, :n] += found.outputs.T @ found.outputs / float(found.orbit @ found.orbit)
     cost = COST * np.eye(2)
     value = np.asarray(solve_discrete_are(a, b, weight, cost), dtype=np.float64)
-    return np.asarray(np.linalg.solve(cost + b.T @ value @ b, b.T @ value @ a), dtype=np.float64)
+    gain = np.asarray(np.linalg.solve(cost + b.T @ value @ b, b.T @ value @ a), dtype=np.float64)
+    # the solver does not always recognise an equation without a stabilising solution
+    if np.abs(np.linalg.eigvals(a - b @ gain)).max() >= 1.0:
+        raise np.linalg.LinAlgError("the regulator does not stabilise the orbit")
+    return gain
 
 
 def _filter(found: CycleMap) -> Array:

@@ -24,7 +24,7 @@ from bench.preflight.margins import Forecast, Stage, bounds
 from bench.progress import Progress, counting, silent
 from bench.result_cache import cached
 from protocols.common.calibrate import CHANGE_TIME, MEASURED, PROBE, SETTLING, harmonic_frequencies
-from protocols.harmonic.holding import PATIENCE, SLOW
+from protocols.harmonic.holding import PATIENCE, SLOW, too_late
 from protocols.harmonic.plan import BARE_CHANGE, Pace, spring_calibration
 from protocols.harmonic.protocol import HarmonicParameters
 from sim.channel import STOREYS
@@ -91,7 +91,8 @@ def trials(
         legs = _calibration_legs([(omega, level) for omega in wanted])
         yield Trial(Stage(f"calibration of the drive with beta = {beta:g}", legs), coupled)
         for omega, planned in plans.items():
-            held = parameters.hold and _slow(parameters, coupled, omega)
+            possible = parameters.hold and too_late(configuration, omega) is None
+            held = possible and _slow(parameters, coupled, omega)
             extra = 2.0 * PATIENCE * tau / omega if held else 0.0
             control = parameters.hold_authority if held else 0.0
             for number, start in enumerate(planned, 1):

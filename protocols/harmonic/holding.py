@@ -3,7 +3,7 @@
 from collections import deque
 from collections.abc import Generator
 from dataclasses import replace
-from math import nan, sqrt
+from math import nan, sqrt, tau
 
 import numpy as np
 
@@ -12,8 +12,9 @@ from bench.analysis.free_motion import SHORTEST, Rate, free_motion
 from bench.analysis.gain import SensorAccuracy, steady_peak
 from bench.analysis.signals import DRIFT
 from bench.analysis.steady import WINDOW, SteadyDetector
+from bench.config.model import BenchConfiguration
 from bench.control.sine import Sine, SineControl, SineResponse, Tolerance
-from bench.control.stabiliser import BLEND, DELAY, HoldMonitor, Stabiliser, observed
+from bench.control.stabiliser import BLEND, DELAY, HoldMonitor, Stabiliser, StabiliserDesign, observed
 from bench.engine.steps import Dwell, Fallen, Measured, Outcome, Publish, SetHarmonics, Step
 from bench.events import HoldCycle, StepStarted
 from protocols.harmonic.measurement import (
@@ -27,7 +28,7 @@ from protocols.harmonic.measurement import (
     TableState,
 )
 from protocols.harmonic.protocol import HarmonicParameters
-from sim.cycle_map import CycleMap, cycle_map
+from sim.cycle_map import cycle_map
 from sim.shaker import Shaker
 from sim.steady import NoOrbit, Orbit
 
@@ -51,33 +52,51 @@ for a hundred cycles; and number of cycles after it in which other multipliers f
 """
 
 
-def prepared(orbit: Orbit | None, shaker: Shaker | None, harmonics: int) -> CycleMap | None:
-    """Cycle map for the stabiliser; None if there is no orbit on the table."""
+def prepared(orbit: Orbit | None, shaker: Shaker | None, harmonics: int) -> StabiliserDesign | None:
+    """Design of the stabiliser, which takes too long while the table is driven. None if there is no orbit on the table,
+    or if no control stabilises it.
+    """
     if orbit is None:
         return None
     try:
-        return cycle_map(orbit, shaker, harmonics, BLEND)
-    except NoOrbit:
+        return StabiliserDesign.of(cycle_map(orbit, shaker, harmonics, BLEND))
+    except (NoOrbit, np.linalg.LinAlgError, ValueError):
         return None
+
+
+def too_late(configuration: BenchConfiguration, omega: float) -> str | None:
+    """Reason why a motion at `omega` [rad/s] cannot be held, None if it can: corrections would begin later than `DELAY`
+    cycles after the measured one.
+
+    A cycle's last sample is read up to a block late, and a command takes effect a lead later.
+    """
+    latency = (configuration.block_samples + configuration.lead_samples) / configuration.sample_rate
+    cycle = tau / omega
+    if latency <= (DELAY - 1) * cycle:
+        return None
+    return (
+        f"acquisition.block_duration and acquisition.lead, together {latency:.3g} s, are longer than a cycle of "
+        f"{cycle:.3g} s, so that a correction would come too late: reduce them"
+    )
 
 
 def hold(
     sine: Sine,
     table: TableState,
-    found: CycleMap,
+    design: StabiliserDesign,
     beta: float,
     largest: float,
     parameters: HarmonicParameters,
     accuracy: SensorAccuracy,
     report: Report,
 ) -> Generator[Step, Outcome, Held | Fallen]:
-    """Capture the orbit of `found` from the present motion, hold it, and measure it.
+    """Capture the orbit of `design` from the present motion, hold it, and measure it.
 
     `largest` [m] is the greatest peak drift allowed. While the motion is being captured the amplitude control is
     frozen; then it corrects the shares to which the control is added.
     """
-    run = _Hold(sine, table, found, largest, parameters, accuracy)
-    phase: float | None = found.phase
+    run = _Hold(sine, table, design, largest, parameters, accuracy)
+    phase: float | None = design.cycle_map.phase
     while True:
         outcome = yield Dwell(1, phase)
         phase = None
@@ -85,6 +104,8 @@ def hold(
             return Fallen()
         for cycle in outcome.cycles or (None,):
             reason = run.push(cycle)
+            if not np.isfinite(run.command[0]):
+                reason = "the estimate of the deviation is not finite"
             yield Publish(HoldCycle(sine.omega, beta, run.monitor.cycles, *run.last))
             if reason is not None:
                 yield SetHarmonics(run.shares)
@@ -94,15 +115,19 @@ def hold(
             yield from report(list(run.recent))
         if (held := run.measured()) is not None and held.peak is not None:
             first, *others = run.shares
-            kicked = (first + KICK * found.sensitive / table.answer, *others)
+            kicked = (first + KICK * design.cycle_map.sensitive / table.answer, *others)
             yield SetHarmonics(kicked, run.monitor.cycles + 1, BLEND)
             yield SetHarmonics(run.shares, run.monitor.cycles + 2, BLEND)
-            free = yield from _released(sine, beta, held.peak.drift, run.monitor.cycles)
+            free = yield from _released(sine, beta, held.peak.drift, largest, run.monitor.cycles)
             return free if isinstance(free, Fallen) else replace(held, rate=free)
 
 
-def _released(sine: Sine, beta: float, drift: float, cycles: int) -> Generator[Step, Outcome, Rate | Fallen | None]:
-    """Rate at which the deviation changes without control, while it is small; `drift` [m] is the peak on the orbit."""
+def _released(
+    sine: Sine, beta: float, drift: float, largest: float, cycles: int
+) -> Generator[Step, Outcome, Rate | Fallen | None]:
+    """Rate at which the deviation changes without control, while it is small; `drift` [m] is the peak on the orbit, and
+    the first one above `largest` [m] ends the observation.
+    """
     yield Publish(StepStarted(f"beta = {beta:g} at {sine.omega:g} rad/s: released, observing the deviation"))
     found = list[Cycle]()
     for count in range(1, RELEASED + 1):
@@ -114,7 +139,8 @@ def _released(sine: Sine, beta: float, drift: float, cycles: int) -> Generator[S
             yield Publish(HoldCycle(sine.omega, beta, cycles + count, float(cycle.extreme[DRIFT]), abs(deviation), 0.0))
             if count > DELAY + FADING:
                 found.append(cycle)
-            if abs(deviation) > GROWN and len(found) > SHORTEST:
+            grown = abs(deviation) > GROWN and len(found) > SHORTEST
+            if grown or float(cycle.extreme[DRIFT]) > largest:
                 return _rate(found)
     return _rate(found)
 
@@ -130,13 +156,13 @@ class _Hold:
         self,
         sine: Sine,
         table: TableState,
-        found: CycleMap,
+        design: StabiliserDesign,
         largest: float,
         parameters: HarmonicParameters,
         accuracy: SensorAccuracy,
     ) -> None:
         self._sine, self._table, self._parameters = sine, table, parameters
-        self._stabiliser = Stabiliser(found, parameters.hold_authority)
+        self._stabiliser = Stabiliser(design, parameters.hold_authority)
         self.monitor = HoldMonitor(parameters.hold_authority, PATIENCE, largest, table.answer)
         tolerances = (parameters.amplitude_tolerance, parameters.phase_tolerance, parameters.distortion_tolerance)
         self._control = SineControl(parameters.harmonics, Tolerance(*(AIM * each for each in tolerances)))

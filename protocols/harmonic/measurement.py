@@ -289,6 +289,8 @@ def _held_point(
     peak, bare, omega = held.peak, reference.peak, free.omega_rad_s
     if peak is None:
         text = f"the motion was to be held on its orbit, and released after {held.cycles} cycles: {held.reason}"
+        if held.cycles == 0:
+            text = f"the motion could not be held on its orbit: {held.reason}"
         return free.model_copy(update={"reason": "; ".join((free.reason, text)).removeprefix("; ")})
     layers = predict_gain(specimen, omega, peak.amplitude, bare.amplitude).layers
     if _nearest(layers, peak) != _ROCKING or _ROCKING not in layers:

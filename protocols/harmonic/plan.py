@@ -17,14 +17,14 @@ from bench.analysis.sensor_accuracy import SensorUncertainty
 from bench.config.model import BenchConfiguration
 from bench.control.oscillator import DriveCalibration, Leg
 from bench.control.sine import Sine
-from bench.control.stabiliser import GROWTH
+from bench.control.stabiliser import GROWTH, StabiliserDesign
 from bench.control.starts import Start
 from bench.engine.steps import Arm, Calibrate, Fallen, OperatorAction, Outcome, Publish, RampOut, Step, Sweep
 from bench.events import Estimate, PointFinished, Progress, StepStarted, Warned
 from drivers.rig import OperatorTask, RigError
 from protocols.common.calibrate import calibrate_drive, harmonic_frequencies
 from protocols.harmonic.free_prediction import with_free_prediction
-from protocols.harmonic.holding import SLOW, hold, prepared
+from protocols.harmonic.holding import SLOW, hold, prepared, too_late
 from protocols.harmonic.measurement import (
     Held,
     Report,
@@ -36,7 +36,6 @@ from protocols.harmonic.measurement import (
     settle_and_measure,
 )
 from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, PointStatus
-from sim.cycle_map import CycleMap
 from sim.gain import predict_gain
 from sim.specimen import Specimen
 from sim.steady import Orbit, resting_level
@@ -176,8 +175,11 @@ class HarmonicPlan:
                 settled = yield from self._settle(omega, specimen, calibration)
             held: Held | Fallen | None = None
             if isinstance(settled, Settled) and held_by is not None and _to_be_held(settled, held_by):
-                yield Publish(StepStarted(f"{where}: holding the motion on its orbit"))
-                held = yield from self._hold(specimen, omega, calibration, settled, held_by)
+                if (late := too_late(self._configuration, omega)) is not None:
+                    held = Held(None, late)
+                else:
+                    yield Publish(StepStarted(f"{where}: holding the motion on its orbit"))
+                    held = yield from self._hold(specimen, omega, calibration, settled, held_by)
             if not isinstance(settled, Settled):
                 falls += 1
                 yield from self._end_test(specimen, fast=True)
@@ -227,13 +229,18 @@ class HarmonicPlan:
         layer = predict_gain(specimen, omega, self._amplitude).rocking
         return layer.orbit if layer else None
 
-    def _prepared(self, orbit: Orbit | None) -> CycleMap | None:
+    def _prepared(self, orbit: Orbit | None) -> StabiliserDesign | None:
         if not self._parameters.hold:
             return None
         return prepared(orbit, self._configuration.simulated_shaker, self._parameters.harmonics)
 
     def _hold(
-        self, specimen: Specimen, omega: float, calibration: DriveCalibration, settled: Settled, found: CycleMap
+        self,
+        specimen: Specimen,
+        omega: float,
+        calibration: DriveCalibration,
+        settled: Settled,
+        design: StabiliserDesign,
     ) -> Generator[Step, Outcome, Held | Fallen]:
         """Hold the present motion on its orbit, and measure it."""
         if settled.table is None:
@@ -247,7 +254,7 @@ class HarmonicPlan:
             yield from hold(
                 sine,
                 settled.table,
-                found,
+                design,
                 specimen.label or 0.0,
                 largest,
                 self._parameters,
@@ -294,9 +301,9 @@ class HarmonicPlan:
         return checked(self._configuration.sensors, self._bare.values())
 
 
-def _to_be_held(settled: Settled, found: CycleMap) -> bool:
+def _to_be_held(settled: Settled, design: StabiliserDesign) -> bool:
     """Whether a motion is held: it is not steady, or its orbit is unstable on the table."""
-    return not settled.steadiness.steady or abs(found.slowest) > 1.0
+    return not settled.steadiness.steady or abs(design.cycle_map.slowest) > 1.0
 
 
 def spring_calibration(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bench.control.stabiliser import CAPTURED, HoldMonitor, Stabiliser
+from bench.control.stabiliser import CAPTURED, HoldMonitor, Stabiliser, StabiliserDesign
 from sim.cycle_map import CycleMap
 from sim.knowledge import SpecimenKnowledge
 from sim.specimen import Specimen
@@ -34,7 +34,7 @@ def test_a_specimen_off_by_four_per_cent_is_captured_from_its_free_motion_and_he
     plant = RockingTable(drawn(point[1], seed), point[0], found.phase)
     for _ in range(120):
         plant.cycle(0.0, 0.0)
-    held = plant.hold(Stabiliser(found, AUTHORITY), 220, NOISE)
+    held = plant.hold(Stabiliser(StabiliserDesign.of(found), AUTHORITY), 220, NOISE)
     assert not held.fell
     assert held.deviations[-40:].max() < 0.005
     assert np.sqrt(np.mean(held.controls[-40:] ** 2)) < 2e-4
@@ -46,14 +46,14 @@ def test_a_table_that_answers_otherwise_than_calibrated_is_held(
 ) -> None:
     found = windows[15.0, 0.97]
     plant = RockingTable(Specimen().coupled(0.97), 15.0, found.phase, answer=answer)
-    held = plant.hold(Stabiliser(found, AUTHORITY), 200, NOISE)
+    held = plant.hold(Stabiliser(StabiliserDesign.of(found), AUTHORITY), 200, NOISE)
     assert held.deviations[-30:].max() < 0.01
 
 
 def test_a_motion_that_repeats_receives_no_control(windows: dict[tuple[float, float], CycleMap]) -> None:
     """Not even one that is far from the predicted orbit."""
     found = windows[15.0, 0.97]
-    stabiliser = Stabiliser(found, AUTHORITY)
+    stabiliser = Stabiliser(StabiliserDesign.of(found), AUTHORITY)
     controls = [abs(stabiliser.next(1.3 * found.orbit)) for _ in range(40)]
     assert max(controls) < 1e-12
     assert stabiliser.deviation < 1e-12
@@ -64,7 +64,7 @@ def test_control_never_exceeds_the_authority_and_a_lost_cycle_is_bridged(
 ) -> None:
     found = windows[15.0, 0.97]
     plant = RockingTable(Specimen().coupled(0.97), 15.0, found.phase)
-    stabiliser = Stabiliser(found, AUTHORITY)
+    stabiliser = Stabiliser(StabiliserDesign.of(found), AUTHORITY)
     for _ in range(120):
         plant.cycle(0.0, 0.0)
     held = plant.hold(stabiliser, 160)

@@ -1,0 +1,161 @@
+"""The steps of a hold on scripted cycles: its latency, its release, and what is computed before it."""
+
+from collections.abc import Callable, Generator, Iterator
+from dataclasses import replace
+from math import nan, tau
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bench.analysis.cycles import Cycle, CycleAnalyser
+from bench.config.model import BenchConfiguration
+from bench.config.sections import Acquisition
+from bench.control.oscillator import DriveCalibration
+from bench.control.sine import Sine
+from bench.control.stabiliser import DELAY, StabiliserDesign
+from bench.engine.steps import Done, Dwell, Measured, Outcome, Publish, SetHarmonics, Step
+from bench.events import HoldCycle, StepStarted
+from protocols.harmonic import holding
+from protocols.harmonic.campaign import HarmonicCampaign
+from protocols.harmonic.forecast import trials
+from protocols.harmonic.holding import hold, prepared, too_late
+from protocols.harmonic.measurement import Held, TableState
+from protocols.harmonic.protocol import HarmonicParameters
+from sim.cycle_map import CycleMap
+from sim.gain import predict_gain
+from sim.specimen import Specimen
+from sim.steady import Orbit
+from tests.protocols.harmonic.scripted import AMPLITUDE, Script, cycle
+
+OMEGA, BETA = 15.0, 0.97
+PARAMETERS = HarmonicParameters(omega=(OMEGA,), beta=(BETA,), starts=1, settle_limit=30.0, measured_cycles=12)
+DRIFT, LARGEST = 0.004, 0.005
+SINE = Sine(OMEGA, AMPLITUDE, DriveCalibration.flat(AMPLITUDE))
+TURN = SINE.turn(cycle(0, DRIFT))
+
+
+def timed(block: float, lead: float) -> BenchConfiguration:
+    return BenchConfiguration(acquisition=Acquisition(block_duration=block, lead=lead))
+
+
+@pytest.fixture(scope="module")
+def orbit() -> Orbit:
+    found = predict_gain(Specimen().coupled(BETA), OMEGA, AMPLITUDE).rocking
+    assert found is not None
+    return found.orbit
+
+
+@pytest.fixture(scope="module")
+def design(orbit: Orbit) -> StabiliserDesign:
+    found = prepared(orbit, None, PARAMETERS.harmonics)
+    assert found is not None
+    return found
+
+
+def latest(configuration: BenchConfiguration, omega: float) -> int:
+    """Largest number of samples by which a correction misses the beginning of its cycle, over many cycles."""
+    rate, block = configuration.sample_rate, configuration.block_samples
+    cycles = CycleAnalyser(omega, rate, 0)
+    ends = np.array([cycles.start_of(n + 1) for n in range(500)])
+    read = -(-ends // block) * block
+    begins = np.array([cycles.start_of(n + DELAY) for n in range(500)])
+    return int(np.max(read + configuration.lead_samples - begins))
+
+
+@pytest.mark.parametrize("block", [0.005, 0.1, 0.2])
+@pytest.mark.parametrize("lead", [0.01, 0.1, 0.3])
+def test_a_motion_is_held_only_if_every_correction_begins_in_its_cycle(block: float, lead: float) -> None:
+    configuration = timed(block, lead)
+    limit = tau / (block + lead)
+    assert too_late(configuration, 0.999 * limit) is None
+    assert latest(configuration, 0.999 * limit) <= 0
+    assert too_late(configuration, 1.07 * limit) is not None
+    assert latest(configuration, 1.07 * limit) > 0
+
+
+def test_a_point_that_cannot_be_held_states_latency_cycle_and_remedy() -> None:
+    campaign = HarmonicCampaign(PARAMETERS, timed(0.1, 0.4))
+    script = Script(lambda _, k: cycle(k, DRIFT * (1.0 + 0.3 * np.sin(2.4 * k))), 0.05, campaign)
+    (point,) = script.run()
+    assert "could not be held on its orbit: acquisition.block_duration and acquisition.lead" in point.reason
+    assert "0.5 s, are longer than a cycle of 0.419 s" in point.reason
+    assert "reduce them" in point.reason
+    assert not [step for step in script.steps if isinstance(step, SetHarmonics) and step.cycle is not None]
+
+
+@pytest.mark.parametrize(("lead", "authority"), [(0.1, PARAMETERS.hold_authority), (0.4, 0.0)])
+def test_the_forecast_has_no_control_where_no_hold_is_possible(lead: float, authority: float) -> None:
+    configuration = timed(0.1, lead)
+    starts = HarmonicCampaign(PARAMETERS, configuration).starts
+    found = [each for each in trials(PARAMETERS, configuration, None, starts) if each.beta == BETA]
+    assert [each.control for each in found] == [authority]
+
+
+@pytest.mark.parametrize("effect", [0.0, nan])
+def test_without_a_stabilising_gain_there_is_no_hold(
+    orbit: Orbit, monkeypatch: pytest.MonkeyPatch, effect: float
+) -> None:
+    """An unstable motion on which the control has no effect, and a map that could not be computed."""
+    whole = holding.cycle_map
+
+    def uncontrolled(*arguments: Any) -> CycleMap:
+        found = whole(*arguments)
+        return replace(found, inputs=(effect * found.inputs[0], effect * found.inputs[1]))
+
+    monkeypatch.setattr(holding, "cycle_map", uncontrolled)
+    assert prepared(orbit, None, PARAMETERS.harmonics) is None
+
+
+def held_by(
+    design: StabiliserDesign, peaks: Callable[[bool], Iterator[float]]
+) -> tuple[Held, list[Step], list[HoldCycle]]:
+    """Result of a hold, its steps and its cycles; `peaks` are those of the held or, if True, of the released motion."""
+
+    def report(_: list[Cycle]) -> Generator[Step, Outcome, None]:
+        yield from ()
+
+    table = TableState(TURN, (1.0 + 0.0j,), 1.0 + 0.0j)
+    plan = hold(SINE, table, design, BETA, LARGEST, PARAMETERS, BenchConfiguration().analysis, report)
+    steps, drifts = list[Step](), peaks(False)
+    step = next(plan)
+    try:
+        while True:
+            steps.append(step)
+            answer: Outcome = Done()
+            if isinstance(step, Publish) and isinstance(step.event, StepStarted):
+                drifts = peaks(True)
+            elif isinstance(step, Dwell):
+                answer = Measured((cycle(len(steps), next(drifts)),))
+            step = plan.send(answer)
+    except StopIteration as end:
+        result = end.value
+    assert isinstance(result, Held)
+    events = [each.event for each in steps if isinstance(each, Publish)]
+    return result, steps, [each for each in events if isinstance(each, HoldCycle)]
+
+
+def test_a_released_motion_is_observed_up_to_the_first_drift_that_is_too_large(design: StabiliserDesign) -> None:
+    def peaks(released: bool) -> Iterator[float]:
+        yield from (DRIFT, DRIFT, 1.01 * LARGEST) if released else ()
+        while True:
+            yield DRIFT
+
+    result, _, cycles = held_by(design, peaks)
+    assert result.peak is not None
+    assert result.rate is None
+    assert cycles[-1].drift_peak == pytest.approx(1.01 * LARGEST)
+    assert len(cycles) == result.cycles + 3
+
+
+def test_an_estimate_that_is_not_finite_releases_the_hold(design: StabiliserDesign) -> None:
+    def peaks(_: bool) -> Iterator[float]:
+        yield from (DRIFT, DRIFT, nan)
+
+    result, steps, cycles = held_by(design, peaks)
+    assert result.peak is None
+    assert result.reason == "the estimate of the deviation is not finite"
+    assert len(cycles) == 3
+    assert all(np.isfinite(step.shares).all() for step in steps if isinstance(step, SetHarmonics))
+    assert isinstance(steps[-1], SetHarmonics)
+    assert steps[-1].shares == (1.0 + 0.0j,)
