@@ -13,6 +13,7 @@ from collections import deque
 from contextlib import suppress
 from typing import IO
 
+from drivers.child import OWN_CONSOLE, ignore_requests
 from drivers.clock import now
 from drivers.daqmx.parameters import Daq
 from sim import waiting
@@ -36,7 +37,11 @@ class ClockWatch:
     def __init__(self, daq: Daq, name: str, rate: float) -> None:
         command = [sys.executable, "-m", "drivers.daqmx.clock_watch", name, repr(rate)]
         self._process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            creationflags=OWN_CONSOLE,
         )
         assert self._process.stdin is not None
         assert self._process.stdout is not None
@@ -102,12 +107,8 @@ def _serve(name: str, rate: float, daq: Daq, readings: IO[bytes]) -> None:
 
 if __name__ == "__main__":
     import os
-    import signal
 
-    # the operator's requests go to the program, which ends this process
-    for each in ("SIGINT", "SIGHUP", "SIGBREAK"):
-        if hasattr(signal, each):
-            signal.signal(getattr(signal, each), signal.SIG_IGN)
+    ignore_requests()
 
     def await_end() -> None:
         sys.stdin.buffer.read()

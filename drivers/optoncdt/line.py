@@ -8,7 +8,6 @@ frame without a time has the text of the error that ended the process; one witho
 """
 
 import queue
-import signal
 import struct
 import subprocess
 import sys
@@ -21,6 +20,7 @@ from typing import IO
 
 from serial import Serial
 
+from drivers.child import OWN_CONSOLE, ignore_requests
 from drivers.clock import now
 from drivers.errors import ConnectionLost, DeviceNotFound
 from drivers.optoncdt.port import open_port
@@ -46,7 +46,11 @@ class Line:
         self._who = who
         command = [sys.executable, "-m", "drivers.optoncdt.line", who, port, str(baud)]
         self._process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            creationflags=OWN_CONSOLE,
         )
         assert self._process.stdin is not None
         assert self._process.stdout is not None
@@ -137,8 +141,5 @@ def _forward(commands: IO[bytes], port: Serial, over: threading.Event) -> None:
 
 
 if __name__ == "__main__":
-    # the operator's requests go to the program, which ends this process when the output is at zero
-    for name in ("SIGINT", "SIGHUP", "SIGBREAK"):
-        if hasattr(signal, name):
-            signal.signal(getattr(signal, name), signal.SIG_IGN)
+    ignore_requests()
     _serve(sys.argv[1], sys.argv[2], int(sys.argv[3]), sys.stdin.buffer, sys.stdout.buffer)

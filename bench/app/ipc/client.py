@@ -34,6 +34,7 @@ from bench.app.ipc.messages import (
 )
 from bench.app.ipc.sessions import RunningSession
 from bench.results import SUMMARY
+from drivers.child import OWN_CONSOLE
 from drivers.clock import now
 
 KEPT = 20_000
@@ -173,7 +174,7 @@ class SessionClient(ClientConnection):
             stdout=self._errors,
             stderr=self._errors,
             text=True,
-            creationflags=_OWN_GROUP | (_GIVES_WAY if self._checks_plan else 0),
+            creationflags=_OWN_GROUP | OWN_CONSOLE | (_GIVES_WAY if self._checks_plan else 0),
             start_new_session=sys.platform != "win32",
         )
         assert self.process.stdin is not None
