@@ -17,7 +17,7 @@ uncorrected effect (GUM F.2.4.5).
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from math import exp, log, pi, sqrt
+from math import exp, pi, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,9 +27,10 @@ from sim.specimen import Specimen
 
 Array = NDArray[np.float64]
 
-FEWEST, MOST, NUMBERS = 0.25, 16.0, 13
-"""Range of the waves within the measuring range, and their number, equally spaced in their logarithm. Fewer are a scale
-error, which tests share; more are averaged over a swing.
+FEWEST, NUMBERS = 0.25, 13
+WAVES: Array = np.array([FEWEST * 2.0 ** (0.5 * k) for k in range(NUMBERS)])
+"""Numbers of waves within the measuring range, from 0.25 to 16. Fewer are a scale error, which tests share; more are
+averaged over a swing. They grow by the root of 2, so that the exponent of the covariance doubles.
 """
 
 SMOOTH = 1.5
@@ -65,8 +66,10 @@ class Harmonics:
     found: NDArray[np.complex128]
     uncertainty: Array
 
+    @lru_cache(maxsize=64)  # noqa: B019 - few objects, which serve many gains
     def rounded(self, step: float) -> "Harmonics":
-        """The harmonics with the uncertainty due to readings in steps [m], at most that of one rounding.
+        """The harmonics with the uncertainty due to readings in steps [m], at most that of one rounding; the same
+        object for the same step.
 
         It is not in the scatter, since all cycles are rounded alike: see `bench.analysis.gain.PEAK_ROUNDINGS`, of which
         one harmonic has 2 zeta(3) q^3 / (pi^4 A), half of it in each part.
@@ -75,8 +78,9 @@ class Harmonics:
         rounding = min(sqrt(ZETA_3 * step**3 / (pi**4 * swing)), step / sqrt(12.0))
         return self.widened(rounding)
 
+    @lru_cache(maxsize=64)  # noqa: B019 - as above
     def widened(self, uncertainty: float) -> "Harmonics":
-        """The harmonics with a further standard uncertainty [m] of each part."""
+        """The harmonics with a further standard uncertainty [m] of each part; the same object for the same one."""
         return replace(self, uncertainty=np.hypot(self.uncertainty, uncertainty))
 
 
@@ -136,40 +140,71 @@ def linearity_errors(
     """Errors of peaks measured by one laser of the range `whole` [m] and the largest error `limit` [m].
 
     `shares`, shape (tests,), are the derivatives of the result with respect to the peaks: they select the worst number
-    of waves where there is no check.
+    of waves where there is no check. What the checks tell is kept for later calls with the same objects.
     """
-    waves: Array = np.geomspace(FEWEST, MOST, NUMBERS)
-    places = np.concatenate([*(each.places for each in effects), *(each.readings for each in checks)])
-    squares = -0.5 * (places[:, None] - places[None, :]) ** 2
-    weights = _rows([each.weights[None, :] for each in effects])
-    observed = _rows([_fourier(each.readings.size, each.found.size) for each in checks])
-    matrix = _rows([weights, observed]) if checks else weights
-    tests, variance = len(effects), 0.5 * limit**2
+    tests = len(effects)
     if limit == 0.0:
         return LinearityErrors(np.zeros((tests, tests)), 0.0)
-    curves = [matrix @ np.exp(squares * (2.0 * pi * each / whole) ** 2) @ matrix.T for each in waves]
-    # a sine has equal errors at places a wave apart
-    turned = [matrix @ np.exp(2j * pi * each / whole * places) for each in waves]
-    sines = [np.outer(each.real, each.real) + np.outer(each.imag, each.imag) for each in turned]
-    joint = np.array([*curves, *sines])
-    prior = variance * joint[:, :tests, :tests]
-    waves = np.tile(waves, 2)
+    places = np.concatenate([each.places for each in effects])
+    weights = _rows([each.weights[None, :] for each in effects])
+    waves = np.tile(WAVES, 2)
+    prior = 0.5 * limit**2 * _covariances(places, weights, places, weights, whole)
     if not checks:
         worst = int(np.einsum("i,kij,j->k", shares, prior, shares).argmax())
         return LinearityErrors(prior[worst], float(waves[worst]))
+    learned = _learned(tuple(checks), limit, whole)
+    crossed = 0.5 * limit**2 * _covariances(learned.places, learned.observed, places, weights, whole)
+    white = learned.whitening @ crossed
+    mean = np.einsum("kmi,km->ki", white, learned.measured)
+    moments = prior - white.transpose(0, 2, 1) @ white + mean[:, :, None] * mean[:, None, :]
+    found = exp(float(learned.likely @ np.log(waves)))
+    return LinearityErrors(np.einsum("k,kij->ij", learned.likely, moments), found)
+
+
+@dataclass(frozen=True, eq=False)
+class _Learned:
+    """What m harmonics tell of the curve, for each of K numbers of waves: `whitening`, shape (K, m, m), makes them
+    independent with unit variance, `measured`, (K, m), are then their values, and `likely`, (K,), is the weight of each
+    number. `observed`, (m, n), gives the harmonics of a curve at the `places` (n,).
+    """
+
+    places: Array
+    observed: Array
+    whitening: Array
+    measured: Array
+    likely: Array
+
+
+@lru_cache(maxsize=32)
+def _learned(checks: tuple[Harmonics, ...], limit: float, whole: float) -> _Learned:
+    places = np.concatenate([each.readings for each in checks])
+    observed = _rows([_fourier(each.readings.size, each.found.size) for each in checks])
     measured = np.concatenate([np.concatenate((each.found.real, each.found.imag)) for each in checks])
     noise = np.diag(np.concatenate([np.tile(each.uncertainty, 2) for each in checks]) ** 2 + (LEAST * limit) ** 2)
-    evidence, moments, numbers = list[float](), list[Array](), list[float]()
-    for k, number in enumerate(waves):
-        factor = np.linalg.cholesky(variance * joint[k, tests:, tests:] + noise)
-        white = np.linalg.solve(factor, np.column_stack((measured, variance * joint[k, tests:, :tests])))
-        mean, explained = white[:, 1:].T @ white[:, 0], white[:, 1:].T @ white[:, 1:]
-        evidence.append(-0.5 * float(white[:, 0] @ white[:, 0]) - float(np.log(np.diag(factor)).sum()))
-        moments.append(prior[k] - explained + np.outer(mean, mean))
-        numbers.append(log(number))
-    likely = np.exp(CAUTION * (np.array(evidence) - max(evidence)))
-    likely /= likely.sum()
-    return LinearityErrors(np.einsum("k,kij->ij", likely, np.array(moments)), exp(float(likely @ np.array(numbers))))
+    factors = np.linalg.cholesky(0.5 * limit**2 * _covariances(places, observed, places, observed, whole) + noise)
+    whitening = np.asarray(np.linalg.inv(factors), dtype=np.float64)
+    white = whitening @ measured
+    sizes = np.log(np.diagonal(factors, axis1=1, axis2=2)).sum(axis=1)
+    evidence = -0.5 * np.einsum("km,km->k", white, white) - sizes
+    likely = np.exp(CAUTION * (evidence - evidence.max()))
+    return _Learned(places, observed, whitening, white, likely / likely.sum())
+
+
+def _covariances(one: Array, left: Array, other: Array, right: Array, whole: float) -> Array:
+    """Covariances of linear functions of the curve, `left` (l, n) of its values at the places `one` (n,) and `right`
+    (r, m) of those at `other` (m,), relative to the variance; shape (2 NUMBERS, l, r), irregular curves before sines.
+    """
+    first = 2.0 * pi * FEWEST / whole
+    distances: Array = one[:, None] - other[None, :]
+    curve: Array = np.exp(-0.5 * (first * distances) ** 2)
+    found = np.empty((2 * NUMBERS, left.shape[0], right.shape[0]))
+    for k, each in enumerate(WAVES):
+        found[k] = left @ curve @ right.T
+        curve *= curve
+        # a sine has equal errors at places a wave apart
+        near, far = (left @ np.exp(2j * pi * each / whole * one), right @ np.exp(2j * pi * each / whole * other))
+        found[NUMBERS + k] = np.outer(near.real, far.real) + np.outer(near.imag, far.imag)
+    return found
 
 
 def _rows(blocks: Sequence[Array]) -> Array:
