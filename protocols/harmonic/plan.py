@@ -164,7 +164,9 @@ class HarmonicPlan:
         falls = 0
         orbit = self._orbit(specimen, omega)
         slow = orbit is not None and orbit.multiplier > SLOW
-        held_by = self._prepared(orbit) if slow else None
+        late = too_late(self._configuration, omega)
+        # the first start already states why its motion cannot be held
+        held_by = self._prepared(orbit) if slow or late is not None else None
         for tried, start in enumerate(starts, 1):
             where = f"beta = {specimen.label:g} at {omega:g} rad/s, start {tried} of {len(starts)}: {start.name}"
             yield Publish(StepStarted(f"{where}, chance {start.chance:.0%}"))
@@ -175,7 +177,7 @@ class HarmonicPlan:
                 settled = yield from self._settle(omega, specimen, calibration)
             held: Held | Fallen | None = None
             if isinstance(settled, Settled) and held_by is not None and _to_be_held(settled, held_by):
-                if (late := too_late(self._configuration, omega)) is not None:
+                if late is not None:
                     held = Held(None, late)
                 else:
                     yield Publish(StepStarted(f"{where}: holding the motion on its orbit"))

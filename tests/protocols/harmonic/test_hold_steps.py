@@ -74,12 +74,15 @@ def test_a_motion_is_held_only_if_every_correction_begins_in_its_cycle(block: fl
     assert latest(configuration, 1.07 * limit) > 0
 
 
-def test_a_point_that_cannot_be_held_states_latency_cycle_and_remedy() -> None:
-    campaign = HarmonicCampaign(PARAMETERS, timed(0.1, 0.4))
+@pytest.mark.parametrize(("omega", "beta"), [(OMEGA, BETA), (16.0, 0.4)])
+def test_a_point_that_cannot_be_held_states_latency_cycle_and_remedy(omega: float, beta: float) -> None:
+    """Also where the orbit is stable, but the motion does not become steady."""
+    parameters = PARAMETERS.model_copy(update={"omega": (omega,), "beta": (beta,)})
+    campaign = HarmonicCampaign(parameters, timed(0.1, 0.4))
     script = Script(lambda _, k: cycle(k, DRIFT * (1.0 + 0.3 * np.sin(2.4 * k))), 0.05, campaign)
     (point,) = script.run()
     assert "could not be held on its orbit: acquisition.block_duration and acquisition.lead" in point.reason
-    assert "0.5 s, are longer than a cycle of 0.419 s" in point.reason
+    assert f"0.5 s, are longer than a cycle of {tau / omega:.3f} s" in point.reason
     assert "reduce them" in point.reason
     assert not [step for step in script.steps if isinstance(step, SetHarmonics) and step.cycle is not None]
 
