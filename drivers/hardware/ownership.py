@@ -8,6 +8,7 @@ Windows.
 import getpass
 import hashlib
 import os
+import re
 import sys
 import time
 from collections.abc import Generator, Iterable
@@ -28,11 +29,31 @@ machine.
 
 
 def devices_of(hardware: Hardware) -> list[str]:
-    """The devices that a rig opens: the chassis or card of the drive, and the serial ports."""
+    """The devices that a rig opens: those of the drive and of the digital lines, each module after its chassis, and the
+    serial ports. A chassis is locked too, because resetting it resets all its modules.
+    """
     daq = hardware.daq
-    where = f" at {daq.server}" if daq.server else ""
+    where = f" at {_same_address(daq.server)}" if daq.server else ""
+    once = dict[str, str]()
+    for terminal in (daq.output, *daq.digital_lines.values()):
+        for name in _chassis_and_device(terminal):
+            # a lock cannot be acquired twice, and its name ignores case
+            once.setdefault(name.casefold(), f"{name}{where}")
     ports = [given.port for _, given in hardware.serial_lasers if given.port is not None]
-    return [f"{device_name(daq.output)}{where}", *(os.path.realpath(port) if "/" in port else port for port in ports)]
+    return [*once.values(), *(os.path.realpath(port) if "/" in port else port for port in ports)]
+
+
+def _chassis_and_device(terminal: str) -> list[str]:
+    """Device of a terminal, after its chassis if it has the default name of a module, such as `cDAQ1Mod2`."""
+    device = device_name(terminal)
+    module = re.fullmatch(r"(.+)Mod\d+", device, re.IGNORECASE)
+    return [device] if module is None else [module[1], device]
+
+
+def _same_address(server: str) -> str:
+    """Address of a server, with one name for this machine."""
+    host, colon, port = server.rpartition(":")
+    return f"127.0.0.1{colon}{port}" if host.casefold() in ("localhost", "::1", "[::1]") else server
 
 
 @contextmanager

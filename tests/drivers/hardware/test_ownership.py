@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from drivers.daqmx.parameters import Daq
+from drivers.daqmx.parameters import Daq, EmergencyStop, Heartbeat
 from drivers.errors import DeviceNotFound
 from drivers.hardware.ownership import FOLDER, devices_of, owned
 from drivers.hardware.parameters import Hardware, Laser1, Laser2
@@ -56,6 +56,29 @@ def test_a_rig_is_refused_before_it_opens_the_device() -> None:
 def test_the_devices_of_a_bench_are_its_card_and_its_ports() -> None:
     hardware = Hardware(laser_1=Laser1(port="COM5"), laser_2=Laser2(port="COM6"))
     assert devices_of(hardware) == ["Dev1", "COM5", "COM6"]
+
+
+def test_the_modules_of_a_chassis_belong_to_one_program() -> None:
+    drive = Hardware(daq=Daq(output="cDAQ1Mod1/ao0", enable_line="cDAQ1Mod3/port0/line0"))
+    assert devices_of(drive) == ["cDAQ1", "cDAQ1Mod1", "cDAQ1Mod3"]
+    other = Hardware(daq=Daq(output="CDAQ1MOD2/ao0", enable_line=None))
+    with owned(devices_of(drive)), pytest.raises(DeviceNotFound, match="CDAQ1 is in use by"):
+        owned(devices_of(other)).__enter__()
+
+
+def test_the_devices_of_the_digital_lines_are_owned_too() -> None:
+    daq = Daq(
+        output="Dev1/ao0",
+        enable_line="dev1/port0/line0",
+        heartbeat=Heartbeat(line="Dev2/port0/line1"),
+        emergency_stop=EmergencyStop(line="Dev3/port0/line2"),
+    )
+    assert sorted(devices_of(Hardware(daq=daq))) == ["Dev1", "Dev2", "Dev3"]
+
+
+@pytest.mark.parametrize("host", ["localhost", "LocalHost", "127.0.0.1", "[::1]"])
+def test_a_server_on_this_machine_has_one_name(host: str) -> None:
+    assert devices_of(Hardware(daq=Daq(server=f"{host}:31763"))) == ["Dev1 at 127.0.0.1:31763"]
 
 
 @pytest.mark.skipif(sys.platform == "win32" or os.geteuid() == 0, reason="permissions do not apply")
