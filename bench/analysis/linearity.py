@@ -198,12 +198,16 @@ def _covariances(one: Array, left: Array, other: Array, right: Array, whole: flo
     distances: Array = one[:, None] - other[None, :]
     curve: Array = np.exp(-0.5 * (first * distances) ** 2)
     found = np.empty((2 * NUMBERS, left.shape[0], right.shape[0]))
-    for k, each in enumerate(WAVES):
-        found[k] = left @ curve @ right.T
+    for k in range(NUMBERS):
+        # there are fewer rows on the right
+        found[k] = left @ (curve @ right.T)
         curve *= curve
-        # a sine has equal errors at places a wave apart
-        near, far = (left @ np.exp(2j * pi * each / whole * one), right @ np.exp(2j * pi * each / whole * other))
-        found[NUMBERS + k] = np.outer(near.real, far.real) + np.outer(near.imag, far.imag)
+    # a sine has equal errors at places a wave apart
+    angles = 2.0 * pi / whole * WAVES
+    for part in (np.cos, np.sin):
+        near, far = part(np.outer(angles, one)) @ left.T, part(np.outer(angles, other)) @ right.T
+        sines = near[:, :, None] * far[:, None, :]
+        found[NUMBERS:] = sines if part is np.cos else found[NUMBERS:] + sines
     return found
 
 
