@@ -271,7 +271,8 @@ def _remarks(rows: list[dict[str, Any]]) -> list[str]:
     disagreeing = len(compared) - sum(compared)
     verdict = counted(disagreeing, "disagrees", "disagree")
     lines = ["", f"{len(compared)} of {len(rows)} points compared with the prediction, {verdict}."]
-    if orbits := [row["orbit_agrees"] for row in rows if row.get("orbit_agrees") is not None]:
+    orbits = [row["orbit_agrees"] for row in rows if row.get("orbit_agrees") is not None and row.get("agrees") is None]
+    if orbits:
         verdict = counted(len(orbits) - sum(orbits), "disagrees", "disagree")
         lines.append(f"{len(orbits)} more compared by the orbit about which the motion revolves, {verdict}.")
     known = [row for row in rows if row.get("dominating") and row.get("alpha_2")]
@@ -284,8 +285,11 @@ def _remarks(rows: list[dict[str, Any]]) -> list[str]:
             f"contributions: {named}."
         )
         lines += textwrap.wrap(text, WIDTH)
-    for row in rows:
-        if row.get("reason"):
-            head = f"omega {row['omega_rad_s']:g} rad/s, beta {row['beta']:g}: "
-            lines += textwrap.wrap(head + str(row["reason"]), WIDTH, subsequent_indent="    ")
+    remarks = [str(row.get("reason") or "").split("; ") for row in rows]
+    shared = [each for each in remarks[0] if each and all(each in own for own in remarks)] if len(rows) > 1 else []
+    heads = ["every point: ", *(f"omega {row['omega_rad_s']:g} rad/s, beta {row['beta']:g}: " for row in rows)]
+    own = [[each for each in remark if each and each not in shared] for remark in remarks]
+    for head, texts in zip(heads, [shared, *own], strict=True):
+        if texts:
+            lines += textwrap.wrap(head + "; ".join(texts), WIDTH, subsequent_indent="    ")
     return lines

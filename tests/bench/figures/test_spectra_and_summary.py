@@ -270,6 +270,16 @@ def test_table_stays_narrow_and_says_what_needs_a_look() -> None:
     assert "omega 12.5 rad/s, beta 0.64: the block overturned in each of 6 starts" in text
 
 
+def test_a_remark_on_every_point_is_listed_once() -> None:
+    common = "the linearity error of laser_2 is not smooth"
+    points = [
+        point(omega, 0.97, "steady", 0.5, agrees=True, reason=reason)
+        for omega, reason in ((12.5, common), (15.0, f"free: not steady; {common}; held"))
+    ]
+    lines = points_table(points).splitlines()[-2:]
+    assert lines == [f"every point: {common}", "omega 15 rad/s, beta 0.97: free: not steady; held"]
+
+
 def test_table_takes_points_as_the_record_gives_them() -> None:
     assert points_table([each.model_dump(mode="json") for each in POINTS]) == points_table(POINTS)
     assert "0 of 0 points" in points_table([])
