@@ -118,6 +118,9 @@ def test_its_file_replays_bit_for_bit_and_is_reported(done: Path, capsys: Said) 
     assert "Tone sweep" in text
     # its own section is a figure: the points stand in the table that every protocol has
     assert 'id="points"' in text
+    # whose headings have the unit once, and not again as the suffix of a name
+    assert "gain [m/s²/V]" in text
+    assert "gain m s2 v" not in text
 
 
 def test_a_plug_in_that_fails_to_load_is_named_and_hinders_nothing_else(tmp_path: Path, capsys: Said) -> None:

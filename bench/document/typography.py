@@ -73,6 +73,12 @@ def unit_text(unit: str) -> str:
     return _POWER.sub(lambda found: _RAISED[found[1]], unit).replace("Hz^0.5", "√Hz")
 
 
+def without_unit(name: str, unit: str) -> str:
+    """Name of a field without the suffix that repeats its unit: `k1_n_m` in N/m becomes k1."""
+    suffix = unit.lower().replace("1/", "per_").replace("/", "_").replace(" ", "_").replace("^0.5", "")
+    return name.removesuffix(f"_{suffix}") if suffix not in ("", "1") else name
+
+
 def typeset(text: str) -> str:
     """A line of a journal or a summary with typeset symbols, units and signs: α₂, Ω, m/s², ±."""
     text = _WORDS.sub(lambda found: _SYMBOLS[found[1]], text.replace("+-", "±"))

@@ -10,7 +10,7 @@ from bench.app.formatting import ABSENT, measurement
 from bench.app.gui import texts
 from bench.app.gui.widgets import in_screen_unit, label, spaced, typeset
 from bench.datafile.tables import Column
-from bench.document.typography import first_words
+from bench.document.typography import first_words, without_unit
 
 NO_LABELS: Mapping[str, str] = {}
 _UNCERTAINTY, _PREDICTED = "_uncertainty", ("_predicted", "_nominal")
@@ -84,7 +84,7 @@ def rows_of(
     """Quantities of all points: those with an uncertainty, or where there is none, every number. `labels` are the
     printed names of fields.
     """
-    stems = {name: _stem(name, column.unit) for name, column in results.items()}
+    stems = {name: without_unit(name, column.unit) for name, column in results.items()}
     if {"measured", "expected", "unit"} <= results.keys():
         return [_line(point) for point in points]
     named = {stem: name for name, stem in stems.items()}
@@ -102,7 +102,7 @@ def every_field(
     headings: list[str] = []
     for name, column in results.items():
         unit = in_screen_unit(column.unit)[1]
-        heading = label(_stem(name, column.unit))
+        heading = label(without_unit(name, column.unit))
         headings.append(heading if unit in ("", "1") else f"{heading} [{unit}]")
     return headings, [[_text(point[name], column.unit) for name, column in results.items()] for point in points]
 
@@ -177,18 +177,12 @@ def _point(point: Mapping[str, Any], results: Mapping[str, Column]) -> str:
         return typeset(label(value))
     factor, unit = in_screen_unit(column.unit)
     shown = f"{factor * float(value):.4g}"
-    return f"{label(_stem(name, column.unit))} {shown}{'' if unit in ('', '1') else f' {unit}'}"
+    return f"{label(without_unit(name, column.unit))} {shown}{'' if unit in ('', '1') else f' {unit}'}"
 
 
 def _quantity(stem: str, description: str) -> str:
     """α₂ by its symbol, any other quantity by the first words of its description."""
     return label(stem) if stem.startswith("alpha_") and stem[6:].isdigit() else spaced(first_words(description) or stem)
-
-
-def _stem(name: str, unit: str) -> str:
-    """A name without the suffix that repeats the unit: `k1_n_m` in N/m becomes k1."""
-    suffix = unit.lower().replace("1/", "per_").replace("/", "_").replace(" ", "_").replace("^0.5", "")
-    return name.removesuffix(f"_{suffix}") if suffix not in ("", "1") else name
 
 
 def _text(value: object, unit: str) -> str:

@@ -21,6 +21,7 @@ from bench.document.typography import (
     typeset,
     unit_text,
     with_uncertainty,
+    without_unit,
 )
 from bench.events import FitFinished
 from bench.figures.fit_figure import fit_figure
@@ -38,18 +39,19 @@ def points_section(campaign: Campaign) -> Section | None:
     if not campaign.points:
         return None
     columns = [
-        Column(_heading(name), unit_text(each.unit), each.values.dtype.kind in "SU") for name, each in results.items()
+        Column(_heading(name, each.unit), unit_text(each.unit), each.values.dtype.kind in "SU")
+        for name, each in results.items()
     ]
     rows = [[_cell(each, row) for each in results.values()] for row in range(min(len(campaign.points), MOST_CELLS))]
     parts: list[Part] = [Table(f"Results of the protocol {campaign.protocol}", columns, rows)]
     if len(campaign.points) > MOST_CELLS:
         parts.append(f"The file contains {len(campaign.points) - MOST_CELLS} more.")
-    meanings = [f"{_heading(name)}: {first_words(each.description)}" for name, each in results.items()]
+    meanings = [f"{_heading(name, each.unit)}: {first_words(each.description)}" for name, each in results.items()]
     return Section("points", "Results", [*parts, Listing(meanings)])
 
 
-def _heading(name: str) -> str:
-    return typeset(name.replace("_", " "))
+def _heading(name: str, unit: str) -> str:
+    return typeset(without_unit(name, unit).replace("_", " "))
 
 
 def _cell(stored: Stored, row: int) -> str:
