@@ -17,7 +17,8 @@ from bench.control.sine import Sine, SineControl, SineResponse, Tolerance
 from bench.control.stabiliser import BLEND, DELAY, HoldMonitor, Stabiliser, StabiliserDesign, observed
 from bench.engine.steps import Dwell, Fallen, Measured, Outcome, Publish, SetHarmonics, Step
 from bench.events import HoldCycle, StepStarted
-from protocols.harmonic.measurement import (
+from protocols.harmonic.protocol import HarmonicParameters
+from protocols.harmonic.settling import (
     AIM,
     INTERVAL,
     JUDGED,
@@ -27,7 +28,6 @@ from protocols.harmonic.measurement import (
     Report,
     TableState,
 )
-from protocols.harmonic.protocol import HarmonicParameters
 from sim.cycle_map import cycle_map
 from sim.shaker import Shaker
 from sim.steady import NoOrbit, Orbit

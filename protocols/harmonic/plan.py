@@ -25,17 +25,9 @@ from drivers.rig import OperatorTask, RigError
 from protocols.common.calibrate import calibrate_drive, harmonic_frequencies
 from protocols.harmonic.free_prediction import with_free_prediction
 from protocols.harmonic.holding import SLOW, hold, prepared, too_late
-from protocols.harmonic.measurement import (
-    Held,
-    Report,
-    Settled,
-    checked,
-    judge,
-    linear_frame,
-    predicted_fields,
-    settle_and_measure,
-)
+from protocols.harmonic.judgement import Conditions, judge, predicted_fields
 from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, PointStatus
+from protocols.harmonic.settling import Held, Report, Settled, checked, linear_frame, settle_and_measure
 from sim.gain import predict_gain
 from sim.specimen import Specimen
 from sim.steady import Orbit, resting_level
@@ -191,8 +183,8 @@ class HarmonicPlan:
                 held = Held(None, "the block fell")
             known, sensors = self._configuration.known_on_table, self._sensors
             shaker, harmonics = self._configuration.simulated_shaker, self._parameters.harmonics
-            bare = self._bare[omega]
-            point = judge(settled, bare, omega, specimen, known, sensors, tried, shaker, harmonics, held)
+            conditions = Conditions(omega, specimen, known, self._bare[omega], sensors, shaker, harmonics)
+            point = judge(settled, conditions, tried, held)
             point = with_free_prediction(point, specimen, self._amplitude, self._configuration, harmonics)
             point = point.model_copy(update={"start_chance": start.chance})
             if point.status in (PointStatus.STEADY, PointStatus.HELD) or not point.predicted_stable:

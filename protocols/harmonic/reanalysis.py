@@ -18,19 +18,18 @@ from bench.datafile.reader import DataFile
 from bench.engine.steps import Arm, Calibrate, Dwell, Measured, Outcome, Publish, SetHarmonics, Step, Sweep
 from bench.events import Acquired, Estimate, Event, PointFinished, StepStarted
 from protocols.harmonic.free_prediction import with_free_prediction
-from protocols.harmonic.measurement import (
+from protocols.harmonic.judgement import Conditions, judge, predicted_fields
+from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, HarmonicSettings, PointStatus
+from protocols.harmonic.settling import (
     JUDGED,
     LASERS,
     TRANSIENT,
     Held,
     Settled,
     checked,
-    judge,
     linear_frame,
     preceding,
-    predicted_fields,
 )
-from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, HarmonicSettings, PointStatus
 from sim.gain import predict_gain
 
 
@@ -167,7 +166,8 @@ class HarmonicFollower:
         tried = min(self._tries, key=lambda series: self._unlike(series, point))
         settled = self._settled(tried)
         held = None if tried.held is None else self._held(tried.held, point)
-        found = judge(settled, bare, omega, specimen, known, sensors, point.starts_tried, shaker, harmonics, held)
+        conditions = Conditions(omega, specimen, known, bare, sensors, shaker, harmonics)
+        found = judge(settled, conditions, point.starts_tried, held)
         found = with_free_prediction(found, specimen, self._amplitude, self._configuration, harmonics)
         return found.model_copy(update={"start_chance": point.start_chance})
 

@@ -32,8 +32,9 @@ from bench.analysis.table_motion import at_rest_in_the_end, table_motion
 from bench.config.model import BenchConfiguration
 from protocols.earthquake.measurement import observe
 from protocols.earthquake.uncertainty import drift_errors
-from protocols.harmonic.measurement import INTERVAL, JUDGED, LASERS, SHORTEST, TRANSIENT, Settled, judge
+from protocols.harmonic.judgement import Conditions, judge
 from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, PointStatus
+from protocols.harmonic.settling import INTERVAL, JUDGED, LASERS, SHORTEST, TRANSIENT, Settled
 from sim.excitation import SampledRecord
 from sim.gain import predict_gain
 from sim.linear import steady_response
@@ -170,7 +171,7 @@ def score(each: Bench) -> Score:
     sensors = SensorUncertainty(ACCURACY, RANGES, each.calibration)
     tests = [_settled(test, each.omega, linear=test is each.bare) for test in (each.bare, each.coupled)]
     specimen = NOMINAL.coupled(each.specimen.label or 0.0)
-    point = judge(tests[1], tests[0], each.omega, specimen, CONFIGURATION.known, sensors, 1)
+    point = judge(tests[1], Conditions(each.omega, specimen, CONFIGURATION.known, tests[0], sensors), 1)
     assert point.alpha_2 is not None
     assert point.alpha_2_uncertainty is not None
     stated = predict_gain(each.specimen, each.omega, tests[1].peak.amplitude, tests[0].peak.amplitude).rocking

@@ -20,8 +20,8 @@ from protocols.harmonic import holding
 from protocols.harmonic.campaign import HarmonicCampaign
 from protocols.harmonic.forecast import trials
 from protocols.harmonic.holding import hold, prepared, too_late
-from protocols.harmonic.measurement import Held, TableState
 from protocols.harmonic.protocol import HarmonicParameters
+from protocols.harmonic.settling import Held, TableState
 from sim.cycle_map import CycleMap
 from sim.gain import predict_gain
 from sim.specimen import Specimen

@@ -10,8 +10,9 @@ from bench.analysis.free_motion import FreeMotion, Rate
 from bench.analysis.gain import SensorAccuracy, SteadyPeak
 from bench.analysis.sensor_accuracy import PeakReadings, SensorUncertainty
 from bench.analysis.steady import Steadiness
-from protocols.harmonic.measurement import Settled, judge
+from protocols.harmonic.judgement import Conditions, judge
 from protocols.harmonic.protocol import HarmonicPoint, PointStatus
+from protocols.harmonic.settling import Settled
 from sim.gain import predict_gain
 from sim.knowledge import SpecimenKnowledge
 from sim.shaker import Shaker
@@ -35,6 +36,14 @@ def _settled(drift: float, u1: float, steadiness: Steadiness = STEADY) -> Settle
 
 
 BARE = _settled(PREDICTED.bare.drift, PREDICTED.bare.u1)
+RANGES = (0.2, 0.2)
+SENSORS = SensorUncertainty(SensorAccuracy(), RANGES)
+
+
+def conditions(
+    known: SpecimenKnowledge = KNOWN, reference: Settled = BARE, sensors: SensorUncertainty = SENSORS
+) -> Conditions:
+    return Conditions(OMEGA, SPECIMEN, known, reference, sensors)
 
 
 @pytest.mark.parametrize(("layer", "status"), [("rocking", PointStatus.STEADY), ("resting", PointStatus.RESTING)])
@@ -43,14 +52,12 @@ def test_each_layer_is_recognised(layer: str, status: PointStatus, error: float)
     expected = PREDICTED.layers[layer]
     peaks = expected.orbit.peaks
     known = SpecimenKnowledge()
-    point = judge(_settled(peaks.drift * (1 + error), peaks.u1), BARE, OMEGA, SPECIMEN, known, SENSORS, 2)
+    point = judge(_settled(peaks.drift * (1 + error), peaks.u1), conditions(known), 2)
     assert (point.status, point.layer) == (status, layer)
     assert point.alpha_2_predicted == pytest.approx(expected.alpha_2)
     assert point.agrees is True
 
 
-RANGES = (0.2, 0.2)
-SENSORS = SensorUncertainty(SensorAccuracy(), RANGES)
 EXACT = SensorAccuracy(laser_linearity=0.0, laser_mismatch=0.0, laser_resolution=0.0, table_scale=0.0)
 
 
@@ -64,7 +71,7 @@ def test_a_difference_beyond_the_uncertainties_of_both_is_flagged(
 
     def off(share: float) -> HarmonicPoint:
         drift = (1.0 + side * share) * peaks.drift
-        return judge(_settled(drift, peaks.u1), BARE, OMEGA, SPECIMEN, known, SensorUncertainty(accuracy, RANGES), 1)
+        return judge(_settled(drift, peaks.u1), conditions(known, sensors=SensorUncertainty(accuracy, RANGES)), 1)
 
     same = off(0.0)
     measured, predicted = same.alpha_2_uncertainty, same.alpha_2_predicted_uncertainty
@@ -82,15 +89,7 @@ def test_a_difference_beyond_the_uncertainties_of_both_is_flagged(
 @pytest.mark.parametrize(("repeats", "words"), [(0, "does not repeat"), (3, "repeats every 3 cycles")])
 def test_what_is_not_steady_is_modulated_and_says_how(repeats: int, words: str) -> None:
     peaks = PREDICTED.layers["rocking"].orbit.peaks
-    point = judge(
-        _settled(peaks.drift, peaks.u1, Steadiness(False, 0.3, 0.1, repeats)),
-        BARE,
-        OMEGA,
-        SPECIMEN,
-        KNOWN,
-        SENSORS,
-        1,
-    )
+    point = judge(_settled(peaks.drift, peaks.u1, Steadiness(False, 0.3, 0.1, repeats)), conditions(), 1)
     assert point.status is PointStatus.MODULATED
     assert words in point.reason
     assert point.agrees is None
@@ -99,7 +98,7 @@ def test_what_is_not_steady_is_modulated_and_says_how(repeats: int, words: str) 
 def test_a_bare_frame_that_was_not_steady_is_no_reference() -> None:
     peaks = PREDICTED.layers["rocking"].orbit.peaks
     wandering = _settled(PREDICTED.bare.drift, PREDICTED.bare.u1, Steadiness(False, 0.1, 0.1, 0))
-    point = judge(_settled(peaks.drift, peaks.u1), wandering, OMEGA, SPECIMEN, KNOWN, SENSORS, 1)
+    point = judge(_settled(peaks.drift, peaks.u1), conditions(reference=wandering), 1)
     assert point.agrees is None
     assert "bare frame was not steady" in point.reason
 
@@ -110,11 +109,11 @@ def test_a_steady_motion_on_an_unstable_orbit_says_that_it_will_not_last() -> No
     assert predicted.rocking is not None
     peaks = predicted.rocking.orbit.peaks
     bare = _settled(predicted.bare.drift, predicted.bare.u1)
-    point = judge(_settled(peaks.drift, peaks.u1), bare, 12.5, specimen, KNOWN, SENSORS, 1)
+    point = judge(_settled(peaks.drift, peaks.u1), Conditions(12.5, specimen, KNOWN, bare, SENSORS), 1)
     assert point.predicted_stable is False
     assert "grow by 0.89 % per cycle on fixed ground" in point.reason
     assert point.table_multiplier is None
-    on_table = judge(_settled(peaks.drift, peaks.u1), bare, 12.5, specimen, KNOWN, SENSORS, 1, Shaker(), 10)
+    on_table = judge(_settled(peaks.drift, peaks.u1), Conditions(12.5, specimen, KNOWN, bare, SENSORS, Shaker(), 10), 1)
     assert on_table.table_multiplier == pytest.approx(0.9993, abs=1e-4)
     assert "on fixed ground and decay by 0.068 % per cycle on this table" in on_table.reason
 
@@ -122,9 +121,9 @@ def test_a_steady_motion_on_an_unstable_orbit_says_that_it_will_not_last() -> No
 def test_a_table_that_is_off_is_told() -> None:
     peaks = PREDICTED.layers["rocking"].orbit.peaks
     good = _settled(peaks.drift, peaks.u1)
-    assert judge(good, BARE, OMEGA, SPECIMEN, KNOWN, SENSORS, 1).reason == ""
+    assert judge(good, conditions(), 1).reason == ""
     off = replace(good, amplitude_error=-0.004, phase_error=0.002, peak=replace(good.peak, harmonics=0.013))
-    point = judge(off, BARE, OMEGA, SPECIMEN, KNOWN, SENSORS, 1)
+    point = judge(off, conditions(), 1)
     assert "the table's amplitude has an error of -0.40 %" in point.reason
     assert "the table's harmonics are 1.3 % of its fundamental" in point.reason
     assert (point.amplitude_error, point.phase_error_rad, point.table_harmonics) == (-0.004, 0.002, 0.013)
@@ -133,7 +132,7 @@ def test_a_table_that_is_off_is_told() -> None:
 
 def test_a_resting_block_says_that_the_stable_rocking_motion_was_not_reached() -> None:
     peaks = PREDICTED.layers["resting"].orbit.peaks
-    point = judge(_settled(peaks.drift, peaks.u1), BARE, OMEGA, SPECIMEN, KNOWN, SENSORS, 6)
+    point = judge(_settled(peaks.drift, peaks.u1), conditions(), 6)
     assert "no start reached the stable rocking motion" in point.reason
 
 
@@ -145,7 +144,7 @@ def test_the_orbit_about_which_a_motion_turns_is_compared_with_the_prediction(of
         motion=FreeMotion(0.95 * peaks.drift, peaks.drift, 1.05 * peaks.drift, 0, Rate(0.999, 0.001, 2.7), 96),
         orbit=_settled((1.0 + off) * peaks.drift, peaks.u1).peak,
     )
-    point = judge(turning, BARE, OMEGA, SPECIMEN, SpecimenKnowledge(), SENSORS, 1)
+    point = judge(turning, conditions(SpecimenKnowledge()), 1)
     assert (point.status, point.agrees, point.orbit_agrees) == (PointStatus.MODULATED, None, off == 0.0)
     assert point.alpha_2_orbit == pytest.approx((1.0 + off) * PREDICTED.layers["rocking"].alpha_2)
     assert point.alpha_2_least is not None

@@ -1,0 +1,297 @@
+"""Comparison of a measured dwell with the prediction."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from math import hypot, log
+from typing import Any
+
+from bench.analysis.free_motion import FreeMotion, Rate
+from bench.analysis.gain import Gain, SteadyPeak, gain
+from bench.analysis.sensor_accuracy import SensorUncertainty
+from bench.prediction.bands import expanded_uncertainty
+from protocols.harmonic.protocol import HarmonicPoint, PointStatus
+from protocols.harmonic.settling import Held, Settled
+from sim.gain import Layer, predict_gain
+from sim.knowledge import SpecimenKnowledge
+from sim.shaker import Shaker
+from sim.specimen import Specimen
+from sim.steady import NoOrbit
+from sim.table_orbit import table_orbit
+
+_ROCKING = "rocking"
+
+AMPLITUDE_NOTE = 0.002
+"""Relative error of the table's amplitude above which a remark is added; the prediction is always for the achieved
+amplitude.
+"""
+
+AMPLITUDE_STEP = 0.002
+"""Relative change of the amplitude in the finite difference for the sensitivity."""
+
+HARMONICS_NOTE = 0.01
+"""Total harmonic distortion of the table above which a remark is added; the prediction is for a pure sine."""
+
+DIFFERS = "the difference from the prediction exceeds the combined uncertainty"
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """Conditions of a test at `omega` [rad/s], and what its result is compared with.
+
+    `reference` is the bare frame's dwell at the same frequency, `known` the uncertainty of the `specimen`. Stability on
+    the table is predicted for `shaker`, None if there is no model of it, which is controlled up to the harmonic
+    `harmonics`.
+    """
+
+    omega: float
+    specimen: Specimen
+    known: SpecimenKnowledge
+    reference: Settled
+    sensors: SensorUncertainty
+    shaker: Shaker | None = None
+    harmonics: int = 1
+
+    def layers(self, peak: SteadyPeak) -> dict[str, Layer]:
+        """Predicted branches at the measured amplitudes of the table."""
+        return predict_gain(self.specimen, self.omega, peak.amplitude, self.reference.peak.amplitude).layers
+
+    def slope(self, name: str, peak: SteadyPeak) -> float:
+        """d ln alpha_2 / d ln amplitude of a branch, both tests at the same amplitude; 0 at the end of the branch.
+
+        A central difference over the steady solver's orbits: the gains of the resting block and of the bare frame are
+        independent of the amplitude.
+        """
+        around = (peak.amplitude * (1.0 - AMPLITUDE_STEP), peak.amplitude * (1.0 + AMPLITUDE_STEP))
+        less, more = (predict_gain(self.specimen, self.omega, each).layers.get(name) for each in around)
+        if less is None or more is None:
+            return 0.0
+        return log(more.alpha_2 / less.alpha_2) / log(around[1] / around[0])
+
+    def branch(self, name: str, layer: Layer | None, peak: SteadyPeak) -> "_Branch":
+        """The branch `name` at the amplitude of `peak`; `layer` is None if it does not exist."""
+        return _Branch(self, layer, self.slope(name, peak), predicted_fields(name, layer, self.known))
+
+
+@dataclass(frozen=True)
+class _Branch:
+    """Predicted branch with which gains are compared; `slope`: see `Conditions.slope`."""
+
+    conditions: Conditions
+    layer: Layer | None
+    slope: float
+    predicted: dict[str, Any]
+
+    def compare(self, peak: SteadyPeak) -> tuple[Gain, bool | None]:
+        """Gain of a peak, and whether it agrees with the predicted one: they differ by no more than their combined
+        expanded uncertainty, |E_n| <= 1 of ISO 13528. None if one of them is unknown or the reference was not steady.
+        """
+        reference, layer = self.conditions.reference, self.layer
+        measured = gain(peak, reference.peak, self.conditions.sensors, self.slope)
+        uncertainty = self.predicted["alpha_2_predicted_uncertainty"]
+        if layer is None or uncertainty is None or not reference.steadiness.steady:
+            return measured, None
+        return measured, abs(measured.alpha_2 - layer.alpha_2) <= hypot(measured.uncertainty, uncertainty)
+
+    def fields(self, peak: SteadyPeak, measured: Gain, agrees: bool | None, table: Settled | Held) -> dict[str, Any]:
+        """Fields of a measured motion: its gain, its comparison, and the errors of the table."""
+        return self.predicted | {
+            "alpha_2": measured.alpha_2,
+            "alpha_2_uncertainty": measured.uncertainty,
+            "dominating": measured.budget.dominating,
+            "uncertainty_parts": measured.budget.as_json,
+            "agrees": agrees,
+            "drift_peak_m": peak.drift,
+            "amplitude_m_s2": peak.amplitude,
+            "cycles_measured": peak.cycles,
+            "amplitude_error": table.amplitude_error,
+            "phase_error_rad": table.phase_error,
+            "table_harmonics": peak.harmonics,
+        }
+
+
+def judge(settled: Settled, conditions: Conditions, starts: int, held: Held | None = None) -> HarmonicPoint:
+    """Point of a dwell, compared with the branch with the nearest peaks of drift and u1, after `starts` tried.
+
+    If the motion is not steady or the orbit is unstable, stability is also predicted on the table. If the motion was
+    then `held` on the rocking orbit, gain and comparison are those of the held motion, and the free one is described
+    beside them.
+    """
+    peak, bare, shaker = settled.peak, conditions.reference.peak, conditions.shaker
+    layers = conditions.layers(peak)
+    steady = settled.steadiness.steady
+    name = _nearest(layers, peak) if steady else _ROCKING
+    status = (PointStatus.STEADY if name == _ROCKING else PointStatus.RESTING) if steady else PointStatus.MODULATED
+    branch = conditions.branch(name, layers.get(name), peak)
+    measured, agrees = branch.compare(peak)
+    agrees = agrees if steady else None
+    on_table = None
+    if shaker is not None and _ROCKING in layers and not (steady and layers[name].stable):
+        on_table = _table_multiplier(layers[_ROCKING], shaker, conditions.harmonics)
+    orbit: dict[str, Any] = {}
+    if settled.orbit is not None:
+        gained, same = branch.compare(settled.orbit)
+        orbit = {"alpha_2_orbit": gained.alpha_2, "alpha_2_orbit_uncertainty": gained.uncertainty, "orbit_agrees": same}
+    remarks = (
+        *_remarks(settled, conditions.reference, name, layers, agrees, on_table, orbit),
+        *conditions.sensors.rough((bare.readings, peak.readings)),
+    )
+    point = HarmonicPoint(
+        omega_rad_s=conditions.omega,
+        beta=conditions.specimen.label or 0.0,
+        status=status,
+        **branch.fields(peak, measured, agrees, settled),
+        bare_drift_peak_m=bare.drift,
+        bare_amplitude_m_s2=bare.amplitude,
+        **_free_fields(settled.motion, bare.drift),
+        **orbit,
+        table_multiplier=on_table,
+        starts_tried=starts,
+        settle_time_s=settled.time,
+        table_updates=settled.updates,
+        reason="; ".join(remarks),
+    )
+    return point if held is None else _held_point(point, held, conditions)
+
+
+def _held_point(free: HarmonicPoint, held: Held, conditions: Conditions) -> HarmonicPoint:
+    """The point of a free motion that was then held; unchanged but for its reason if the hold was released."""
+    peak = held.peak
+    if peak is None:
+        released = f"the motion was to be held on its orbit, and released after {held.cycles} cycles"
+        text = f"{released if held.cycles else 'the motion could not be held on its orbit'}: {held.reason}"
+        return _remarked(free, text)
+    layers = conditions.layers(peak)
+    if _nearest(layers, peak) != _ROCKING or _ROCKING not in layers:
+        return _remarked(free, "the motion on which the hold came to rest is not the rocking orbit")
+    branch = conditions.branch(_ROCKING, layers[_ROCKING], peak)
+    measured, agrees = branch.compare(peak)
+    remarks = [f"free: {free.reason}"] if free.reason else []
+    remarks.append(f"held after {held.captured} cycles with a control of {100.0 * held.control:.2g} % of the amplitude")
+    remarks += [*_amplitude_remark(held), *([DIFFERS] if agrees is False else [])]
+    return free.model_copy(
+        update={
+            "status": PointStatus.HELD,
+            **branch.fields(peak, measured, agrees, held),
+            **_rate_fields(held.rate),
+            "control_share": held.control,
+            "captured_cycles": held.captured,
+            "table_updates": free.table_updates + held.updates,
+            "reason": "; ".join(remarks),
+        }
+    )
+
+
+def _remarked(point: HarmonicPoint, remark: str) -> HarmonicPoint:
+    return point.model_copy(update={"reason": "; ".join(filter(None, (point.reason, remark)))})
+
+
+def _table_multiplier(layer: Layer, shaker: Shaker, harmonics: int) -> float | None:
+    """Modulus of the slowest multiplier on the table; None if no orbit is found."""
+    try:
+        return abs(table_orbit(layer.orbit, shaker, harmonics).slowest)
+    except NoOrbit:
+        return None
+
+
+def _free_fields(motion: FreeMotion | None, bare: float) -> dict[str, Any]:
+    """Fields of an unsteady motion; `bare` is the peak drift of the bare frame [m]."""
+    if motion is None:
+        return {}
+    found = {
+        "alpha_2_least": motion.least / bare,
+        "alpha_2_greatest": motion.greatest / bare,
+        "alpha_2_mean": motion.mean / bare,
+        "repeats_cycles": motion.repeats or None,
+    }
+    return found | _rate_fields(motion.rate)
+
+
+def _rate_fields(rate: Rate | None) -> dict[str, Any]:
+    """Fields of the measured multiplier."""
+    if rate is None:
+        return {}
+    return {
+        "multiplier": rate.modulus,
+        "multiplier_uncertainty": 2.0 * rate.uncertainty,
+        "multiplier_angle_rad": rate.angle,
+    }
+
+
+def predicted_fields(name: str, layer: Layer | None, known: SpecimenKnowledge) -> dict[str, Any]:
+    """Prediction fields of a point for the branch `name`; each is None if the branch does not exist."""
+    return {
+        "layer": name if layer else "none",
+        "alpha_2_predicted": layer.alpha_2 if layer else None,
+        "alpha_2_predicted_uncertainty": expanded_uncertainty(layer, known) if layer else None,
+        "predicted_stable": layer.stable if layer else None,
+    }
+
+
+def _nearest(layers: dict[str, Layer], peak: SteadyPeak) -> str:
+    """The branch whose peaks of drift and u1 are closest, in ratio, to the measured ones."""
+
+    def distance(name: str) -> float:
+        expected = layers[name].orbit.peaks
+        return hypot(log(peak.drift / expected.drift), log(peak.u1 / expected.u1))
+
+    return min(layers, key=distance, default=_ROCKING)
+
+
+def _described(settled: Settled) -> str:
+    """Description of an unsteady motion."""
+    motion = settled.motion
+    if motion is not None and motion.rate is not None and motion.rate.decays:
+        decay, doubt = 100.0 * (1.0 - motion.rate.modulus), 200.0 * motion.rate.uncertainty
+        return (
+            f"the motion approaches a periodic one: the deviation decays by ({decay:.2g} +- {doubt:.1g}) % per "
+            "cycle; with a longer --settle-limit it may become steady"
+        )
+    repeats = settled.steadiness.repeats if motion is None else motion.repeats
+    return f"the motion repeats every {repeats} cycles" if repeats else "the motion does not repeat"
+
+
+def _growth(fixed: float, on_table: float | None) -> str:
+    """Growth or decay of disturbances, by the moduli of the slowest multipliers on fixed ground and on the table."""
+
+    def change(modulus: float) -> str:
+        return f"{'grow' if modulus > 1.0 else 'decay'} by {100.0 * abs(modulus - 1.0):.2g} % per cycle"
+
+    found = f"{change(fixed)} on fixed ground"
+    return found if on_table is None else f"{found} and {change(on_table)} on this table"
+
+
+def _remarks(
+    settled: Settled,
+    reference: Settled,
+    name: str,
+    layers: dict[str, Layer],
+    agrees: bool | None,
+    on_table: float | None,
+    orbit: Mapping[str, Any],
+) -> Iterator[str]:
+    """Remarks on the point."""
+    state, peak = settled.steadiness, settled.peak
+    if not state.steady:
+        yield f"not steady after {settled.time:.0f} s: {_described(settled)}, spread {100.0 * state.spread:.1f} %"
+        if on_table is not None:
+            yield f"disturbances of the predicted orbit {_growth(layers[_ROCKING].multiplier, on_table)}"
+        if orbit:
+            gained = f"alpha_2 = {orbit['alpha_2_orbit']:.4f} +- {orbit['alpha_2_orbit_uncertainty']:.4f}"
+            verdict = {True: ", which agrees with the prediction", False: ", which differs from the prediction"}
+            yield f"its mean cycle is that of the orbit: {gained}{verdict.get(orbit['orbit_agrees'], '')}"
+    elif name in layers and not layers[name].stable:
+        yield f"steady while measured; disturbances of the predicted orbit {_growth(layers[name].multiplier, on_table)}"
+    elif name != _ROCKING and _ROCKING in layers and layers[_ROCKING].stable:
+        yield "no start reached the stable rocking motion; the block rests"
+    yield from _amplitude_remark(settled)
+    if peak.harmonics > HARMONICS_NOTE:
+        yield f"the table's harmonics are {100.0 * peak.harmonics:.1f} % of its fundamental"
+    if not reference.steadiness.steady:
+        yield "the bare frame was not steady, so its drift is not a valid reference"
+    if agrees is False:
+        yield DIFFERS
+
+
+def _amplitude_remark(table: Settled | Held) -> Iterator[str]:
+    if abs(table.amplitude_error) > AMPLITUDE_NOTE:
+        yield f"the table's amplitude has an error of {100.0 * table.amplitude_error:+.2f} %"

@@ -1,0 +1,185 @@
+"""Waiting for the steady state of a dwell, and its measurement."""
+
+from collections import deque
+from collections.abc import Callable, Generator, Iterable, Sequence
+from dataclasses import dataclass, replace
+from math import tau
+
+from bench.analysis.cycles import Cycle
+from bench.analysis.free_motion import CYCLES, KEPT, FreeMotion, Rate, free_motion, orbit_peak
+from bench.analysis.gain import SensorAccuracy, SteadyPeak, modulated_peak, steady_peak
+from bench.analysis.linearity import LinearFrame
+from bench.analysis.sensor_accuracy import SensorUncertainty
+from bench.analysis.signals import ACCELERATION, DISPLACEMENT, LASER_1, LASER_2
+from bench.analysis.steady import WINDOW, Steadiness, SteadyDetector
+from bench.config.model import BenchConfiguration
+from bench.control.sine import Sine, SineControl, SineResponse, Tolerance
+from bench.engine.steps import Dwell, Fallen, Measured, Outcome, SetHarmonics, Step
+from protocols.common.calibrate import need_cycles
+from protocols.harmonic.protocol import HarmonicParameters
+
+INTERVAL = 6
+"""Number of cycles between checks of the table's motion and of steadiness."""
+
+TRANSIENT = 2
+"""Number of cycles discarded at the beginning of an interval, in which the last correction of the drive takes
+effect.
+"""
+
+AIM = 0.5
+"""Fraction of the tolerances that is aimed at; the rest allows for disturbances of the table by a block that has not
+settled.
+"""
+
+
+@dataclass(frozen=True)
+class TableState:
+    """Sine of the table at the end of a dwell: `turn` (see `Sine.turn`), the `shares` of its drive, and the `answer` of
+    its fundamental per share.
+    """
+
+    turn: complex
+    shares: tuple[complex, ...]
+    answer: complex
+
+
+@dataclass(frozen=True)
+class Settled:
+    """A measured dwell: its peak, its steadiness, and its settling time [s]. `amplitude_error` (relative) and
+    `phase_error` [rad] are those of the table, after `updates` corrections of its drive. `motion` describes an unsteady
+    motion, and `orbit` is the peak of its mean cycle if it revolves about a periodic motion. `table` is the state in
+    which the dwell leaves the table; None where it is not known.
+    """
+
+    peak: SteadyPeak
+    steadiness: Steadiness
+    time: float
+    amplitude_error: float
+    phase_error: float
+    updates: int
+    motion: FreeMotion | None = None
+    orbit: SteadyPeak | None = None
+    table: TableState | None = None
+
+
+@dataclass(frozen=True)
+class Held:
+    """Result of a hold: the peak of the held motion, errors of the table as in `Settled`, after `updates` corrections.
+
+    `control` is the rms of the control over the measured cycles, as a share of the amplitude, and `captured` the number
+    of cycles until the capture. `peak` is None where the hold was released for a `reason`. `rate` is that of the
+    deviation without control after the measurement.
+    """
+
+    peak: SteadyPeak | None
+    reason: str = ""
+    amplitude_error: float = 0.0
+    phase_error: float = 0.0
+    updates: int = 0
+    control: float = 0.0
+    captured: int | None = None
+    cycles: int = 0
+    rate: Rate | None = None
+
+
+JUDGED = (ACCELERATION, DISPLACEMENT, LASER_1, LASER_2)
+"""Signals of the steadiness criterion: those of the sensors, since the jitter of a laser's delay affects only their
+phase, but the amplitudes of u1 and drift, which are small differences.
+"""
+
+LASERS = (2, 3)
+"""Indices of the lasers in `JUDGED`."""
+
+SHORTEST = 10.0
+"""Shortest wait [s]: at high frequencies two windows of cycles are shorter than the transient of the frame."""
+
+PRECEDING = 96
+"""Largest number of cycles before the measured ones from which the remaining transient is estimated."""
+
+Report = Callable[[list[Cycle]], Generator[Step, Outcome, None]]
+"""Callback that publishes the running gain at each check, from the cycles of the last window."""
+
+
+def settle_and_measure(
+    sine: Sine,
+    parameters: HarmonicParameters,
+    accuracy: SensorAccuracy,
+    report: Report,
+    frame: LinearFrame | None = None,
+) -> Generator[Step, Outcome, Settled | Fallen]:
+    """Hold the table at `sine` until every signal is steady, then measure.
+
+    A motion that is not steady within the settle limit is measured as modulated. Without block, the `frame` checks the
+    lasers.
+    """
+    detector = SteadyDetector(parameters.settle_tolerance, JUDGED, LASERS, sine.omega * accuracy.laser_timing)
+    control = SineControl(
+        parameters.harmonics,
+        Tolerance(
+            AIM * parameters.amplitude_tolerance,
+            AIM * parameters.phase_tolerance,
+            AIM * parameters.distortion_tolerance,
+        ),
+    )
+    turn: complex | None = None
+    updates, drive = 0, (1.0 + 0.0j,)
+    recent: deque[Cycle] = deque(maxlen=WINDOW)
+    constant: deque[Cycle] = deque(maxlen=KEPT)
+    measured = max(parameters.measured_cycles, 2 * WINDOW)
+    waited, over = 0.0, False
+    while True:
+        ready = over or (waited >= SHORTEST and detector.judge().steady)
+        asked = measured if ready else INTERVAL
+        outcome = yield Dwell(asked)
+        if not isinstance(outcome, Measured):
+            return Fallen()
+        waited += asked * tau / sine.omega
+        need_cycles(outcome.cycles, asked)
+        turn = sine.turn(outcome.cycles[0]) if turn is None else turn
+        for cycle in outcome.cycles:
+            detector.push(cycle)
+        # the first cycles after a correction of the drive are transient
+        constant.extend(outcome.cycles if constant or not updates else outcome.cycles[TRANSIENT:])
+        if ready:
+            # judge the measured cycles at twice the tolerance, since at the tolerance itself noise would decide
+            steadiness = detector.judge(allowance=2.0)
+            if steadiness.steady or over:
+                used = outcome.cycles[-parameters.measured_cycles :]
+                table = SineResponse.of(used, sine, turn)
+                motion = orbit = None
+                if steadiness.steady:
+                    peak = steady_peak(used, sine.omega, before=preceding(list(constant), used), frame=frame)
+                else:
+                    kept = list(constant)
+                    peak, motion = modulated_peak(kept[-CYCLES:], sine.omega), free_motion(kept)
+                    orbit = orbit_peak(kept, motion, sine.omega)
+                state = TableState(turn, drive, complex(table.achieved[0] / table.played[0]))
+                return Settled(
+                    peak, steadiness, waited, table.amplitude_error, table.phase_error, updates, motion, orbit, state
+                )
+        recent.extend(outcome.cycles)
+        yield from report(list(recent))
+        over = waited >= parameters.settle_limit
+        shares = control.next(SineResponse.of(outcome.cycles[TRANSIENT:], sine, turn))
+        if shares is not None and not over:
+            yield SetHarmonics(shares)
+            drive = shares
+            updates += 1
+            detector.restart()
+            constant.clear()
+
+
+def linear_frame(configuration: BenchConfiguration) -> LinearFrame:
+    """The bare frame, whose tests check the lasers."""
+    grounded = configuration.laser_reference == "ground"
+    return LinearFrame(configuration.known_specimen.bare(), grounded)
+
+
+def checked(sensors: SensorUncertainty, references: Iterable[Settled]) -> SensorUncertainty:
+    """Sensors whose linearity the steady tests of the bare frame have checked."""
+    return replace(sensors, checks=tuple(each.peak.checks for each in references if each.peak.checks is not None))
+
+
+def preceding(constant: Sequence[Cycle], used: Sequence[Cycle]) -> Sequence[Cycle]:
+    """Cycles before the `used` ones at the end of those at a constant drive."""
+    return constant[: -len(used)][-PRECEDING:]
