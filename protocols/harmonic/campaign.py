@@ -216,7 +216,7 @@ _COLUMNS = (
     TextColumn("beta", "1"),
     TextColumn("omega", "rad/s"),
     TextColumn("status", words=True),
-    TextColumn("layer", words=True),
+    TextColumn("branch", words=True),
     TextColumn("alpha_2", "1"),
     TextColumn("U (k=2)", "1"),
     TextColumn("predicted", "1"),
@@ -270,7 +270,8 @@ def _remarks(rows: list[dict[str, Any]]) -> list[str]:
     compared = [row["agrees"] for row in rows if row.get("agrees") is not None]
     disagreeing = len(compared) - sum(compared)
     verdict = counted(disagreeing, "disagrees", "disagree")
-    lines = ["", f"{len(compared)} of {len(rows)} points compared with the prediction, {verdict}."]
+    result = f"{len(compared)} of {len(rows)} points compared with the prediction, {verdict}."
+    lines = ["", result if rows else "No point was measured."]
     orbits = [row["orbit_agrees"] for row in rows if row.get("orbit_agrees") is not None and row.get("agrees") is None]
     if orbits:
         verdict = counted(len(orbits) - sum(orbits), "disagrees", "disagree")
@@ -280,10 +281,8 @@ def _remarks(rows: list[dict[str, Any]]) -> list[str]:
         shares = [100.0 * row["alpha_2_uncertainty"] / row["alpha_2"] for row in known]
         most = Counter(str(row["dominating"]) for row in known).most_common()
         named = ", ".join(f"{name} ({number})" for name, number in most)
-        text = (
-            f"the uncertainty of alpha_2 is {min(shares):.2f} to {max(shares):.2f} % (k = 2); largest "
-            f"contributions: {named}."
-        )
+        span = " to ".join(dict.fromkeys(f"{share:.2f}" for share in (min(shares), max(shares))))
+        text = f"the expanded uncertainty of alpha_2 is {span} % (k = 2); largest contributions: {named}."
         lines += textwrap.wrap(text, WIDTH)
     remarks = [str(row.get("reason") or "").split("; ") for row in rows]
     shared = [each for each in remarks[0] if each and all(each in own for own in remarks)] if len(rows) > 1 else []

@@ -166,7 +166,7 @@ def _gains(campaign: Campaign, points: Sequence[Mapping[str, Any]]) -> Table:
         Column("β", "1"),
         Column("Ω", "rad/s"),
         Column("status", words=True),
-        Column("layer", words=True),
+        Column("branch", words=True),
         Column("α₂ measured", "1"),
         Column("α₂ predicted", "1"),
         Column("difference", "%"),

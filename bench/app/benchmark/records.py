@@ -27,7 +27,7 @@ FULL = 100
 MAP_COLUMNS = (
     Column("how", "how"),
     Column("points", "points", "d"),
-    Column("found", "rocking layer", "d"),
+    Column("found", "rocking branch", "d"),
     Column("error", "greatest error", ".1e"),
     Column("seconds", "time [s]", ".3g"),
     Column("per_point_ms", "per point [ms]", ".3g"),

@@ -67,7 +67,7 @@ _HISTORY = {
 _STEADY = {
     "omega_rad_s": "omega",
     "beta": "beta",
-    "layer": "layer",
+    "layer": "branch",
     "alpha_1": "alpha_1",
     "alpha_2": "alpha_2",
     "alpha_2_low": "from",
@@ -326,7 +326,7 @@ def extremes(table: "Table") -> str:
     each = [(value, beta == value) for value in stiffnesses]
     groups = each if len(each) <= MOST_SPECTRA else [(None, np.full(beta.size, True))]
     where = (TextColumn("at omega", "rad/s"), TextColumn("beta"))
-    group = (TextColumn("beta"), TextColumn("layer"), TextColumn("points"), TextColumn("unstable"))
+    group = (TextColumn("beta"), TextColumn("branch"), TextColumn("points"), TextColumn("unstable"))
     columns = (*group, TextColumn("least alpha_2"), *where, TextColumn("greatest"), *where)
     rows: list[list[str]] = []
     for value, chosen in groups:

@@ -250,7 +250,7 @@ def test_summary_is_never_overwritten_nor_left_half_written(tmp_path: Path, monk
 def test_table_shows_every_point_once_with_units_and_dashes() -> None:
     text = points_table(POINTS)
     head, units, rule, *rest = text.splitlines()
-    assert head.split()[:5] == ["beta", "omega", "status", "layer", "alpha_2"]
+    assert head.split()[:5] == ["beta", "omega", "status", "branch", "alpha_2"]
     assert "[rad/s]" in units
     assert set(rule) == {"-"}
     assert rest[0].split() == [
@@ -282,4 +282,4 @@ def test_a_remark_on_every_point_is_listed_once() -> None:
 
 def test_table_takes_points_as_the_record_gives_them() -> None:
     assert points_table([each.model_dump(mode="json") for each in POINTS]) == points_table(POINTS)
-    assert "0 of 0 points" in points_table([])
+    assert "No point was measured." in points_table([])
