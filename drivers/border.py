@@ -22,7 +22,7 @@ MOST_CHANNELS = 256
 HIGHEST_RATE = 1e6
 """Largest sample rate [1/s]; above it, this program's buffers would hold less than a second."""
 LONGEST_LEAD = 10.0
-"""Longest lead [s], the delay with which the guard's commands take effect."""
+"""Longest lead [s]; the guard's commands take effect after this delay."""
 HIGHEST_VOLTAGE = 100.0
 """Largest drive range [V]."""
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
@@ -45,7 +45,7 @@ class CheckedClock:
         if _is_number(given):
             self._last = float(given)
         else:
-            self.fault = f"its clock shows {given!r}"
+            self.fault = f"its clock returned {given!r}"
         return self._last
 
     def wait_until(self, instant: float) -> None:
@@ -90,13 +90,13 @@ class CheckedRig:
         self._require_clock()
 
     def _given(self, name: str) -> Any:
-        """Property of the backend's rig, of any type."""
+        """Unvalidated property of the backend's rig."""
         with self._calls(name.replace("_", " ")):
             return getattr(self._rig, name)
 
     @property
     def alignments(self) -> tuple[Alignment, ...]:
-        """Alignments of sensors with their own clocks since `arm()`."""
+        """Clock alignments, since `arm()`, of the sensors that have their own clocks."""
         given = self._given("alignments")
         names = [channel.name for channel in self.channels]
         if type(given) is not tuple or not all(_is_alignment(each, names) for each in cast("tuple[Any, ...]", given)):
@@ -243,7 +243,7 @@ class CheckedRig:
         return Block(int(first), own)
 
     def raw_values(self) -> tuple[RawValues, ...]:
-        """See `drivers.rig.Rig`; none of a backend without this method."""
+        """See `drivers.rig.Rig`; empty for a backend without this method."""
         if not callable(method := getattr(self._rig, "raw_values", None)):
             return ()
         with self._calls("raw values"):
@@ -255,7 +255,7 @@ class CheckedRig:
         return tuple(RawValues(each.sensor, *(np.array(getattr(each, name)) for name in _RAW)) for each in raw)
 
     def _require_storable(self, counts: NDArray[Any]) -> None:
-        """Check that counts are within the range of their channel's storage type; the file would alter others."""
+        """Refuse counts outside the range of their channel's storage type, which the file would alter."""
         low, high = counts.min(axis=0), counts.max(axis=0)
         for column, channel in enumerate(self.channels):
             span = np.iinfo(channel.storage)

@@ -7,7 +7,8 @@ from sim import waiting
 
 
 def now() -> float:
-    """The machine's clock [s since an arbitrary origin], which never decreases and resolves better than a microsecond.
+    """The machine's clock [s since an arbitrary origin], which never decreases; its resolution is better than a
+    microsecond.
 
     All time stamps use this clock. Python's monotonic clock may step by 15.6 ms on Windows (documentation of Python,
     `time.monotonic` before 3.13); this counter does not. On Linux both are CLOCK_MONOTONIC, shared by all processes.

@@ -35,8 +35,8 @@ class ComputedRig(RigBase, ABC):
 
     @abstractmethod
     def respond(self, volts: NDArray[np.float64]) -> Counts:
-        """Counts of all channels, shape (n, n_channels), under the next `volts`, shape (n,); sample i of the drive
-        takes effect after sample i of the inputs.
+        """Counts of all channels, shape (n, n_channels), in response to the next `volts`, shape (n,); sample i of the
+        drive takes effect after sample i of the inputs.
         """
 
     def begin(self) -> None:

@@ -37,7 +37,7 @@ class Drive:
     def append(self, volts: NDArray[np.float64]) -> NDArray[np.float64]:
         """Count `volts`, shape (n,), as queued, and return a copy.
 
-        Raises RigError unless it is one-dimensional, finite and within the range.
+        Raises RigError unless the samples are one-dimensional, finite and within the range.
         """
         samples = np.array(volts, dtype=np.float64)
         if samples.ndim != 1:
@@ -52,7 +52,7 @@ class Drive:
         return samples
 
     def require(self, n: int) -> None:
-        """Raise DriveUnderflow unless the lead is queued beyond the next `n` samples."""
+        """Raise DriveUnderflow unless `n` samples and the lead are queued."""
         if self._waiting < n + self.lead:
             raise DriveUnderflow(
                 f"the drive ran out at sample {self.index}: {self._waiting} samples were queued and {n + self.lead}"
@@ -60,7 +60,9 @@ class Drive:
             )
 
     def advance(self, n: int, gap: int = 0) -> int:
-        """Count `n` samples as played and read, after a gap without drive. Returns the index of the first sample."""
+        """Count `n` samples as played and read, after `gap` samples without drive. Returns the index of the first
+        one.
+        """
         first = self.index + gap
         self._waiting -= n
         self.index = first + n
@@ -84,7 +86,7 @@ def ending_by(stop: Callable[[], None]) -> Generator[None]:
 
 
 class RigState(Enum):
-    """States of a rig. A rig whose sample clock starts with the first block is armed, then running."""
+    """States of a rig. A rig whose sample clock starts with the first block is armed until then, and running after."""
 
     STOPPED = "not armed"
     ARMED = "armed"
@@ -105,7 +107,7 @@ class RigBase:
 
     @property
     def armed(self) -> bool:
-        """Whether the rig takes drive samples."""
+        """Whether the rig accepts drive samples."""
         return self._state in (RigState.ARMED, RigState.RUNNING)
 
     def raw_values(self) -> tuple[RawValues, ...]:

@@ -25,7 +25,7 @@ class DriveUnderflow(RigError):
 
 
 class InputOverflow(RigError):
-    """Inputs were read too late: unread samples were overwritten."""
+    """The inputs were read too late, and unread samples were overwritten."""
 
     error_code = "input_overflow"
 

@@ -18,7 +18,7 @@ TAKEN = (
 
 
 class FurtherChannel(CalibratedInput):
-    """An additional analogue sensor, recorded, monitored, displayed and exported like every channel.
+    """An additional analogue sensor, which is recorded, monitored, displayed and exported like every other channel.
 
     On hardware it is a DAQ input; on the simulated bench it measures the motion of `place`.
     """
@@ -28,15 +28,15 @@ class FurtherChannel(CalibratedInput):
         ..., "", "measured quantity", example="acceleration"
     )
     unit: str = quantity(..., "", "SI unit of the quantity", min_length=1, example="m/s2")
-    place: Place = quantity(..., "", "part on which it is mounted", example="storey 2")
+    place: Place = quantity(..., "", "part of the bench on which the sensor is mounted", example="storey 2")
     sensitivity: float = quantity(
         ..., "V/unit", "volts per unit as calibrated; its sign is the polarity", usual=(1e-6, 1e6), example=0.1
     )
-    zero: float = quantity(0.0, "V", "voltage at zero", usual=(1e-3, 2.0))
+    zero: float = quantity(0.0, "V", "voltage when the quantity is zero", usual=(1e-3, 2.0))
     limit: float | None = quantity(
         None,
         "unit",
-        "largest magnitude relative to the zero at rest, beyond which the guard aborts; if absent, the "
+        "largest permitted magnitude relative to the value at rest; beyond it the guard aborts; if absent, the "
         "channel is not monitored",
         gt=0,
         example=20.0,
@@ -64,7 +64,7 @@ class FurtherChannel(CalibratedInput):
 
     @property
     def simulated(self) -> PlacedSensor:
-        """The sensor on the simulated bench. Raises InvalidInput for a motion that is not simulated."""
+        """The sensor's model on the simulated bench. Raises InvalidInput for a motion that is not simulated."""
         if self.measures not in SIMULATED or self.place == "elsewhere":
             allowed = f"on the simulated bench, it must be {', '.join(SIMULATED)} of table or storeys"
             raise InvalidInput("measures", f"{self.measures} of {self.place}", allowed)

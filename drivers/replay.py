@@ -1,4 +1,4 @@
-"""Rig that plays back the recorded samples of a file, run by run."""
+"""Rig that replays the recorded samples of a file, run by run."""
 
 from collections.abc import Collection, Mapping, Sequence
 from typing import Protocol
@@ -17,7 +17,7 @@ class RecordedRun(Protocol):
 
     @property
     def stretches(self) -> Sequence[tuple[int, int]]:
-        """Index of the first sample and number of samples of each gap-free section, ascending."""
+        """Index of the first sample and number of samples of each gap-free section, in ascending order."""
         ...
 
     def counts(self, first: int, n: int) -> Counts:
@@ -26,7 +26,7 @@ class RecordedRun(Protocol):
 
 
 class Recording(Protocol):
-    """A file that can be played back."""
+    """A file that can be replayed."""
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -60,7 +60,7 @@ class Recording(Protocol):
 
 
 class Course(Protocol):
-    """Data of the recorded runs other than samples; runs are numbered from 0."""
+    """Data of the recorded runs other than their samples; runs are numbered from 0."""
 
     def in_hand(self, run: int, samples: int) -> float:
         """Bench time [s] at which the first `samples` samples of `run` had been read."""
@@ -71,7 +71,7 @@ class Course(Protocol):
         ...
 
     def alignments(self, run: int) -> tuple[Alignment, ...]:
-        """Alignments of sensors with their own clocks in `run`."""
+        """Clock alignments, in `run`, of the sensors that have their own clocks."""
         ...
 
 
@@ -80,8 +80,8 @@ class ReplayRig(RigBase):
 
     The drive is checked as in every rig but has no effect. A block ends early at a gap or the end of the recording;
     after a gap the next block begins at a later sample, and the samples of the gap consume no drive. `lead` is by
-    default that of the recording. An optional `course` determines when blocks arrive, on a `clock` that begins at 0
-    with the recording, and when safety inputs open. The caller closes the recording, after the rig.
+    default the recording's lead. An optional `course` determines when blocks arrive, on a `clock` that begins at 0 with
+    the recording, and when safety inputs open. The caller closes the recording after closing the rig.
     """
 
     def __init__(
@@ -121,7 +121,7 @@ class ReplayRig(RigBase):
         self.require_stopped("arm", REARM)
         runs = self._recording.runs
         if self._number + 1 >= len(runs):
-            self._over = f"all {len(runs)} recorded runs were played"
+            self._over = f"all {len(runs)} recorded runs have been replayed"
             raise RigError(f"arm is refused: {self._over}; reopen the recording")
         self._number += 1
         self._rest = list(runs[self._number].stretches)

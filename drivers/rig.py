@@ -23,11 +23,11 @@ from sim.parameters import column
 
 @dataclass(frozen=True)
 class RawValues:
-    """Values of a sensor with its own clock before their resampling, whole numbers of shape (n,) each.
+    """Values of a sensor with its own clock, before resampling: arrays of integers, shape (n,) each.
 
-    `sensor` is the name of its channel. `index` counts the measurements, with gaps where some were lost; `time` is that
-    of the measurement on the sensor's clock [us], `code` the word of the sensor, and `arrival` the time at which it had
-    been received [us of the computer's clock since `arm()`].
+    `sensor` is the name of its channel. `index` counts the measurements, with gaps where some were lost; `time` is the
+    time of the measurement on the sensor's clock [us], `code` the sensor's word, and `arrival` the time at which the
+    word had been received [us of the computer's clock since `arm()`].
     """
 
     sensor: str
@@ -56,7 +56,7 @@ class Block:
 
 @dataclass(frozen=True)
 class Alignment:
-    """Alignment of a sensor with its own clock to the sample clock in one run.
+    """Alignment of a sensor's own clock to the sample clock in one run.
 
     A value taken at second t of the sensor's clock is placed at second `offset + rate * t + delay` of the sample clock.
     `residual` is the root mean square residual of the clock readings that bound it [s], `delay` the configured delay
@@ -64,7 +64,7 @@ class Alignment:
     """
 
     sensor: str = column("", "name of the channel")
-    offset: float = column("s", "time in the run at second 0 of the sensor's clock, without delay")
+    offset: float = column("s", "time in the run at second 0 of the sensor's clock, excluding the delay")
     rate: float = column("1", "seconds of the sample clock per second of the sensor's clock")
     residual: float = column("s", "root mean square residual of the clock readings")
     delay: float = column("s", "configured delay added to the times of the values")
@@ -90,27 +90,27 @@ class OperatorTask(StrEnum):
     """An operator's task on the bench between two tests. Some tasks have an amount, in SI units."""
 
     MOUNT_SPRING = "mount spring"
-    """Block and spring are mounted, the block free to rock; the amount is the nominal stiffness on the spring's label
+    """Block and spring are mounted, and the block is free to rock; the amount is the stiffness on the spring's label
     [N/m].
     """
     REMOVE_BLOCK = "remove block"
     STAND_BLOCK_UP = "stand block up"
     LOCK_FRAME = "lock frame"
-    """The storeys are clamped to the table and move with it, without spring and block."""
+    """Spring and block are removed, and the storeys are clamped to the table, so that they move with it."""
     UNLOCK_FRAME = "unlock frame"
     HOLD_BLOCK = "hold block"
     """As MOUNT_SPRING, but with the block clamped to the table: it cannot lift, and it fixes the spring to the
     table.
     """
     LOCK_TABLE = "lock table"
-    """The table is clamped to the ground at mid stroke, with any specimen; it must not be driven."""
+    """The table, with any specimen, is clamped to the ground at mid stroke; it must not be driven."""
     UNLOCK_TABLE = "unlock table"
     WATCH_BLOCK = "watch block"
     """The block stands alone, without spring, and the laser of storey 2 points horizontally at its face on the frame's
-    side, at the height of the amount above the table [m]: see `sim.block_face`. No spring can be mounted meanwhile;
+    side, at the height of the amount above the table [m]: see `sim.block_face`. No spring can be mounted in this state;
     without a block the laser has no target."""
     WATCH_STOREYS = "watch storeys"
-    """The laser of storey 2 measures its storey again."""
+    """The laser of storey 2 is aimed at its storey again."""
     TILT_BLOCK = "tilt block"
     """The stand-alone block is held tilted by the amount [rad], positive with its top towards the frame, and
     released without a push a few seconds after the rig is armed; required before each test."""
@@ -129,7 +129,7 @@ class Rig(Protocol):
 
     @property
     def sample_rate(self) -> float:
-        """Samples per second per channel, for inputs and drive, as read back from the device [1/s]."""
+        """Sample rate of each input and of the drive, as read back from the device [1/s]."""
         ...
 
     @property
@@ -139,7 +139,7 @@ class Rig(Protocol):
 
     @property
     def lead(self) -> int:
-        """Number of drive samples that must be written ahead of the sample being read: the output latency."""
+        """Number of drive samples that must be queued beyond the block being read: the output latency."""
         ...
 
     @property
@@ -154,24 +154,22 @@ class Rig(Protocol):
 
     @property
     def alignments(self) -> tuple[Alignment, ...]:
-        """Alignments of sensors with their own clocks since `arm()`; usually none."""
+        """Clock alignments, since `arm()`, of the sensors that have their own clocks; usually none."""
         ...
 
     def raw_values(self) -> tuple[RawValues, ...]:
-        """Values of sensors with their own clocks received since the last call, or since `arm()`; usually none.
+        """Values received since the last call, or since `arm()`, from sensors with their own clocks; usually none.
 
         They remain available after `stop()` and a failure. A backend of another package may lack this method.
         """
         ...
 
     def interlocks(self) -> Mapping[str, bool]:
-        """Existing safety inputs by name; True if closed (good)."""
+        """States of the existing safety inputs by name; True if closed (good)."""
         ...
 
     def arm(self) -> None:
-        """Close the enable line with the output at zero; sample 0 is acquired at once, or when the first block is
-        read.
-        """
+        """Close the enable line with the output at zero. Sample 0 is acquired at once, or with the first block read."""
         ...
 
     def write(self, volts: NDArray[np.float64]) -> None:
@@ -195,9 +193,9 @@ class Rig(Protocol):
     def halt(self) -> None:
         """Cut the enable line now, then set the output to zero. Allowed in every state, and repeatedly.
 
-        The only method that may be called during another: from another thread while `read` waits, and from a signal
-        handler during any call, so it does not wait for locks held by calls. A call that it interrupts raises RigError,
-        a `read` at the latest when its block is due.
+        The only method that may be called while another one runs: from another thread while `read` waits, and from a
+        signal handler during any call. It must therefore not wait for locks held by other calls. An interrupted call
+        raises RigError, `read` at the latest when its block is due.
         """
         ...
 
@@ -208,6 +206,6 @@ class Rig(Protocol):
     def perform(self, work: OperatorTask, amount: float | None = None) -> None:
         """Register that the operator's task `work`, with its `amount` if any, was carried out on the stopped rig.
 
-        A simulated rig carries it out on its specimen; a real one does nothing. Raises RigError if armed.
+        A simulated rig carries out the task on its specimen; a real one does nothing. Raises RigError if armed.
         """
         ...

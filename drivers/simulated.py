@@ -14,22 +14,22 @@ from sim.specimen import Specimen
 from sim.virtual_bench import VirtualBench, VirtualBenchParameters
 
 _STILL_VELOCITY = 2.0e-4
-"""Velocity of table, storeys and the block's top [m/s] below which the bench counts as at rest."""
+"""Velocity of table, storeys and the block's top [m/s] below which the bench is considered at rest."""
 _STILL_DISPLACEMENT = 2.0e-4
-"""Displacement of the table from mid stroke [m] below which it counts as at rest."""
+"""Displacement of the table from mid stroke [m] below which the table is considered at rest."""
 _LONGEST_WAIT = 300.0
-"""Longest wait for rest [s]; not used for a block held by its catch."""
+"""Longest wait for rest [s]; a block held by its catch is not awaited."""
 _WARM_UP = 0.5
 """Settling time of filters and lasers at rest before the sample clock starts [s]."""
 
 
 class SimulatedRig(ComputedRig):
-    """Rig with a simulated bench. Under a `VirtualClock` it runs as fast as the machine allows; under a `WallClock` a
+    """Rig with a simulated bench. With a `VirtualClock` it runs as fast as the machine allows; with a `WallClock` a
     block is returned at the time at which it would have been measured.
 
     `lead` is the number of drive samples that must be queued, 50 ms by default. Between two runs the bench coasts at
-    zero drive until it is at rest. A part held by hand is released a few seconds after sample 0; after a run that ended
-    earlier, it remains held. Every spring is `spring_factor` times as stiff as its label.
+    zero drive until it is at rest. A part held by hand is released a few seconds after sample 0; if the run ends
+    earlier, the part remains held. Every spring is `spring_factor` times as stiff as its label.
     """
 
     def __init__(
@@ -79,7 +79,7 @@ class SimulatedRig(ComputedRig):
 
     def _come_to_rest(self) -> None:
         """Coast at zero drive until the bench is at rest."""
-        # not done in `halt`, which may interrupt a read
+        # `halt` must not wait for rest, because it may interrupt a read
         self.bench.disarm()
         waited = 0.0
         while self._moved and waited < _LONGEST_WAIT:

@@ -14,10 +14,10 @@ _CLAMPED = 400.0
 
 
 class SpecimenHandling:
-    """Handles the original specimen, with springs `spring_factor` times as stiff as their labels.
+    """Operator actions on the original specimen, with springs `spring_factor` times as stiff as their labels.
 
     Mounting a spring, removing the block and clamping the storeys first release any part held by hand and the clamp of
-    the block. The lock of the table and the target of laser 2 are changed only by their own tasks.
+    the block. The table's lock and laser 2's target change only by their own tasks.
     """
 
     def __init__(self, specimen: Specimen, spring_factor: float = 1.0) -> None:
@@ -43,7 +43,7 @@ class SpecimenHandling:
                 return replace(now, tilt=0.0)
             case OperatorTask.LOCK_FRAME:
                 stiff = {"k1": _CLAMPED * self._frame.k1, "k2": _CLAMPED * self._frame.k2}
-                # a new object: a copy would keep the cached modes of the soft frame
+                # a new object, since a copy would keep the cached modes of the unclamped frame
                 clamped = Frame.model_validate(self._frame.model_dump() | stiff)
                 return self._standing(now.specimen.bare().model_copy(update={"frame": clamped}), now)
             case OperatorTask.UNLOCK_FRAME:
@@ -85,7 +85,9 @@ class SpecimenHandling:
         return pull
 
     def _free(self, now: Arrangement) -> Specimen:
-        """Specimen with free storeys: every task on a clamped frame unlocks it first."""
+        """The present specimen with free storeys: every task that changes a clamped frame's specimen unlocks the
+        frame.
+        """
         return now.specimen.model_copy(update={"frame": self._frame})
 
     @staticmethod
@@ -109,7 +111,7 @@ def _tilt(amount: float | None, now: Arrangement) -> float:
 
 
 def _needed(item: str, amount: float | None, why: str) -> float:
-    """The amount. Raises InvalidInput if missing."""
+    """The amount. Raises InvalidInput if it is missing or not finite."""
     if amount is None or not isfinite(amount):
         raise InvalidInput(item, amount, why)
     return amount

@@ -1,7 +1,7 @@
 """Readings of the sample clock by a separate process, through a separate connection to a gRPC device server.
 
-They do not delay the acquisition loop and take the same time whatever it does. Half the difference between the two
-directions of a call shifts every time derived from it, equally in a check and in a run.
+They do not delay the acquisition loop, and their duration does not depend on its load. Half the difference between the
+transmission times to and from the server shifts every time derived from a call, equally in a check and in a run.
 """
 
 import struct
@@ -55,7 +55,7 @@ class ClockWatch:
 
     @property
     def alive(self) -> bool:
-        """Whether readings may arrive."""
+        """Whether the process can still deliver readings."""
         return self._thread.is_alive()
 
     def take(self) -> list[Reading]:
@@ -76,7 +76,7 @@ class ClockWatch:
 
 
 def _serve(name: str, rate: float, daq: Daq, readings: IO[bytes]) -> None:
-    """Write readings until the server is gone."""
+    """Write readings until the connection to the server is lost."""
     from nidaqmx.errors import DaqError
 
     from drivers.daqmx import library
@@ -112,7 +112,7 @@ if __name__ == "__main__":
 
     def await_end() -> None:
         sys.stdin.buffer.read()
-        # without ending the tasks of the program, as nidaqmx would
+        # a normal exit would let nidaqmx clear the program's tasks
         os._exit(0)
 
     given = Daq.model_validate_json(sys.stdin.buffer.readline())

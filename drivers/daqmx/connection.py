@@ -20,7 +20,7 @@ _PORT = 31763
 
 
 class Connection:
-    """Options for new tasks, the only difference between this PC and a server.
+    """Connection to the driver of this PC or to a server, selected by the options for its tasks.
 
     Encrypted with `tls`; a `plain` connection may leave private networks. Raises DeviceNotFound if no server answers
     within 2 s, InvalidInput for an address without port, for a plain connection to a public network, and for
@@ -42,11 +42,11 @@ class Connection:
 
     @property
     def late(self) -> bool:
-        """Whether a call has ever timed out, after which the state of the server's tasks is unknown."""
+        """Whether any call has timed out; the state of the server's tasks is then unknown."""
         return self._deadline is not None and bool(self._deadline.late)
 
     def options(self, name: str = "") -> Options:
-        """Options for a new task of this name, by which later processes can find it; not for an existing task."""
+        """Options for creating a task of this name, by which later processes can find it."""
         return self._session(name, SessionInitializationBehavior.INITIALIZE_SERVER_SESSION)
 
     def attaching(self, name: str) -> Options:
@@ -107,7 +107,7 @@ class Connection:
             self._channel.close()
             raise DeviceNotFound(
                 f"no gRPC device server responds at {server}: start ni_grpc_device_server there and check the port"
-                f" ({_PORT} unless changed); to be reached from another machine it needs"
+                f" ({_PORT} unless changed); for connections from another machine, set"
                 ' "address": "[::]" in its server_config.json'
                 f"{_ENCRYPTED if tls is not None else ''}"
             ) from error

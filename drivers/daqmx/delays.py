@@ -1,7 +1,7 @@
-"""Delays between the sample clock and the samples of each input, for their removal.
+"""Delays of each input's samples relative to the sample clock, for their correction.
 
-The filter of a delta-sigma converter delays its input by about 40 samples; a multiplexer takes its inputs one after the
-other. Inputs on different modules therefore record the same motion at different times.
+The filter of a delta-sigma converter delays its input by about 40 samples; a multiplexer samples its inputs one after
+the other. Inputs on different modules therefore record the same motion at different times.
 """
 
 import re
@@ -44,21 +44,21 @@ _FIGURE = 1.0e-6
 """Standard uncertainty of a delay in specifications [s]: rounding to two digits, and tolerance of analogue filters."""
 _KNOWN = {"9234": (2.6e-6, 5.0e-6), "9237": (4.5e-6, _FIGURE), "9239": (3.3e-6, _FIGURE)}
 """Input delay of delta-sigma modules without a property for it: (40 + 5/512) samples and this time [s] with its
-standard uncertainty [s], from their specifications and NI's knowledge base, kA00Z0000004A0YSAU. No document of NI was
-found that gives this time for the NI 9234: it is assumed to be among those of its relatives."""
+standard uncertainty [s], from their specifications and NI's knowledge base, kA00Z0000004A0YSAU. No NI document was
+found that gives this time for the NI 9234; a value between those of related modules is assumed."""
 _CLOCKED = 1.0e-7
 """Standard uncertainty of a time determined by the device's clock [s], a few ticks."""
 _DELTA_SIGMA_BITS = 24
-"""Resolution [bits] from which on a converter is assumed to be a delta-sigma converter."""
+"""Lowest resolution [bits] at which a converter is assumed to be of the delta-sigma type."""
 
 
 def input_delays(
     task: library.Task, channels: Sequence[InputChannel], devices: Sequence[Connected], rate: float
 ) -> tuple[InputDelay, ...]:
-    """The delay of each input of a clocked task, from the device if it has a property for it, else the known value.
+    """The delay of each input of a clocked task, read from the device if it has a property for it, else tabulated.
 
-    `devices` are those of the channels, in order. If a device can remove the delay itself, this is switched off, so
-    that the delay is removed in one place only.
+    `devices` are the devices of the channels, in order. If a device can remove the delay itself, this function is
+    switched off, so that the delay is removed in one place only.
     """
     several = len({device.name for device in devices}) > 1
     steps: dict[str, float | None] = {}
@@ -81,7 +81,7 @@ def _multiplexed(number: int, total: int, step: float | None, rate: float) -> In
         return InputDelay(0.0, _CLOCKED, "first input of its multiplexer")
     if step is not None:
         return InputDelay(-number * step, _CLOCKED, "AI.ConvRate")
-    # at most evenly spaced over the sample
+    # the inputs are at most evenly spaced over the sample period
     return InputDelay(0.0, number / (total * rate) / sqrt(3.0), "multiplexer without AI.ConvRate: within a sample")
 
 
@@ -107,7 +107,7 @@ def _filter_delay(channel: InputChannel, device: Connected, rate: float) -> Inpu
     model = re.search(r"\bNI[ -]?(\d{4})", device.product)
     if model is not None and (constant := _KNOWN.get(model[1])) is not None:
         seconds, uncertainty = constant
-        source = "specifications" if uncertainty == _FIGURE else "assumed from the relatives"
+        source = "specifications" if uncertainty == _FIGURE else "assumed from related modules"
         return InputDelay(_SAMPLES / rate + seconds, uncertainty, f"{source} of the {device.product}")
     if channel.ai_resolution >= _DELTA_SIGMA_BITS:
         return InputDelay(0.0, inf, f"unknown for {device.product}")

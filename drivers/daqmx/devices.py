@@ -22,11 +22,12 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class FoundDevice:
-    """One device or module. Ranges are (lowest, highest) pairs [V]; rates [1/s] are None for functions that it lacks.
+    """One device or module. Ranges are (lowest, highest) pairs [V]; rates [1/s] are None for functions that the device
+    lacks.
 
-    `lines` can be digital outputs, `input_lines` can be digital inputs.
-    `chassis` is that of a module.
-    `input_rate` is the maximum for one channel; `total_input_rate` is shared by all channels unless `simultaneous`.
+    `lines` can be digital outputs, `input_lines` can be digital inputs. `chassis` is the chassis of a module, None for
+    other devices. `input_rate` is the maximum for one channel; `total_input_rate` is shared by all channels unless
+    `simultaneous`.
     """
 
     name: str
@@ -71,7 +72,7 @@ def find_devices(server: str | None, tls: Tls | None = None, *, plain: bool = Fa
 
 
 def described(device: library.Device) -> FoundDevice:
-    """The properties of a device."""
+    """The device's properties, read through the driver."""
     inputs = tuple(channel.name for channel in device.ai_physical_chans)
     outputs = tuple(channel.name for channel in device.ao_physical_chans)
     serial = int(device.serial_num)
@@ -167,9 +168,7 @@ _NIBBLE = 4
 
 
 def _require_one_direction(daq: Daq, used: Mapping[str, FoundDevice]) -> None:
-    """Raise InvalidInput for outputs and inputs in the same half of an NI 9401: the second would reverse the lines of
-    the first.
-    """
+    """Raise InvalidInput for an output and an input in the same half of an NI 9401, whose lines share one direction."""
     seen: dict[tuple[str, int], str] = {}
     for item, line in daq.digital_lines.items():
         device = used[device_name(line).lower()]

@@ -11,14 +11,14 @@ from drivers.daqmx.parameters import Tls
 from sim.errors import InvalidInput
 
 _REMEDY = (
-    "it is neither this computer nor in a private network, and over a plain connection others may read it and drive the"
+    "it is neither this computer nor in a private network, and others could intercept a plain connection and drive the"
     " shaker: set hardware.daq.tls with the server's certificate, or hardware.daq.plain_connection = true"
 )
 
 
 def require_private(server: str) -> None:
-    """Raise InvalidInput for a server outside loopback, link-local and private networks. An unknown name is accepted,
-    since no connection to it is possible.
+    """Raise InvalidInput for a server outside loopback, link-local and private networks. A name that cannot be resolved
+    is accepted, since no connection to it is possible.
     """
     host = server.rpartition(":")[0].strip("[]")
     try:
@@ -32,7 +32,7 @@ def require_private(server: str) -> None:
 
 
 def credentials(tls: Tls) -> Any:
-    """Credentials of a channel. Raises InvalidInput for a file that cannot be read or is not a PEM file, and for a
+    """Credentials of a gRPC channel. Raises InvalidInput for a file that cannot be read or is not a PEM file, and for a
     certificate without key or a key without certificate.
     """
     import grpc

@@ -34,7 +34,7 @@ _ABSENT = _Meaning(DeviceNotFound, "`rockbench devices` lists the devices that a
 _BUSY = _Meaning(DeviceNotFound, "another program holds the device: end it first")
 _NO_ROUTE = _Meaning(
     RigError,
-    "see hardware.daq.start_trigger and hardware.daq.clock; clock = OnboardClock gives the output its own clock",
+    "see hardware.daq.start_trigger and hardware.daq.clock; clock = OnboardClock selects the output's own clock",
 )
 _OTHER = _Meaning(RigError, "the run has ended")
 
@@ -125,7 +125,7 @@ _UNSUPPORTED = {
 
 
 def is_unsupported(error: DaqError) -> bool:
-    """Whether the error means that a device lacks a property."""
+    """Whether the error reports a property that the device lacks."""
     return code_of(error) in _UNSUPPORTED
 
 
@@ -154,7 +154,7 @@ def translation(doing: str, error: Error) -> RigError:
 
 
 def status_of(error: RpcError) -> str:
-    """The name of the state of a gRPC call that failed."""
+    """The status name of a failed gRPC call."""
     return str(getattr(cast(Any, error).rpc_code, "name", "UNKNOWN"))
 
 

@@ -46,8 +46,8 @@ def scaling_of(channel: InputChannel, terminal: str) -> InputScaling:
 def valid_counts(size: int, resolution: int, *, left: bool) -> tuple[int, int]:
     """Lowest and highest valid count of a signed converter of `resolution` bits in `size` bits.
 
-    At the extreme counts the converter is saturated, so they are excluded. `left`: the converter's bits are
-    the upper ones of the sample.
+    At the extreme counts the converter is saturated, so they are excluded. `left`: the sample is left-justified, so
+    that its upper bits are the converter's.
     """
     step = 2 ** (size - resolution) if left else 1
     rail = 2 ** (resolution - 1)
@@ -66,9 +66,9 @@ TERMINAL_CONFIGURATIONS: dict[Wiring, TerminalConfiguration] = {
 
 
 class Inputs:
-    """Input task with all inputs, in the given order, on `devices`, and their `delays`.
+    """Task of all inputs, in the given order, on `devices`; `delays` are the inputs' delays.
 
-    The output starts on `trigger` and is clocked from `clock`; by default both are terminals of the inputs' device.
+    The output starts on `trigger` and is clocked from `clock`, by default terminals of the inputs' device.
     """
 
     def __init__(
@@ -79,7 +79,8 @@ class Inputs:
         rate: float,
         devices: Sequence[Connected],
     ) -> None:
-        # the device's own error is more specific than a time-out, so it is raised first
+        # shorter than the call's own deadline, so that the device's error, which is more specific than a time-out, is
+        # raised
         self._allowance = daq.timeout_margin / 4.0
         mark = uuid4().hex
         self._names = [f"rockbench_{mark}_{k}" for k in range(len(inputs))]
@@ -151,7 +152,7 @@ class Inputs:
             self._task.close()
 
     def _terminals(self) -> tuple[str, str]:
-        """Terminals of start trigger and sample clock; their timing engine is kept.
+        """Terminals of start trigger and sample clock; the task keeps the timing engine that generates them.
 
         On a chassis with several engines they are undefined until the task is reserved, unless the engine is set
         (NI-DAQmx help, "cDAQ-91xx and TestScale Chassis Timing Engines").
@@ -189,5 +190,5 @@ class Inputs:
 def _dtype(scalings: Sequence[InputScaling]) -> type[np.int16] | type[np.int32]:
     widest = max(scaling.bits for scaling in scalings)
     if widest > 32:
-        raise RigError(f"the inputs have raw samples of {widest} bits; at most 32 can be read")
+        raise RigError(f"the inputs have raw samples of {widest} bits; choose devices with at most 32")
     return np.int16 if widest <= 16 else np.int32

@@ -254,20 +254,20 @@ class WatchdogTask(Protocol):
 
 
 class UnscaledReader(Protocol):
-    """Reads counts into an array of shape (channels, n); returns the number per channel."""
+    """Reads counts into an array of shape (channels, n); returns the number of samples per channel."""
 
     def read_int16(self, data: NDArray[Any], number_of_samples_per_channel: int, timeout: float) -> int: ...
     def read_int32(self, data: NDArray[Any], number_of_samples_per_channel: int, timeout: float) -> int: ...
 
 
 class AnalogWriter(Protocol):
-    """Writes volts, shape (n,); returns their number."""
+    """Writes volts, shape (n,); returns the number of samples written."""
 
     def write_many_sample(self, data: NDArray[np.float64], timeout: float) -> int: ...
 
 
 class LinesReader(Protocol):
-    """Reads the levels of digital lines now into an array of bool, shape (channels,), one line each."""
+    """Reads the present levels of digital lines, one per channel, into an array of bool, shape (channels,)."""
 
     def read_one_sample_one_line(self, data: NDArray[np.bool_], timeout: float) -> object: ...
 
@@ -294,23 +294,23 @@ def watchdog_task(device: str, name: str, timeout: float, options: Options) -> W
 
 
 def let_go(task: WatchdogTask) -> None:
-    """Drop the object of a watchdog that must not be closed because it has another owner or its device is gone."""
+    """Drop the object of a watchdog that must not be closed because another client owns it or its device is lost."""
     # nidaqmx has no public method for this and warns about every watchdog not closed
     cast(Any, task)._handle = None
 
 
 def goes_low(line: str) -> DOExpirationState:
-    """Expiration state of a line that goes low."""
+    """Expiration state that sets a line low."""
     return DOExpirationState(physical_channel=line, expiration_state=Level.LOW)
 
 
 def goes_to_zero(output: str) -> AOExpirationState:
-    """Expiration state of an analogue output that goes to 0 V."""
+    """Expiration state that sets an analogue output to 0 V."""
     return AOExpirationState(physical_channel=output, expiration_state=0.0, output_type=WatchdogAOExpirState.VOLTAGE)
 
 
 def unscaled_reader(task: Task) -> UnscaledReader:
-    """Reads the inputs of a task; the caller ensures the array's shape: the check would cost a call each time."""
+    """Reads the inputs of a task. The caller ensures the array's shape, since checking it would cost an extra call."""
     reader = AnalogUnscaledReader(task.in_stream)
     reader.verify_array_shape = False
     return cast(UnscaledReader, reader)

@@ -62,7 +62,7 @@ class Output:
         """
         if not self._started and self._prefilled + volts.size > self._buffer:
             raise RigError(
-                f"{self._prefilled + volts.size} drive samples before the start are refused: the buffer holds "
+                f"writing {self._prefilled + volts.size} drive samples before the start is refused: the buffer holds "
                 f"{self._buffer}; start the output first"
             )
         rest = np.ascontiguousarray(volts, np.float64)
@@ -79,7 +79,7 @@ class Output:
         self._started = True
 
     def zero(self) -> None:
-        """Set the output to 0 V now; no other task may have reserved it."""
+        """Set the output to 0 V now. Fails if another task has reserved it."""
         put_to_zero(self._connection, self._daq)
 
     def reset_device(self) -> None:
@@ -125,7 +125,7 @@ class Output:
 
 
 def put_to_zero(connection: Connection, daq: Daq) -> None:
-    """Set the output to 0 V now; no task may have reserved it."""
+    """Set the output to 0 V now. Fails if a task has reserved it."""
     with translated("setting the output to 0 V"):
         # the task has no name: if a slow server creates it late, it must not block the next one
         task = library.task("", connection.options())
@@ -142,7 +142,7 @@ def _add_channel(task: library.Task, daq: Daq) -> library.OutputChannel:
 
 
 def _transfer_early(channel: library.OutputChannel) -> str:
-    """Refill the onboard memory as soon as it is half empty; returns a description.
+    """Have the driver refill the onboard memory as soon as it is half empty; returns the setting in words.
 
     Even a deep onboard memory then adds no latency beyond the caller's lead.
     """

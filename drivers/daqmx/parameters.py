@@ -15,11 +15,11 @@ class AnalogInput(Parameters):
 
     terminal: str = quantity("Dev1/ai0", "", "physical channel of the input")
     wiring: Wiring = quantity("default", "", "terminal configuration of the input")
-    range: float = quantity(10.0, "V", "largest magnitude at the input", gt=0, le=60, usual=(1.0, 60.0))
+    range: float = quantity(10.0, "V", "largest magnitude of the voltage at the input", gt=0, le=60, usual=(1.0, 60.0))
 
 
 class SafetyInput(Parameters):
-    """Contact that the program reads: digital input line, and level in the good state."""
+    """Safety contact read by the program: digital input line, and level in the good state."""
 
     line: str = quantity("Dev1/port0/line1", "", "digital input line")
     good: Literal["high", "low"] = quantity(
@@ -87,7 +87,10 @@ class Tls(Parameters):
         None, "", "PEM file of the private key of that certificate", example="client_privatekey.pem"
     )
     server_name: str | None = quantity(
-        None, "", "name in the server's certificate; absent: that of the server's address", example="crio.local"
+        None,
+        "",
+        "host name in the server's certificate, if it differs from that in the server's address",
+        example="crio.local",
     )
 
 
@@ -139,10 +142,10 @@ class Daq(Parameters):
     amplifier_ready: AmplifierReady | None = quantity(None, "", "amplifier ready; absent if not wired")
     heartbeat: Heartbeat | None = quantity(None, "", "heartbeat; absent if there is no heartbeat relay")
     buffer: float = quantity(
-        10.0, "s", "duration held by the input buffer: longest possible delay of a read", ge=1.0, le=60.0
+        10.0, "s", "duration of the data that the input buffer holds: longest possible delay of a read", ge=1.0, le=60.0
     )
     timeout_margin: float = quantity(
-        2.0, "s", "time allowed for a call beyond its own duration", ge=0.1, le=60, formerly="patience"
+        2.0, "s", "time allowed for a call to the driver beyond its own duration", ge=0.1, le=60, formerly="patience"
     )
 
     @property

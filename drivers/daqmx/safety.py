@@ -1,4 +1,4 @@
-"""Enable chain: relay of the amplifier, watchdog of the device, heartbeat for an external relay, safety inputs.
+"""Enable chain: the amplifier's relay, the device's watchdog, the heartbeat of an external relay, the safety inputs.
 
 The relay is open at low level, and open is safe. X Series devices have a watchdog for their digital lines, cDAQ-9185
 and 9189 have one for all outputs of their modules, and a CompactRIO has none (manuals, "Watchdog Timer"). The heartbeat
@@ -93,15 +93,16 @@ class EnableLine:
 WATCHDOG_TASK = "rockbench_watchdog"
 
 _PER_TIMEOUT = 4
-"""Largest number of resets per time-out."""
+"""Number of resets within one time-out, at most."""
 _REFUSED = {
     int(DAQmxErrors.WATCHDOG_TIMER_NOT_SUPPORTED): "{device} has no watchdog: remove hardware.daq.watchdog",
-    int(DAQmxErrors.WATCHDOG_TIMEOUT_OUT_OF_RANGE_AND_NOT_SPECIAL_VAL): "too long for {device}",
+    int(DAQmxErrors.WATCHDOG_TIMEOUT_OUT_OF_RANGE_AND_NOT_SPECIAL_VAL): "it is outside the range of {device}",
 }
 
 
 class Watchdog:
-    """Opens `line` unless reset within `timeout` seconds. Raises InvalidInput if the device does not support it.
+    """Opens `line` unless reset within `timeout` seconds. Raises InvalidInput if the device has no watchdog or the
+    time-out is too long for it.
 
     The watchdog is on the device of the line, or on `chassis` if that device is a module. A chassis also sets `output`
     to 0 V, and expires at once when its network connection is lost; after an expiry it does nothing until it is
@@ -140,7 +141,7 @@ class Watchdog:
             return self._chassis is not None and self._alive().expired
 
     def reset_chassis(self) -> None:
-        """Reset the chassis: all outputs at their power-up states, its tasks aborted."""
+        """Reset the chassis: its tasks are aborted, and its outputs return to their power-up states."""
         if self._chassis is not None:
             reset_chassis(self._connection, self._chassis)
 
@@ -257,7 +258,7 @@ class SafetyInputs:
             self._task.start()
 
     def read(self) -> dict[str, bool]:
-        """Whether each input is good now. Raises RigError; the state of all is unknown then."""
+        """Whether each input is good now. Raises RigError if the states cannot be read."""
         # a level missing from the device's reply counts as open
         levels = ~self._good
         with translated("reading the safety inputs"):

@@ -32,12 +32,12 @@ class _State(Enum):
 
 
 class DaqSession:
-    """Output and inputs share start trigger and sample clock: output sample i is played while input sample i is
+    """Output and inputs share the start trigger and the sample clock: output sample i is played while input sample i is
     acquired.
 
-    The output is clocked from the terminal of the inputs' sample clock. A device without such a route rejects the
-    output; then `hardware.daq.clock` may name another terminal or, with OnboardClock, give the output a separate clock,
-    which starts with the inputs and stays synchronous if both have the same timebase. There is no automatic fallback.
+    The output is clocked from the terminal of the inputs' sample clock. A device that cannot route this signal rejects
+    the output; `hardware.daq.clock` must then name another terminal, or OnboardClock for a separate output clock, which
+    starts with the inputs and stays synchronous if both clocks have the same timebase. There is no automatic fallback.
 
     A run is `prepare`, `write` the first samples, `start`, then `write` and `read` in turn, and `stop`. On any failure
     in between, the relay is opened and the output set to zero before the error is raised. One thread at a time may use
@@ -112,14 +112,14 @@ class DaqSession:
                 raise ConnectionLost("prepare is refused: the device had to be reset; open a new session")
             if not self._tasks.inputs.are_ours():
                 raise ConnectionLost("prepare is refused: another client has taken the device; open a new session")
-            # complete an earlier stop that failed
+            # repeat a stop that has failed
             self._rest()
             self._state, self._at_rest, self._cut = _State.PREPARED, False, False
             with self._resting_on_failure():
                 self._tasks.prepare(lambda: self._cut)
 
     def write(self, volts: NDArray[np.float64]) -> None:
-        """Append drive samples, shape (n,), finite and in range [V]; before `start` they are its first samples.
+        """Append drive samples, shape (n,), finite and in range [V]; those written before `start` are played first.
 
         Raises DriveUnderflow if the output has run out of samples, DeviceTimeout if no space becomes free, RigError
         when the session is not prepared.
@@ -132,7 +132,7 @@ class DaqSession:
                 self._reset_watchdog()
 
     def start(self) -> None:
-        """Start the sample clock, at sample 0. Raises DriveUnderflow if nothing was written."""
+        """Start the sample clock at sample 0. Raises DriveUnderflow if no samples were written."""
         with self._lock:
             self._require(_State.PREPARED, "start")
             with self._resting_on_failure():
@@ -161,19 +161,18 @@ class DaqSession:
         return counts
 
     def acquired(self) -> int:
-        """Number of samples of each input acquired since `start`, which bounds the sample clock. Raises as `read`
-        does.
+        """Number of samples acquired per input since `start`, a reading of the sample clock. Raises the errors of
+        `read`.
         """
         self._require(_State.RUNNING, "reading the sample clock")
         with self._resting_on_failure():
             return self._tasks.inputs.acquired()
 
     def safety_inputs(self) -> dict[str, bool]:
-        """Whether each wired safety input is good now, read by one call to the device; available in every state but
-        closed.
+        """Whether each wired safety input is good now, read in one call to the device, in every state except closed.
 
-        An amplifier that reports ready only while enabled is omitted while it is not enabled. Raises RigError as `read`
-        does.
+        The ready contact of an amplifier that is ready only while enabled is omitted while the amplifier is not
+        enabled. Raises RigError if the inputs cannot be read.
         """
         safety = self._tasks.safety
         if safety is None:
@@ -190,9 +189,9 @@ class DaqSession:
     def cut(self) -> bool:
         """Open the enable relay now, in one call, from any thread and in every state, even during a read.
 
-        Returns True if the device confirmed it. False if there is no enable line or the device did not respond, in
-        which case only the emergency stop remains. Never raises. The sample clock runs until `stop`; the watchdog is no
-        longer reset.
+        Returns True if the device confirmed it, False if there is no enable line or the device did not respond; only
+        the emergency stop remains then. Never raises. The sample clock runs until `stop`; the watchdog is no longer
+        reset.
         """
         self._cut = True
         return self._tasks.relay is not None and self._tasks.relay.cut()
@@ -200,8 +199,8 @@ class DaqSession:
     def stop(self) -> None:
         """Open the relay, end the tasks, and set the output to 0 V.
 
-        Allowed in every state, and repeatedly. Attempts every step. Raises RigError at the end if relay or output could
-        not be set; the next call repeats them.
+        Allowed in every state, and repeatedly. Attempts every step. Raises RigError at the end if the relay or the
+        output could not be set; the next call repeats all steps.
         """
         with self._lock:
             if self._state is _State.CLOSED:
@@ -210,7 +209,7 @@ class DaqSession:
             self._rest()
 
     def close(self) -> None:
-        """Stop, and release the device; may be called repeatedly. Raises as `stop` does."""
+        """Stop, and release the device; may be called repeatedly. Raises the errors of `stop`."""
         with self._lock:
             if self._state is _State.CLOSED:
                 return
@@ -247,7 +246,9 @@ class DaqSession:
 
     @contextmanager
     def _resting_on_failure(self) -> Generator[None]:
-        """Stop the bench before an error is raised, and add failures of the stop to it; `stop` repeats them."""
+        """Context manager that stops the bench before an error leaves its body, and adds a failure of the stop to
+        it.
+        """
         try:
             yield
         except BaseException as error:
@@ -271,9 +272,9 @@ class DaqSession:
 
 
 def _make_safe(connection: Connection, daq: Daq) -> None:
-    """Open the relay and set the output to 0 V as far as possible.
+    """Open the relay and set the output to 0 V, ignoring failures.
 
-    A failure here is reported when the tasks are created.
+    A persistent failure is reported when the tasks are created.
     """
     with suppress(RigError):
         if daq.enable_line is not None:

@@ -41,9 +41,9 @@ _SAME_RATE = 1.0e-9
 class Tasks:
     """Enable relay, watchdog, heartbeat, safety inputs, output and inputs, on the devices `used`.
 
-    If one cannot be created, the others are cleared. After construction the relay is open and the output at 0 V.
-    `was_reset`: the device had to be reset to set the output to 0 V, so its tasks are gone. Raises InvalidInput for a
-    sample rate that the device cannot produce exactly.
+    If one of the tasks cannot be created, the others are cleared. After construction the relay is open and the output
+    at 0 V. `was_reset`: the device had to be reset to set the output to 0 V, so its tasks are gone. Raises InvalidInput
+    for a sample rate that the device cannot produce exactly.
     """
 
     def __init__(
@@ -61,7 +61,7 @@ class Tasks:
         self.safety: SafetyInputs | None = None
         self.was_reset = False
         self.ready_delay = None if daq.amplifier_ready is None else daq.amplifier_ready.delay
-        """Delay from enable line to amplifier ready [s]; None if ready does not depend on the line."""
+        """Longest delay from closing the enable line to amplifier ready [s]; None if the two are independent."""
         with ExitStack() as made:
             if daq.enable_line is not None:
                 self.relay = EnableLine(connection, daq.enable_line)
@@ -91,7 +91,7 @@ class Tasks:
         """
         if self.relay is not None:
             self.relay.open()
-        # a call interrupted by a halt may have left them running
+        # a previous call interrupted by a halt may have left these tasks running
         if self.heartbeat is not None:
             self.heartbeat.rest()
         if self.safety is not None:
@@ -132,7 +132,7 @@ class Tasks:
         if self.relay is not None:
             attempt(self.relay.open, matters=True)
         if self.heartbeat is not None:
-            # a line that cannot be set low no longer toggles either
+            # failure is harmless: the line no longer toggles
             attempt(self.heartbeat.rest)
         if self.safety is not None:
             attempt(self.safety.stop)
@@ -155,7 +155,7 @@ class Tasks:
             raise failures[0]
 
     def _end_expiration(self, attempt: Callable[..., bool], failures: list[BaseException]) -> None:
-        """Reset a chassis whose watchdog has expired: the relay is open, and no task runs until the reset."""
+        """Reset a chassis whose watchdog has expired; its relay is open, and it runs no task until the reset."""
         watchdog = self.watchdog
         expired: list[bool] = []
         if (
@@ -207,7 +207,7 @@ def _connected(given: AnalogInput, used: Sequence[FoundDevice]) -> Connected:
 
 def _require_not_cut(is_cut: Callable[[], bool]) -> None:
     if is_cut():
-        raise RigError("prepare is refused: the enable line was cut during it")
+        raise RigError("prepare is refused: the enable line was cut while the run was being prepared")
 
 
 def _quietly(step: Callable[[], None]) -> None:
@@ -231,7 +231,7 @@ def description_of(
     tasks: Tasks,
     stale: Sequence[str],
 ) -> dict[str, str]:
-    """Description of names and settings; `used` are the devices, `stale` the tasks left by another client."""
+    """Names and settings as text; `used` are the devices, `stale` the tasks left by another client."""
     heartbeat = daq.heartbeat
     return {
         "driver": f"NI-DAQmx {version.major_version}.{version.minor_version}.{version.update_version}",

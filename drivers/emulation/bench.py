@@ -20,11 +20,11 @@ from sim.virtual_bench import VirtualBench, VirtualBenchParameters
 _KEPT = 30.0
 """Duration of the retained history [s]."""
 _IDLE_TURN = 0.02
-"""Interval at which the bench advances without a client [s]."""
+"""Interval at which the bench advances while no client reads it [s]."""
 
 
 class EmulatedBench:
-    """A `Plant` around the virtual bench. It advances at every read, and in a separate thread in between.
+    """A `Plant` around the virtual bench, advanced by every read, and by a separate thread in between.
 
     One tick is one sample of the virtual bench; `clock_error` is the relative error of the tick rate.
     """
@@ -74,7 +74,7 @@ class EmulatedBench:
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """Quantities measured at the inputs."""
+        """Channels measured at the inputs."""
         return self._bench.channels
 
     @property
@@ -127,12 +127,12 @@ class EmulatedBench:
             self._subscriber = subscriber
 
     def connect_laser(self, storey: int, live: Callable[[], bool]) -> None:
-        """Switch the analogue output of the laser on storey 1 or 2: while not `live`, it shows the error current."""
+        """Switch the analogue output of the laser on storey 1 or 2: it supplies the error current unless `live()`."""
         with self.lock:
             self._outputs[1 + storey] = live
 
     def sight(self, storey: int) -> "Storey":
-        """Target of the laser of storey 1 or 2: the storey, or the block while laser 2 is aimed at it."""
+        """Target of the laser on storey 1 or 2: the storey, or the block while laser 2 is aimed at it."""
         return Storey(self, storey)
 
     def seen(self, storey: int, times: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -202,7 +202,7 @@ class EmulatedBench:
 
 
 class Storey:
-    """A `Sight`: the target of one of the lasers."""
+    """A `Sight` of one of the lasers' targets."""
 
     def __init__(self, bench: EmulatedBench, storey: int) -> None:
         self._bench, self._storey = bench, storey

@@ -17,7 +17,7 @@ from sim import waiting
 from sim.errors import InvalidInput, RockbenchError
 
 Handler = Callable[[dict[str, Any]], object]
-"""Handler of a command with its arguments; returns data for JSON."""
+"""Handles a command with its arguments; returns data that can be written as JSON."""
 
 _LONGEST = 65536
 """Length of the longest request [bytes]."""
@@ -103,12 +103,12 @@ class ControlServer:
         command = arguments.pop("command", None)
         if not isinstance(command, str) or (handler := self._handlers.get(command)) is None:
             known = ", ".join(sorted(self._handlers))
-            raise RigError(f"command {command!r} is refused: available: {known}")
+            raise RigError(f"command {command!r} is refused: it must be one of {known}")
         return handler(arguments)
 
 
 def _requests(lines: BinaryIO) -> Iterator[bytes]:
-    """Received lines; of a line that is too long, only the beginning."""
+    """Received lines; a line that is too long is truncated."""
     while line := lines.readline(_LONGEST + 1):
         part = line
         while part and not part.endswith(b"\n"):
@@ -117,13 +117,13 @@ def _requests(lines: BinaryIO) -> Iterator[bytes]:
 
 
 def _hang_up(connection: socket.socket) -> None:
-    """End the connection for the thread that reads from it, unless it has already ended."""
+    """End the input of a connection, so that the thread that reads it ends; does nothing on a closed connection."""
     with suppress(OSError):
         connection.shutdown(socket.SHUT_RD)
 
 
 _PATIENCE = 60.0
-"""Time-out for a reply [s], long enough for the bench to come to rest."""
+"""Time-out for a reply [s]; the bench comes to rest in less."""
 
 
 def ask(address: str, command: str, /, *, patience: float = _PATIENCE, **arguments: object) -> Any:

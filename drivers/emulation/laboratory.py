@@ -27,11 +27,11 @@ class ClockErrors:
 
 
 class Laboratory:
-    """Emulated instruments with their real wire protocols, around one virtual bench in real time.
+    """Emulated instruments with real wire protocols, connected to one virtual bench in real time.
 
-    `hardware` is the configuration of a client; `modules` are those of a chassis. Raises InvalidInput for devices that
-    lack something, DeviceNotFound if pseudo-terminals, which serial lasers need, do not exist; everything is then
-    closed.
+    `hardware` is the configuration of a client; `modules` are the modules of a chassis. Raises InvalidInput if the
+    devices lack a required function, DeviceNotFound if serial lasers are requested on a system without
+    pseudo-terminals; everything is closed first.
     """
 
     def __init__(
@@ -92,7 +92,7 @@ class Laboratory:
         self.daq.start()
 
     def close(self) -> None:
-        """Switch everything off; no thread, port or process remains. May be called repeatedly."""
+        """Switch everything off and end all threads and processes; may be called repeatedly."""
         self._opened.close()
 
     def __enter__(self) -> Self:
@@ -116,21 +116,21 @@ class Laboratory:
         self.bench.perform(OperatorTask(arguments["work"]), arguments.get("amount"))
 
     def _laser(self, arguments: Mapping[str, Any]) -> None:
-        """Inject a fault of the laser on `storey` by the name of a method of EmulatedLaser and its `arguments`."""
+        """Inject a fault of the laser on `storey`, named by a method of EmulatedLaser, with its `arguments`."""
         laser = self.lasers[int(arguments["storey"]) - 1]
         _FAULTS_OF_LASER[arguments["fault"]](laser, *arguments.get("arguments", ()))
 
     def _daq(self, arguments: Mapping[str, Any]) -> None:
-        """Inject a fault of the DAQ by the name of a method of DaqServer and its `arguments`."""
+        """Inject a fault of the DAQ, named by a method of DaqServer, with its `arguments`."""
         _FAULTS_OF_DAQ[arguments["fault"]](self.daq, *arguments.get("arguments", ()))
 
     def _safety(self, arguments: Mapping[str, Any]) -> None:
-        """Change the enable chain by the name of a method of SafetyChain and its `arguments`."""
+        """Change the enable chain by a method of SafetyChain, given by name, with its `arguments`."""
         _FAULTS_OF_SAFETY[arguments["fault"]](self.safety, *arguments.get("arguments", ()))
 
     def _truth(self, arguments: Mapping[str, Any]) -> dict[str, Any]:  # noqa: ARG002 - the signature of a handler
-        """True values: host times [s] of the clocks' zeros and their true rates, state of the enable chain, and volts
-        at the drive output.
+        """True values: host times [s] at which the clocks are zero, true clock rates, state of the enable chain, and
+        volts at the drive output.
         """
         return {
             "enabled": self.bench.enabled,

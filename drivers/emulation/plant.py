@@ -1,6 +1,6 @@
 """Interface of the real-time bench to which the emulated instruments are wired.
 
-All times are seconds of the machine's monotonic clock (`time.monotonic`), which every process on it shares.
+All times are seconds of the machine's monotonic clock (`time.monotonic`), which all processes on the machine share.
 """
 
 from collections.abc import Callable
@@ -13,8 +13,8 @@ from sim.channel import Counts
 from sim.errors import InvalidInput
 
 Output = Callable[[int, int], NDArray[np.float64]]
-"""Volts at the drive output at `n` ticks from tick `first` on: `output(first, n)`, shape (n,). Called once per tick, in
-order. Between tasks and after an underflow the output holds its last value, like a real one.
+"""`output(first, n)`: volts at the drive output at `n` ticks from tick `first` on, shape (n,). Each tick is read once,
+in order. Between tasks and after an underflow the output holds its last value, like a real output.
 """
 
 
@@ -23,7 +23,7 @@ class Plant(Protocol):
 
     @property
     def tick_rate(self) -> float:
-        """Nominal ticks per second: samples are taken and drive values take effect at ticks."""
+        """Nominal ticks per second. Samples are taken and drive values take effect at ticks."""
         ...
 
     @property
@@ -36,7 +36,7 @@ class Plant(Protocol):
         ...
 
     def time_of(self, tick: int) -> float:
-        """Time of a tick [s], including the clock error of the plant."""
+        """Time of a tick [s], including the plant's clock error."""
         ...
 
     def inputs(self, first: int, n: int) -> Counts:
@@ -47,11 +47,11 @@ class Plant(Protocol):
         ...
 
     def wire(self, output: Output) -> None:
-        """Connect the drive output; until then the drive is zero."""
+        """Connect the drive output; the drive is zero before."""
         ...
 
     def enable(self, closed: bool) -> None:
-        """Open or close the enable relay of the amplifier; while open, the drive does not move the table."""
+        """Open or close the amplifier's enable relay; while it is open, the drive does not move the table."""
         ...
 
 
@@ -70,7 +70,7 @@ T = TypeVar("T", bound=np.generic)
 
 
 class History(Generic[T]):
-    """The newest `capacity` rows of a growing array, by row number; rows are never changed."""
+    """The newest `capacity` rows of a growing array, by row number; rows never change."""
 
     def __init__(self, capacity: int, columns: int, dtype: type[T]) -> None:
         self._rows: NDArray[T] = np.zeros((capacity, columns), dtype=dtype)
@@ -90,7 +90,7 @@ class History(Generic[T]):
         self._end += len(rows)
 
     def at(self, numbers: NDArray[np.int64]) -> NDArray[T]:
-        """Rows of these numbers, shape (n, columns). Raises InvalidInput for rows discarded or not yet appended."""
+        """The rows `numbers`, shape (n, columns). Raises InvalidInput for rows discarded or not yet appended."""
         if numbers.size and not (self._end - self._rows.shape[0] <= numbers.min() and numbers.max() < self._end):
             allowed = f"rows {max(self._end - self._rows.shape[0], 0)} to {self._end - 1} are kept"
             raise InvalidInput("row", (int(numbers.min()), int(numbers.max())), allowed)

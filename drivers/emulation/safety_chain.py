@@ -1,7 +1,8 @@
 """Enable chain of the amplifier and its monitoring contacts.
 
 In series: enable relay, heartbeat relay, emergency stop, over-travel switches; then the amplifier, which may have
-tripped. A second contact of each is wired to a digital input of the DAQ device.
+tripped. Second contacts of the emergency stop and of the switches, and the amplifier's ready contact, are wired to
+digital inputs of the DAQ device.
 """
 
 import time
@@ -69,7 +70,7 @@ class SafetyChain:
 
     @property
     def contacts(self) -> dict[str, bool]:
-        """Every contact by name, and whether it is closed."""
+        """Whether each contact is closed, by name."""
         with self._lock:
             return {
                 "enable relay": self._enable_relay,
@@ -107,17 +108,17 @@ class SafetyChain:
         self._change(lambda: setattr(self, "_emergency_stop", True))
 
     def trip_over_travel(self, end: int = 1) -> None:
-        """Hold the switch at one end open: end 1, where displacements are positive, or end 2."""
+        """Hold the switch at one end open: end 1, at positive displacements, or end 2."""
         if end not in _ENDS:
             raise RigError(f"over-travel at end {end!r} is refused: the ends are 1 and 2")
         self._change(lambda: self._jammed.add(end))
 
     def reset_over_travel(self) -> None:
-        """Release the switches; they follow the table again."""
+        """Release the switches, so that they follow the table again."""
         self._change(self._jammed.clear)
 
     def trip_amplifier(self) -> None:
-        """Trip the amplifier: its output is off until it is reset."""
+        """Trip the amplifier; its output is off until the amplifier is reset."""
         self._change(lambda: setattr(self, "_tripped", True))
 
     def reset_amplifier(self) -> None:
@@ -156,7 +157,9 @@ class SafetyChain:
         return self._closed and time.monotonic() >= self._closed_since + _SOFT_START
 
     def _table_at(self, x: NDArray[np.float64]) -> None:
-        """Update the switches for the table's displacements `x` [m] since the last call; the bench's lock is held."""
+        """Update the switches for the table's displacements `x` [m] since the last call; called with the bench's lock
+        held.
+        """
         for end, reach in zip(_ENDS, (x.max(), -x.min()), strict=True):
             if reach > self._trip:
                 self._open_until[end] = time.monotonic() + _HOLD

@@ -14,7 +14,7 @@ from sim.virtual_bench import VirtualBenchParameters
 
 Connection = Literal["serial", "analogue"]
 Device = Literal["usb", "crio", "cDAQ-9174", "cDAQ-9185", "cRIO-9045", "cRIO-9049", "PCIe-6351", "USB-6351"]
-"""Two sets with a calibration polynomial, USB-6363 and cRIO-9045 with NI 9239; and the devices of the zoo by name."""
+"""Selectable devices: two sets with a calibration polynomial, USB-6363 and cRIO-9045 with NI 9239, and the zoo's."""
 
 _VALUES = 4
 """Number of values per measurement on the serial line: distance, counter, and the two halves of the time stamp."""
@@ -26,15 +26,16 @@ HEARTBEAT = 1.5
 _READY = 1.0
 """Declared delay of the amplifier: longest time from enable to ready [s]."""
 _RELAYS, _CONTACTS = 2, 4
-"""Lines of enable relay and heartbeat relay, and of the contacts of the safety chain."""
+"""Number of lines for the enable and heartbeat relays, and for the contacts of the safety chain."""
 
 
 @dataclass(frozen=True)
 class Site:
     """Devices of a laboratory and the terminals in use.
 
-    `inputs` are those of displacement, acceleration and lasers; `contacts` are the digital inputs in the order of the
-    safety chain's INPUTS, empty on a device without digital inputs. `range` is the largest voltage of all inputs [V].
+    `inputs` are the terminals of displacement, acceleration and lasers; `contacts` are the digital inputs in the order
+    of the safety chain's INPUTS, none on a device without digital inputs. `range` is the largest voltage of all inputs
+    [V].
     """
 
     devices: tuple[DeviceModel, ...]
@@ -93,7 +94,7 @@ def _first(devices: Sequence[DeviceModel], what: str, has: Callable[[DeviceModel
 
 
 def _contacts(devices: Sequence[DeviceModel], relays: DeviceModel) -> tuple[str, ...]:
-    """The lines of the safety inputs, if possible on a module other than that of the relays."""
+    """The lines of the safety inputs, if possible on a module other than the relays' module."""
     for one in sorted(devices, key=lambda one: one is relays):
         names = one.input_line_names
         if one is not relays:
@@ -106,7 +107,7 @@ def _contacts(devices: Sequence[DeviceModel], relays: DeviceModel) -> tuple[str,
 
 
 _PIPELINE = 3
-"""Measurements from exposure to output (manual of the optoNCDT 1420, p. 52)."""
+"""Measuring cycles between exposure and output (manual of the optoNCDT 1420, p. 52)."""
 
 
 def hardware_of(
@@ -118,7 +119,9 @@ def hardware_of(
     emulator_address: str,
     ports: Sequence[str | None],
 ) -> Hardware:
-    """The configuration of a client, with the calibrations of the virtual bench; `ports` are those of the lasers."""
+    """The configuration of a client, with the calibrations of the virtual bench; `ports` are the lasers' serial
+    ports.
+    """
     displacement, acceleration, laser_1, laser_2 = site.inputs
     lines: tuple[str | None, ...] = site.contacts or (None,) * _CONTACTS
     emergency_stop, over_travel, over_travel_2, ready = lines

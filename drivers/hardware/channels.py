@@ -22,7 +22,7 @@ Without a valid distance the current is lower, 3 to 3.75 mA depending on the mod
 
 @dataclass(frozen=True)
 class AnalogueScaling:
-    """value = (volts - middle) * slope: from mid range [m], with `slope` in m/V.
+    """Displacement from mid range [m] = (volts - middle) * slope, with `slope` in m/V.
 
     `valid` is the voltage range of valid distances.
     """
@@ -44,7 +44,7 @@ def laser_scaling(measuring_range: float, load: float) -> AnalogueScaling:
 def require_input_range(item: str, input_range: float, load: float) -> None:
     """Raise InvalidInput about `item` if an input of +-`input_range` [V] does not cover the measuring range.
 
-    The converter may saturate within the reserve beyond it: values there are then invalid.
+    The converter may saturate within the reserve beyond the measuring range; values there are then invalid.
     """
     if (needed := _END * load) > input_range * (1.0 + 1e-9):
         allowed = (
@@ -64,7 +64,7 @@ _MEASURED = {
 
 
 class Scaling(Protocol):
-    """Scaling of one input: volts = coefficients[0] + coefficients[1] counts + ..., within the converter's range."""
+    """Scaling of one input within the converter's range: volts = coefficients[0] + coefficients[1] counts + ..."""
 
     @property
     def coefficients(self) -> tuple[float, ...]:
@@ -87,7 +87,7 @@ def analogue_channels(
 ) -> tuple[Channel, ...]:
     """The channels of the DAQ's inputs, in order: transducers, lasers on their analogue outputs, additional sensors.
 
-    `devices` is the description of the DAQ, with the identity of each device.
+    `devices` is the DAQ's description, which contains the identity of each device.
     """
     channels: list[Channel] = []
     transducers = hardware.transducers
@@ -131,7 +131,7 @@ def _analogue(
     c0, c1, *higher = scaling.coefficients
     valid = scaling.lowest, scaling.highest
     if volts is not None:
-        # the polynomial is linear to 0.1 %, which is sufficient for the limits of the sensor's reserve
+        # the polynomial is linear to within 0.1 %, which is sufficient for the limits of the sensor's reserve
         ends = sorted(round((end - c0) / c1) for end in volts)
         valid = max(valid[0], ends[0]), min(valid[1], ends[1])
     terms = tuple(c * slope for c in higher)

@@ -1,8 +1,7 @@
-"""Ownership of the bench's devices: opening a device resets it, which would end the run of another program.
+"""Locks that prevent two programs from opening a device: opening resets it, which would end the other's run.
 
-Each device and serial port has a lock file on this machine. The operating system holds the lock and releases it when
-the process ends, however it ends; the holder's name is in a second file, because a locked file cannot be read on
-Windows.
+Each device and serial port has a lock file on this machine. The operating system releases the lock when the process
+ends for any reason. The owner's name is in a second file, because a locked file cannot be read on Windows.
 """
 
 import getpass
@@ -37,14 +36,14 @@ def devices_of(hardware: Hardware) -> list[str]:
     once = dict[str, str]()
     for terminal in (daq.output, *daq.digital_lines.values()):
         for name in _chassis_and_device(terminal):
-            # a lock cannot be acquired twice, and its name ignores case
+            # a device must be locked once only, and its name is case-insensitive
             once.setdefault(name.casefold(), f"{name}{where}")
     ports = [given.port for _, given in hardware.serial_lasers if given.port is not None]
     return [*once.values(), *(os.path.realpath(port) if "/" in port else port for port in ports)]
 
 
 def _chassis_and_device(terminal: str) -> list[str]:
-    """Device of a terminal, after its chassis if it has the default name of a module, such as `cDAQ1Mod2`."""
+    """Device of a terminal, preceded by its chassis if its name is a module's default name, such as `cDAQ1Mod2`."""
     device = device_name(terminal)
     module = re.fullmatch(r"(.+)Mod\d+", device, re.IGNORECASE)
     return [device] if module is None else [module[1], device]
@@ -58,7 +57,9 @@ def _same_address(server: str) -> str:
 
 @contextmanager
 def owned(devices: Iterable[str]) -> Generator[None]:
-    """Context manager that owns the `devices`. Raises DeviceNotFound naming the program that holds one of them."""
+    """Context manager that locks the `devices`. Raises DeviceNotFound naming the program that has locked one of
+    them.
+    """
     with ExitStack() as held:
         for device in devices:
             held.enter_context(_owned(device))
@@ -76,10 +77,10 @@ def _owned(device: str) -> Generator[None]:
     except Timeout:
         raise DeviceNotFound(f"{device} is in use by {_holder(name)}: end that run, or close that program") from None
     except OSError as error:
-        remedy = f"check the folder, or name another in the environment variable {FOLDER}"
+        remedy = f"check the folder, or set another one in the environment variable {FOLDER}"
         raise DeviceNotFound(f"{device} cannot be locked in {folder} ({error.strerror or error}): {remedy}") from error
     try:
-        # on a full disk the name is missing, but the lock holds
+        # the lock remains valid if the name cannot be written, as on a full disk
         with suppress(OSError):
             name.unlink(missing_ok=True)
             name.write_text(_own_name(), encoding="utf-8")
@@ -96,7 +97,7 @@ def _folder() -> Path:
     folder = Path(given or Path(shared or gettempdir(), "rockbench-devices"))
     with suppress(OSError):
         folder.mkdir(parents=True, exist_ok=True)
-        # other users must be able to lock the same files; in a sticky folder Linux would not allow it
+        # other users must be able to lock the same files, which Linux prevents in a sticky folder
         folder.chmod(0o777)
     return folder
 
@@ -115,6 +116,6 @@ def _holder(name: Path) -> str:
         with suppress(OSError):
             if text := name.read_text(encoding="utf-8", errors="replace")[:200]:
                 return text
-        # the holder writes its name just after locking
+        # the owner writes its name just after it has locked the file
         time.sleep(0.02)
     return "another program"

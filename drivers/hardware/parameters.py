@@ -63,10 +63,12 @@ class Lasers(Parameters):
     """Parameters of both lasers."""
 
     connection: Literal["serial", "analogue"] = quantity(
-        "serial", "", "connection of the lasers: a sensor cannot use both at once"
+        "serial",
+        "",
+        "connection of both lasers: a sensor cannot use its serial line and its analogue output at the same time",
     )
     reference: Literal["ground", "table"] = quantity(
-        "ground", "", "where the lasers are mounted: on the ground they measure x + u, on the table u"
+        "ground", "", "part on which the lasers are mounted: on the ground they measure x + u, on the table u"
     )
     rate: float = quantity(4000.0, "1/s", "measuring rate of each laser", gt=0, le=8000)
     delay: float = quantity(

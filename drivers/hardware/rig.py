@@ -1,4 +1,4 @@
-"""The laboratory rig: DAQ and lasers. Values of free-running sensors are resampled to the DAQ's sample clock."""
+"""The laboratory rig: DAQ and lasers, with the values of free-running sensors resampled to the DAQ's sample clock."""
 
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
@@ -24,21 +24,23 @@ from drivers.rig import Alignment, Block, Channel, Counts, OperatorTask, RawValu
 from drivers.timebase.deskew import Deskew
 
 _FIRST_READINGS = 20
-"""Number of readings of the sample clock after its start; they bound it to a fraction of a call's duration."""
+"""Number of readings of the sample clock after its start, which bound it to within a fraction of a call's duration."""
 
 _GOLDEN = 0.6180339887498949
 """Phase step between two readings, whose multiples are evenly distributed over a period."""
 _READINGS = 6
-"""Number of readings of the sample clock after each block; the best of several is much better than a single one."""
+"""Number of readings of the sample clock after each block; the tightest of several is much tighter than a single
+one.
+"""
 
 
 class HardwareRig(RigBase):
     """DAQ and lasers as one rig. The sample clock starts with the first block that is read.
 
-    Samples are returned without the delays of filters and multiplexers: a block is complete when its most delayed input
-    is. That delay is added to `lead`, the number of drive samples that must be queued. `further` are additional
-    sensors. Raises InvalidInput or RigError if the bench differs from the configuration; in that case nothing is left
-    open.
+    Samples are corrected for the delays of filters and multiplexers. A block is complete when its most delayed input
+    is, so the largest delay is added to `lead`, the number of drive samples that must be queued. `further` are
+    additional sensors. Raises InvalidInput or RigError if the bench differs from the configuration; all devices are
+    then closed.
     """
 
     def __init__(self, hardware: Hardware, *, lead: int, further: Sequence[FurtherChannel] = ()) -> None:
@@ -144,7 +146,7 @@ class HardwareRig(RigBase):
 
     def perform(self, work: OperatorTask, amount: float | None = None) -> None:
         self.require_stopped(work.value)
-        # on a real bench the operator has carried it out; an emulated laboratory must change its virtual specimen
+        # on a real bench the operator has carried out the task; an emulated laboratory must change its virtual specimen
         if self._laboratory is not None:
             ask(self._laboratory, "handwork", work=work.value, amount=amount)
 
@@ -156,15 +158,15 @@ class HardwareRig(RigBase):
             self._observe_clock(self._tracks, _FIRST_READINGS)
 
     def _observe_clock(self, tracks: Tracks, times: int) -> None:
-        """Bound the sample clock between two readings of the machine's clock, made by the process that watches it, or
-        here without one.
+        """Read the sample clock between two readings of the machine's clock, which bound it. A separate process
+        supplies the readings; without one, they are made here.
 
-        The readings are spread over the sample period, since right after a block all would have the same phase, and the
-        bounds would be no tighter than a period.
+        The readings are spread over the sample period: right after a block all would have the same phase, and the
+        bounds would be no tighter than one period.
         """
         watched = [] if self._watch is None else self._watch.take()
         for before, count, after in watched:
-            # an earlier reading may have the count of the last run
+            # an earlier reading may be of the previous run
             if before > self._started:
                 tracks.observe(before, count, after)
         if self._watch is not None and self._watch.alive and (watched or times == _FIRST_READINGS):
@@ -177,7 +179,7 @@ class HardwareRig(RigBase):
             tracks.observe(before, count, now())
 
     def _read_all(self, n: int) -> Counts:
-        """Counts of all channels, shape (n, n_channels): from the DAQ, and from the tracks."""
+        """Counts of all channels, shape (n, n_channels), from the DAQ and the tracks."""
         counts = self._deskew.moved(self._daq.read(self._deskew.missing(n)))
         if self._tracks is None:
             return counts
@@ -186,14 +188,14 @@ class HardwareRig(RigBase):
 
     @contextmanager
     def _ending_on_failure(self) -> Generator[None]:
-        """Context manager that cuts the output on any failure; reports the original cause, not a follow-up error."""
+        """Context manager that cuts the output on any failure and raises the original error, not a follow-up one."""
         try:
             yield
         except BaseException as error:
             try:
                 self.halt()
             except RigError as second:
-                # a relay or output that did not respond is part of the failure
+                # the message must include a relay or output that did not respond
                 error.args = (f"{error}; {second}", *error.args[1:])
             finally:
                 self._failed = True
@@ -201,7 +203,7 @@ class HardwareRig(RigBase):
 
     @contextmanager
     def _raised_once(self) -> Generator[None]:
-        """Context manager that suppresses errors of stopping a device whose failure has already been raised."""
+        """Context manager that suppresses the RigError of stopping a device after a failure that was already raised."""
         try:
             yield
         except RigError:

@@ -21,13 +21,13 @@ from drivers.timebase.sensor_track import SensorTrack
 from sim.errors import InvalidInput
 
 _PATIENCE = 0.05
-"""Longest time that a block waits for late values [s]; values that arrive later count as lost."""
+"""Longest wait for late values of a block [s]; values that arrive later are marked as late."""
 _SHARE = 0.5
-"""The same time as a fraction of the block's duration, so that the drive is written in time."""
+"""Longest wait as a fraction of the block's duration, so that the drive is written in time."""
 
 
 _FASTEST = 5.0
-"""Speed of a target beyond which a change between two values is implausible [m/s]; the table has at most 1 m/s."""
+"""Largest plausible speed of a target between two values [m/s]; the table reaches at most 1 m/s."""
 MARKS = Marks(LOST, LATE, IMPLAUSIBLE)
 
 
@@ -41,7 +41,7 @@ class Readings(Protocol):
 
     @property
     def time(self) -> NDArray[np.float64]:
-        """Second of the sensor's clock."""
+        """Time of each value on the sensor's clock [s]."""
         ...
 
     @property
@@ -60,7 +60,7 @@ class ClockedSensor(Protocol):
 
     @property
     def silent(self) -> bool:
-        """Whether no value has arrived for so long that blocks no longer wait for the sensor."""
+        """Whether values have been absent for so long that blocks no longer wait for the sensor."""
         ...
 
     def start(self) -> None:
@@ -72,7 +72,7 @@ class ClockedSensor(Protocol):
         ...
 
     def wait(self, timeout: float) -> bool:
-        """Wait until values are available or a failure occurs; False after `timeout` [s]."""
+        """Wait until values are available or a failure occurs; returns False after `timeout` [s]."""
         ...
 
     def close(self) -> None:
@@ -84,7 +84,7 @@ class ClockedSensor(Protocol):
 class Track:
     """An instrument: its open sensor, its channel, and the placement of its values on the sample clock.
 
-    `observation_time` [s] is the time for which its clock is observed before the first run.
+    `observation_time` [s] is the time for which the sensor's clock is observed before the first run.
     """
 
     sensor: ClockedSensor
@@ -94,9 +94,9 @@ class Track:
 
 
 class Tracks:
-    """Tracks of sensors that stream from construction on; `begin` a run, then request blocks of counts.
+    """Tracks of sensors that stream from construction on: call `begin` for each run, then `counts` for each block.
 
-    Owns the sensors and closes them, even if one cannot be started.
+    The sensors are closed by `close`, and if one of them cannot be started.
     """
 
     def __init__(self, tracks: Sequence[Track]) -> None:
@@ -135,8 +135,8 @@ class Tracks:
     def counts(self, first: int, n: int) -> NDArray[np.int16]:
         """Counts at `n` samples from `first` on, shape (n, n_tracks); waits briefly for late values.
 
-        Values that have not arrived by then are marked as late; does not wait for a silent sensor. Raises
-        ConnectionLost, and RigError before a run.
+        Values that have not arrived by then are marked as late; a silent sensor is not awaited. Raises ConnectionLost,
+        and RigError before a run.
         """
         last = (first + n - 1) / self._sample_rate
         deadline = now() + min(_PATIENCE, _SHARE * n / self._sample_rate)
@@ -150,8 +150,8 @@ class Tracks:
         return np.column_stack(placed)
 
     def raw(self) -> tuple[RawValues, ...]:
-        """The values received since the last call, or since the run began, as sent by the sensors."""
-        # if a sensor has failed, the values received before
+        """The values received since the last call, or since the run began, before resampling."""
+        # if a sensor has failed, the values received before the failure are returned
         with suppress(RigError):
             self._take()
         taken, self._raw = self._raw, [[] for _ in self._tracks]
@@ -194,10 +194,10 @@ class Tracks:
 
 
 def open_serial_lasers(hardware: Hardware) -> tuple[Track, ...]:
-    """Open the serial lasers; returns none if they are connected by analogue outputs.
+    """Open the serial lasers; returns no tracks if the lasers are connected by their analogue outputs.
 
-    The caller closes them. Raises InvalidInput for a laser without port, RigError if one is missing or differs from the
-    configuration; in that case none is left open.
+    The caller closes them. Raises InvalidInput for a laser without port, RigError if a laser is missing or differs from
+    the configuration; all are then closed.
     """
     with ExitStack() as opened:
         tracks: list[Track] = []
@@ -211,7 +211,10 @@ def open_serial_lasers(hardware: Hardware) -> tuple[Track, ...]:
 
 def _open(name: str, given: LaserInput, lasers: Lasers) -> Track:
     if given.port is None:
-        allowed = "specify the serial port of the laser (`rockbench devices` lists them), or lasers.connection"
+        allowed = (
+            "specify the serial port of the laser (`rockbench devices` lists the ports), or set"
+            " hardware.lasers.connection to analogue"
+        )
         raise InvalidInput(f"hardware.{name}.port", given.port, allowed)
     reach = given.measuring_range
     step = _FASTEST / lasers.rate / count_size(reach)

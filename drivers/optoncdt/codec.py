@@ -22,13 +22,13 @@ FULL_SCALE = 65520
 """Largest word that is a distance, at 101 % of the measuring range (manual, p. 65)."""
 
 MID_RANGE = FULL_SCALE // 2
-"""Word at the middle of the measuring range."""
+"""Word at mid range."""
 
 Number = TypeVar("Number", float, NDArray[np.float64])
 
 
 def count_size(measuring_range: float) -> float:
-    """Distance per word [m] (manual, p. 65)."""
+    """Distance per count [m] (manual, p. 65)."""
     return 1.02 * measuring_range / FULL_SCALE
 
 
@@ -47,7 +47,7 @@ def distance(code: Number, measuring_range: float) -> Number:
 
 
 def code_of(distance: Number, measuring_range: float) -> Number:
-    """The inverse of `distance`, not rounded."""
+    """The word, not rounded, of a distance [m]: the inverse of `distance`."""
     return (distance - 0.5 * measuring_range) / count_size(measuring_range) + MID_RANGE
 
 
@@ -60,9 +60,9 @@ class Words:
 
 
 class Decoder:
-    """Extracts words from a stream that may be split anywhere and may have lost bytes.
+    """Extracts words from a stream that arrives in arbitrary pieces and may have lost bytes.
 
-    A word is a sequence of L-, M- and H-byte; other bytes are dropped.
+    A word is a sequence of an L-, an M- and an H-byte; other bytes are dropped.
     """
 
     def __init__(self) -> None:

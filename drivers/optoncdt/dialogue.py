@@ -9,8 +9,8 @@ from drivers.errors import ConnectionLost, DeviceTimeout, RigError
 
 _WORD = re.compile(rb"[\x00-\x3f][\x40-\x7f][\x80-\xff]")
 _PROMPT = re.compile(rb"(?:^|(?<=[\r\n\x80-\xff]))->")
-"""Prompt at the start of a line, since a minus sign in text or a value may resemble a prompt. The rest of a truncated
-value may precede it.
+"""Prompt, accepted only at the start of a line or after the rest of a truncated value, since elsewhere a minus sign in
+text or a value may resemble it.
 """
 _NOT_TEXT = re.compile(rb"[^\t\r\n\x20-\x7e]")
 
@@ -18,19 +18,19 @@ _NOT_TEXT = re.compile(rb"[^\t\r\n\x20-\x7e]")
 class Reply:
     """Collects the bytes after a command up to the prompt.
 
-    Measured values that arrive during the reply are discarded, since a value split by text would be misread.
+    Measured values that arrive within the reply are discarded, since a value split by text would be misread.
     """
 
     def __init__(self) -> None:
         self.complete = False
         self.prompt_in_value = False
-        """Whether a possible prompt, which may be part of a value, was received; accepted if nothing follows."""
+        """Whether a possible prompt was received that may be part of a value; it is accepted if nothing follows."""
         self.rest = b""
         """Bytes after the prompt."""
         self._text = b""
 
     def feed(self, chunk: bytes) -> None:
-        """Process more bytes from the line; returns nothing once the reply is complete."""
+        """Add bytes from the line; those after the prompt are kept in `rest`."""
         line, self._text = self._text + chunk, b""
         self.prompt_in_value |= b"->" in line
         place = 0
@@ -51,9 +51,9 @@ class Reply:
 
 
 def error_in(command: str, lines: list[str]) -> str | None:
-    """The sensor's error, code and text, in the lines that answer `command`; None when it succeeded.
+    """The code and text of the sensor's error in the lines that answer `command`; None if the command succeeded.
 
-    A code is at the beginning of a line or after the echo of the command. Warnings, W and a number, do not prevent the
+    A code is at the beginning of a line or after the echo of the command. A warning, W and a number, does not prevent
     execution of the command (manual of the optoNCDT 1320, p. 82).
     """
     name = re.escape(command.split()[0])
@@ -75,7 +75,7 @@ def parameters_in(name: str, lines: list[str]) -> list[str]:
 USUAL = 1.0
 """Time-out of a command [s]."""
 SLOW = 3.0
-"""Time-out of a command that waits for a measurement, which takes at most 2 s (manual, p. 108) [s]."""
+"""Time-out [s] of a command that waits for a measurement, which takes at most 2 s (manual, p. 108)."""
 
 
 class CommandRefused(RigError):
@@ -93,7 +93,8 @@ class CommandRefused(RigError):
 
 
 class Dialogue:
-    """Command dialogue with a sensor. `who` names sensor and port in errors; `port` has a read time-out of about 10 ms.
+    """Command dialogue with a sensor on `port`, whose read time-out is about 10 ms. `who` names sensor and port in
+    errors.
 
     Every method raises ConnectionLost if the port has disappeared.
     """
@@ -116,7 +117,7 @@ class Dialogue:
         return self.judged(command, reply, timeout)
 
     def setting(self, name: str, timeout: float = USUAL) -> list[str]:
-        """The present parameters of a setting, in capitals; raises as `ask` does."""
+        """The present parameters of a setting, in capitals; raises the errors of `ask`."""
         return parameters_in(name, self.ask(name, timeout))
 
     def send(self, command: str) -> None:
@@ -127,7 +128,7 @@ class Dialogue:
             raise self.gone(error) from error
 
     def judged(self, command: str, reply: Reply, timeout: float) -> list[str]:
-        """The lines of a received reply. Raises CommandRefused, or DeviceTimeout when it is incomplete."""
+        """The lines of a received reply. Raises CommandRefused, or DeviceTimeout if the reply is incomplete."""
         if not (reply.complete or reply.prompt_in_value):
             raise DeviceTimeout(
                 f"{self.who} did not reply to {command} within {timeout:g} s; check its power and cable, and reopen it"
@@ -138,14 +139,16 @@ class Dialogue:
         return lines
 
     def discard(self) -> None:
-        """Discard all received, unread bytes."""
+        """Discard all bytes received but not read."""
         try:
             self.port.read(self.port.in_waiting)
         except OSError as error:
             raise self.gone(error) from error
 
     def drain(self, quiet: float, limit: float) -> bool:
-        """Discard input until the line has been quiet for `quiet` [s]; False if that takes longer than `limit` [s]."""
+        """Discard input until the line has been quiet for `quiet` [s]; returns False if it is not within `limit`
+        [s].
+        """
         begun = last = time.monotonic()
         while (now := time.monotonic()) - last < quiet:
             if now - begun > limit:
@@ -155,7 +158,7 @@ class Dialogue:
         return True
 
     def gone(self, error: Exception) -> ConnectionLost:
-        """Error to raise when the port failed with `error`."""
+        """The rig error for the failure `error` of the port."""
         return ConnectionLost(f"{self.who} was disconnected ({error}); plug it in, check its power, and reopen it")
 
     def _read(self) -> bytes:

@@ -10,18 +10,18 @@ from drivers.optoncdt.codec import Words
 from sim.errors import InvalidInput
 
 BITS_PER_VALUE = 30
-"""Bits of a value on the line: three bytes, each with a start and a stop bit."""
+"""Bits per value on the line: three bytes, each with a start and a stop bit."""
 
 _WISHES = (("COUNTER", "TIMESTAMP"), ("COUNTER",))
 """Sets of additional signals, in order of preference."""
 _VALUES = {"TIMESTAMP": ("TIMESTAMP_LO", "TIMESTAMP_HI")}
-"""The time stamp takes two values, of 16 bits each (manual, p. 66)."""
+"""Signals of several values: the time stamp occupies two values of 16 bits (manual, p. 66)."""
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Positions of a measurement's values; the distance is at 0. `time` holds the positions of the two halves of the
-    time stamp.
+    """Positions of the values in a measurement of `size` values; the distance is at 0. `time` holds the positions of
+    the lower and upper half of the time stamp.
     """
 
     size: int
@@ -32,14 +32,14 @@ class Layout:
 def wanted(rate: float, baud: int) -> tuple[str, ...]:
     """The additional signals that fit on the line at `rate` [1/s]: counter and time stamp, or the counter alone.
 
-    Raises InvalidInput if the counter does not fit, since without it a lost value would go unnoticed.
+    Raises InvalidInput if the counter does not fit, since a lost value would go unnoticed without it.
     """
     for signals in _WISHES:
         if (1 + len(_values(signals))) * rate * BITS_PER_VALUE <= baud:
             return signals
     most = baud / (2 * BITS_PER_VALUE)
     allowed = (
-        f"{baud} baud allow {most:.0f} measurements/s with counter;"
+        f"{baud} baud allow at most {most:.0f} measurements/s with the counter;"
         " choose a lower rate, or a higher baud rate in the sensor's web interface"
     )
     raise InvalidInput("hardware.lasers.rate", rate, allowed)
@@ -74,15 +74,14 @@ TICK = 10e-6
 """Resolution of the time stamp [s] (manual, p. 66)."""
 
 _LOCK = 8
-"""Number of consecutive measurements without a gap before values are accepted."""
+"""Number of consecutive measurements required before values are accepted."""
 _FACTORY = 100
-"""Number of consecutive words that each begin a measurement after which it is certain that the sensor sends distances
-alone.
+"""Number of consecutive measurements of a single word from which it is concluded that the sensor sends distances alone.
 """
 _SLACK = 2.0
-"""Largest difference of time stamp and counter between consecutive measurements [periods]."""
+"""Largest deviation of the time-stamp step from one period between consecutive measurements [periods]."""
 _RATE_SLACK = 0.01
-"""Largest relative difference of time stamp and counter over a longer gap."""
+"""Largest relative difference between the steps of time stamp and counter over a longer gap."""
 
 
 @dataclass(frozen=True)
@@ -97,10 +96,10 @@ class Frames:
 class Assembler:
     """Assembles words into measurements at nominally `rate` [1/s] with the given `layout`.
 
-    A burst of lost bytes can join the start of one measurement to the end of a later one. Therefore a measurement
-    is accepted only if counter and time stamp follow from the previous one: each gap costs one more measurement.
-    Without time stamp the time is the index divided by the nominal rate. `values` is the number of measurements
-    returned.
+    A burst of lost bytes can join the start of one measurement to the end of a later one. Therefore a measurement is
+    accepted only if its counter and time stamp continue those of the previous one, so each gap costs one more
+    measurement. Without a time stamp, the time is the index divided by the nominal rate. `values` is the number of
+    measurements returned.
     """
 
     def __init__(self, who: str, layout: Layout, rate: float) -> None:
@@ -117,7 +116,7 @@ class Assembler:
         self._index, self._elapsed = 0, 0
 
     def feed(self, words: Words) -> Frames:
-        """The measurements completed by these words.
+        """The measurements completed by `words`.
 
         Raises ConnectionLost if counter and time stamp jump permanently: the sensor was switched off in between.
         """
@@ -162,7 +161,7 @@ class Assembler:
             )
 
     def _trusted(self, counter: NDArray[np.int64], ticks: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Mask of measurements at the end of a run of at least `_LOCK` consecutive ones."""
+        """Mask of the measurements that continue their predecessor; initially only after `_LOCK` consecutive ones."""
         before = self._neighbour or (int(counter[0]), int(ticks[0]))
         follows = _steps(counter, before[0], COUNTER_TURN) == 1
         if self._layout.time is not None:
@@ -171,7 +170,7 @@ class Assembler:
         self._neighbour = int(counter[-1]), int(ticks[-1])
         if self.values:
             return follows
-        # number of consecutive measurements that end at each measurement
+        # length of the run of consecutive measurements up to each one
         place = np.arange(counter.size)
         run = place - np.maximum.accumulate(np.where(follows, -1 - self._run, place))
         self._run = int(run[-1])
@@ -180,7 +179,7 @@ class Assembler:
     def _unwrapped(
         self, counter: NDArray[np.int64], ticks: NDArray[np.int64]
     ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Index and ticks since the start of the sensor's counters, unwrapped."""
+        """Unwrapped index and ticks of each measurement."""
         if not counter.size:
             return counter, ticks
         if not self.values:
@@ -197,7 +196,7 @@ class Assembler:
         return index, elapsed
 
     def _checked(self, steps: NDArray[np.int64], passed: NDArray[np.int64]) -> NDArray[np.int64]:
-        """The steps of the index, including full turns of the counter within gaps; `passed` holds the ticks between
+        """The steps of the index, with the wraps of the counter within gaps added; `passed` holds the ticks between
         values.
         """
         if self._layout.time is None:

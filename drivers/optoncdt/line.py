@@ -1,10 +1,11 @@
-"""Line of a streaming sensor, read by a separate process.
+"""Serial line of a streaming sensor, read by a separate process.
 
-A port buffers a few thousand bytes, a tenth of a second at full rate. The process stamps the bytes on arrival and keeps
-them while this program does not run, so that a stall of the program loses no values.
+A port buffers a few thousand bytes, a tenth of a second at full rate. The process time-stamps the bytes on arrival and
+keeps them while this program is stalled, so that a stall loses no values.
 
 Frames from the process: time of arrival on the machine's clock [s] (float64), number of bytes (uint32), the bytes. A
-frame without a time has the text of the error that ended the process; one without bytes reports the open port.
+frame whose time is NaN contains the text of the error that ended the process; one without bytes reports that the port
+is open.
 """
 
 import queue
@@ -33,11 +34,12 @@ _PACE = 0.0025
 More frequent reads coincide with an arrival more often, which improves the identification of the sensor's clock.
 """
 _ENDING = 2.0
-"""Longest wait for the end of the process [s]."""
+"""Longest wait for the process to end [s]."""
 
 
 class Line:
-    """The process that reads `port` at `baud`; the port must be closed here. Methods may be called from any thread.
+    """The process that reads `port` at `baud`. This program must have closed the port. Methods may be called from any
+    thread.
 
     Raises DeviceNotFound if the port cannot be opened.
     """
@@ -96,7 +98,9 @@ class Line:
 
 
 def _serve(who: str, name: str, baud: int, commands: IO[bytes], frames: IO[bytes]) -> None:
-    """Read the port until `commands` ends; write frames in another thread, so that a full pipe never delays a read."""
+    """Read the port until `commands` ends; another thread writes the frames, so that a full pipe never delays a
+    read.
+    """
     pending: queue.SimpleQueue[tuple[bytes, float] | None] = queue.SimpleQueue()
     writer = threading.Thread(target=_write, args=(pending, frames))
     writer.start()
@@ -124,7 +128,7 @@ def _serve(who: str, name: str, baud: int, commands: IO[bytes], frames: IO[bytes
 
 
 def _write(pending: "queue.SimpleQueue[tuple[bytes, float] | None]", frames: IO[bytes]) -> None:
-    # the program may have ended
+    # the receiving program may have ended
     with suppress(OSError):
         while (one := pending.get()) is not None:
             chunk, arrival = one

@@ -14,7 +14,7 @@ if sys.platform == "win32":
 else:
     import termios
 
-    # raised by the system when it refuses a setting; the library does not translate it
+    # raised when the system refuses a setting; the library does not translate it
     _PORT_ERRORS = (OSError, ValueError, termios.error)
 
 _READ_TIMEOUT = 0.02
@@ -41,7 +41,7 @@ def open_port(name: str, port: str, baud: int) -> Serial:
 
 
 def has_baud(port: Serial, baud: int) -> bool:
-    """Set the baud rate of an open port; False if adapter or system does not support it."""
+    """Set the baud rate of an open port; returns False if the adapter or the system does not support it."""
     try:
         port.baudrate = baud
     except _PORT_ERRORS:

@@ -59,14 +59,14 @@ _QUIET = 0.05
 """Time without input after which the line is quiet [s]: adapters delay data by up to 16 ms."""
 _SILENCE = "OUTPUT NONE"
 _TRIES = 3
-"""Repetitions of a command: bytes sent at other baud rates corrupt the first command at the right rate."""
+"""Number of attempts per command: bytes sent at other baud rates corrupt the first command at the right rate."""
 _DRAINED = 1.0
 """Longest wait for a quiet line [s]."""
 
 
 @dataclass(frozen=True)
 class Answer:
-    """Baud rate of an answer, identity of the sensor, and whether it refused the command."""
+    """Baud rate of an answer, identity of the sensor, and its refusal of the command, if any."""
 
     baud: int
     info: SensorInfo
@@ -119,7 +119,7 @@ def _answer(dialogue: Dialogue, baud: int, command: str, tries: int) -> Answer |
 
 
 def _refusal(dialogue: Dialogue, command: str) -> CommandRefused | None:
-    """Error with which the sensor repeatedly rejects a command; None once it executes the command. Raises
+    """The error if the sensor rejects a command at every attempt; None as soon as it executes the command. Raises
     DeviceTimeout.
     """
     refusal = None
@@ -129,7 +129,7 @@ def _refusal(dialogue: Dialogue, command: str) -> CommandRefused | None:
         except CommandRefused as error:
             refusal = error
             continue
-        # an error text within a value would not be detected, so only the sensor's reaction counts
+        # an error text inside a value would not be detected, so the effect of the command is checked
         if command != _SILENCE or dialogue.drain(_QUIET, _DRAINED):
             return None
         refusal = CommandRefused(dialogue.who, command, "values continue to arrive")
@@ -146,7 +146,7 @@ def _identity(dialogue: Dialogue) -> SensorInfo | None:
 
 @dataclass(frozen=True)
 class FoundLaser:
-    """One serial port: the sensor on it and its baud rate, or the reason why none can be used."""
+    """One serial port: its sensor and baud rate, or the reason why no sensor can be used."""
 
     port: str
     baud: int | None
@@ -155,10 +155,10 @@ class FoundLaser:
 
 
 def find_lasers(ports: Sequence[str] | None = None) -> list[FoundLaser]:
-    """The sensors on `ports`, or on all ports that the system lists.
+    """The sensors on `ports`, by default on all ports that the system lists.
 
-    Sends only queries, at each possible baud rate: no setting of a sensor is changed, and a stream continues. Takes
-    about 4 s, for all ports in parallel.
+    Sends only queries, at each possible baud rate, so that the settings of a sensor do not change and a stream
+    continues. Takes about 4 s, for all ports in parallel.
     """
     names = list(dict.fromkeys(listed_ports() if ports is None else ports))
     if not names:

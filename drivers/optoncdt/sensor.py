@@ -21,7 +21,9 @@ _FIXED = ("AVERAGE NONE", "TRIGGER NONE", "OUTHOLD NONE", "OUTREDUCEDEVICE NONE"
 def require_sensor(
     name: str, who: str, info: SensorInfo, measuring_range: float, serial_number: str | None = None
 ) -> None:
-    """Raise DeviceNotFound for another model, InvalidInput if the measuring range [m] is not the configured one."""
+    """Raise DeviceNotFound for another model, InvalidInput if measuring range [m] or serial number is not as
+    configured.
+    """
     if not info.supported:
         raise DeviceNotFound(
             f"{who} is a {info.model}, whose data format is not supported; connect an ILD1420, or correct the port"
@@ -55,9 +57,9 @@ def configure(dialogue: Dialogue, rate: float, baud: int) -> tuple[Layout, bool]
 
 
 def _require_no_mastering(dialogue: Dialogue) -> None:
-    """Check that mastering is off, since it shifts the zero without an indication in the stream (manual, p. 65).
+    """Raise RigError if mastering is on, since it shifts the zero without an indication in the stream (manual, p. 65).
 
-    The query is not documented; to a sensor without it, MASTERMV NONE is sent, which is documented (p. 108).
+    The query is not documented. A sensor without it is sent MASTERMV NONE, which is documented (p. 108).
     """
     remedy = "set MASTERMV NONE in its web interface"
     try:
@@ -80,7 +82,7 @@ _RATES = "sensors support 250, 500, 1000, 2000 and 4000 1/s, newer ones also 800
 
 
 def _set_rate(dialogue: Dialogue, rate: float) -> bool:
-    """Set the rate, in kHz, and read it back, since a rejected rate would only show as a wrong time scale.
+    """Set the rate, in kHz, and read it back, since a rejected rate would merely cause a wrong time scale.
 
     Returns False if the sensor lacks the query, which the manual does not document; the values must then be counted.
     """
@@ -111,7 +113,9 @@ _SILENT_PERIODS, _SILENT_TIME = 10.0, 0.1
 """Number of periods and time [s] without data after which a sensor is silent."""
 _QUIET, _DRAINED = 0.05, 0.5
 _COUNTING, _COUNTED = 0.5, 0.2
-"""Duration of counting values [s], and largest relative deviation from the rate: rates differ by a factor of two."""
+"""Duration [s] of counting values, and largest relative deviation from the set rate; rates differ by a factor of
+two.
+"""
 
 
 class SerialLaser:
@@ -207,7 +211,7 @@ class SerialLaser:
         return self._stream.take()
 
     def wait(self, timeout: float) -> bool:
-        """Wait until `take` has values or a failure; False after `timeout` [s]."""
+        """Wait until `take` returns values or raises; returns False after `timeout` [s]."""
         return self._stream.wait(timeout) if self._stream is not None else False
 
     def laser(self, on: bool) -> None:
@@ -250,7 +254,8 @@ class SerialLaser:
             counted.append(stream.take())
         values = [one for one in counted if len(one)]
         first, last = values[0], values[-1]
-        # the first values may have waited in a buffer: only the differences of their arrivals from the last count
+        # the first values may have waited in a buffer, so the rate is taken from the last value of the first and last
+        # chunk
         passed = float(last.arrival[-1] - first.arrival[-1])
         steps = int(last.index[-1] - first.index[-1])
         actual = steps / passed if passed > 0.0 else 0.0
@@ -258,7 +263,7 @@ class SerialLaser:
             raise InvalidInput(_RATE, self._rate, f"{self._who} sends {actual:.0f} 1/s instead; {_RATES}")
 
     def _reopen(self) -> None:
-        """Take the port back from the process that read it; it may have disappeared."""
+        """Reopen the port after the process that read it has ended, if the port still exists."""
         with suppress(RigError):
             self._port = open_port(self.name, self._port_name, self.baud)
         self._dialogue = Dialogue(self._who, self._port)

@@ -25,7 +25,7 @@ class Readings:
 
     `index` counts them since the start of the stream, with gaps where some were lost. `time` is the time of measurement
     on the sensor's clock [s]. `code` holds the raw words. `arrival` is the time on the machine's clock [s] at which
-    their bytes had been read, an upper bound of the arrival.
+    their bytes had been read, an upper bound on their arrival.
     """
 
     index: NDArray[np.int64]
@@ -38,7 +38,9 @@ class Readings:
 
 
 class Stream:
-    """Values of the sensor of `dialogue` on `line` until `end`. All methods may be called from any thread."""
+    """Values of the sensor on `line` until `end`; `dialogue` parses its replies. Methods may be called from any
+    thread.
+    """
 
     def __init__(self, dialogue: Dialogue, line: Line, layout: Layout, rate: float) -> None:
         self._dialogue, self._line = dialogue, line
@@ -61,8 +63,8 @@ class Stream:
         return self._last
 
     def ask(self, command: str, timeout: float = USUAL) -> list[str]:
-        """Send a command during the stream; values that arrive with the reply are lost. Raises as `Dialogue.ask`
-        does.
+        """Send a command during the stream; values that arrive with the reply are lost. Raises the errors of
+        `Dialogue.ask`.
         """
         reply = Reply()
         with self._changed:
@@ -93,12 +95,12 @@ class Stream:
         )
 
     def wait(self, timeout: float) -> bool:
-        """Wait until `take` has values or an error; False after `timeout` [s]."""
+        """Wait until `take` returns values or raises; returns False after `timeout` [s]."""
         with self._changed:
             return waiting.wait_for(self._changed, lambda: self._holding > 0 or self._failure is not None, timeout)
 
     def end(self) -> None:
-        """Stop reading; no thread or process remains. Allowed any number of times."""
+        """Stop reading and end the thread and the process; may be called repeatedly."""
         self._over = True
         self._line.close()
         waiting.join(self._thread)
@@ -119,7 +121,7 @@ class Stream:
         except ConnectionLost as error:
             self._fail(error)
         except Exception as error:
-            # end reading after any error of the decoding
+            # any decoding error ends the stream
             self._fail(self._dialogue.gone(error))
 
     def _accept(self, chunk: bytes, arrival: float) -> None:

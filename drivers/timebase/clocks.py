@@ -1,4 +1,4 @@
-"""Estimators of a DAQ's sample clock and of a sensor's clock relative to the machine's clock."""
+"""Estimators of the DAQ's sample clock and of a sensor's clock relative to the machine's clock."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,23 +6,23 @@ from numpy.typing import NDArray
 from drivers.timebase.fit import Bounds, Points, bends, due, floor_below, rate_error, typical
 
 _TOLERANCE = 0.25
-"""Largest deviation of a history from a line, in sample periods, before its older half is discarded: since counts are
-integers, the bounds of a reader in step with the clock wander by a fraction of a period.
+"""Largest deviation of a history from a line, in sample periods, before its older half is discarded. Since counts are
+integers, the bounds drift by a fraction of a period when the readings are synchronous with the clock.
 """
 _RECENT = 2.0
 """Longest time over which two bounds can be compared without knowing the clock rate [s]."""
 _CONTRADICTION = 200e-6
-"""Smallest contradiction of such bounds [s]: clocks that differ by 50 ppm drift apart by 100 us in that time."""
+"""Smallest contradiction between two bounds [s]: clocks that differ by 50 ppm drift apart by 100 us in `_RECENT`."""
 
 
 class SampleClock:
-    """Estimator of the sample clock, on which sample i of a run is at second i / `sample_rate`.
+    """Estimator of the sample clock, on which sample i of a run is taken at second i / `sample_rate`.
 
     Each reading bounds the clock on both sides: by the last sample taken and by the next one. The estimate is midway
-    between the tightest bounds, and NaN before the first sample. With packet transfer, as over USB, the count lags, and
-    an uncounted sample may have been taken: the bounds then contradict each other. For the rest of the run, only the
-    last counted sample is used; it is late by the shortest transfer time, a constant that is part of the delay measured
-    by the loop check.
+    between the tightest bounds, and NaN before the first sample. With packet transfer, as over USB, the count lags
+    behind the samples taken, and the bounds may contradict each other. The bound by the next sample is then ignored for
+    the rest of the run; the estimate is late by the shortest transfer time, a constant that is part of the delay
+    measured by the loop check.
     """
 
     def __init__(self, sample_rate: float) -> None:
@@ -56,7 +56,7 @@ class SampleClock:
 
     @property
     def residual(self) -> float:
-        """Root mean square distance [s] of the tightest bounds from the line in use."""
+        """Root mean square distance [s] of the tightest bounds from the fitted line."""
         self._refresh()
         return self._residual
 
@@ -78,7 +78,7 @@ class SampleClock:
         self._residual = float(np.sqrt(np.mean(off**2)))
 
     def _sides(self) -> list[tuple[Points, float]]:
-        """Valid bounds, each with the sign of its delays' dependence on the slope."""
+        """Valid bounds, each with the sign with which its delays depend on the slope."""
         latest = (self._latest.points, 1.0)
         return [latest] if self._counts_lag else [latest, (self._earliest.points, -1.0)]
 
@@ -100,15 +100,15 @@ def _least(points: Points) -> float:
 
 
 _SENSOR_TOLERANCE = 100e-6
-"""Distance of a history from one line [s] beyond which its older half is discarded."""
+"""Largest deviation of a history from a line [s] before its older half is discarded."""
 
 
 class SensorClock:
     """Estimator of a sensor's clock: second t of the sensor is at second `offset + rate * t` of the machine's clock.
 
-    The line is the earliest consistent with the arrivals, so the smallest transfer delay is part of `offset`. To track
-    changes, the older half of a history that no single line fits is discarded. All values are NaN before the first
-    reading.
+    The line is the earliest one consistent with the arrivals, so `offset` includes the smallest transfer delay. To
+    track changes, the older half of a history that no single line fits is discarded. All values are NaN before the
+    first reading.
     """
 
     def __init__(self) -> None:
@@ -134,7 +134,7 @@ class SensorClock:
 
     @property
     def offset(self) -> float:
-        """Second of the machine's clock at second 0 of the sensor [s]."""
+        """Time on the machine's clock at second 0 of the sensor [s]."""
         self._refresh()
         return self._offset
 
@@ -161,6 +161,7 @@ class SensorClock:
         points = self._bounds.points
         floor = floor_below(points, self._slope)
         delay = points.delay - self._slope * points.seconds - floor
-        # delays of burst and scheduler add up and are rarely both short, so the smallest of n remains above zero
+        # delays by bursts and by the scheduler add up and are rarely both short, so the smallest of n remains above
+        # zero
         self._offset = floor - typical(delay) / np.sqrt(len(points))
         self._residual = float(np.sqrt(np.mean(delay**2)))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from sim.errors import InvalidInput
 
 _LEAST = 3
-"""Frequencies below which the scatter about the line is not meaningful."""
+"""Minimum number of frequencies for a meaningful scatter about the line."""
 
 
 @dataclass(frozen=True)
@@ -35,12 +35,12 @@ def common_motion(
 ) -> CommonMotion:
     """Compare the complex amplitudes of two signals at `omega` [rad/s], shape (m,) each.
 
-    Frequencies must be dense enough, from zero on, that the delay shifts the phase by less than pi from each to the
-    next. Frequencies are weighted by the square of the first signal's amplitude. Raises InvalidInput for fewer than
-    three frequencies, or if a signal does not move.
+    The frequencies, starting near zero, must be so closely spaced that the delay shifts the phase by less than pi
+    between neighbours. Frequencies are weighted by the square of the first signal's amplitude. Raises InvalidInput for
+    fewer than three frequencies, or if an amplitude is zero.
     """
     if omega.size < _LEAST:
-        raise InvalidInput("frequencies", omega.size, f"at least {_LEAST}")
+        raise InvalidInput("frequencies", omega.size, f"at least {_LEAST} are required")
     if not (np.abs(first) > 0.0).all() or not (np.abs(second) > 0.0).all():
         raise InvalidInput("amplitude", 0.0, "both signals must move at every frequency")
     order = np.argsort(omega)
@@ -52,7 +52,7 @@ def common_motion(
     moment = float(weight @ omega**2)
     return CommonMotion(
         delay=delay,
-        # the weights are relative: the scatter determines their scale
+        # the weights are relative; the scatter determines their scale
         uncertainty=float(np.sqrt(variance * (weight**2 @ omega**2)) / moment),
         polarity=polarity,
         scale=float(abs(np.sum(weight * ratio * np.exp(1j * omega * delay)))),

@@ -1,4 +1,4 @@
-"""Removal of the inputs' known delays from their samples."""
+"""Correction of the inputs' samples for their known delays."""
 
 from collections.abc import Sequence
 
@@ -9,16 +9,16 @@ from sim.channel import Counts
 _NODES = 4
 """Number of samples in an interpolation."""
 _WHOLE = 1.0e-4
-"""Distance from a whole number of samples below which nothing is interpolated [samples]."""
+"""Distance from a whole number of samples below which a shift is not interpolated [samples]."""
 
 
 class Deskew:
-    """Aligns samples with the edges of the sample clock: sample i of the result contains every signal at edge i.
+    """Aligns samples with the edges of the sample clock: sample i of the result is the value of every signal at edge i.
 
     Values between samples are interpolated by a cubic through four of them, with an error below 1e-4 of the amplitude
-    at 0.02 of the sample rate. A value between two counts of which one is outside `valid` is that count. `latency` is
-    the number of samples that must have been acquired beyond those returned; before the first sample, signals have
-    their first values.
+    at 0.02 of the sample rate. Between two counts, one of which is outside `valid`, the result is that count. `latency`
+    is the number of samples that must have been acquired beyond those returned. Before the first sample, signals are
+    assumed constant.
     """
 
     def __init__(self, delays: Sequence[float], rate: float, valid: Sequence[tuple[int, int]]) -> None:
@@ -32,11 +32,11 @@ class Deskew:
         self._kept: Counts | None = None
 
     def begin(self) -> None:
-        """Discard the samples of the last run."""
+        """Discard the samples of the previous run."""
         self._kept = None
 
     def missing(self, n: int) -> int:
-        """Number of samples that must be read to return the next `n`."""
+        """Number of samples to read before the next `n` can be returned."""
         return n + (self.latency if self._kept is None else 0)
 
     def moved(self, raw: Counts) -> Counts:
@@ -54,7 +54,7 @@ class Deskew:
 
 
 class _Column:
-    """Interpolation of one input, `shift` samples ahead of the returned ones."""
+    """Interpolation of one input at `shift` samples after the returned ones."""
 
     def __init__(self, shift: float, latency: int, valid: tuple[int, int]) -> None:
         whole = int(np.floor(shift))

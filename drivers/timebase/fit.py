@@ -1,4 +1,4 @@
-"""Bounds of a clock's error and the line fitted to them."""
+"""Bounds on a clock's error, and lines fitted to them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 _STRETCH = 0.2
-"""Length of an interval [s] of which the best reading is kept; clocks that differ by 50 ppm drift apart by 10 us in
-it.
+"""Length of an interval [s], of whose readings the best one is kept; clocks that differ by 50 ppm drift apart by 10 us
+in this time.
 """
 _KEPT = 120.0
-"""Duration of the history [s]: long enough for a rate accurate to 1e-6, short enough that a quartz hardly drifts."""
+"""Duration of the history [s]: long enough for a rate accurate to 1e-6, too short for a quartz clock to drift much."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Bounds:
         self._points = Points(seconds[begin:], delay[begin:])
 
     def forget(self) -> None:
-        """Discard the older half."""
+        """Discard the older half of the history."""
         half = len(self._points) // 2
         self._points = Points(self._points.seconds[half:], self._points.delay[half:])
 
@@ -65,22 +65,22 @@ _RATE_SPREAD = 50e-6
 _LARGEST = 1e-3
 """Largest rate error searched for [1]: a machine's clock is slewed by at most 500 ppm."""
 _HALVINGS = 18
-"""Number of bisections: the rate is then accurate to 4e-9, a quarter of a microsecond in a minute."""
+"""Number of bisections, which give the rate to 4e-9, a quarter of a microsecond per minute."""
 _STEPS = 2.0 ** np.arange(-30, -9)
 """Steps from the most probable rate to find the width of its distribution: 1e-9 to 1e-3."""
 _NEGLIGIBLE = 8.0
-"""Slopes whose log posterior is lower by this much are neglected."""
+"""Slopes whose log posterior is below its maximum by more than this are neglected."""
 _GRID = 41
 """Number of slopes over which the mean is taken."""
 _RESOLUTION = 1e-7
-"""Mean delay below which readings count as exact [s]."""
+"""Mean delay below which readings are considered exact [s]."""
 _FAR = 5.0
-"""A delay of this many times the typical one is a stall of the machine and is excluded as an outlier."""
+"""Multiple of the typical delay above which a delay is excluded as an outlier, caused by a stall of the machine."""
 _QUARTER = 8
-"""Minimum number of readings in a quarter of the history for the test."""
+"""Minimum number of readings in a quarter of the history for the test in `bends`."""
 _CHANCE = 4.0
-"""Multiple of mean/sqrt(n) that the smallest of n delays practically never exceeds, even for sums of two delays, such
-as those of burst and scheduler.
+"""Multiple of mean/sqrt(n) that the smallest of n delays practically never exceeds, even if each is the sum of two
+delays, such as those by bursts and by the scheduler.
 """
 
 _GROWTH = 0.02
@@ -95,9 +95,9 @@ def due(history: float, fitted: float) -> bool:
 
 
 def rate_error(sides: Sequence[tuple[Points, float]]) -> float:
-    """Common slope of the lines below `sides`: the mean of its joint posterior.
+    """Common slope of the lines below the points of `sides`: the mean of its posterior.
 
-    Each side has a sign: its delays grow by sign times slope. Two-sided bounds have the signs +1 and -1.
+    Each side has a sign; its delays grow by sign times slope. Two-sided bounds have the signs +1 and -1.
     """
     given = [_side(points.seconds, points.delay, sign) for points, sign in sides]
     rough = _most_probable(given)
@@ -115,7 +115,7 @@ def rate_error(sides: Sequence[tuple[Points, float]]) -> float:
 
 @dataclass(frozen=True)
 class _Side:
-    """Delays against centred seconds."""
+    """Readings of one bound, with `seconds` relative to their mean."""
 
     sign: float
     seconds: NDArray[np.float64]
@@ -128,7 +128,7 @@ def _side(seconds: NDArray[np.float64], delay: NDArray[np.float64], sign: float)
 
 
 def _without_stalls(side: _Side, slope: float) -> _Side:
-    """The side without outliers from a line of about this slope."""
+    """The side without outliers above the line of about this slope."""
     above = side.delay - side.sign * slope * side.seconds
     above -= above.min()
     kept = above <= _FAR * typical(above) + _RESOLUTION
@@ -170,9 +170,10 @@ def typical(above: NDArray[np.float64]) -> float:
 
 
 def bends(points: Points, slope: float, tolerance: float) -> bool:
-    """Whether the points differ from the line by more than `tolerance` [s] and chance, as after a change of the rate.
+    """Whether the points deviate from the line by more than `tolerance` [s] plus chance, as after a change of the rate.
 
-    Uses the smallest delays of the last three quarters; the first may have been read differently.
+    Compares the smallest delays of the last three quarters. The first is ignored, since its readings may have been made
+    differently.
     """
     size = len(points) // 4
     if size < _QUARTER:

@@ -11,7 +11,7 @@ from drivers.rig import Alignment, RawValues
 
 @dataclass(frozen=True)
 class Marks:
-    """Numbers of samples without a value: lost between two values, not arrived in time, or implausible."""
+    """Numbers that mark samples without a value: lost between two values, not arrived in time, or implausible."""
 
     lost: int
     late: int
@@ -19,9 +19,10 @@ class Marks:
 
 
 class Resampler:
-    """Interpolates about the last `capacity` readings: index, second of the sensor's clock, counts or fault mark.
+    """Interpolates within at least the last `capacity` readings: index, second of the sensor's clock, counts or fault
+    mark.
 
-    Counts beyond +-`largest` are fault marks, `lost_mark` is the mark of missing values.
+    Counts beyond +-`largest` are fault marks; `lost_mark` marks missing values, `late_mark` values not yet received.
     """
 
     def __init__(self, capacity: int, largest: int, lost_mark: int, late_mark: int) -> None:
@@ -55,8 +56,8 @@ class Resampler:
     def at(self, times: NDArray[np.float64]) -> NDArray[np.int16]:
         """Counts at sensor times, shape (n,), by linear interpolation between readings.
 
-        Where one of the two is not a distance, its fault mark is returned; where one is missing, the mark of lost
-        values.
+        Where one of the two readings is not a distance, its fault mark is returned; where a reading is missing, the
+        mark of lost values.
         """
         seen = np.full(times.shape, self._late_mark, dtype=np.int16)
         if self._end < 2:
@@ -76,14 +77,14 @@ class Resampler:
 
 
 RARE, RECOVERY = 3.0, 0.05
-"""Number of implausible values within a short time above which they no longer count as single faults, and the decrease
-of that number with each plausible value.
+"""Number of implausible values within a short time above which they are no longer considered single faults, and the
+decrease of that number per plausible value.
 """
 
 
 class Plausibility:
-    """Marks single values that differ from the last plausible one by more than `largest_step` for each measurement
-    between them, as when a flipped bit gives another valid distance. Counts beyond +-`largest` are not values.
+    """Marks single values that differ from the last plausible one by more than `largest_step` per measurement since
+    then, as when a flipped bit gives another valid distance. Counts beyond +-`largest` are not values.
 
     Only rare values are marked: frequent or lasting jumps are a motion, which the guard must judge.
     """
@@ -95,12 +96,14 @@ class Plausibility:
         self.restart()
 
     def restart(self) -> None:
-        """Start again after a restart of the sensor; the number of marked values is kept."""
+        """Discard the history, as after a restart of the sensor; the number of marked values is kept."""
         self._before: tuple[int, int] | None = None
         self._doubt = 0.0
 
     def marked(self, index: NDArray[np.int64], counts: NDArray[np.int16]) -> NDArray[np.int16]:
-        """The counts of the next measurements `index`, shape (n,) both, with the mark of implausible values."""
+        """The counts of the next measurements `index`, both of shape (n,), with implausible values replaced by the
+        mark.
+        """
         is_value = np.abs(counts.astype(np.int32)) <= self._largest
         places, values = index[is_value], counts[is_value].astype(np.int64)
         if not values.size or not np.isfinite(self._largest_step):
@@ -140,8 +143,8 @@ def resampled(
 ) -> NDArray[np.int16]:
     """Counts at `samples` of a run, shape (n,), ascending, from all values received in it, placed by its `alignment`.
 
-    Values that had arrived too late for their block are included. `marked` converts the words of the sensor to counts
-    of at most +-`largest`, or to fault marks beyond.
+    Values that arrived too late for their block are included. `marked` converts the words of the sensor to counts of at
+    most +-`largest`, or to fault marks beyond.
     """
     # of repeated values, the first one counts
     order = np.flatnonzero(raw.time > np.maximum.accumulate(np.concatenate(([-1], raw.time[:-1]))))

@@ -15,7 +15,7 @@ from drivers.timebase.resampling import Marks, Plausibility, Resampler
 class Line:
     """Linear relation of clocks: second `time` of one is second `seconds` of another, which runs `rate` times as fast.
 
-    The point is near the present, to avoid rounding errors on clocks that have run for weeks.
+    The point (`time`, `seconds`) is close to the present, to avoid rounding errors on clocks that have run for weeks.
     """
 
     time: float
@@ -34,7 +34,7 @@ class Line:
 _SLEW = 50e-6
 """Largest slew rate of the clock relation [s/s]: at 1 m/s it causes an error of 50 um/s."""
 _FIRST_SLEW = 500e-6
-"""The same in the first seconds [s/s], when the lines are known only to a fraction of a millisecond."""
+"""Largest slew rate in the first phase of a run [s/s], when the lines are known only to a fraction of a millisecond."""
 _FIRST = 10.0
 """Duration of the first phase [s]."""
 
@@ -51,10 +51,12 @@ class Course:
         return self._time
 
     def times(self, line: Line, seconds: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Sensor times, shape (n,), at ascending `seconds`, from the present `line`; advances to the last of them."""
+        """Sensor times, shape (n,), at ascending `seconds`, following the present `line`; advances to the last of
+        them.
+        """
         end = float(seconds[-1])
         if not self._seconds < float(seconds[0]):
-            # the first request, or a request for the past: no point to continue from
+            # at the first request, and at a request for the past, there is no point to continue from
             self._began = self._seconds = float(seconds[0])
             self._time = line.time_at(self._seconds)
         passed = end - self._seconds
@@ -65,7 +67,7 @@ class Course:
         return times
 
     def reach(self, line: Line, time: float) -> float:
-        """The latest second of the sample clock for which `times` would return at most `time` [s]."""
+        """Latest second of the sample clock for which `times` would return a time of at most `time` [s]."""
         known = line.seconds_at(time)
         if np.isnan(self._seconds):
             return known
@@ -77,7 +79,7 @@ class Course:
         return min(max(known, early), late)
 
     def _after(self, line: Line, passed: float) -> float:
-        """The time after `passed` seconds: on the line, or as close to it as the slew limit allows."""
+        """The sensor time after `passed` seconds: on the line, or as close to it as the slew limit allows."""
         free = self._time + passed / line.rate
         allowed = self._slew * passed
         return min(max(line.time_at(self._seconds + passed), free - allowed), free + allowed)
@@ -90,17 +92,20 @@ class Course:
 _KEPT = 10.0
 """Duration held by the buffer of values [s]."""
 _LEAST_HISTORY = 1.0
-"""Shortest history of a clock for placing values [s]."""
+"""Shortest history of a clock with which values are placed [s]."""
 _BACK = 0.25
-"""Age relative to the newest value [s] above which a value is not a repetition: the sensor's clock was restarted."""
+"""Age relative to the newest value [s] above which a value is not a repetition but follows a restart of the sensor's
+clock.
+"""
 
 
 class SensorTrack:
     """Resamples the values of the sensor `name` on the grid of the sample clock.
 
-    `rate` is its measuring rate [1/s]; `delay` [s] is added to the times found from arrivals. `marked` converts its
-    codes to counts up to +-`largest`, and its error words to fault marks outside that range; `lost_mark` marks missing
-    values. A restart of the sensor's clock begins a new history.
+    `rate` is its measuring rate [1/s]; `delay` [s] is added to the times estimated from arrivals. `marked` converts its
+    codes to counts up to +-`largest`, and its error words to fault marks outside that range; `marks` are the fault
+    marks of missing, late and implausible values. Values that change by more than `largest_step` per measurement are
+    implausible. A restart of the sensor's clock begins a new history.
     """
 
     def __init__(
@@ -123,7 +128,7 @@ class SensorTrack:
         self._asked = 0.0
 
     def begin(self) -> None:
-        """Begin a run: restart the count of values, and keep the history of the sensor's clock."""
+        """Begin a run: the counts of values restart, and the history of the sensor's clock is kept."""
         self._course = Course()
         self._values = self._lost = self._late = 0
         self._plausibility.count = 0
@@ -137,7 +142,8 @@ class SensorTrack:
         arrival: NDArray[np.float64],
     ) -> None:
         """Add readings in order, shape (n,) each: index, second of the sensor's clock, code, and arrival [s of the
-        machine's clock]. Repeated ones are dropped."""
+        machine's clock]. Repeated readings are dropped.
+        """
         restarts = np.flatnonzero(np.diff(time) < -_BACK) + 1
         for part in np.split(np.arange(time.size), restarts):
             self._add(index[part], time[part], code[part], arrival[part])
@@ -150,7 +156,7 @@ class SensorTrack:
         return self._course.reach(line, last[1])
 
     def counts(self, clock: SampleClock, first: int, n: int, sample_rate: float) -> NDArray[np.int16]:
-        """Counts at `n` samples from `first` on, shape (n,), interpolated between two values, or the fault mark of one
+        """Counts at `n` samples from `first` on, shape (n,): interpolated between two values, or the fault mark of one
         of them. Blocks must be requested in order.
         """
         self._asked = (first + n) / sample_rate
@@ -164,7 +170,7 @@ class SensorTrack:
         return counts
 
     def alignment(self, clock: SampleClock) -> Alignment:
-        """Alignment of the values in this run; NaN where still unknown."""
+        """Alignment of the sensor's clock in this run; unknown items are NaN."""
         line, last = self._line(clock), self._resampler.last
         behind = self._asked if last is None else self._course.time - last[1]
         return Alignment(
@@ -186,7 +192,7 @@ class SensorTrack:
         code: NDArray[np.int32],
         arrival: NDArray[np.float64],
     ) -> None:
-        """Add readings without a restart of the sensor's clock."""
+        """Add readings among which the sensor's clock does not restart."""
         if time.size == 0:
             return
         last = self._resampler.last
@@ -207,7 +213,7 @@ class SensorTrack:
         self._sensor.add(time, arrival)
 
     def _line(self, clock: SampleClock) -> Line | None:
-        """Time on the sample clock [s] as a function of the sensor's, delay included; None while either is unknown."""
+        """Sample clock as a function of the sensor's clock, including the delay; None while either clock is unknown."""
         last = self._resampler.last
         if last is None or self._sensor.history < _LEAST_HISTORY:
             return None

@@ -1,9 +1,9 @@
 # pyright: reportUnknownMemberType=false
 """Loop check of a bench: tests every channel and the path through the shaker at low level.
 
-1. The storeys are clamped to the table, so that every sensor measures one motion. All channels are acquired at rest.
-2. If every sensor gives valid samples, the drive is calibrated and sines of equal velocity amplitude are driven.
-3. The clamps are removed.
+1. The storeys are clamped to the table, so that all sensors measure one motion. All channels are acquired at rest. 2.
+If every sensor gives valid samples, the drive is calibrated and sines of equal velocity amplitude are driven. 3. The
+clamps are removed.
 """
 
 import textwrap
@@ -78,7 +78,7 @@ _UNCLAMP = "Remove the clamps from the storeys."
 
 
 class LoopCheck(Prepared[CheckParameters]):
-    """Loop check. Raises InvalidInput for motions beyond limits, stroke or the ranges of the lasers."""
+    """Loop check. Raises InvalidInput for motions beyond the limits, the stroke or the ranges of the lasers."""
 
     def __init__(
         self, parameters: CheckParameters, configuration: BenchConfiguration, stored: Sources | None = None
@@ -90,13 +90,13 @@ class LoopCheck(Prepared[CheckParameters]):
         if self.configuration.laser_reference == "ground":
             reach = min(reach, min(self.configuration.laser_half_ranges))
         if velocity > limits.velocity:
-            raise InvalidInput("velocity", velocity, f"limits.velocity = {limits.velocity:g} m/s")
+            raise InvalidInput("velocity", velocity, f"it must not exceed limits.velocity = {limits.velocity:g} m/s")
         if velocity / slow > reach:
-            needs = f"at this frequency {velocity:g} m/s needs {1e3 * velocity / slow:.1f} mm, but the bench allows"
-            raise InvalidInput("omega", slow, f"{needs} {1e3 * reach:.1f} mm")
+            needs = f"a velocity of {velocity:g} m/s at this frequency needs {1e3 * velocity / slow:.1f} mm"
+            raise InvalidInput("omega", slow, f"{needs}, but the bench allows {1e3 * reach:.1f} mm")
         if velocity * fast > limits.acceleration:
-            needs = f"at this frequency {velocity:g} m/s needs {velocity * fast:.3g} m/s2, but limits.acceleration ="
-            raise InvalidInput("omega", fast, f"{needs} {limits.acceleration:g} m/s2")
+            needs = f"a velocity of {velocity:g} m/s at this frequency needs {velocity * fast:.3g} m/s2"
+            raise InvalidInput("omega", fast, f"{needs}, but limits.acceleration = {limits.acceleration:g} m/s2")
 
     @cached_property
     def prediction(self) -> Table:
@@ -177,7 +177,7 @@ def _measured_sines(parameters: CheckParameters) -> Generator[Step, Outcome, Sin
     """
     omegas = sorted(parameters.omega)
     yield Publish(StepStarted("calibrate the drive"))
-    # the travel of the table is smallest at the highest frequency
+    # the table's travel is smallest at the highest frequency
     probed = yield from probed_drive(omegas[-1])
     calibration = yield from calibrate_drive(omegas, parameters.velocity * omegas[0], probed)
     if isinstance(calibration, Fallen):
@@ -225,7 +225,7 @@ _COLUMNS = (
 
 
 def _table(lines: Sequence[CheckLine]) -> str:
-    """Table with a row for each line, the remedies below, and the number of lines by verdict."""
+    """Text table of the lines, each followed by its remedy, and the number of lines by verdict."""
     title, rule, *rows = text_table(_COLUMNS, map(_cells, lines)).splitlines()
     text = [title, rule]
     for line, row in zip(lines, rows, strict=True):
@@ -238,7 +238,7 @@ def _table(lines: Sequence[CheckLine]) -> str:
 
 
 def _margins(lines: Sequence[CheckLine]) -> "Figure":
-    """Figure of all lines with limits, on a scale from the lowest (-1) to the highest allowed value (+1)."""
+    """Figure of all lines that have limits, on a scale from the lowest (-1) to the highest allowed value (+1)."""
     judged = [(line, position) for line in lines if (position := _position(line)) is not None]
     figure = new_figure(8.0, 1.2 + 0.24 * len(judged))
     panel = figure.subplots()
@@ -250,7 +250,7 @@ def _margins(lines: Sequence[CheckLine]) -> "Figure":
     panel.set_yticks(range(len(judged)), labels, fontsize=7)
     panel.set_xlim(-1.1 * _OUTSIDE, 1.1 * _OUTSIDE)
     panel.set_xticks([-1.0, 0.0, 1.0], ["lowest", "middle", "highest"])
-    panel.set_xlabel("position within the allowed range; circles passed, crosses failed", color=GREY)
+    panel.set_xlabel("position within the allowed range (circles: passed, crosses: failed)", color=GREY)
     panel.invert_yaxis()
     set_grid(panel)
     return figure
@@ -270,7 +270,7 @@ def _cells(line: CheckLine) -> tuple[str, ...]:
 
 
 def _position(line: CheckLine) -> float | None:
-    """Measured value on a scale from -1 to 1 between its limits, clipped beyond; None without limits."""
+    """Measured value on a scale from -1 to 1 between its limits, clipped beyond `_OUTSIDE`; None without limits."""
     if line.measured is None or line.lowest is None or line.highest is None:
         return None
     middle, half = 0.5 * (line.lowest + line.highest), 0.5 * (line.highest - line.lowest)

@@ -1,4 +1,4 @@
-"""Lines of the check: bench at rest, drive, and comparison of the sensors under a common motion."""
+"""Check lines: bench at rest, drive, and comparison of the sensors under a common motion."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ Amplitudes = NDArray[np.complex128]
 class Sines:
     """Complex amplitudes c at `omega` [rad/s], shape (n,) each, with signal = Re(c exp(-i omega t)).
 
-    The four sensors measure a common motion; amplitudes are displacements [m], for the accelerometer computed as
+    The four sensors measure a common motion. Amplitudes are displacements [m]; the accelerometer's are computed as
     acceleration / -omega^2. `drive` is in volts, `acceleration` in m/s2.
     """
 
@@ -46,7 +46,7 @@ class Sines:
 
 @dataclass(frozen=True)
 class Sensor:
-    """A compared sensor: field of its amplitudes in `Sines`, and configuration keys for its polarity and scale."""
+    """A compared sensor: field of its amplitudes in `Sines`, and configuration keys of its polarity and scale."""
 
     signal: str
     polarity: str
@@ -64,14 +64,14 @@ LASERS = {
 SENSORS = TABLE | LASERS
 
 _STUCK = 0.01
-"""Scatter [counts] below which a channel counts as stuck; one differing sample in ten thousand exceeds it."""
+"""Scatter [counts] below which a channel is considered stuck; one differing sample in ten thousand exceeds it."""
 
 _FINEST = 1e-5
 """Step of the search for the dead time [s]."""
 
-_SIGN = "reverse the sign of {}, or the sensor: it moves opposite to {}"
-_SCALE = "check {} and the calibration: it differs from {}"
-_OWN_LATENCY = "this is the laser's internal latency: raise its measuring rate, and disable its averaging"
+_SIGN = "reverse the sign of {}, or the sensor: its signal is opposite to {}"
+_SCALE = "check {} and the calibration: the scale differs from {}"
+_OWN_LATENCY = "the laser's internal latency is too long: raise its measuring rate, and disable its averaging"
 _SKEW = (
     "the two sensors show the same motion at different times: connect both to inputs of one module, or "
     "see the input delays in the bench description"
@@ -84,13 +84,13 @@ _OF_THE_LINE = {
     IMPLAUSIBLE: "bits were changed on the line: check the cable, its shield and the RS422 adapter",
 }
 """Remedies for values that a sensor measured but that did not arrive."""
-_MISSING = "the program does not read this input: make sure that the input itself opens the enable chain"
+_MISSING = "the program does not read this input: make sure that its contact opens the enable chain directly"
 _ALONE = "nothing opens the enable relay if the program crashes: wire a heartbeat relay, or set a watchdog"
 
 
 def resting_lines(heard: RestSamples, parameters: CheckParameters, accuracy: SensorAccuracy) -> Iterator[CheckLine]:
     """Two lines for each channel: fraction of valid samples, and noise if enough samples are valid. The noise of a
-    laser may be one step of its output; larger noise originates in the target or the bench.
+    laser may be as large as its resolution; larger noise originates in the target or the bench.
     """
     limits = {
         TABLE_DISPLACEMENT: parameters.displacement_noise,
@@ -136,8 +136,8 @@ def input_lines(channels: Sequence[Channel]) -> Iterator[CheckLine]:
 def table_delay_lines(
     sines: Sines, parameters: CheckParameters, sample_rate: float, *, lasers: bool, most: float = inf
 ) -> Iterator[CheckLine]:
-    """A line for the accelerometer against the table's displacement sensor, and one for each laser on the ground
-    against the accelerometer, at most `most` [s]: with those of `delay_lines`, every pair of channels is compared.
+    """Delay of the accelerometer against the table's displacement sensor, and of each laser on the ground against the
+    accelerometer, at most `most` [s]. Together with `delay_lines`, every pair of channels is compared.
 
     An acceleration that follows each step of the held output lags by half a sample.
     """
@@ -148,7 +148,7 @@ def table_delay_lines(
     storeys = dict(zip(STOREYS, (sines.storey_1, sines.storey_2), strict=True)) if lasers else {}
     against = {name: _delay_between(sines.omega, sines.accelerometer, seen) for name, seen in storeys.items()}
     middle = float(np.mean([one.delay for one in against.values()])) if against else np.nan
-    # the lasers lag behind both by their latency, the smaller of the two differences
+    # the lasers lag behind the correct sensor by their latency, the smaller of the two differences
     alone = TABLE_ACCELERATION if abs(middle + pair.delay) < abs(middle) else TABLE_DISPLACEMENT
     odd = f"{alone} differs from the lasers: " if lasers else ""
     yield judged(
@@ -167,7 +167,7 @@ def table_delay_lines(
             yield stated(name, what, one.delay, "s", uncertainty=expanded)
             continue
         allowed = -most - 0.5 / sample_rate, most
-        remedy = "compare the other delay lines: they tell whether the accelerometer or this laser differs"
+        remedy = "compare the other delay lines, which show whether the accelerometer or this laser differs"
         yield judged(name, what, one.delay, allowed, "s", remedy, expected=0.0, uncertainty=expanded)
 
 
@@ -201,7 +201,7 @@ def drive_lines(sines: Sines, parameters: CheckParameters, configuration: BenchC
 
 
 def expected_drive(omega: NDArray[np.float64], configuration: BenchConfiguration) -> NDArray[np.float64] | None:
-    """Drive per acceleration [V s2/m] of the simulated shaker, shape (n,); None for a real one."""
+    """Drive per acceleration [V s2/m] of the simulated shaker, shape (n,); None for a real shaker."""
     if configuration.backend != "simulated":
         return None
     specimen = configuration.simulation.specimen or configuration.specimen
@@ -212,11 +212,11 @@ def expected_drive(omega: NDArray[np.float64], configuration: BenchConfiguration
 def dead_time(
     omega: NDArray[np.float64], drive: NDArray[np.complex128], acceleration: NDArray[np.complex128], longest: float
 ) -> float:
-    """Signed delay [s] between drive and motion that mass, dashpot and spring do not explain, up to twice `longest`.
+    """Signed delay [s] between drive and motion not explained by mass, dashpot and spring, up to twice `longest`.
 
-    drive / acceleration = (m + c / s + k / s^2) / G exp(s T) with s = i omega: for each T the three quotients follow
-    by linear least squares; the result is the T with the smallest residual. It includes the delay of the inputs'
-    filters, of the amplifier, and half a sample.
+    drive / acceleration = (m + c / s + k / s^2) / G exp(s T) with s = i omega. For each T, the three quotients are
+    fitted by linear least squares; the result is the T with the smallest residual. It includes the delays of the
+    inputs' filters and of the amplifier, and half a sample.
     """
     # the cycles' amplitudes rotate with exp(-i omega t)
     wanted = np.conj(drive / acceleration)
@@ -230,8 +230,8 @@ def dead_time(
 def scale_lines(sines: Sines, parameters: CheckParameters, *, lasers: bool) -> Iterator[CheckLine]:
     """Two lines for each sensor except the reference.
 
-    The reference is the table's displacement sensor, unless the accelerometer contradicts it and the lasers agree with
-    the accelerometer. `lasers` mounted on the ground are compared as well.
+    The reference is the table's displacement sensor, or the accelerometer if it differs from that sensor and the lasers
+    agree with it. `lasers` mounted on the ground are compared as well.
     """
     sensors = SENSORS if lasers else TABLE
     seen: dict[str, Amplitudes] = {name: getattr(sines, sensor.signal) for name, sensor in sensors.items()}
@@ -306,8 +306,8 @@ def delay_lines(sines: Sines, parameters: CheckParameters, configuration: BenchC
 def signed_scale(omega: NDArray[np.float64], amplitudes: Amplitudes, reference: Amplitudes) -> tuple[float, float]:
     """Scale of a sensor relative to another, negative for opposite polarity, and its standard uncertainty.
 
-    The magnitude is extrapolated to zero frequency with a term in omega^2: the load on a compliant clamp moves by
-    (omega / omega_clamp)^2 more than the table.
+    The magnitude is extrapolated to zero frequency with a term in omega^2: a mass on a compliant clamp moves more than
+    the table, by the fraction (omega / omega_clamp)^2.
     """
     ratio = amplitudes / reference
     basis = np.column_stack((np.ones(omega.size), omega**2))
@@ -316,7 +316,7 @@ def signed_scale(omega: NDArray[np.float64], amplitudes: Amplitudes, reference: 
     solution = covariance @ (basis.T @ magnitude)
     residual = magnitude - basis @ solution
     spread = float(residual @ residual) / (omega.size - 2)
-    # at the lowest frequency, a delay rotates the ratio by less than a right angle
+    # at the lowest frequency, delays rotate the ratio by less than a right angle
     sign = 1.0 if ratio[np.argmin(omega)].real >= 0.0 else -1.0
     return sign * float(solution[0]), float(np.sqrt(spread * covariance[0, 0]))
 
@@ -325,7 +325,7 @@ def allowed_delay(specimen: Specimen, omega: float, error: float) -> float:
     """Delay [s] of a laser on the ground that changes u1 = laser - x of the bare frame by the relative `error`.
 
     A small delay d rotates the phasor of the laser by omega d, so the error of u1 is omega d |u1 + x|. The drift is the
-    difference of two lasers: a common delay does not change its amplitude.
+    difference between two lasers, so a common delay does not change its amplitude.
     """
     u1, _ = steady_response(specimen.bare(), omega, 1.0)
     return error * abs(u1) / (omega * abs(u1 - 1.0 / omega**2))

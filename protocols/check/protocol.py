@@ -12,7 +12,7 @@ Frequency = Annotated[float, Field(gt=0, le=60)]
 
 
 class CheckParameters(Parameters):
-    """Loop check: first at rest, then with sines of equal velocity and the frame locked to the table."""
+    """Loop check: at rest, then with sines of equal velocity amplitude and the frame locked to the table."""
 
     omega: tuple[Frequency, ...] = quantity(
         (8.0, 12.0, 18.0, 27.0, 40.0), "rad/s", "circular frequencies of the sines", min_length=4
@@ -21,7 +21,7 @@ class CheckParameters(Parameters):
     _each_once = field_validator("omega")(each_once)
 
     velocity: float = quantity(
-        0.06, "m/s", "amplitude of the table's velocity: the same at every frequency", gt=0, le=0.5
+        0.06, "m/s", "amplitude of the table's velocity, the same at every frequency", gt=0, le=0.5
     )
     cycles: int = quantity(8, "1", "number of cycles measured at each frequency", ge=4, le=200)
     rest: float = quantity(2.0, "s", "time at rest in which noise and valid samples are evaluated", ge=0.5, le=60)
@@ -75,13 +75,13 @@ def allowed_range(line: CheckLine) -> str:
 
 
 def number(value: float | None, digits: int = 4) -> str:
-    """A value with the given number of significant digits; "-" if absent."""
+    """A value to the given number of significant digits; "-" if absent."""
     return "-" if value is None else f"{value:.{digits}g}"
 
 
 PROTOCOL = Protocol(
     name="check",
-    summary="Check the loop of the configured bench at low level, line by line: passed or failed, with the remedy.",
+    summary="Check the loop of the configured bench at low level, and give a remedy for each line that fails.",
     details=(
         "Records every channel at rest, then drives sines of equal velocity with the frame locked to the "
         "table, and checks polarity, scale and delay of all sensors, and the drive. The exit code is also 1 "

@@ -1,4 +1,4 @@
-"""Probe and calibration of the drive by sines that leave the block at rest, and checks of the measured cycles."""
+"""Probe and calibration of the drive with sines that leave the block at rest, and checks of the measured cycles."""
 
 from collections.abc import Generator, Sequence
 from math import ceil, log2
@@ -25,8 +25,8 @@ ENOUGH = 0.75
 """Minimum fraction of cycles with nearly complete samples."""
 
 AUDIBLE = 5.0
-"""Smallest significant response of the table's acceleration to the drive, in standard uncertainties; noise exceeds it
-with a probability of 1e-5.
+"""Smallest significant response of the table's acceleration to the drive, in standard uncertainties; the probability
+that noise exceeds it is 1e-5.
 """
 
 _PROBED = 8
@@ -41,8 +41,8 @@ def calibrate_drive(
 ) -> Generator[Step, Outcome, DriveCalibration | Fallen]:
     """Measure the table's response to the drive at `omegas` [rad/s] with table accelerations of `level` [m/s2].
 
-    Without a `start` the response is first probed in two steps, from a command too small to cause damage; the response
-    at one frequency serves as the start for the next.
+    Without a `start`, the response is first probed in two steps, beginning with a command too small to cause damage;
+    the response at each frequency is then the initial value for the next.
     """
     known = start is not None
     if start is None:
@@ -62,7 +62,7 @@ def calibrate_drive(
             return response
         points[omega] = response
         if not known:
-            # it starts from rest, so that the drive does not jump
+            # change the calibration at rest, so that the drive does not jump
             outcome = yield Sweep((Leg(CHANGE_TIME, 0.0, omega),))
             if isinstance(outcome, Fallen):
                 return outcome
@@ -72,9 +72,9 @@ def calibrate_drive(
 
 
 def probed_drive(omega: float) -> Generator[Step, Outcome, DriveCalibration]:
-    """Gain of the drive at `omega` [rad/s], measured with two commands too small to cause damage.
+    """Gain of the drive at `omega` [rad/s], measured with two commands that are too small to cause damage.
 
-    The mean over cycles is compared with their scatter, which separates a response from noise of any spectrum. Raises
+    The mean over the cycles is compared with their scatter, to separate a response from noise of any spectrum. Raises
     Unmeasurable if the table does not respond.
     """
     yield Calibrate(DriveCalibration.flat(1.0))
@@ -130,7 +130,7 @@ def drive_response(cycles: Sequence[Cycle]) -> complex:
 
 
 class Unmeasurable(RockbenchError):
-    """The signals are insufficient to continue the protocol."""
+    """The signals are not sufficient to continue the protocol."""
 
     error_code = "not_measurable"
 
@@ -139,8 +139,8 @@ def need_cycles(cycles: Sequence[Cycle], asked: int) -> None:
     """Raise Unmeasurable if too many cycles have missing samples."""
     if len(cycles) < ENOUGH * asked:
         raise Unmeasurable(
-            f"{asked - len(cycles)} of {asked} cycles have missing samples: a sensor leaves its range, or its "
-            "values are late; the file states the reason for each sample. Move the sensor, reduce the motion, or "
+            f"{asked - len(cycles)} of {asked} cycles have missing samples: a sensor exceeds its range, or its "
+            "values are late; the data file states the reason for each sample. Move the sensor, reduce the motion, or "
             "close other programs"
         )
 

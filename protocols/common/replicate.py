@@ -1,4 +1,4 @@
-"""Replication, a stage of other protocols: iterates the drive until the table follows a motion."""
+"""Replication stage of other protocols, which iterates the drive until the table follows a motion."""
 
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
@@ -29,11 +29,11 @@ Ending = Status | Literal["samples lost"]
 class Replicated:
     """Result of a replication: the best `drive` [V] and its table acceleration [m/s2], both of the target's shape.
 
-    `acceleration` was measured in the last accepted pass; None if there is none. `repeatable` is the rms error of the
-    best drive, excluding noise (1 without a pass); `spectrum_error` is the largest deviation of the response spectrum
-    that noise does not explain, with its period [s].
+    `acceleration` was measured in the last accepted pass; None if there is none. `repeatable` is the relative rms error
+    of the best drive, excluding noise (1 without a pass); `spectrum_error` is the largest deviation of the response
+    spectrum that noise does not explain, with its period [s].
 
-    `status` and `reason` describe the end of the passes. The status is "running" if the block `fell` before the end: it
+    `status` and `reason` describe how the passes ended. The status is "running" if the block `fell` before the end; it
     then lies in its catch, and the caller must have it set upright.
     """
 
@@ -57,10 +57,10 @@ def replicate(
 ) -> Generator[Step, Outcome, Replicated]:
     """Find the drive that makes the table follow `target`; `name` is the motion's name.
 
-    The event from `progress` is published after each pass. A pass with lost samples of the table's sensors is repeated;
-    after a second loss the result is the best drive so far. The rig must not be armed on entry, and is not armed on
-    return. Raises InvalidInput if the model does not cover the target, or if the first drive exceeds a limit and must
-    not be scaled.
+    The event from `progress` is published after each pass. A pass with missing samples of the table's sensors is
+    repeated; after a second loss the best drive so far is returned. The rig must not be armed on entry, and is not
+    armed on return. Raises InvalidInput if the model does not cover the target, or if the first drive exceeds a limit
+    and may not be scaled.
     """
     replication = Replication(target, model, limits, parameters)
     achieved: Array | None = None

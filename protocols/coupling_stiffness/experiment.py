@@ -1,4 +1,4 @@
-"""Identification of the stiffness of mounted springs, written to a specimen file for other runs.
+"""Identification of the stiffness of mounted springs, which is written to a specimen file for other runs.
 
 1. Decays of the bare frame are measured after pulses, unless a previous identification is used. 2. Each spring is
 mounted with the block clamped to the table, and decays are measured again. 3. The stiffness of the spring is the
@@ -53,7 +53,9 @@ STILL_CLAMPED = "THE BLOCK IS STILL CLAMPED to the table: remove clamp, spring a
 
 
 class CouplingStiffness(Prepared[CouplingStiffnessParameters]):
-    """Spring identification. Raises InvalidInput without a reference frame, and for a pulse beyond the limits."""
+    """Spring identification. Raises InvalidInput if there is no reference frame, or if the limits forbid a usable
+    pulse.
+    """
 
     def __init__(
         self, parameters: CouplingStiffnessParameters, configuration: BenchConfiguration, stored: Sources | None = None
@@ -74,7 +76,7 @@ class CouplingStiffness(Prepared[CouplingStiffnessParameters]):
         self._bare: FrameResult | None = None
         self._springs: list[SpringResult] = []
         self._clamped = False
-        """True while a block is clamped to the table."""
+        """Whether the block is clamped to the table."""
 
     @property
     def _duration(self) -> float:
@@ -170,7 +172,7 @@ class CouplingStiffness(Prepared[CouplingStiffnessParameters]):
         if abs(spring.k2_apart) > SIGNIFICANT:
             yield Publish(
                 Warned(
-                    f"{name}: k2 differs from that of the bare frame by {spring.k2_apart:+.1f} standard "
+                    f"{name}: k2 differs from its value for the bare frame by {spring.k2_apart:+.1f} standard "
                     "uncertainties: check whether the block, its clamp or the spring touches the second storey, or "
                     "the clamp yields under the spring",
                 )
@@ -185,7 +187,7 @@ class CouplingStiffness(Prepared[CouplingStiffnessParameters]):
         pace: Pace,
         point: Callable[[FrameResult, int], SpringPoint] = bare_point,
     ) -> Generator[Step, Outcome, FrameResult]:
-        """Decays of the frame as mounted, with a point for each decay."""
+        """Decays of the present frame, with a point for each decay."""
         pace.elapsed += BY_HAND
         pulse = self._pulses[name]
         decays = yield from pulsed_decays(self.parameters, self.configuration, pulse, setting, pace, name, point)

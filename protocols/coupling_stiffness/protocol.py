@@ -12,7 +12,7 @@ Stiffness = Annotated[float, Field(gt=0, le=100)]
 
 
 class CouplingStiffnessParameters(DecayParameters):
-    """Decays of the bare frame, then of the frame with each spring attached to the clamped block."""
+    """Decays of the bare frame, then of the frame with each spring between it and the clamped block."""
 
     beta: tuple[Stiffness, ...] = quantity(
         (0.25, 0.64, 0.97), "1", "stiffness ratios on the labels of the springs", min_length=1, usual=COUPLING
@@ -38,7 +38,7 @@ class SpringPoint(Parameters):
     decays: int = decay_field("decays")
     k_c_n_m: float | None = quantity(None, "N/m", "stiffness of the spring as mounted; absent for the bare frame")
     k_c_uncertainty: float | None = quantity(None, "N/m", EXPANDED)
-    k_c_nominal_n_m: float | None = quantity(None, "N/m", "nominal value on the label")
+    k_c_nominal_n_m: float | None = quantity(None, "N/m", "nominal stiffness on the label")
     beta_mounted: float | None = quantity(
         None, "1", "stiffness of the spring relative to that of the first storey, k_C/k1"
     )
@@ -50,8 +50,7 @@ class SpringPoint(Parameters):
     k2_agrees: bool | None = quantity(
         None,
         "",
-        "whether k2 agrees with that of the bare frame within the uncertainty of the difference; absent if "
-        "not compared",
+        "whether k2 agrees with k2 of the bare frame within the uncertainty of the difference; absent if not compared",
     )
     k_c_parts: str = quantity("", "", "standard uncertainty of k_C by contribution, largest first, as JSON")
     xi1: float = decay_field("xi1")
@@ -72,8 +71,8 @@ PROTOCOL = Protocol(
     summary="Stiffness of mounted springs, from the shift of the frame's modes with the block clamped.",
     details=(
         "Decays are measured with the bare frame, then with each spring mounted and the block clamped to the "
-        "table, so that the spring adds to the stiffness of the first storey. Its stiffness is the "
-        "difference, which also determines beta as mounted. Other runs load the result, specimen.json."
+        "table, so that the spring adds to the stiffness of the first storey. The difference is the stiffness of "
+        "the spring and determines beta as mounted. Other runs load the result, specimen.json."
     ),
     example="--beta 0.4 --specimen FILE",
     parameters=CouplingStiffnessParameters,

@@ -35,7 +35,7 @@ _COLUMNS = (
 )
 
 SHOWN = 6.0
-"""Time of a decay that is drawn after the pulse [s], long enough to show the modes."""
+"""Time of a decay that is drawn after the pulse [s], long enough to show both modes."""
 
 
 def springs_table(points: Sequence[SpringPoint]) -> str:
@@ -48,7 +48,7 @@ def springs_table(points: Sequence[SpringPoint]) -> str:
 
 
 def springs_figure(springs: Sequence[SpringResult]) -> "Figure":
-    """Comparison of the springs, and two rows for each spring: decay and residual. Empty without springs."""
+    """Figure that compares the springs, with two rows for each spring: decay and residual. Empty without springs."""
     figure = new_figure(9.0, 3.6 + 3.2 * len(springs))
     grid = figure.add_gridspec(1 + 2 * len(springs), 2, height_ratios=(3.4, *[2.2, 1.0] * len(springs)))
     compared, budget = figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1])
@@ -126,7 +126,7 @@ def _draw_decay(panel: "Axes", below: "Axes", spring: SpringResult) -> None:
 
 
 def springs_sections(campaign: Campaign) -> list[Section]:
-    """Report section on the stiffness of the springs as mounted, decay by decay."""
+    """Report section on the stiffness of the mounted springs, with each decay."""
     points = campaign.points
     if not points:
         return []
@@ -169,7 +169,7 @@ def _spring_pictures(points: Rows) -> list[Part]:
         return []
     figure = _labels_figure(*([row[name] for row in rows] for name in ("beta", "beta_mounted", "beta_uncertainty")))
     caption = "Deviation of the mounted springs from their labels, with expanded uncertainties (k = 2)."
-    parts: list[Part] = [Picture(figure, caption, "Deviation of every spring from its label.")]
+    parts: list[Part] = [Picture(figure, caption, "Deviation of each spring from its label.")]
     known = [row for row in rows if row.get("k_c_parts")]
     if not known:
         return parts

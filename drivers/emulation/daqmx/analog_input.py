@@ -29,8 +29,8 @@ _WIRING_OF = {
 
 @dataclass
 class FilterDelay:
-    """Settings of a converter with properties for its delay: whether whole samples of delay are removed, and the
-    delay's unit.
+    """Settings of a converter with properties for its delay: whether whole samples of the delay are removed, and the
+    unit of the delay.
     """
 
     removed: bool = True
@@ -68,11 +68,11 @@ Buffer Size Determined?").
 
 
 class AnalogInput:
-    """`Job` of analogue inputs.
+    """`Job` of an analogue input task.
 
     `changed` guards it, and wakes threads that wait for samples.
 
-    The counter of acquired samples shows whole packets of `packet` samples, those transferred to the computer.
+    The counter of acquired samples counts those transferred to the computer, in whole packets of `packet` samples.
     """
 
     def __init__(self, plant: Plant, changed: threading.Condition, packet: int = 1) -> None:
@@ -89,7 +89,7 @@ class AnalogInput:
         self._first: int | None = None
         self._position = 0
         self.run = 0
-        """Number of earlier runs."""
+        """Number of earlier runs of the task."""
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -153,9 +153,9 @@ class AnalogInput:
 
     @property
     def delays(self) -> NDArray[np.float64]:
-        """Delay of the signal in the samples of each input [s], shape (channels,); all 0 without a clock.
+        """Delay of each input's samples [s], shape (channels,); all 0 without a clock.
 
-        It is that of the filter, and negative for later inputs of a multiplexer.
+        It is the delay of the converter's filter, and negative for later inputs of a multiplexer.
         """
         if self.clock is None:
             return np.zeros(len(self.inputs))
@@ -176,7 +176,7 @@ class AnalogInput:
 
     @property
     def acquired(self) -> int:
-        """Samples per channel acquired by the clock, independent of reads, in whole packets."""
+        """Samples per channel acquired since the start, read or not, in whole packets."""
         self._require_not_overrun()
         return self._passed(self._plant.tick()) // self._packet * self._packet
 
@@ -244,7 +244,7 @@ class AnalogInput:
         return first, got, self.clock.divider if self.clock else 1
 
     def _fetch(self, first: int, n: int, divider: int) -> Seen:
-        """The plant's counts, read without holding `changed`, because the plant may have to compute them first."""
+        """The plant's counts, read without holding `changed`, since the plant may have to compute them first."""
         if n == 0:
             return np.zeros((0, len(self.inputs)), np.int16)
         shifts = self.delays * self._plant.tick_rate
@@ -294,13 +294,13 @@ class AnalogInput:
         return self._first + sample * (self.clock.divider if self.clock else 1)
 
     def _passed(self, tick: int) -> int:
-        """Number of samples acquired at `tick`."""
+        """Number of samples acquired up to `tick`."""
         if self._first is None:
             return 0
         return self.clock.passed(self._first, tick) if self.clock else max(tick - self._first + 1, 0)
 
     def _ready(self) -> int:
-        """Number of readable samples: the plant completes a tick with the next one."""
+        """Number of readable samples: the plant completes a tick when the next one is due."""
         return self._passed(self._plant.tick() - 1 - self._ahead)
 
     def _require_run(self, run: int) -> None:

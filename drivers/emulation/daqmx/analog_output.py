@@ -21,7 +21,7 @@ TRANSFER_CONDITIONS = {
     OutputDataTransferCondition.ON_BOARD_MEMORY_HALF_FULL_OR_LESS.value: 0.5,
     OutputDataTransferCondition.ON_BOARD_MEMORY_LESS_THAN_FULL.value: 1.0,
 }
-"""Values of AO.DataXferReqCond, and the fraction of the device's memory filled ahead."""
+"""Fraction of the device's memory that is filled ahead, by value of AO.DataXferReqCond."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class OutputChannel:
 
 
 class AnalogOutput:
-    """`Job` of analogue outputs. `changed` guards it, and wakes threads that wait for free space."""
+    """`Job` of an analogue output task. `changed` guards it, and wakes threads that wait for free space."""
 
     def __init__(self, plant: Plant, instant: Instant, changed: threading.Condition) -> None:
         self._plant = plant
@@ -93,7 +93,7 @@ class AnalogOutput:
 
     @property
     def clock(self) -> SampleClock | None:
-        """The sample clock; without one, values are output on writing."""
+        """The sample clock; None if values are output as soon as they are written."""
         return self._clock
 
     @clock.setter
@@ -176,7 +176,7 @@ class AnalogOutput:
     def write(self, volts: NDArray[np.float64], timeout: float) -> int:
         """Append samples, shape (n, channels) [V]; waits for free space.
 
-        Returns their number. Raises DaqmxFailure with the number of samples accepted.
+        Returns the number of samples written. Raises DaqmxFailure with the number of samples accepted.
         """
         self._require_in_range(volts)
         deadline = deadline_after(timeout)
@@ -211,7 +211,7 @@ class AnalogOutput:
         return wait_until(self._changed, float("inf") if tick is None else self._plant.time_of(tick), deadline)
 
     def _prepared(self, samples: int) -> Generation:
-        """The current generation; the first write determines the buffer size if none is set."""
+        """The present generation, created if needed; the first write determines the buffer size if none is set."""
         assert self.clock is not None
         if self._generation is None:
             self._buffer = self._buffer or samples

@@ -13,7 +13,7 @@ _SAME = 1.0e-9
 _LARGEST_DIVISOR = 31
 """Largest divisor of the rate of a delta-sigma module (NI 9144 User Guide, p. 57, "Clock Divisor")."""
 _OVERSAMPLING = 256.0
-"""Ticks of the master timebase in a sample at the highest rate (NI-9234 Specifications, "Data Rate Range")."""
+"""Ticks of the master timebase per sample at the highest rate (NI-9234 Specifications, "Data Rate Range")."""
 _PADDING = 10.0e-6
 """Settling time between the channels of a multiplexer [s] (cDAQ-9183 User Manual, "AI Convert Clock Signal Behavior for
 Analog Input Modules", "Scanned Modules"; M and X Series alike)."""
@@ -25,7 +25,7 @@ class DeltaSigma:
 
     The delay is that of the digital filter (NI knowledge base, kA00Z0000004A0YSAU, "Calculate the Input Delay"). The
     driver does not remove it: a client must account for the differences (NI-DAQmx help, "cdaqmultidevice"). `readable`:
-    the device has the properties AI.FilterDelay and AI.RemoveFilterDelay.
+    whether the device has the properties AI.FilterDelay and AI.RemoveFilterDelay.
     """
 
     timebase: float
@@ -39,11 +39,11 @@ class DeltaSigma:
 
 
 def delta_sigma_rate(asked: float, converters: Sequence[DeltaSigma]) -> float:
-    """Sample rate [1/s] of a task with these converters, at least `asked` and at least the lowest.
+    """Sample rate [1/s] of a task with these converters: the lowest supported rate not below `asked`.
 
     All share the fastest timebase f (NI cDAQ-9172 User Guide, p. 18, "Sigma-Delta"), and rates are f / 256 / n for n
-    from 1 to 31; others are coerced up to the next (NI knowledge base, 593CC07F76B1405A862570DE005F6836). Raises
-    DaqmxFailure above the highest.
+    from 1 to 31; other rates are coerced to the next higher one (NI knowledge base, 593CC07F76B1405A862570DE005F6836).
+    Raises DaqmxFailure above the highest rate.
     """
     highest = max(one.timebase for one in converters) / _OVERSAMPLING
     if not 0.0 < asked <= highest * (1.0 + _SAME):
@@ -56,7 +56,7 @@ def delta_sigma_rate(asked: float, converters: Sequence[DeltaSigma]) -> float:
 
 
 def conversion_period(fastest: float, channels: int, rate: float) -> float:
-    """Time between the conversions of two channels of a multiplexer [s]: the fastest plus the padding, or evenly spaced
-    at sample rates that leave no time for it.
+    """Time between the conversions of two channels of a multiplexer [s]: the shortest plus the settling time, or, at
+    sample rates that leave no time for it, an even part of the sample period.
     """
     return min(fastest + (_PADDING if channels > 1 else 0.0), 1.0 / (rate * channels))

@@ -16,7 +16,7 @@ _STRAIGHT: Mapping[int, tuple[float, ...]] = MappingProxyType({})
 
 
 Seen = NDArray[np.int16 | np.int32 | np.float64]
-"""Counts of the plant; not integer between two of its ticks."""
+"""Counts of the plant; interpolated, and not integer, between two of its ticks."""
 START, CLOCK = "StartTrigger", "SampleClock"
 """Signals of a timing engine."""
 
@@ -32,12 +32,12 @@ class Wirings(IntFlag):
 
 @dataclass(frozen=True)
 class AnalogInputs:
-    """The inputs of a device. Input k is terminal `first_terminal + k` of the plant; beyond the last terminal it reads
-    0 V.
+    """The inputs of a device. Input k reads terminal `first_terminal + k` of the plant, or 0 V beyond the last
+    terminal.
 
-    `ranges` are the largest magnitudes [V], widest first; rates are per second. The converter has `resolution` bits in
-    raw samples of `raw_bits`. `polynomials` are, for single inputs, volts per power of the counts in the widest range;
-    the others are linear, with their rails at the ends of the range. `delta_sigma` describes converters of that type;
+    `ranges` are the largest magnitudes [V], widest first; rates are in 1/s. The converter has `resolution` bits in raw
+    samples of `raw_bits`. `polynomials` are, for single inputs, volts per power of the counts in the widest range; the
+    others are linear, with their rails at the ends of the range. `delta_sigma` describes converters of that type;
     `conversion` is the fastest conversion of a multiplexed converter [s], None for simultaneously sampled inputs.
     """
 
@@ -57,9 +57,9 @@ class AnalogInputs:
 
 @dataclass(frozen=True)
 class AnalogOutputs:
-    """The outputs of a device: largest magnitudes [V], samples per second, samples in its onboard memory.
+    """The outputs of a device: largest magnitudes [V], highest rate [1/s], samples in its onboard memory.
 
-    `transfer_condition`: the condition of transfers to that memory can be set.
+    `transfer_condition`: whether the condition of transfers to that memory can be set.
     """
 
     count: int
@@ -71,13 +71,13 @@ class AnalogOutputs:
 
 @dataclass(frozen=True)
 class DeviceModel:
-    """Device, chassis, or module in a `chassis`.
+    """A device, a chassis, or a module in a `chassis`.
 
-    `lines` is the number of lines at port 0 that can be outputs, `input_lines` of those that can be inputs; groups of
-    `direction_group` consecutive lines share one direction. `watchdog` is the longest time-out [s] of its watchdog,
-    None where there is none; that of a chassis acts on the outputs of its modules. `input_engines` and `output_engines`
-    are the timing engines of analogue inputs and outputs, in the order of their numbers; a module has those of its
-    chassis.
+    `lines` is the number of lines at port 0 that can be outputs, `input_lines` the number of those that can be inputs;
+    groups of `direction_group` consecutive lines share one direction. `watchdog` is the longest time-out [s] of its
+    watchdog, None without one; the watchdog of a chassis acts on the outputs of its modules. `input_engines` and
+    `output_engines` are the timing engines of analogue inputs and outputs, in the order of their numbers; a module has
+    the engines of its chassis.
     """
 
     name: str
@@ -117,7 +117,7 @@ class DeviceModel:
         return tuple(f"{self.name}/port0/line{k}" for k in range(self.input_lines))
 
     def direction_of(self, k: int) -> str:
-        """The lines that share the direction of line `k`, as text."""
+        """Name of the range of lines that share the direction of line `k`."""
         first = k // self.direction_group * self.direction_group
         return f"{self.name}/port0/line{first}:{first + self.direction_group - 1}"
 
@@ -143,7 +143,7 @@ _NEWTON_STEPS = 3
 class InputConverter:
     """Input `k` of a device, set to `range` [V].
 
-    `source` is the converter of the plant's counts.
+    `source` is the converter that produces the plant's counts.
 
     volts = coefficients[0] + coefficients[1] raw + coefficients[2] raw^2 + ...
     """
@@ -159,7 +159,7 @@ class InputConverter:
         self._same = self.coefficients == (0.0, source.lsb) and self._rails == source.codes
 
     def is_like(self, other: "InputConverter") -> bool:
-        """Whether both produce the same raw counts."""
+        """Whether both converters produce the same raw counts."""
         return self.coefficients == other.coefficients and self._rails == other._rails
 
     def raw(self, counts: Seen) -> NDArray[np.int16 | np.int32]:

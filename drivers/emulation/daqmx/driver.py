@@ -19,8 +19,8 @@ from sim.sensors import Converter
 class Driver:
     """Devices, tasks and reservations; `changed` guards all of it.
 
-    It outlives every client. `drive` is the output wired to the plant; with None, no output is connected. `wires` are
-    connected to the digital lines. `converter` is that of the plant's counts. `output_clock_error` and `packet` as in
+    It outlives every client. `drive` is the output wired to the plant, None if no output is connected. `wires` are
+    connected to the digital lines. `converter` produces the plant's counts. For `output_clock_error` and `packet` see
     `DaqServer`.
     """
 
@@ -54,7 +54,7 @@ class Driver:
             plant.wire(self.terminals[drive])
 
     def create(self, name: str, *, may_attach: bool, may_create: bool) -> tuple[Task, bool]:
-        """Task of that name, and whether it is new; "" generates a name.
+        """The task `name`, and whether it is new; "" generates a name.
 
         Raises SessionExists and SessionMissing.
         """
@@ -72,7 +72,7 @@ class Driver:
             return task, True
 
     def task(self, name: str) -> Task:
-        """Task of that name. Raises DaqmxFailure if it was cleared or never created."""
+        """The task `name`. Raises DaqmxFailure if it was cleared or never created."""
         if name not in self._tasks:
             raise DaqmxFailure(
                 DAQmxErrors.INVALID_TASK, f"Task specified is invalid or does not exist.\n\nTask Name: {name}"
@@ -116,7 +116,7 @@ class Driver:
             self.changed.notify_all()
 
     def stop(self, task: Task) -> None:
-        """End a task and release its resources. Raises DaqmxFailure if the run had failed."""
+        """End a task and release its resources. Raises DaqmxFailure if its run has failed."""
         with self.changed:
             self._end(task)
             if task.job is not None:
@@ -129,7 +129,7 @@ class Driver:
             self._tasks.pop(task.name, None)
 
     def reset_device(self, device: DeviceModel) -> None:
-        """Abort the device's tasks, set its outputs to 0 V and its lines low. The stopped tasks remain."""
+        """Abort the device's tasks, set its outputs to 0 V and its lines low. The aborted tasks are not removed."""
         with self.changed:
             for name in {device.name, *device.modules}:
                 part = self.catalogue.device(name)
@@ -183,14 +183,14 @@ class Driver:
             self.terminals[output].hold(value)
 
     def lose_network(self) -> None:
-        """Simulate a lost network connection to every chassis, to which its watchdog responds."""
+        """Simulate a lost network connection to every chassis; watchdogs configured for it expire."""
         with self.changed:
             for task in self._tasks.values():
                 if isinstance(task.job, Watchdog):
                     task.job.lose_network()
 
     def require_alive(self, job: Job) -> None:
-        """Raise DaqmxFailure for a job on a chassis whose watchdog has expired."""
+        """Raise DaqmxFailure if the job uses a chassis whose watchdog has expired."""
         for name in job.devices:
             if (owner := self.catalogue.device(name).clockwork) in self._expired:
                 raise DaqmxFailure(
@@ -240,7 +240,7 @@ def _begin(task: Task, job: Job, tick: int) -> None:
 
 
 def _goes_with(waiting: Job, fired: Job) -> bool:
-    """Whether a job that waits for trigger, clock or both receives them all from the starting job."""
+    """Whether the starting job supplies every signal, trigger, clock or both, that a waiting job awaits."""
     triggered = waiting.awaited is None or _same(waiting.awaited, fired.start_terminal)
     return triggered and (waiting.source is None or _same(waiting.source, fired.clock_terminal))
 

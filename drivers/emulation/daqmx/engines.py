@@ -1,4 +1,4 @@
-"""Timing engines of a device: each runs one clocked task and appears in the names of that task's terminals."""
+"""Timing engines of a device: each runs one clocked task, and its number is part of that task's terminal names."""
 
 from collections.abc import Callable
 
@@ -37,7 +37,7 @@ class EngineSlot:
         return f"{device.clockwork} timing engine {engines[self.number(engines) or 0]}"
 
     def request(self, number: int, engines: tuple[str, ...]) -> None:
-        """Set the engine. Raises DaqmxFailure if there is no such engine, or no choice."""
+        """Set the engine. Raises DaqmxFailure if this engine does not exist, or if the device has only one."""
         if len(engines) == 1:
             raise DaqmxFailure(
                 DAQmxErrors.ATTRIBUTE_NOT_SUPPORTED_IN_TASK_CONTEXT,
@@ -53,7 +53,7 @@ class EngineSlot:
         self.requested = number
 
     def choose(self, device: DeviceModel, engines: tuple[str, ...], is_free: Callable[[str], bool]) -> None:
-        """Choose the first free engine, or the first if none is free; its reservation then fails."""
+        """Choose the first free engine. If none is free, choose the first one, whose reservation then fails."""
         if self.requested is not None or self._chosen is not None:
             return
         for self._chosen in range(len(engines)):

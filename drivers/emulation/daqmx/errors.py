@@ -4,7 +4,7 @@ from nidaqmx.error_codes import DAQmxErrors
 
 
 class DaqmxFailure(Exception):
-    """An error of the driver; for a write, with the number of samples per channel written before it."""
+    """An error of the driver; after a write, with the number of samples per channel written before it."""
 
     def __init__(self, code: DAQmxErrors, text: str, *, samples_written: int = 0) -> None:
         super().__init__(text)
@@ -21,4 +21,4 @@ class SessionMissing(Exception):
 
 
 class NotEmulated(Exception):
-    """A function of the real driver that the emulation does not have."""
+    """A function of the real driver that is not emulated."""

@@ -13,7 +13,7 @@ from drivers.emulation.daqmx.timing import SampleClock
 from drivers.emulation.plant import History
 
 Signal = Callable[[int, int], NDArray[np.float64]]
-"""Volts at `n` ticks from tick `first` on: `signal(first, n)`, shape (n,)."""
+"""`signal(first, n)`: volts at `n` ticks from tick `first` on, shape (n,)."""
 
 _PATIENCE = 10.0
 """Duration of the retained output [s]."""
@@ -22,7 +22,7 @@ _PATIENCE = 10.0
 class Generation:
     """Samples of all channels of an output task, by number.
 
-    `buffer` samples fit before the start; a running generation has the device's `memory` in addition.
+    Before the start, `buffer` samples fit; while running, the device's `memory` samples in addition.
     """
 
     def __init__(self, channels: int, clock: SampleClock, buffer: int, memory: int) -> None:
@@ -42,11 +42,11 @@ class Generation:
         self._first = tick
 
     def played(self, tick: int) -> int:
-        """Number of samples generated at `tick`, up to the last one written."""
+        """Number of samples generated up to `tick`, at most those written."""
         return min(self._due(tick), self.written)
 
     def dry(self, tick: int) -> bool:
-        """Whether more samples were due at `tick` than were written."""
+        """Whether more samples were due by `tick` than have been written."""
         return self._due(tick) > self.written
 
     def space(self, tick: int) -> int:
@@ -55,14 +55,14 @@ class Generation:
         return capacity - (self.written - self.played(tick))
 
     def tick_of_space(self, samples: int) -> int | None:
-        """Tick at which `samples`, or as many as can ever fit, will fit; None while not running."""
+        """Tick at which there will be space for `samples`, at most for the whole capacity; None while not running."""
         if self._first is None:
             return None
         capacity = self._buffer + self._memory
         return self._clock.ticks(self._first, self.written + min(samples, capacity) - capacity - 1)
 
     def append(self, samples: NDArray[np.float64]) -> None:
-        """Append samples, shape (n, channels), for which there is room."""
+        """Append samples, shape (n, channels); the caller ensures that there is space for them."""
         self._samples.append(samples)
 
     def signal(self, channel: int) -> Signal:
@@ -80,10 +80,10 @@ class Generation:
 
 
 class Instant:
-    """Synchronisation: provides a common tick for everything that starts or changes together.
+    """Provides a common tick for everything that starts or changes simultaneously.
 
     `tick` is the plant's clock; it is read under the lock and must not block. The plant takes the same lock when it
-    reads past ticks: decisions made under it precede every read.
+    reads past ticks, so that a decision made under the lock precedes every read of the tick that it concerns.
     """
 
     def __init__(self, tick: Callable[[], int]) -> None:
@@ -97,7 +97,7 @@ class Instant:
 
     @contextmanager
     def next(self) -> Generator[int]:
-        """Context manager for the next tick, which is not read meanwhile."""
+        """Context manager that provides the next tick, which cannot be read in its body."""
         with self.lock:
             yield self._tick() + 1
 
@@ -110,7 +110,9 @@ class OutputTerminal:
         self._changes: deque[tuple[int, Signal]] = deque([(0, _constant(0.0))])
 
     def __call__(self, first: int, n: int) -> NDArray[np.float64]:
-        """Volts at `n` past ticks from `first` on, shape (n,); read in order, earlier ones are discarded."""
+        """Volts at `n` past ticks from `first` on, shape (n,). Ticks are read in order; earlier values are
+        discarded.
+        """
         with self._instant.lock:
             while len(self._changes) > 1 and self._changes[1][0] <= first:
                 self._changes.popleft()
@@ -127,7 +129,7 @@ class OutputTerminal:
             self.follow(tick, _constant(volts))
 
     def follow(self, tick: int, signal: Signal) -> None:
-        """Play `signal` from `tick`, the next one, on."""
+        """Play `signal` from `tick` on, which must be the next tick."""
         self._changes.append((tick, signal))
 
     def freeze(self) -> None:
@@ -136,7 +138,7 @@ class OutputTerminal:
             self.hold(self.volts_at(tick - 1))
 
     def volts_at(self, tick: int) -> float:
-        """Volts at one tick, new or the last one read."""
+        """Volts at one tick, which is the last one read or a later one."""
         with self._instant.lock:
             signal = next(signal for start, signal in reversed(self._changes) if start <= tick)
             return float(signal(tick, 1)[0])

@@ -11,7 +11,7 @@ from drivers.emulation.daqmx.errors import DaqmxFailure
 
 @dataclass(frozen=True)
 class Wires:
-    """Wiring by line name: receivers of an output line's level (`told`), sources of an input line's level (`shows`)."""
+    """Wiring by line name: receivers of an output line's level (`told`), sources of an input line's level (`shown`)."""
 
     told: Mapping[str, Callable[[bool], None]] = field(default_factory=dict[str, Callable[[bool], None]])
     shown: Mapping[str, Callable[[], bool]] = field(default_factory=dict[str, Callable[[], bool]])
@@ -20,7 +20,7 @@ class Wires:
 class Lines:
     """Levels by line name; outputs are low at power-up, unwired inputs are pulled down.
 
-    Has its own lock, because a watchdog expires independently.
+    The levels have their own lock, because a watchdog may expire at any time.
     """
 
     def __init__(self, wires: Wires) -> None:
@@ -34,7 +34,7 @@ class Lines:
         return line in self._high
 
     def shows(self, line: str) -> bool:
-        """The level at a line: its wired source, or its set value."""
+        """The level of a line: that of its wired source, otherwise the level to which it was set."""
         shown = self._wires.shown.get(line)
         return line in self._high if shown is None else shown()
 
@@ -57,7 +57,7 @@ class Lines:
                 self._set(line, high)
 
     def release(self, device: str) -> None:
-        """Permit writes again; the lines return to the last written level, the worst case for a client."""
+        """Permit writes again; the lines return to the levels written last, the worst case for a client."""
         with self._lock:
             if device in self._expired:
                 for line, high in self._expired.pop(device)[0].items():
@@ -87,17 +87,17 @@ class Line:
 
 @dataclass(frozen=True)
 class LineChannel:
-    """One channel: a line, or several read or written together."""
+    """One channel: a line, or several lines read or written together."""
 
     name: str
     lines: tuple[Line, ...]
 
 
 class LineTask:
-    """`Job` of digital lines, without a clock."""
+    """`Job` of a task of digital lines, without a clock."""
 
     outwards: bool
-    """Whether its lines are outputs."""
+    """Whether the lines of the task are outputs."""
     awaited: str | None = None
     start_terminal: str | None = None
     source: str | None = None
@@ -113,7 +113,7 @@ class LineTask:
 
     @property
     def all_lines(self) -> tuple[Line, ...]:
-        """The lines of the job, channel after channel."""
+        """The lines of all channels, channel by channel."""
         return tuple(line for channel in self._made for line in channel.lines)
 
     @property
@@ -131,7 +131,7 @@ class LineTask:
 
     @property
     def groups(self) -> frozenset[str]:
-        """Groups of lines whose direction the task sets."""
+        """The direction groups of the task's lines."""
         return frozenset(line.group for line in self.all_lines)
 
     def engage(self, is_free: Callable[[str], bool]) -> None:
@@ -151,17 +151,17 @@ class LineTask:
 
 
 class DigitalInput(LineTask):
-    """`Job` of digital inputs, without a clock."""
+    """`Job` of a task of digital inputs, without a clock."""
 
     outwards = False
 
     @property
     def inputs(self) -> list[LineChannel]:
-        """Its channels."""
+        """The channels of the task."""
         return self._made
 
     def read(self) -> bytes:
-        """The present levels, one byte per line, channel after channel; a shorter channel is padded with 0."""
+        """The present levels, one byte per line, channel by channel; shorter channels are padded with 0."""
         width = self.lines_per_channel
         return b"".join(
             bytes(self._lines.shows(line.name) for line in channel.lines).ljust(width, b"\0") for channel in self.inputs
@@ -169,13 +169,13 @@ class DigitalInput(LineTask):
 
 
 class DigitalOutput(LineTask):
-    """`Job` of digital outputs, without a clock."""
+    """`Job` of a task of digital outputs, without a clock."""
 
     outwards = True
 
     @property
     def outputs(self) -> list[LineChannel]:
-        """Its channels."""
+        """The channels of the task."""
         return self._made
 
     def write(self, levels: Sequence[bool]) -> None:

@@ -20,7 +20,7 @@ _BEND = 1.0e-4
 def x_series(name: str = "Dev1", *, simulated: bool = False, calibrated: bool = False) -> DeviceModel:
     """A multifunction device at the USB port, after the data sheet of the USB-6363.
 
-    With `calibrated`, one input has a calibration polynomial with offset, slope error, square and cube.
+    If `calibrated`, one input has a calibration polynomial with offset, slope error, and square and cubic terms.
     """
     return DeviceModel(
         name,
@@ -47,8 +47,8 @@ def x_series(name: str = "Dev1", *, simulated: bool = False, calibrated: bool = 
 def compact_rio(name: str = "cRIO1", *, simulated: bool = False, calibrated: bool = False) -> tuple[DeviceModel, ...]:
     """A cRIO-9045 with two NI 9239 (inputs), NI 9263 (outputs), NI 9485 (relays) and NI 9421 (digital inputs).
 
-    Modules are devices: `cRIO1Mod1/ai0`. The controller has a timing engine for each slot: `/cRIO1/it0/StartTrigger`. A
-    CompactRIO has no watchdog that DAQmx could set. `calibrated` as in `x_series`, for the first module.
+    Modules are devices: `cRIO1Mod1/ai0`. The controller has a timing engine for each slot: `/cRIO1/it0/StartTrigger`.
+    DAQmx cannot set a watchdog on a CompactRIO. `calibrated` as in `x_series`, for the first module.
     """
     controller, *modules = build("cRIO-9045", ("9239", "9239", "9263", "9485", "9421"))
     assert modules[0].inputs is not None
@@ -106,7 +106,7 @@ class Catalogue:
         return self._find(channel, "input_names")
 
     def output(self, channel: str) -> tuple[DeviceModel, int]:
-        """Device of an analogue output, and its output number."""
+        """The device of an analogue output and the number of the output."""
         return self._find(channel, "output_names")
 
     def line(self, line: str) -> tuple[DeviceModel, int]:

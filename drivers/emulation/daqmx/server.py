@@ -41,7 +41,9 @@ class Faults:
         self._silent_until = 0.0
 
     def fail_next(self, call: str, code: int) -> None:
-        """Make the next call of this name fail with a DAQmx code and without effect; each request applies once."""
+        """Make the next call of this name fail with a DAQmx code and without effect; each request applies to one
+        call.
+        """
         with self._changed:
             self._codes.setdefault(call, deque()).append(code)
 
@@ -51,7 +53,7 @@ class Faults:
             self._silent_until = time.monotonic() + seconds
 
     def end(self) -> None:
-        """End the stall: answer requests again."""
+        """End the stall, so that requests are answered again."""
         with self._changed:
             self._silent_until = 0.0
             self._changed.notify_all()
@@ -107,7 +109,7 @@ class Boundary(_GRPC.ServerInterceptor):
 
 
 def _metadata(call: str, failure: DaqmxFailure) -> tuple[tuple[str, str], ...]:
-    """The code, and for reads and writes the number of samples per channel before the error."""
+    """The error code, and for reads and writes the number of samples per channel transferred before the error."""
     entries = [("ni-error", str(failure.code.value))]
     if call.startswith("Read"):
         # the samples of a failed read are lost: only a time-out returns those acquired
@@ -158,18 +160,18 @@ class SessionUtilities(SessionUtilitiesServicer):
 
 
 _WORKERS = 32
-"""Concurrent calls; a waiting read occupies one."""
+"""Concurrent calls; a waiting read occupies one of them."""
 
 
 class DaqServer:
-    """Emulates NI's gRPC device server with `devices` whose terminals are those of `plant`.
+    """Emulates NI's gRPC device server with `devices`, whose inputs and output are wired to `plant`.
 
-    `drive` is the analogue output that drives the plant and `enable_line` the digital line of its enable relay; by
-    default the first of the devices. `wires` replaces the wiring of the digital lines when more than the relay is
-    connected. `converter` is that of the plant's counts. `credentials` are those of an encrypted server; without
-    any it is plain. `output_clock_error` is the relative excess rate of an output
-    that does not follow the inputs' sample clock; the inputs' sample counter advances in steps of `packet`, as with
-    packet transfer. Raises InvalidInput when the address is not available.
+    `drive` is the analogue output that drives the plant and `enable_line` the digital line of its enable relay; the
+    defaults are the first of each on the devices. `wires` replaces the wiring of the digital lines when more than the
+    relay is connected. `converter` produces the plant's counts. With `credentials` the server is encrypted, otherwise
+    plain. `output_clock_error` is the relative excess rate of an output that does not follow the inputs' sample clock;
+    the inputs' sample counter advances in steps of `packet`, as with packet transfer. Raises InvalidInput when the
+    address is not available.
     """
 
     def __init__(
@@ -239,7 +241,7 @@ class DaqServer:
         self._server.start()
 
     def close(self) -> None:
-        """Switch devices and server off; no thread or port remains. May be called repeatedly."""
+        """Switch devices and server off, end all threads and free the port; may be called repeatedly."""
         self._faults.end()
         gone = self._server.stop(None)
         # also ends waiting reads and writes
@@ -258,7 +260,7 @@ class DaqServer:
         self._faults.stall(seconds)
 
     def lose_network(self) -> None:
-        """Simulate a lost network between this server and its chassis: watchdogs configured to do so expire."""
+        """Simulate a lost connection between this server and its chassis; watchdogs configured for it expire."""
         self._driver.lose_network()
 
     def vanish(self) -> None:
@@ -274,7 +276,7 @@ class DaqServer:
 
 
 def _chosen(item: str, given: str | None, known: Sequence[str]) -> str | None:
-    """The specified one, or else the first."""
+    """The specified terminal, by default the first."""
     if given is None:
         return known[0] if known else None
     if given not in known:

@@ -10,7 +10,7 @@ from drivers.emulation.daqmx.errors import DaqmxFailure
 
 
 class Job(Protocol):
-    """Work of a task: its channels, timing and run."""
+    """The function of a task: its channels, timing and run."""
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -19,7 +19,7 @@ class Job(Protocol):
 
     @property
     def devices(self) -> frozenset[str]:
-        """Names of the devices that it uses."""
+        """Names of the devices in use."""
         ...
 
     @property
@@ -29,26 +29,26 @@ class Job(Protocol):
 
     @property
     def awaited(self) -> str | None:
-        """The terminal of the start trigger that it waits for."""
+        """The terminal of the awaited start trigger; None without one."""
         ...
 
     @property
     def start_terminal(self) -> str | None:
-        """The terminal of its own start signal."""
+        """The terminal of the job's own start signal."""
         ...
 
     @property
     def source(self) -> str | None:
-        """The terminal of the external sample clock that it follows; None for its own clock, or none."""
+        """The terminal of the external sample clock; None for a job with its own clock or without one."""
         ...
 
     @property
     def clock_terminal(self) -> str | None:
-        """The terminal of its own sample clock."""
+        """The terminal of the job's own sample clock."""
         ...
 
     def engage(self, is_free: Callable[[str], bool]) -> None:
-        """Choose from the free resources what the driver chooses when it reserves the task."""
+        """Choose the resources that the driver chooses when it reserves the task."""
         ...
 
     def check(self) -> None:
@@ -64,7 +64,7 @@ class Job(Protocol):
         ...
 
     def verdict(self) -> None:
-        """Raise DaqmxFailure if the ended run had failed."""
+        """Raise DaqmxFailure if the run that ended has failed."""
         ...
 
 
@@ -94,7 +94,7 @@ class Task:
 
     @property
     def required_job(self) -> Job:
-        """Its job. Raises DaqmxFailure if it has no channel yet."""
+        """The task's job. Raises DaqmxFailure for a task without channels."""
         if self.job is None:
             raise DaqmxFailure(
                 DAQmxErrors.CAN_NOT_PERFORM_OP_WHEN_NO_CHANS_IN_TASK,
@@ -103,7 +103,7 @@ class Task:
         return self.job
 
     def doing(self, kind: type[J]) -> J:
-        """Its job, which must be of this kind. Raises DaqmxFailure if it is another."""
+        """The task's job. Raises DaqmxFailure if it is not of this kind."""
         job = self.required_job
         if not isinstance(job, kind):
             raise DaqmxFailure(
@@ -113,7 +113,7 @@ class Task:
         return job
 
     def require_stopped(self) -> None:
-        """Raise DaqmxFailure while it runs."""
+        """Raise DaqmxFailure while the task runs."""
         if self.state.started:
             raise DaqmxFailure(
                 DAQmxErrors.CAN_NOT_PERFORM_OP_WHILE_TASK_RUNNING,

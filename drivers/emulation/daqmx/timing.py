@@ -12,16 +12,16 @@ from numpy.typing import NDArray
 from drivers.emulation.daqmx.errors import DaqmxFailure
 
 _SOON = 5.0e-5
-"""Tolerance for clock readings that are before the expected tick due to rounding [s]."""
+"""Tolerance for clock readings that precede the expected tick because of rounding [s]."""
 
 
 def deadline_after(timeout: float) -> float:
-    """Deadline of a call with this DAQmx time-out (monotonic seconds); -1 waits for ever."""
+    """Deadline [monotonic s] of a call with this DAQmx time-out; -1: never."""
     return float("inf") if timeout < 0.0 else time.monotonic() + timeout
 
 
 def wait_until(changed: threading.Condition, instant: float, deadline: float) -> bool:
-    """Wait until `instant`, `deadline` or a change; returns False if the deadline passes first."""
+    """Wait until `instant`, `deadline` or a notification; returns False if the deadline passes first."""
     now = time.monotonic()
     if now >= deadline:
         return False
@@ -36,7 +36,7 @@ _SAME = 1.0e-9
 
 @dataclass(frozen=True)
 class SampleClock:
-    """One sample every `divider` ticks: `rate` samples per second. `samples` sizes the buffer, per channel.
+    """One sample every `divider` ticks: `rate` samples per second. `samples` is the requested buffer size per channel.
 
     `error` is the relative excess rate of the clock over the plant's ticks.
     """
@@ -55,11 +55,11 @@ class SampleClock:
         return first + ceil(samples * self.divider / (1.0 + self.error))
 
     def passed(self, first: int, tick: int) -> int:
-        """Number of samples up to `tick` if sample 0 is at `first`."""
+        """Number of samples up to `tick` if sample 0 is at tick `first`."""
         return max(int(self.numbers(first, np.array([tick]))[0]) + 1, 0)
 
     def numbers(self, first: int, ticks: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Number of the latest sample at each of `ticks`, same shape, if sample 0 is at `first`."""
+        """Number of the latest sample at each of `ticks`, same shape, if sample 0 is at tick `first`."""
         if self.error == 0.0:
             return (ticks - first) // self.divider
         return np.floor((ticks - first) * (1.0 + self.error) / self.divider).astype(np.int64)

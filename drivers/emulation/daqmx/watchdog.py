@@ -12,7 +12,7 @@ from drivers.emulation.daqmx.lines import Lines
 from sim import waiting
 
 Expire = Callable[[Sequence[DeviceModel], dict[str, bool], dict[str, float]], None]
-"""Sets the outputs of devices: levels by line, volts by analogue output."""
+"""Function that sets the outputs of devices: levels by line, volts by analogue output."""
 
 
 class Watchdog:
@@ -42,7 +42,7 @@ class Watchdog:
         self.timeout = timeout
         self.device = device
         self.guarded = frozenset(part.name for part in parts)
-        """Its devices, of whose tasks none may be reserved when it starts."""
+        """The devices of the watchdog; when it starts, none of their tasks may be reserved."""
         self._parts = tuple(parts)
         self._expire = expire
         self._lines = lines
@@ -68,7 +68,7 @@ class Watchdog:
 
     @property
     def expired(self) -> bool:
-        """Whether it has expired because it was not reset in time."""
+        """Whether the watchdog has expired."""
         return self._expired
 
     def expire_to(self, states: dict[str, bool]) -> None:
@@ -90,7 +90,7 @@ class Watchdog:
 
     @property
     def trips_on_loss(self) -> bool:
-        """Whether it expires when the network connection to the chassis is lost. Raises DaqmxFailure on a device."""
+        """Whether it expires when the chassis loses its network connection. Raises DaqmxFailure unless on a chassis."""
         self._require_network()
         return self._trips
 
@@ -104,7 +104,7 @@ class Watchdog:
         self._expired = False
 
     def lose_network(self) -> None:
-        """Simulate a lost connection: the watchdog expires at once if it is configured to."""
+        """Simulate a lost network connection: the watchdog expires at once if it is configured for it."""
         with self._changed:
             if self._trips and self._deadline is not None:
                 self._deadline = time.monotonic()
@@ -154,7 +154,7 @@ class Watchdog:
     def clear_expiration(self) -> None:
         """Permit writes to the lines again, and restart the timer if it had expired.
 
-        Raises DaqmxFailure on a chassis, which must be reset instead.
+        Raises DaqmxFailure for a chassis, which must be reset instead.
         """
         with self._changed:
             if self._expired and len(self._parts) > 1:

@@ -45,8 +45,8 @@ MODULES: dict[str, DeviceModel] = {
         "NI 9215",
         inputs=AnalogInputs(4, (10.0,), 1.0e5, 1.0e5, simultaneous=True, wirings=Wirings.DIFFERENTIAL),
     ),
-    # NI-9234 Specifications: 24 bits, 5 V, internal master timebase of 13.1072 MHz; the constant of its input delay has
-    # no page number here: no stored copy of the specifications contains it
+    # NI-9234 Specifications: 24 bits, 5 V, internal master timebase of 13.1072 MHz; the constant of its input delay is
+    # cited without page number, since no copy of that page was available
     "9234": DeviceModel(
         "",
         "NI 9234",
@@ -104,7 +104,7 @@ def _cdaq(product: str, watchdog: float | None = None) -> DeviceModel:
 
 
 def _crio(product: str) -> DeviceModel:
-    """A controller; no watchdog that DAQmx could set (NI-DAQmx help lists none for CompactRIO)."""
+    """A controller. DAQmx cannot set a watchdog on it (NI-DAQmx help lists none for CompactRIO)."""
     return DeviceModel("cRIO1", product, _CRIO, input_engines=_CRIO_INPUTS, output_engines=_CRIO_OUTPUTS)
 
 
@@ -145,14 +145,14 @@ def _x_series(product: str, *, transfer_condition: bool) -> DeviceModel:
 
 SINGLE: dict[str, DeviceModel] = {
     "PCIe-6351": _x_series("PCIe-6351", transfer_condition=True),
-    # without bus mastering there is no condition for transfers, but a request size (NI-DAQmx help, "AO.UsbXferReqSize")
+    # without bus mastering there is a request size instead of a transfer condition (NI-DAQmx help, "AO.UsbXferReqSize")
     "USB-6351": _x_series("USB-6351 (BNC)", transfer_condition=False),
 }
 
 NAMES = (*CHASSIS, *SINGLE)
 """Every device that can be emulated by its name."""
 SUGGESTED = ("9205", "9263", "9401", "9485")
-"""Default modules of a chassis: inputs, output, digital inputs, relays."""
+"""Modules in a chassis by default: inputs, output, digital inputs, relays."""
 
 
 def build(device: str, modules: Sequence[str] = ()) -> tuple[DeviceModel, ...]:
@@ -191,5 +191,5 @@ def build(device: str, modules: Sequence[str] = ()) -> tuple[DeviceModel, ...]:
 
 
 def _on_bus(outputs: AnalogOutputs | None, chassis: DeviceModel) -> AnalogOutputs | None:
-    """Outputs in a chassis: only a controller, which transfers by bus mastering, has a condition for it."""
+    """Outputs in a chassis; only a controller, which uses bus mastering, has a transfer condition."""
     return None if outputs is None else replace(outputs, transfer_condition=chassis.category is _CRIO)

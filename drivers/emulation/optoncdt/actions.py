@@ -46,7 +46,7 @@ class Identity:
 
 
 class Mastering:
-    """Pending mastering: waits for a valid distance for at most two seconds."""
+    """A pending mastering request, which waits for a valid distance for at most two seconds."""
 
     def __init__(self, sensor: Sensor, value: float, done: list[str], now: float) -> None:
         self._sensor, self._value, self._done = sensor, value, done
@@ -86,11 +86,11 @@ class Actions:
         }
 
     def done(self, request: Request) -> list[str]:
-        """The answer to a successful command that returns no value (manual, p. 98)."""
+        """The answer to a command that succeeds and returns no value (manual, p. 98)."""
         return [f"{request.text} ok"] if self._sensor.settings.echo else []
 
     def require_professional(self) -> None:
-        """Raise Refusal for the user level with read access only."""
+        """Raise Refusal at the user level that has read access only."""
         if not self._sensor.settings.professional:
             raise Refusal(202, "Access denied")
 
@@ -102,7 +102,7 @@ class Actions:
 
     def _info(self, request: Request) -> list[str]:
         _no_parameters(request)
-        # known clients expect one line before the name
+        # existing clients expect one line before the name
         return [request.text, *self._identity.lines] if self._sensor.settings.echo else self._identity.lines
 
     def _outputs(self, request: Request) -> list[str]:
@@ -169,7 +169,7 @@ class Actions:
         return self.done(request)
 
     def _measuring_settings(self, request: Request) -> list[str]:
-        """Handler for measurement settings: there is one storage slot, regardless of its name."""
+        """Handler for stored measurement settings, which share one slot, whatever its name."""
         self.require_professional()
         sensor = self._sensor
         match request.parameters:

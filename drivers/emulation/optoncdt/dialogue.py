@@ -1,4 +1,4 @@
-"""Serial line of the sensor, a pseudo-terminal that programs open like a serial port, and its command dialogue."""
+"""The sensor's serial line, a pseudo-terminal that programs open like a serial port, and its command dialogue."""
 
 import os
 import select
@@ -81,7 +81,7 @@ class PseudoTerminal:
         self.dropped += len(sent) - taken
 
     def close(self) -> None:
-        """Close the line, so that the client's next access fails; may be called repeatedly."""
+        """Close the line; the client's next access fails. May be called repeatedly."""
         if self._open:
             self._open = False
             os.close(self._end)
@@ -95,7 +95,7 @@ _OPEN_TO_ALL = ("ECHO", "LANGUAGE")
 
 
 class Dialogue:
-    """Executes commands for `sensor` and answers them; `rates` are its measuring rates [1/s]."""
+    """Executes commands on `sensor` and answers them; `rates` are the measuring rates of the sensor [1/s]."""
 
     def __init__(self, sensor: Sensor, actions: Actions, rates: tuple[float, ...]) -> None:
         self._sensor, self._actions = sensor, actions
@@ -117,7 +117,7 @@ class Dialogue:
             line, self._heard = self._heard.split(b"\n", 1)
             said += self._answer(line.rstrip(b"\r"), now)
         if b"\n" not in self._heard:
-            # keep enough of an unterminated command to exceed the longest valid one
+            # keep enough of an unterminated command for it to be rejected as too long
             self._heard = self._heard[: _LONGEST + 1]
         return said
 

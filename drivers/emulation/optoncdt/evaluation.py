@@ -1,4 +1,4 @@
-"""Conversion of distances to codes (errors of the optics, moving mean, mastering, hold) and of codes to bytes."""
+"""Conversion of distances to codes, with optical errors, moving mean, mastering and hold, and of codes to bytes."""
 
 from enum import IntEnum
 
@@ -12,11 +12,11 @@ from sim.sensors import Laser
 WORD = 3
 """Bytes per value."""
 WORD_BITS = 30
-"""Bits per value on the line: each byte has a start bit and a stop bit."""
+"""Bits per value on the line, including a start bit and a stop bit per byte."""
 LAST_DISTANCE = 65520
 """Code at the end of the reserve beyond the measuring range (manual of the optoNCDT 1420, p. 65)."""
 LAST_MASTERED = 262071
-"""Largest code of a mastered distance: error codes begin above."""
+"""Largest code of a mastered distance; error codes are greater."""
 
 
 class Fault(IntEnum):
@@ -47,7 +47,7 @@ def mastered_codes(shares: NDArray[np.float64]) -> NDArray[np.int64]:
 def words(blocks: NDArray[np.int64]) -> NDArray[np.uint8]:
     """Bytes of `n` blocks of `m` values of 18 bits, shape (n, m): low, middle and high six bits (manual, p. 84).
 
-    The two upper bits distinguish the three bytes, and the first value of a block from the others.
+    The two upper bits of each byte identify the byte of the value and mark the first value of a block.
     """
     sent = np.empty((*blocks.shape, WORD), dtype=np.uint8)
     sent[:, :, 0] = blocks & 0x3F
@@ -80,7 +80,7 @@ class Optics:
 
 
 class Evaluation:
-    """Converts measurements, in order, to codes; keeps the history for the moving mean and the hold."""
+    """Converts successive measurements to codes; keeps the history for the moving mean and the hold."""
 
     def __init__(self, measuring_range: float) -> None:
         self._range = measuring_range
@@ -93,8 +93,8 @@ class Evaluation:
         self._age = np.inf
 
     def codes(self, shares: Array, faults: NDArray[np.int64], settings: Settings) -> NDArray[np.int64]:
-        """Codes of measurements, shape (n,), n > 0: of `shares` (fractions of the range) where `faults` is zero, else
-        the fault.
+        """Codes of measurements, shape (n,), n > 0: of `shares` (fractions of the range) where `faults` is zero,
+        elsewhere the fault.
         """
         valid = faults == 0
         shares = self._mean(np.where(valid, shares, np.nan), settings.average)
@@ -107,7 +107,7 @@ class Evaluation:
         return self._hold(np.where(valid, codes, faults), valid, settings.hold)
 
     def _mean(self, shares: Array, n: int) -> Array:
-        """Mean of the valid measurements among the last `n`, where the newest is valid."""
+        """Mean of the valid ones among the last `n` measurements; meaningless where the newest is invalid."""
         known = np.concatenate((self._tail, shares))
         self._tail = known[known.size - min(n - 1, known.size) :]
         if n == 1:

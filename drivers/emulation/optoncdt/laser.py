@@ -28,7 +28,7 @@ class Line:
     def __init__(self, random: Generator) -> None:
         self._random = random
         self.lose = 0
-        """Number of following bytes to lose."""
+        """Number of next bytes to lose."""
         self.probability = 0.0
         """Probability of the loss of a byte."""
         self.garbage = 0
@@ -39,7 +39,7 @@ class Line:
         """Whether an answer may split a value."""
 
     def carried(self, stream: Bytes, answer: bytes, now: float) -> Bytes:
-        """Bytes that reach the client: the values of `stream`, with the answer between two of them."""
+        """Bytes that reach the client: the values of `stream`, with `answer` inserted between two of them."""
         sent = self._woven(stream, answer)
         if now < self.silent_until:
             return sent[:0]
@@ -54,8 +54,8 @@ class Line:
         return sent
 
     def misread(self, sent: Bytes, baud: int, read_at: int) -> Bytes:
-        """Noise that a client receives at a rate other than `baud`; without a hyphen, so that it never resembles a
-        prompt by chance.
+        """Noise received by a client whose rate `read_at` differs from `baud`. It contains no hyphen, so that it never
+        resembles a prompt.
         """
         noise = self._random.integers(0, 256, round(sent.size * min(1.0, read_at / baud)), dtype=np.uint8)
         return np.where(noise == _HYPHEN, np.uint8(0), noise)
@@ -70,7 +70,7 @@ class Line:
 
 
 _TURN = 0.002
-"""Period of the sensor's line handling [s]."""
+"""Period at which the serial line is served [s]."""
 _RATES = (250.0, 500.0, 1000.0, 2000.0, 4000.0, 8000.0)
 """Measuring rates of a recent sensor [1/s]; older sensors lack the last rate (manual of the optoNCDT 1420, p. 84)."""
 _TARGETS = {"too close": Fault.TOO_CLOSE, "too far": Fault.TOO_FAR, "none": Fault.NO_PEAK, None: None}
@@ -79,7 +79,7 @@ _TARGETS = {"too close": Fault.TOO_CLOSE, "too far": Fault.TOO_FAR, "none": Faul
 class EmulatedLaser:
     """A sensor that measures `sight` with the errors of the simulated `laser`, on the serial port `port`.
 
-    It is switched on by the constructor and serves its line from `start()` on. `as_found` are the settings at power-up;
+    The constructor switches it on, and it serves its line from `start()` on. `as_found` are the settings at power-up;
     by default it does not stream. `clock_error` is the relative error of its clock, by default that of `laser`. `rates`
     [1/s], `password` and `boot_time` [s] differ between versions of the sensor or are not documented. Every method may
     be called from any thread.
@@ -112,11 +112,11 @@ class EmulatedLaser:
         self._thread = threading.Thread(target=self._serve, name=f"emulated {identity.name}", daemon=True)
 
     def start(self) -> None:
-        """Serve the line."""
+        """Start to serve the line."""
         self._thread.start()
 
     def close(self) -> None:
-        """Switch off; no thread or port remains. May be called repeatedly."""
+        """Switch off, end the thread and close the port; may be called repeatedly."""
         self.unplug()
         if self._thread.is_alive():
             waiting.join(self._thread)
@@ -128,7 +128,7 @@ class EmulatedLaser:
 
     @property
     def analogue(self) -> bool:
-        """Whether the analogue output is live; otherwise it shows its error current."""
+        """Whether the analogue output follows the target; otherwise it supplies its error current."""
         return self._sensor.settings.output == "ANALOG"
 
     @property
@@ -143,7 +143,7 @@ class EmulatedLaser:
 
     @property
     def epoch(self) -> float:
-        """Host time of the zero of the time stamps: power-up or the last RESETCNT TIMESTAMP [s]."""
+        """Host time at which the time stamps were zero: power-up or the last RESETCNT TIMESTAMP [s]."""
         with self._lock:
             return self._sensor.grid.epoch.now
 
@@ -154,7 +154,7 @@ class EmulatedLaser:
             return self._sensor.grid.rate
 
     def host_time_of(self, index: int) -> float:
-        """Host time of an exposure [s]: `index` is its counter, continued beyond 18 bits, at the present rate."""
+        """Host time of an exposure at the present rate [s]; `index` is its counter, continued beyond 18 bits."""
         with self._lock:
             grid = self._sensor.grid
             return float(grid.times(np.array([index + grid.count.now]))[0])
@@ -170,7 +170,7 @@ class EmulatedLaser:
             self._line.garbage = count
 
     def silence(self, seconds: float) -> None:
-        """Suppress all output to the client for a while; the sensor continues measuring."""
+        """Suppress all output to the client for `seconds`; the sensor continues to measure."""
         with self._lock:
             self._line.silent_until = time.monotonic() + seconds
 
@@ -180,17 +180,17 @@ class EmulatedLaser:
             self._line.splits_words = allowed
 
     def laser_off(self) -> None:
-        """Open or close the input that switches the laser on."""
+        """Open the input that switches the laser on."""
         with self._lock:
             self._sensor.beam = False
 
     def laser_on(self) -> None:
-        """Close the input again."""
+        """Close the input that switches the laser on."""
         with self._lock:
             self._sensor.beam = True
 
     def target(self, place: Literal["too close", "too far", "none"] | None) -> None:
-        """Replace the target by another or none; None restores the original sight."""
+        """Replace the target by one that is too close, too far or missing; None restores the original sight."""
         with self._lock:
             self._sensor.target = _TARGETS[place]
 
@@ -211,7 +211,7 @@ class EmulatedLaser:
 
     def _turn(self, now: float) -> None:
         received = self._terminal.read()
-        # checked after the read: a client opens and configures the port before it sends data
+        # read after the data, since a client configures the port before it sends data
         connected, read_at, baud = self._terminal.connected, self._terminal.baud, self._sensor.settings.baud
         if read_at != baud:
             # at the wrong rate no command is recognised, and the received bytes corrupt the next one

@@ -13,11 +13,11 @@ from drivers.emulation.plant import Sight
 from sim.sensors import Laser
 
 TICKS = 100_000
-"""Ticks of the time stamp in a second of the sensor's clock (manual of the optoNCDT 1420, p. 66)."""
+"""Time-stamp ticks per second of the sensor's clock (manual of the optoNCDT 1420, p. 66)."""
 
 
 class Zero:
-    """Resettable counter: earlier values keep their zero."""
+    """Resettable zero of a counter; values before a reset are counted from the previous zero."""
 
     def __init__(self, now: float) -> None:
         self._before = self.now = now
@@ -26,7 +26,7 @@ class Zero:
         self._before, self.now = self.now, now
 
     def since(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Ascending `values`, shape (n,) with n > 0, counted from their zero."""
+        """Ascending `values`, shape (n,) with n > 0, each counted from its zero."""
         if values[0] >= self.now:
             return values - self.now
         return values - np.where(values < self.now, self._before, self.now)
@@ -35,7 +35,7 @@ class Zero:
 class Grid:
     """Exposures at equal intervals of the sensor's clock, which has the relative error `clock_error`.
 
-    Host times in seconds. Exposures are numbered from power-up, across changes of the rate.
+    Times are host times [s]. Exposures are numbered from power-up, through changes of the rate.
     """
 
     def __init__(self, rate: float, clock_error: float, origin: float) -> None:
@@ -56,15 +56,15 @@ class Grid:
         return self.first + max(floor((now - self._origin) * self.rate) + 1, 0)
 
     def times(self, numbers: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Times of the exposures of these numbers [s]."""
+        """Times of the exposures `numbers` [s]."""
         return self._origin + (numbers - self.first) / self.rate
 
     def counters(self, numbers: NDArray[np.int64]) -> NDArray[np.int64]:
-        """The 18-bit counter of these exposures."""
+        """The 18-bit counters of the exposures `numbers`."""
         return self.count.since(numbers.astype(np.float64)).astype(np.int64) & 0x3FFFF
 
     def stamps(self, times: NDArray[np.float64]) -> NDArray[np.int64]:
-        """The 32-bit time stamps of exposures at these times, in ticks."""
+        """The 32-bit time stamps of exposures at `times`, in ticks."""
         return np.floor(self.epoch.since(times) * (self._pace * TICKS)).astype(np.int64) & 0xFFFFFFFF
 
 
@@ -117,7 +117,7 @@ class Sensor:
         self._evaluation.restart()
 
     def apply(self, settings: Settings, now: float) -> None:
-        """Use other settings from `now` on."""
+        """Apply `settings` from `now` on."""
         if settings.rate != self.settings.rate:
             self.grid.change(settings.rate, now)
             self._following = self.grid.first
@@ -141,7 +141,7 @@ class Sensor:
 
     @property
     def values(self) -> int:
-        """Number of values in a block: a time stamp takes two."""
+        """Number of values in a block; a time stamp occupies two."""
         return 1 + len(self.settings.additional) + ("TIMESTAMP" in self.settings.additional)
 
     def look(self, now: float) -> float | None:
@@ -150,7 +150,7 @@ class Sensor:
         return None if faults[0] else float(shares[0])
 
     def master(self, value: float, now: float) -> bool:
-        """Master the present distance to `value` [m]; False when it is invalid."""
+        """Master the present distance to `value` [m]; returns False if the distance is invalid."""
         place = self.look(now)
         if place is None:
             return False
@@ -158,8 +158,8 @@ class Sensor:
         return True
 
     def _measure(self, times: NDArray[np.float64]) -> tuple[NDArray[np.float64], Codes]:
-        """Fractions of the measuring range and faults at `times`, shape (n,) each; the fractions at faults are
-        meaningless.
+        """Fractions of the measuring range and faults at `times`, shape (n,) each; the fractions are meaningless where
+        there is a fault.
         """
         if not self.beam or self.settings.laser_power == "OFF":
             return np.full(times.size, np.nan), np.full(times.size, Fault.LASER_OFF)
@@ -169,14 +169,14 @@ class Sensor:
         return shares, faults_of(shares)
 
     def _blocks(self, numbers: Codes) -> Codes:
-        """Transmitted values of the exposures of these numbers, shape (n, values)."""
+        """Transmitted values of the exposures `numbers`, shape (n, values)."""
         times = self.grid.times(numbers)
         shares, faults = self._measure(times)
         codes = self._evaluation.codes(shares, faults, self.settings)
         every = self.settings.reduction if "RS422" in self.settings.reduced else 1
         too_much = self.values * WORD_BITS * self.grid.rate / every / self.settings.baud
         if too_much > 1.0:
-            # an error in place of every distance, in as many blocks as fit on the line
+            # every distance is replaced by an error, in as many blocks as fit on the line
             codes = np.full(numbers.size, Fault.DATA_VOLUME)
             every = int(np.ceil(every * too_much))
         blocks = np.array([codes, *self._additional(numbers, times, shares, faults)]).T

@@ -15,7 +15,7 @@ Their order of transmission is not documented; this sensor sends them in this or
 
 @dataclass(frozen=True)
 class Mastering:
-    """The distance at mastering, as a fraction of the measuring range, which is reported as `value` [m]."""
+    """A mastered distance: the distance `place`, a fraction of the measuring range, is reported as `value` [m]."""
 
     place: float
     value: float
@@ -35,15 +35,14 @@ class Settings:
     average: int = 1
     """Measurements in the moving mean."""
     hold: float = 0.0
-    """Number of measurements for which the last valid value replaces an error; infinity means until the next valid
-    value.
+    """Number of measurements for which the last valid value replaces an error; if infinite, until the next valid value.
     """
     reduction: int = 1
     """Output reduction: one in this number of measurements is sent."""
     reduced: tuple[str, ...] = ("RS422",)
     """The outputs to which the reduction applies."""
     trigger: Literal["NONE", "EDGE", "PULSE", "SOFTWARE"] = "NONE"
-    """With any value but NONE the sensor sends no output, since there is no trigger source."""
+    """With any value except NONE the sensor sends no output, since there is no trigger source."""
     laser_power: Literal["FULL", "OFF"] = "FULL"
     mastering: Mastering | None = None
     baud: int = 921_600
@@ -54,7 +53,7 @@ class Settings:
 
 
 BASIC = ("baud", "language")
-"""Device settings; the others are measurement settings."""
+"""The device settings; all others are measurement settings."""
 
 
 class Refusal(Exception):
@@ -71,7 +70,7 @@ OUT_OF_RANGE = "Parameter value is out of range or the format is invalid"
 
 @dataclass(frozen=True)
 class Command:
-    """Query and change of a setting; `change` raises Refusal."""
+    """Functions that query and change a setting; `change` raises Refusal."""
 
     show: Callable[[Settings], str]
     change: Callable[[Settings, list[str]], Settings]
@@ -86,14 +85,14 @@ def number(text: str, kind: type[int] | type[float] = int) -> float:
 
 
 def single(parameters: list[str]) -> str:
-    """The only parameter. Raises Refusal."""
+    """The single element of `parameters`. Raises Refusal if there are none or several."""
     if len(parameters) != 1:
         raise Refusal(232, WRONG_COUNT)
     return parameters[0]
 
 
 def _choice(field: str, meanings: dict[str, Any]) -> Command:
-    """A setting with a keyword for each value."""
+    """Command for a setting with a keyword for each value."""
     words = {value: word for word, value in meanings.items()}
 
     def change(settings: Settings, parameters: list[str]) -> Settings:
@@ -109,7 +108,7 @@ def _named(*words: str) -> dict[str, Any]:
 
 
 def _several(field: str, allowed: tuple[str, ...]) -> Command:
-    """A setting that is a set of keywords, or NONE; shown in the sensor's order."""
+    """Command for a setting that is a set of keywords, or NONE; reported in the sensor's order."""
 
     def show(settings: Settings) -> str:
         return " ".join(getattr(settings, field)) or "NONE"
@@ -125,7 +124,7 @@ def _several(field: str, allowed: tuple[str, ...]) -> Command:
 
 
 def _integer(field: str, allowed: Callable[[float], bool]) -> Command:
-    """A setting that is a number."""
+    """Command for an integer setting."""
 
     def change(settings: Settings, parameters: list[str]) -> Settings:
         if not allowed(value := number(single(parameters))):
@@ -136,7 +135,7 @@ def _integer(field: str, allowed: Callable[[float], bool]) -> Command:
 
 
 def _measuring_rate(rates: tuple[float, ...]) -> Command:
-    """Measuring rate in kHz, one of `rates` [1/s]."""
+    """Command for the measuring rate, in kHz; permitted are `rates` [1/s]."""
 
     def change(settings: Settings, parameters: list[str]) -> Settings:
         if (rate := 1e3 * number(single(parameters), float)) not in rates:
@@ -176,7 +175,7 @@ def _change_average(settings: Settings, parameters: list[str]) -> Settings:
 
 
 def commands(rates: tuple[float, ...]) -> dict[str, Command]:
-    """The settings by name; the sensor measures at `rates` [1/s]."""
+    """The commands for settings by name; `rates` are the measuring rates of the sensor [1/s]."""
     return {
         "LANGUAGE": _choice("language", _named("DE", "EN", "CN")),
         "ECHO": _choice("echo", {"ON": True, "OFF": False}),

@@ -1,6 +1,6 @@
-"""Results of decays: the fit as an event, findings for other runs, and the masses on which they depend.
+"""Results of decays: the fit as an event, findings for other runs, and the masses on which the findings depend.
 
-The masses of the storeys are taken from a specimen file if it has them, else from the configuration.
+The masses of the storeys are taken from the specimen file if it contains them, otherwise from the configuration.
 """
 
 from collections.abc import Generator
@@ -32,13 +32,13 @@ MASSES = ("m1", "m2")
 
 
 def fit_finished(decay: Decay, name: str) -> FitFinished:
-    """Event with a fitted decay as measured by the lasers."""
+    """Event with a fitted decay and the lasers' signals."""
     fit, stretch = decay.fit, decay.fit.stretch
     columns = {"time": Series(stretch.time, "s", "time since the start of the recording")}
     for row, laser in enumerate(STOREYS):
         measured, fitted = stretch.seen[row], fit.fitted[row]
         columns[laser] = Series(measured, "m", f"signal of {laser}, averaged over the time step")
-        columns[f"{laser}_fitted"] = Series(fitted, "m", f"signal of {laser} for the fitted frame")
+        columns[f"{laser}_fitted"] = Series(fitted, "m", f"signal of {laser} computed with the fitted frame")
         columns[f"{laser}_residual"] = Series(measured - fitted, "m", "measured minus fitted")
     columns[TABLE_DISPLACEMENT] = Series(stretch.table, "m", "measured motion of the table, used as input of the fit")
     uncertainties = np.sqrt(np.diag(decay.uncertainty.own + decay.uncertainty.common))
@@ -50,10 +50,10 @@ def fit_finished(decay: Decay, name: str) -> FitFinished:
 
 
 def frame_findings(result: FrameResult, known: Identified) -> tuple[list[Finding], list[Correlation]]:
-    """Stiffnesses, damping ratios and the masses used to identify them, with all correlations.
+    """Stiffnesses, damping ratios, and the masses with which they were identified, with all correlations.
 
-    Known masses are kept; they correlate the frame with all other known quantities. Physically impossible values, such
-    as a negative damping ratio, are omitted.
+    Masses known from the specimen file are kept; they correlate the frame with all other known quantities. Physically
+    impossible values, such as a negative damping ratio, are omitted.
     """
     indices = list(FOUND.values())
     inner = result.frame.covariance[np.ix_(indices, indices)]
@@ -95,7 +95,7 @@ def frame_findings(result: FrameResult, known: Identified) -> tuple[list[Finding
 
 
 def impossible_values(result: FrameResult) -> str | None:
-    """Warning naming physically impossible values, which are not written to a file; None if all are possible."""
+    """Warning that names physically impossible values, which are not stored; None if all values are possible."""
     values = {name: float(result.frame.values[place]) for name, place in FOUND.items()}
     texts = [f"{name} = {value:.3g}" for name, value in values.items() if not possible(name, value)]
     return f"{', '.join(texts)} is physically impossible, and is not stored for other runs" if texts else None
@@ -107,7 +107,7 @@ def through_masses(shift: Array, known: Identified, name: str) -> float:
 
 
 def known_covariance(known: Identified, first: str, second: str) -> float:
-    """Covariance of two findings; variance if both are the same."""
+    """Covariance of two findings, or variance if both are the same."""
     places = (first,) if first == second else (first, second)
     return float(known.covariance(places)[0, -1])
 
@@ -115,8 +115,8 @@ def known_covariance(known: Identified, first: str, second: str) -> float:
 def correlations_with(
     name: str, own: float, covariances: dict[str, float], others: dict[str, float]
 ) -> list[Correlation]:
-    """Correlations of `name`, whose standard uncertainty is `own`, with other quantities, from covariances and standard
-    uncertainties.
+    """Correlations of `name`, whose standard uncertainty is `own`, with other quantities, from the covariances with
+    them and their standard uncertainties.
     """
     return [
         Correlation(first=name, second=other, coefficient=float(np.clip(covariance / (others[other] * own), -1.0, 1.0)))
@@ -131,12 +131,12 @@ def standard_uncertainties(known: Identified) -> dict[str, float]:
 
 
 def known_masses(known: Identified | None) -> Identified | None:
-    """The identified quantities if they include both masses, else None."""
+    """The identified quantities if they include both masses, otherwise None."""
     return known if known is not None and set(MASSES) <= set(known.names) else None
 
 
 def mass_covariance(parameters: DecayParameters, known: Identified | None) -> NDArray[np.float64]:
-    """Covariance of both masses [kg2], shape (2, 2)."""
+    """Covariance of the two masses [kg2], shape (2, 2)."""
     if (found := known_masses(known)) is not None:
         return found.covariance(MASSES)
     rho = parameters.mass_correlation
@@ -158,14 +158,14 @@ def check_masses(parameters: DecayParameters, configuration: BenchConfiguration)
 
 
 def mass_warning(configuration: BenchConfiguration) -> Generator[Step, Outcome, None]:
-    """Warn when the configuration and the specimen file have different masses; those of the specimen file are used."""
+    """Warn if the masses in configuration and specimen file differ; those of the specimen file are used."""
     if (known := known_masses(configuration.identified)) is None:
         return
     frame = configuration.specimen.frame
     found = {name: finding for name in MASSES if (finding := known.finding(name)) is not None}
     if any(finding.value != getattr(frame, name) for name, finding in found.items()):
-        asked = f"specimen.frame has m1 = {frame.m1:.6g} kg, m2 = {frame.m2:.6g} kg"
-        text = f"the masses are those of the specimen file, {_masses_text(known)}; {asked}, which is not used"
+        asked = f"specimen.frame.m1 = {frame.m1:.6g} kg and m2 = {frame.m2:.6g} kg"
+        text = f"the masses are those of the specimen file, {_masses_text(known)}; {asked} are not used"
         yield Publish(Warned(text))
 
 

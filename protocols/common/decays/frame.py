@@ -1,4 +1,4 @@
-"""Combination of decays: quantities `modal.NAMES` and slopes of the damping, with all covariances."""
+"""Combination of decays: the quantities `modal.NAMES` and the slopes of the damping, with all covariances."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -17,17 +17,18 @@ from protocols.common.decays.parameters import DecayPoint
 Array = NDArray[np.float64]
 
 SIGNIFICANT = 2.576
-"""Threshold of a significant difference in standard uncertainties: the normal quantile for 99 %."""
+"""Threshold of a significant difference, in standard uncertainties: the normal quantile for 99 %."""
 
 
 @dataclass(frozen=True, eq=False)
 class FrameResult:
     """Result of one or several decays.
 
-    `frame` combines the quantities, `slopes` the changes of the damping with amplitude [1/m]. `masses` [kg] are as
-    weighed, with the covariance `weighed` [kg2], shape (2, 2). `mass_shift`, shape (8, 2), is the sensitivity of the
-    quantities to the masses, `time_shift`, shape (8,), is the sensitivity to the timebase multiplied by the timebase's
-    standard uncertainty. `parts` holds the standard uncertainties, shape (8,), by contribution.
+    `frame` contains the combined quantities, `slopes` the combined changes of the damping with amplitude [1/m].
+    `masses` [kg] are the weighed masses, `weighed` [kg2], shape (2, 2), is their covariance. `mass_shift`, shape (8,
+    2), is the sensitivity of the quantities to the masses, `time_shift`, shape (8,), is the sensitivity to the timebase
+    multiplied by the timebase's standard uncertainty. `parts` holds the standard uncertainties, shape (8,), by
+    contribution.
     """
 
     decays: tuple[Decay, ...]
@@ -41,14 +42,14 @@ class FrameResult:
 
     @property
     def shared_shift(self) -> Array:
-        """Sensitivity of the quantities to both masses and the timebase, which all frames of a run share, shape (8,
-        3).
+        """Sensitivity of the quantities to the masses and the timebase, whose errors all frames of a run share, shape
+        (8, 3).
         """
         return np.column_stack((self.mass_shift, self.time_shift))
 
     @property
     def shared(self) -> Array:
-        """Covariance of both masses [kg2] and of the timebase, in units of its standard uncertainty, shape (3, 3)."""
+        """Covariance of both masses [kg2] and of the timebase in units of its standard uncertainty, shape (3, 3)."""
         whole = np.eye(3)
         whole[:2, :2] = self.weighed
         return whole
@@ -138,7 +139,7 @@ def _course_json(course: DampingCourse) -> str:
 
 
 def _short(value: float) -> float:
-    """Round to five digits, for strings in a data file."""
+    """The value rounded to five digits, for strings in a data file."""
     return float(f"{value:.5g}")
 
 
@@ -155,13 +156,13 @@ _FIELDS = (
 
 
 def _part(name: str, decays: Sequence[Decay], frame: Combined) -> Array:
-    """Standard uncertainty due to one contribution, which averages out over the decays if it is independent."""
+    """Standard uncertainty due to one contribution, which averages out unless it is common to all decays."""
     variances = np.array([np.diag(one.uncertainty.parts[name]) for one in decays])
     return np.sqrt(np.mean(variances, axis=0) if name in COMMON else np.sum(frame.weights**2 * variances, axis=0))
 
 
 def nonlinear_text(result: FrameResult) -> str:
-    """Warning, with the slopes, that the damping depends on the amplitude."""
+    """Warning that the damping depends on the amplitude, with the significant slopes."""
     slopes = [
         f"xi{mode + 1} changes by {slope:.2g} +- {uncertainty:.1g} per metre of drift"
         for mode, (slope, uncertainty) in enumerate(zip(result.slopes.values, result.slope_uncertainty, strict=True))

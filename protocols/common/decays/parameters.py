@@ -1,4 +1,4 @@
-"""Parameters of every test by free decays, and the result of a decay."""
+"""Parameters common to all tests with free decays, and the result of a decay."""
 
 from copy import copy
 from typing import Any
@@ -7,7 +7,9 @@ from sim.parameters import Parameters, quantity
 
 EXPANDED = "expanded uncertainty of the preceding value (k = 2)"
 _PARTS = "standard uncertainty by contribution, largest first, as JSON"
-_COURSE = "drift amplitudes in the mode [m], damping ratios at these amplitudes, their standard uncertainties, as JSON"
+_COURSE = (
+    "drift amplitudes in the mode [m], damping ratios at these amplitudes, and their standard uncertainties, as JSON"
+)
 
 
 class DecayParameters(Parameters):
@@ -36,7 +38,7 @@ class DecayParameters(Parameters):
         le=300,
     )
     repeats: int = quantity(
-        5, "1", "number of decays that are combined; their scatter is compared with their uncertainty", ge=1, le=50
+        5, "1", "number of decays to combine; their scatter is compared with their uncertainty", ge=1, le=50
     )
     mass_uncertainty: float = quantity(
         0.0005, "kg", "standard uncertainty of the weighed mass of each storey", ge=0, le=0.1

@@ -29,13 +29,13 @@ SHARE = 0.75
 """Fraction of each limit that is used."""
 
 QUIET = 2.0
-"""Time at rest in the recording before the pulse [s], to determine the noise of the table's sensor."""
+"""Time at rest in the recording before the pulse [s], from which the noise of the table's sensor is determined."""
 
 LEFT, LONGEST = 1.0 / 12.0, 60.0
-"""Fraction of the first mode that remains at the end of the window, and the longest automatic window [s]."""
+"""Fraction of the first mode that remains at the end of the window, and longest automatic window [s]."""
 
 LEAST = 0.003
-"""Minimum drift of a decay [m]; below it the resolution of the lasers dominates."""
+"""Minimum drift of a decay [m]; the resolution of the lasers dominates below it."""
 
 _FEWEST = 20
 """Minimum number of samples of a pulse."""
@@ -60,8 +60,8 @@ class Pulse:
         return made / np.abs(made).max()
 
     def record(self, volts: float, window: float | None = None) -> Array:
-        """Drive [V], shape (n,), for a peak of `volts`: rest, pulse, and zeros for `window` [s], by default the pulse's
-        window.
+        """Drive [V], shape (n,), with a peak of `volts`: rest, pulse, and zeros for `window` [s], by default the
+        pulse's window.
         """
         before, after = (round(time * self.sample_rate) for time in (QUIET, self.window if window is None else window))
         return np.concatenate((np.zeros(before), volts * self.shape, np.zeros(after)))
@@ -78,7 +78,9 @@ class Pulse:
 
 
 def frequencies(specimen: Specimen) -> Array:
-    """Undamped circular frequencies of the frame [rad/s], shape (2,), ascending; the block end of a spring is fixed."""
+    """Undamped circular frequencies of the frame [rad/s], shape (2,), ascending, with a spring fixed at the block's
+    end.
+    """
     mass, _, stiffness = frame_matrices(specimen.frame)
     stiffness[0, 0] += specimen.k_c
     root = np.sqrt(np.diag(mass))
@@ -102,7 +104,7 @@ def decay_window(parameters: DecayParameters, specimen: Specimen) -> float:
 
 @dataclass(frozen=True, eq=False)
 class PlannedPulse:
-    """Pulse with its expected peak drift [m] and demands, by the keys of `bench.preflight.margins`.
+    """A pulse, its expected peak `drift` [m], and its demands, by the keys of `bench.preflight.margins`.
 
     Unknown demands are absent. `binds` names the limit that determines the drift.
     """
@@ -116,8 +118,8 @@ class PlannedPulse:
 def plan_pulse(parameters: DecayParameters, configuration: BenchConfiguration, specimen: Specimen) -> PlannedPulse:
     """Plan the pulse at the level allowed by the bench.
 
-    The table of a simulated bench is modelled by its shaker; any other as one whose velocity follows the drive. Raises
-    InvalidInput for a pulse that is too short, or too weak within the limits.
+    The table of a simulated bench is modelled by its shaker. Any other table is assumed to follow the drive in
+    velocity. Raises InvalidInput for a pulse that is too short, or too weak within the limits.
     """
     pulse = decay_pulse(parameters, configuration, specimen)
     if pulse.shape.size < _FEWEST:
@@ -140,7 +142,7 @@ def plan_pulse(parameters: DecayParameters, configuration: BenchConfiguration, s
 
 
 def pulse_forecast(configuration: BenchConfiguration, pulses: Mapping[str, PlannedPulse], duration: float) -> Forecast:
-    """Largest demands over the `pulses`, which are keyed by the name of the specimen."""
+    """Largest demands of all `pulses`, which are keyed by the name of the specimen."""
     demands: list[Demand] = []
     for quantity in bounds(configuration):
         known = {name: pulse.demands[quantity] for name, pulse in pulses.items() if quantity in pulse.demands}
@@ -170,5 +172,5 @@ def _unit_demands(pulse: Pulse, configuration: BenchConfiguration, specimen: Spe
 
 def _motion(moved: Array, pulse: Pulse, specimen: Specimen, configuration: BenchConfiguration) -> dict[str, float]:
     found = resting_demands(moved, pulse.sample_rate, specimen, configuration)
-    # a clamped block does not lift
+    # a clamped block cannot lift
     return {name: value for name, value in found.items() if name != RESTING}

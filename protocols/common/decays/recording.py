@@ -1,4 +1,4 @@
-"""Recording of the decays of one frame: a search for the level, followed by recording, fit and point of each decay.
+"""Recording of the decays of one frame: search for the level, then recording, fit and point of each decay.
 
 An unusable decay is repeated once, then omitted.
 """
@@ -30,7 +30,7 @@ REST = 2.0
 """Time at rest before each pulse, in which the signals are zeroed [s]."""
 
 STILL = 5e-5
-"""Scatter below which the storeys count as at rest [m]; larger than the resolution of a laser."""
+"""Scatter below which the storeys are considered at rest [m]; larger than the resolution of a laser."""
 
 WAITING = 45.0
 """Expected time of a recording in addition to its drive: settling of the storeys, rest, ramp [s]."""
@@ -39,7 +39,7 @@ DETECTABLE = 20.0
 """Minimum ratio of the drift in a probe to the noise."""
 
 GROWTH, NEAR = 10.0, 2.0
-"""Largest growth factor of the drive between probes, and remaining growth factor below which a probe is the last."""
+"""Largest growth factor of the drive between probes, and required growth factor below which a probe is the last."""
 
 _PROBED = 3.0
 """Time after the pulse of a probe within which the largest motion is expected [s]."""
@@ -50,7 +50,7 @@ _MOST = 6
 
 @dataclass
 class Pace:
-    """Progress of a run: its `expected` duration [s], and the `elapsed` time [s]."""
+    """Progress of a run: its `expected` duration [s] and the `elapsed` time [s]."""
 
     expected: float
     elapsed: float = 0.0
@@ -60,7 +60,8 @@ class Pace:
         return Progress(self.elapsed / self.expected, self.expected - self.elapsed, activity)
 
     def finish(self, begun: float, planned: float) -> None:
-        """Register the end of a part that was expected to take `planned` [s] and began when `begun` [s] had elapsed.
+        """Register the end of a part with an expected duration of `planned` [s] that began when `begun` [s] had
+        elapsed.
 
         Its actual duration, which depends on the number of probes and repetitions, replaces the expected one.
         """
@@ -94,9 +95,9 @@ def record(volts: Array, sample_rate: float, pace: Pace, activity: str) -> Gener
 def find_level(
     pulse: Pulse, drift: float, configuration: BenchConfiguration, pace: Pace
 ) -> Generator[Step, Outcome, float]:
-    """Find the drive [V] for which the pulse causes a peak of `drift` [m], or as large a drift as the limits allow.
+    """Find the drive [V] whose pulse causes a peak of `drift` [m], or the largest drift that the limits allow.
 
-    Raises Unmeasurable if the frame does not respond, or its drift does not reach `LEAST`.
+    Raises Unmeasurable if the frame does not respond, or if its drift cannot reach `LEAST`.
     """
     volts, seen, limit = PROBE, 0.0, _largest_drive(pulse, configuration)
     for probe in range(1, _MOST + 1):
@@ -139,7 +140,7 @@ def _accept(volts: float, seen: float, drift: float, binds: str) -> Generator[St
 
 
 def _headroom(signals: Array, sample_rate: float, configuration: BenchConfiguration) -> tuple[float, str]:
-    """Factor by which a motion may be scaled up until it reaches `SHARE` of a limit, and the name of that limit."""
+    """Factor by which a motion may be scaled until it reaches `SHARE` of a limit, and the name of that limit."""
     # average over a few milliseconds: differences of single samples are dominated by noise
     many = max(round(0.02 * sample_rate), 1)
     rows = len(signals) // many
@@ -166,7 +167,7 @@ def _peak(values: Array) -> float:
 
 
 PointMaker = Callable[[FrameResult, int], Parameters]
-"""Creates the point of a result; the number is 0 for all decays together."""
+"""Creates the point of a result from its number, which is 0 for all decays together."""
 
 PROBES = 3
 """Number of probes that most tables need, used for the expected duration."""
@@ -184,7 +185,7 @@ def pulsed_decays(
     name: str,
     point: PointMaker = decay_point,
 ) -> Generator[Step, Outcome, list[Decay]]:
-    """Find the level, then record the decays; `point` creates the point of each.
+    """Find the level, then record the decays; `point` creates the point of each decay.
 
     Raises Unmeasurable if no decay is usable.
     """
@@ -213,7 +214,7 @@ def repeat_decays(
     how: str,
     point: PointMaker = decay_point,
 ) -> Generator[Step, Outcome, list[Decay]]:
-    """Record decays by `once`, each in at most two attempts, and publish the fit and the point of each.
+    """Record decays with `once`, in at most two attempts each, and publish the fit and the point of each.
 
     `planned` is the expected time of one decay [s], `name` and `how` describe the excitation. Raises Unmeasurable if no
     decay is usable.
@@ -236,7 +237,7 @@ def repeat_decays(
         pace.finish(begun, planned)
         yield Publish(pace.progress(f"finished {name} {number} of {parameters.repeats}"))
     if not decays:
-        raise Unmeasurable("no decay was usable: see the warnings of this run")
+        raise Unmeasurable("no decay was usable: see the warnings of this run for the reasons")
     return decays
 
 

@@ -14,7 +14,7 @@ EXPANDED = "Uncertainties are expanded (k = 2) and include the uncertainty of th
 
 
 def budget_parts(quantity: str, labels: list[str], shares: list[dict[str, float]], expanded: list[float]) -> list[Part]:
-    """Table and bars of an uncertainty budget: `shares` by contribution and `expanded` uncertainties, all in %."""
+    """Table and bar chart of an uncertainty budget: `shares` by contribution and `expanded` uncertainties, all in %."""
     names = sorted({name for each in shares for name in each}, key=lambda name: -sum(s.get(name, 0.0) for s in shares))
     columns = [Column("quantity", words=True), Column("U (k = 2)", "%"), *(Column(name, "%") for name in names)]
     rows = [

@@ -7,7 +7,7 @@ from sim.parameters import COUPLING, Parameters, quantity
 
 
 class IdentifyParameters(Parameters):
-    """Random-phase multisines at low level, with the specimen mounted; several realisations of several periods each."""
+    """Random-phase multisines at low level with the specimen mounted: several realisations of several periods each."""
 
     beta: float | None = quantity(
         None,
@@ -49,7 +49,7 @@ class IdentifyParameters(Parameters):
         3, "1", "number of multisines with different phases; their differences show the distortion", ge=2, le=50
     )
     periods: int = quantity(
-        3, "1", "number of periods used of each multisine; their differences show the noise", ge=2, le=50
+        3, "1", "number of periods of each multisine that are used; their differences show the noise", ge=2, le=50
     )
     discarded: int | None = quantity(
         None,

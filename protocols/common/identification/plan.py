@@ -1,8 +1,8 @@
 """Steps of an identification.
 
-1. The specimen is mounted. The table is probed from a drive too small to cause damage up to the level.
-2. Multisines with random phases are played, each from rest; their first periods are discarded.
-3. Response, noise and distortion are computed from the periods.
+1. The specimen is mounted. The table is probed with increasing drive, from one too small to cause damage up to the
+level. 2. Multisines with random phases are played, each from rest; their first periods are discarded. 3. Response,
+noise and distortion are computed from the periods.
 """
 
 from collections.abc import Callable, Generator, Sequence
@@ -40,7 +40,7 @@ REST = 2.0
 """Time at rest before each drive, in which the signals are zeroed [s]."""
 
 OVERHEAD = 12.0
-"""Time in addition to the duration of the drive: rest, settling of the storeys, ramp [s]."""
+"""Time required in addition to the duration of the drive [s]: rest, settling of the storeys, ramp."""
 
 
 @dataclass
@@ -57,7 +57,7 @@ class Rules:
     gone: float = 0.0
 
     def require_drive(self, volts: Array) -> None:
-        """Raise Unmeasurable for a drive beyond its limits: the table responds less than expected."""
+        """Raise Unmeasurable for a drive beyond its limits, which occurs if the table responds less than expected."""
         peak, slew = float(np.abs(volts).max()), float(np.abs(np.diff(volts)).max()) * self.sample_rate
         limits = self.limits
         if peak > limits.drive_voltage or slew > limits.drive_slew:
@@ -71,7 +71,7 @@ class Rules:
         return Progress(self.gone / self.expected, self.expected - self.gone, activity)
 
     def remains(self, seconds: float) -> None:
-        """Set the expected remaining time [s], since the number of probes depends on the table."""
+        """Correct the expected remaining time [s], since the number of probes depends on the table."""
         self.expected = self.gone + seconds
 
     def watch(self) -> Callable[[Array], Event]:
@@ -88,7 +88,7 @@ class Rules:
 
 
 def played(volts: Array, rules: Rules) -> Generator[Step, Outcome, Played | Fallen]:
-    """Arm, play and ramp out; returns `Fallen` even if the block falls only during the ramp."""
+    """Arm, play and ramp out. Returns `Fallen` if the block falls, even during the ramp."""
     yield Arm(REST)
     outcome = yield Play(volts, rules.watch())
     end = yield RampOut(fast=isinstance(outcome, Fallen))
@@ -108,20 +108,20 @@ AUDIBLE = 2.0
 """Minimum ratio of the response to its noise."""
 
 _AUDIBLE_BY = 2
-"""Number of the probe by which the table must respond."""
+"""Number of the probe at which, at the latest, the table must respond."""
 
 _MOST = 6
 """Largest number of probes."""
 
 
 def probed_response(motion: Complex, grid: Grid, rules: Rules) -> Generator[Step, Outcome, Complex | Fallen]:
-    """Response of the table [m/s2/V] at the lines, measured with `motion` [m/s2].
+    """Response of the table [m/s2/V] at the lines, measured with the motion `motion` [m/s2].
 
-    Raises Unmeasurable if the table does not respond, or does not reach the motion.
+    Raises Unmeasurable if the table does not respond, or does not reach this motion.
     """
     short = grid.shortened()
     level, reached = seen_peak(motion, short, rules.knee), 0.0
-    # until the response is measured, use the spectrum of the acceleration for the drive
+    # the first drive has the spectrum of the acceleration, since the response is unknown
     drive = motion * (PROBE / _peak(motion, short))
     for probe in range(1, _MOST + 1):
         rules.require_drive(short.record(drive))
@@ -155,7 +155,7 @@ def _acceleration(outcome: Played) -> NDArray[np.float64]:
 
 
 def _answer(moved: Complex) -> tuple[float, float]:
-    """Rms of the mean over the periods, and rms of its noise, estimated from the scatter of the periods.
+    """Root sum of squares of the mean over the periods, and of its noise, estimated from the scatter of the periods.
 
     Without a response, both are equal except for their scatter, which decreases with the number of lines.
     """
@@ -188,7 +188,9 @@ def expected_duration(parameters: IdentifyParameters, found: Planned) -> float:
 def identified(
     parameters: IdentifyParameters, configuration: BenchConfiguration, found: Planned
 ) -> Generator[Step, Outcome, TableModel]:
-    """The complete identification with the planned motions `found`, from mounting the specimen to the table model."""
+    """All steps of an identification with the planned motions `found`, from mounting the specimen to the table
+    model.
+    """
     specimen = specimen_of(parameters, configuration)
     rules = Rules(
         configuration.limits,
@@ -228,12 +230,12 @@ def _mounting(specimen: Specimen) -> OperatorAction:
 
 
 def _level(found: Planned) -> str:
-    reason = "as requested" if found.binds == "level" else f"{found.binds} is the limit"
+    reason = "as requested" if found.binds == "level" else f"limited by {found.binds}"
     return f"probe the table; the level is {found.level:.3g} m/s2, {reason}"
 
 
 def _fell(specimen: Specimen) -> Generator[Step, Outcome, Unmeasurable]:
-    """Request that the block be set upright. Returns the error that ends the run."""
+    """Request that the block be set upright; returns the error that ends the run."""
     if specimen.beta is None:
         return Unmeasurable("storey 1 has a permanent offset without a standing block: check frame and lasers")
     yield OperatorAction(OperatorTask.STAND_BLOCK_UP, specimen, "The block has fallen. Set it upright on its base.")
@@ -251,7 +253,7 @@ def _warned(outcome: Played, specimen: Specimen, configuration: BenchConfigurati
 def _identified(
     records: Sequence[Played], found: Planned, specimen: Specimen
 ) -> tuple[TableModel, tuple[float, float]]:
-    """Table model, and gain and lead [s] of the displacement sensor relative to the accelerometer."""
+    """Table model, with gain and lead [s] of the displacement sensor relative to the accelerometer."""
     grid = found.grid
     drive = np.array([grid.used(record.drive) for record in records])
     moved = [np.array([grid.used(record.signals[:, at]) for record in records]) for at in (ACCELERATION, DISPLACEMENT)]

@@ -1,5 +1,5 @@
-"""Multisines of an identification: requested motions, their level within the limits of bench and resting block, and the
-drive for them.
+"""Multisines of an identification: requested motions, their level within the limits of bench and resting block, and
+their drive.
 """
 
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ FADE = 0.25
 """Duration of the fade-in and of the fade-out of a multisine, in periods."""
 
 _LEFT = 0.02
-"""Fraction of the specimen's transient that remains at the first used period."""
+"""Fraction of the specimen's transient that remains at the start of the first used period."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +75,7 @@ class Grid:
 
 
 def grid(parameters: IdentifyParameters, configuration: BenchConfiguration, specimen: Specimen) -> Grid:
-    """Frequency lines for `parameters` on this bench. Raises InvalidInput for a band without lines."""
+    """Frequency lines for `parameters` on this bench. Raises InvalidInput if the period is too short for the band."""
     rate = configuration.sample_rate
     samples = round(parameters.period * rate)
     low, high = band(parameters, configuration)
@@ -84,7 +84,7 @@ def grid(parameters: IdentifyParameters, configuration: BenchConfiguration, spec
         raise InvalidInput(
             "period", parameters.period, f"a line at {low:g} Hz needs a period of at least {1.0 / low:g} s"
         )
-    # lines at or beyond both ends, so that nothing is extrapolated
+    # the lines include both ends of the band, so that no value is extrapolated
     wide = (2 if parameters.odd_lines else 1) * spacing
     lines = band_lines(samples, rate, (max(low - wide, spacing), high + wide), odd=parameters.odd_lines)
     first = int(np.searchsorted(lines * spacing, low * (1.0 + 1e-9), side="right")) - 1
@@ -95,7 +95,7 @@ def grid(parameters: IdentifyParameters, configuration: BenchConfiguration, spec
 
 
 def band(parameters: IdentifyParameters, configuration: BenchConfiguration) -> tuple[float, float]:
-    """Identified band [Hz]: as specified in the parameters, else as required for replication."""
+    """Identified band [Hz]: as specified in the parameters, otherwise as required for replication."""
     low, high = configuration.table_band
     return parameters.band_low or low / REACH, parameters.band_high or high * REACH
 
@@ -113,10 +113,10 @@ def wanted_motions(parameters: IdentifyParameters, lines: Grid) -> list[Complex]
 
 
 def drive_for(motion: Complex, response: Complex, grid: Grid, knee: float) -> Complex:
-    """Complex amplitudes of the drive [V] for those of an acceleration, using the table's `response` where known.
+    """Complex amplitudes of the drive [V] for the acceleration `motion`, using the table's `response` where known.
 
-    Above the `knee` [Hz], where filters attenuate the measured response, the drive is that of the octave below;
-    dividing by the attenuated response would make the motion much too large.
+    Above the `knee` [Hz], where filters attenuate the measured response, the gain of the octave below is used; with the
+    attenuated response the motion would be much too large.
     """
     frequency = grid.frequency
     size = np.sqrt(octave_mean(np.abs(response) ** 2, frequency))
@@ -128,14 +128,14 @@ def drive_for(motion: Complex, response: Complex, grid: Grid, knee: float) -> Co
 
 
 def seen_peak(motion: Complex, grid: Grid, knee: float) -> float:
-    """Peak [m/s2] of an acceleration, from its lines up to half the `knee` [Hz], where no filter attenuates them."""
+    """Peak [m/s2] of an acceleration, from its lines up to half the `knee` [Hz], which no filter attenuates."""
     seen = grid.frequency <= 0.5 * knee
     seen = seen if seen.any() else np.ones(seen.shape, np.bool_)
     return float(np.abs(waveform(grid.lines[seen], motion[seen], grid.samples)).max())
 
 
 def _settling(specimen: Specimen) -> float:
-    """Time for the slowest motion of the specimen, with a resting block, to decay to the fraction `_LEFT` [s]."""
+    """Time [s] in which the slowest motion of the specimen, with a resting block, decays to the fraction `_LEFT`."""
     return log(_LEFT) / float(resting_rates(specimen).real.max())
 
 
@@ -148,9 +148,9 @@ BLOCK_SHARE = 0.6
 
 @dataclass(frozen=True, eq=False)
 class Planned:
-    """Planned multisines: acceleration spectra `motions` at the lines of `grid`, whose largest peak is `level`.
+    """Planned multisines: acceleration spectra `motions` at the lines of `grid`, with a largest peak of `level` [m/s2].
 
-    `asked` holds the largest magnitudes of their demands. `binds` names the limit that determines the level.
+    `asked` holds the largest demands of the motions. `binds` names the limit that determines the level.
     """
 
     grid: Grid
@@ -174,8 +174,8 @@ def mounted_name(specimen: Specimen) -> str:
 def planned(parameters: IdentifyParameters, configuration: BenchConfiguration) -> Planned:
     """Plan the motions at the allowed level.
 
-    The drive is a limit only if the table is known: simulated, or identified before. Raises InvalidInput for a band
-    that the bench cannot produce.
+    The drive limits the level only if the table is known, because it is simulated or was identified before. Raises
+    InvalidInput for a band that the bench cannot produce.
     """
     specimen = specimen_of(parameters, configuration)
     lines = grid(parameters, configuration, specimen)

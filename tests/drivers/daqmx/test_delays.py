@@ -68,7 +68,7 @@ def test_two_modules_in_one_task_have_each_their_own() -> None:
     ("module", "rate", "constant", "uncertainty", "source"),
     [
         ("9239", 2000.0, 3.3e-6, 1e-6, "specifications of"),
-        ("9234", 2048.0, 2.6e-6, 5e-6, "assumed from the relatives of"),
+        ("9234", 2048.0, 2.6e-6, 5e-6, "assumed from related modules of"),
     ],
 )
 def test_a_filter_without_a_property_has_its_known_delay(

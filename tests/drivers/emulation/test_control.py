@@ -85,7 +85,7 @@ def test_a_failure_of_the_laboratory_is_told(server: ControlServer, command: str
 
 
 def test_an_unknown_command_is_named(server: ControlServer) -> None:
-    with pytest.raises(RigError, match=r"'dance' is refused: available: break, epoch, handwork"):
+    with pytest.raises(RigError, match=r"'dance' is refused: it must be one of break, epoch, handwork"):
         ask(server.address, "dance")
 
 

@@ -31,7 +31,7 @@ class AboutAttribute(Protocol):
 
 
 class Service:
-    """Part of the service; its calls use the driver."""
+    """Base class of the parts of the service, whose calls use the driver."""
 
     def __init__(self, driver: Driver) -> None:
         self._driver = driver

@@ -143,7 +143,7 @@ class ChannelService(Service):
 def _line_channels(
     lines: Sequence[Line], request: pb.CreateDIChanRequest | pb.CreateDOChanRequest
 ) -> Iterator[LineChannel]:
-    """Channels of these lines, grouped and named as requested."""
+    """Channels of the requested lines, grouped and named as requested."""
     separate = (request.line_grouping_raw or request.line_grouping) == LineGrouping.CHAN_PER_LINE.value
     groups = [(line,) for line in lines] if separate else [tuple(lines)]
     names = unflattened(request.name_to_assign_to_lines) or tuple(
@@ -227,7 +227,7 @@ class ChannelAttributeService(Service):
         return pb.SetChanAttributeBoolResponse()
 
     def _filter_delay(self, request: _AboutChannel) -> float:
-        """The delay in its units."""
+        """The filter delay in the requested unit."""
         units, clock = self._filter(request).units, self._task(request).doing(AnalogInput).clock
         converter = self._input(request).inputs.delta_sigma
         if converter is None or clock is None:
@@ -236,7 +236,7 @@ class ChannelAttributeService(Service):
         return delay if units == DigitalWidthUnits.SECONDS.value else delay * clock.rate
 
     def _filter(self, request: _AboutChannel) -> FilterDelay:
-        """Removal of the delay, where the converter has properties for it."""
+        """Settings of the filter delay. Raises DaqmxFailure for a converter without properties for it."""
         channel = self._input(request)
         if channel.inputs.delta_sigma is None or not channel.inputs.delta_sigma.readable:
             raise unsupported(attribute_of(request))
@@ -302,7 +302,7 @@ class ChannelAttributeService(Service):
 
 
 def _named(channels: Sequence[N], request: _AboutChannel) -> N:
-    """The channel of a request: the first that it names, or the first of all."""
+    """The first channel that the request names; the first of the task if it names none."""
     asked = unflattened(request.channel)
     if not asked:
         return channels[0]

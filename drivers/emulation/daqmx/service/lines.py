@@ -136,7 +136,9 @@ class LineService(Service):
         return pb.ReadDigitalLinesResponse(read_array=levels, samps_per_chan_read=1, num_bytes_per_samp=width)
 
     def _looked_at(self, task: Task, job: DigitalInput) -> bytes:
-        """The present levels. A task not yet started returns to its previous state (NI-DAQmx help, "Start Task")."""
+        """The present levels. A task that was not started is started and stopped again (NI-DAQmx help, "Start
+        Task").
+        """
         started = task.state.started
         if not started:
             self._driver.start(task)

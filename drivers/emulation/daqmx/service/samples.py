@@ -88,7 +88,7 @@ class ReadingService(Service):
         return pb.GetReadAttributeStringResponse(value=flattened(self._task(request).required_job.channels))
 
     def _read(self, request: _ReadRequest) -> tuple[AnalogInput, Seen, int]:
-        """The acquired counts, shape (n, channels), and 0 or the error code for fewer than requested."""
+        """The acquired counts, shape (n, channels), and 0, or the error code if fewer than requested were acquired."""
         task = self._task(request)
         job = task.doing(AnalogInput)
         self._driver.require_alive(job)
@@ -121,7 +121,7 @@ def _require_fit(job: AnalogInput, bits: int) -> None:
 def _packed(
     values: NDArray[np.int16 | np.int32 | np.float64], request: _ReadRequest
 ) -> NDArray[np.int16 | np.int32 | np.float64]:
-    """Values, shape (n, channels), as the server sends them, padded to the client's buffer size.
+    """Values, shape (n, channels), in the server's transmission order, padded to the client's buffer size.
 
     The samples are contiguous, channel by channel unless interleaved, even when fewer than requested.
     """
@@ -207,7 +207,7 @@ class WritingService(Service):
                     raise unsupported(other)
 
     def _write(self, task: Task, volts: NDArray[np.float64], timeout: float, *, auto_start: bool) -> int:
-        """Write `volts`, shape (n, channels): into the buffer, or directly to the terminals without a clock."""
+        """Write `volts`, shape (n, channels), to the buffer; without a clock, directly to the terminals."""
         job = task.doing(AnalogOutput)
         with self._driver.changed:
             if job.clock is None:

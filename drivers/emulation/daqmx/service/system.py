@@ -26,7 +26,7 @@ _VERSION: Mapping[int, int] = {
     pb.SYSTEM_ATTRIBUTE_NIDAQ_MINOR_VERSION: 8,
     pb.SYSTEM_ATTRIBUTE_NIDAQ_UPDATE_VERSION: 0,
 }
-"""The oldest driver still in common use: clients must not need newer functions."""
+"""The reported version, the oldest still in common use: clients must not need newer functions."""
 
 
 def _inputs(device: DeviceModel, attribute: int) -> AnalogInputs:
@@ -158,7 +158,7 @@ class SystemService(Service):
             return pb.GetErrorStringResponse(error_string="")
 
     def _chassis(self, request: _AboutDevice, attribute: int) -> str:
-        """The name of the chassis of a module, which only a chassis of that category has as its parent."""
+        """The chassis of a module. Raises DaqmxFailure if it is not of the category of `attribute`."""
         device = self._driver.catalogue.device(request.device_name)
         if device.chassis is None or self._driver.catalogue.device(device.chassis).category != _CHASSIS[attribute]:
             raise unsupported(attribute)

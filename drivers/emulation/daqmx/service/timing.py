@@ -24,7 +24,7 @@ def _sampled(task: Task) -> Sampled:
 
 
 def _conversion_rate(job: Sampled, device: str) -> float:
-    """Conversions of a multiplexed device per second. Raises DaqmxFailure for devices without multiplexer."""
+    """Conversions of a multiplexed device per second. Raises DaqmxFailure for devices without a multiplexer."""
     period = job.conversion(device) if isinstance(job, AnalogInput) else None
     if period is None:
         raise unsupported(pb.TIMING_ATTRIBUTE_AI_CONV_RATE)
@@ -164,7 +164,7 @@ class TimingService(Service):
         return pb.CfgOutputBufferResponse()
 
     def _terminal(self, request: AboutTask, job: Sampled, what: str) -> str:
-        """A terminal of the task. Raises DaqmxFailure while its timing engine is undefined."""
+        """The name of a terminal of the task. Raises DaqmxFailure while the task's timing engine is undefined."""
         if job.clock is None:
             return ""
         if job.engine.number(job.engines) is None:
