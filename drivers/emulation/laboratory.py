@@ -11,7 +11,7 @@ from drivers.emulation.daqmx.lines import Wires
 from drivers.emulation.daqmx.server import DaqServer
 from drivers.emulation.optoncdt.laser import EmulatedLaser
 from drivers.emulation.safety_chain import INPUTS, SafetyChain
-from drivers.emulation.wiring import HEARTBEAT, Connection, Device, hardware_of, site_of
+from drivers.emulation.wiring import HEARTBEAT, Connection, Device, hardware_of, sensors_within, site_of
 from drivers.rig import OperatorTask
 from sim.specimen import Specimen
 from sim.virtual_bench import VirtualBenchParameters
@@ -48,6 +48,7 @@ class Laboratory:
     ) -> None:
         errors = clock_errors or ClockErrors()
         site = site_of(device, modules)
+        parameters = sensors_within(parameters, site.range)
         with ExitStack() as opened:
             bench = EmulatedBench(parameters, specimen, seed=seed, spring_factor=spring_factor, clock_error=errors.daq)
             opened.callback(bench.close)

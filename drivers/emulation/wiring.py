@@ -10,6 +10,7 @@ from drivers.emulation.daqmx.models import compact_rio, x_series
 from drivers.emulation.daqmx.zoo import build
 from drivers.hardware.parameters import Hardware, Laser1, Laser2, Lasers, TableAcceleration, TableDisplacement
 from sim.errors import InvalidInput
+from sim.parameters import Parameters
 from sim.virtual_bench import VirtualBenchParameters
 
 Connection = Literal["serial", "analogue"]
@@ -104,6 +105,25 @@ def _contacts(devices: Sequence[DeviceModel], relays: DeviceModel) -> tuple[str,
             first = max(one.direction_group, 1)
             return names[first : first + _CONTACTS]
     return ()
+
+
+def sensors_within(parameters: VirtualBenchParameters, span: float) -> VirtualBenchParameters:
+    """The virtual bench with sensors whose outputs use inputs of +-`span` [V] as they use those of its converter.
+
+    A laboratory connects sensors, and load resistors of the lasers, that match its inputs: at the 5 V of an NI 9234
+    those for 10 V would reach half of their measuring ranges, and the limits of the bench would never trip.
+    """
+    share = min(1.0, span / parameters.converter.range)
+    changed: dict[str, Parameters] = {}
+    for name, key in (
+        ("displacement_sensor", "sensitivity"),
+        ("accelerometer", "sensitivity"),
+        ("laser_1", "load"),
+        ("laser_2", "load"),
+    ):
+        sensor = getattr(parameters, name)
+        changed[name] = sensor.model_copy(update={key: share * getattr(sensor, key)})
+    return parameters.model_copy(update=changed)
 
 
 _PIPELINE = 3
