@@ -100,7 +100,7 @@ def problems_of(path: Path) -> list[InvalidInput]:
 
 def _read(path: Path) -> BenchConfiguration:
     read = validated(BenchConfiguration, read_table(path, "configuration file"), _within(path))
-    return _with_calibration_file(_with_specimen_file(read, path), path)
+    return _with_certificates(_with_calibration_file(_with_specimen_file(read, path), path), path)
 
 
 def _refusals(configuration: BenchConfiguration, path: Path) -> list[InvalidInput]:
@@ -127,6 +127,17 @@ def _with_calibration_file(configuration: BenchConfiguration, path: Path) -> Ben
         return configuration
     found = read_calibration(path.parent / configuration.laser_calibration)
     return configuration.model_copy(update={"laser_calibration": None, "calibrated": found})
+
+
+def _with_certificates(configuration: BenchConfiguration, path: Path) -> BenchConfiguration:
+    """Replace the names of the connection's PEM files, relative to the same folder, by their paths."""
+    tls = configuration.hardware.daq.tls
+    if tls is None:
+        return configuration
+    names = {name: getattr(tls, name) for name in ("root_certificate", "client_certificate", "client_key")}
+    paths = {name: str(path.absolute().parent / each) for name, each in names.items() if each is not None}
+    daq = configuration.hardware.daq.model_copy(update={"tls": tls.model_copy(update=paths)})
+    return configuration.model_copy(update={"hardware": configuration.hardware.model_copy(update={"daq": daq})})
 
 
 def with_identified(configuration: BenchConfiguration, identified: Identified) -> BenchConfiguration:

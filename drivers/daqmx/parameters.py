@@ -74,17 +74,20 @@ class Tls(Parameters):
     root_certificate: str = quantity(
         "server_self_signed_crt.pem",
         "",
-        "PEM file of the server's certificate, or of the authority that signed it",
+        "PEM file of the server's certificate, or of the authority that signed it, relative to this file",
         min_length=1,
     )
     client_certificate: str | None = quantity(
         None,
         "",
-        "PEM file of this client's certificate, for a server with root_cert (mutual TLS); absent: none",
+        "PEM file of the client certificate (mutual TLS, a server with root_cert), relative to this file; absent: none",
         example="client_self_signed_crt.pem",
     )
     client_key: str | None = quantity(
-        None, "", "PEM file of the private key of that certificate", example="client_privatekey.pem"
+        None,
+        "",
+        "PEM file of the private key of that certificate, relative to this file",
+        example="client_privatekey.pem",
     )
     server_name: str | None = quantity(
         None,

@@ -337,3 +337,18 @@ def test_a_profile_sets_block_and_lead_and_is_refused_where_the_devices_are_too_
         assert (found.block_duration, found.lead) == (block, lead)
     with pytest.raises(InvalidInput, match=r"--profile fast.*acquisition\.block_duration.*analogue lasers"):
         with_profile(BenchConfiguration(backend="hardware"), "fast")
+
+
+def test_certificates_are_relative_to_the_configuration_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder, elsewhere = tmp_path / "laboratory", tmp_path / "elsewhere"
+    folder.mkdir()
+    elsewhere.mkdir()
+    file, other = folder / "bench.toml", tmp_path / "key.pem"
+    lines = ["[hardware.daq.tls]", 'root_certificate = "server.pem"', 'client_certificate = "../client.pem"']
+    file.write_text("\n".join([*lines, f"client_key = '{other}'"]), encoding="utf-8")
+    monkeypatch.chdir(elsewhere)
+    tls = read_configuration(file).hardware.daq.tls
+    assert tls is not None
+    assert Path(tls.root_certificate) == folder / "server.pem"
+    assert Path(str(tls.client_certificate)).resolve() == tmp_path / "client.pem"
+    assert Path(str(tls.client_key)) == other
