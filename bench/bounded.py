@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any, cast
 
 LARGEST = 2**25
-"""Maximum size of a text file [bytes]; a long accelerogram has a few million."""
+"""Maximum size of a text file [bytes]; a long accelerogram has a few million bytes."""
 DEEPEST = 40
 """Maximum nesting of tables and lists; a configuration has five levels."""
 

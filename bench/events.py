@@ -1,7 +1,7 @@
 """Events of a run, each declared once with its columns in the data file, its journal line and its label in the log.
 
-Recorder, live analysis, console and window are subscribers: functions called with each event. The engine calls them in
-its own thread, in the order of subscription, so that a subscriber must queue long computations.
+The recorder, the live analysis, the console and the window are subscribers: functions that the engine calls with each
+event, in its own thread and in the order of subscription. A subscriber must therefore queue long computations.
 """
 
 from collections.abc import Callable, Mapping
@@ -36,17 +36,17 @@ class State(StrEnum):
 
 @dataclass(frozen=True)
 class Event:
-    """Event at `time`: seconds of the bench's clock since the session began.
+    """Event at `time` [s], counted by the bench's clock from the start of the session.
 
-    The stream sets the time of publication if an event has none (NaN).
+    If `time` is NaN, the stream sets it to the time of publication.
     """
 
     table: ClassVar[str] = ""
-    """Path of its columns in the data file, below /entry; empty if the event is only in the journal."""
+    """Path of its columns in the data file, below /entry; empty for an event that is stored only in the journal."""
     journalled: ClassVar[bool] = True
-    """Whether the event is in the journal; frequent events are not."""
+    """Whether the event is written to the journal; frequent events are not."""
     notice: ClassVar[str] = ""
-    """Label in the log of terminal and window; empty for events that are not logged."""
+    """Label in the logs of the terminal and the window; empty for events that are not logged."""
     grave: ClassVar[bool] = False
     """Whether the event needs the operator's attention."""
 
@@ -81,7 +81,7 @@ def event(
 
 @event(table="state_changes")
 class StateChanged(Event):
-    """Transition of the bench from one state to another, with its reason and `code` and `subject` of the cause."""
+    """Transition of the bench from one state to another, with its reason, and the `code` and `subject` of the cause."""
 
     before: State = column("", "state before the transition")
     after: State = column("", "state after the transition")
@@ -100,8 +100,8 @@ class Acquired(Event):
 
     `run` counts the armings of the rig; the block's `first` sample index is relative to the start of the run.
     `signals`, shape (n, n_signals), are in SI units, tared for the run, in the order of `bench.analysis.signals`.
-    `magnitudes` returns the largest of the quantities that the guard limits, by their keys, in SI units; a subscriber
-    may call it before it returns.
+    `magnitudes` returns the largest magnitude in the block of each quantity that the guard limits, by key, in SI units.
+    A subscriber may call it only until the subscriber itself returns.
     """
 
     run: int
@@ -121,7 +121,7 @@ class ValuesReceived(Event):
 
 @event(table="operator_actions")
 class SpecimenMounted(Event):
-    """The operator has completed `work`, with its `amount` if any; `specimen` is now on the table."""
+    """The operator has completed the action `work`, with its `amount` if it has one; `specimen` is now on the table."""
 
     specimen: Specimen
     work: OperatorTask = column("", "action of the operator")
@@ -138,7 +138,7 @@ class SpecimenMounted(Event):
 
 @event(table="instrument/alignments")
 class SensorsAligned(Event):
-    """Alignment of sensors with free clocks to the sample clock in `run`; published at the end of the run."""
+    """Alignment of sensors with free-running clocks to the sample clock in `run`; published at the end of the run."""
 
     run: int = column("1", "number of armings of the rig")
     alignments: tuple[Alignment, ...] = column("", "one row for each sensor")
@@ -161,7 +161,7 @@ class StepStarted(Event):
 
 @event(journalled=False)
 class Progress(Event):
-    """Completed fraction of the campaign, 0 to 1, present step, and estimated remaining bench time [s]."""
+    """Completed fraction of the campaign (0 to 1), present step, and estimated remaining bench time [s]."""
 
     fraction: float
     remaining: float
@@ -183,7 +183,7 @@ class LiveValue(Event):
 class Estimate(Event):
     """Running gain coefficient of the point under test; NaN while unknown.
 
-    `predicted` is for the branch of steady motion that the point's start-up aims at.
+    `predicted` is the prediction for the branch of steady motion that the point's start-up aims at.
     """
 
     omega: float = column("rad/s", "circular frequency of the base motion")
@@ -197,13 +197,13 @@ class Estimate(Event):
 
 @event(table="hold_cycles", journalled=False)
 class HoldCycle(Event):
-    """A cycle while a stabiliser holds an unstable motion; NaN for a cycle that could not be measured."""
+    """One cycle of an unstable motion that a stabiliser holds; values are NaN if the cycle could not be measured."""
 
     omega: float = column("rad/s", "circular frequency of the base motion")
     beta: float | None = column("1", "stiffness ratio of the coupling spring")
     cycle: int = column("1", "number of the cycle since the beginning of the hold")
     drift_peak: float = column("m", "peak drift in the cycle")
-    deviation: float = column("1", "estimated deviation from the periodic motion, relative to it")
+    deviation: float = column("1", "estimated deviation from the periodic motion, relative to that motion")
     control: float = column("1", "magnitude of the control in the cycle, relative to the table's amplitude")
 
 
@@ -211,8 +211,8 @@ class HoldCycle(Event):
 class RunningGain(Event):
     """Gain under a record during its first `seconds`: ratio of the peak drifts so far, measured and predicted.
 
-    Peaks are the largest magnitudes of the drift since the start of the record, for coupled and bare frame alike. NaN
-    while unknown; `beta` is None for the bare frame.
+    Peaks are the largest magnitudes of the drift since the start of the record, for the coupled and the bare frame.
+    Values are NaN while unknown; `beta` is None for the bare frame.
     """
 
     record: str = column("", "name of the record")
@@ -230,12 +230,12 @@ TWIN_TRACE = ("seconds", "u1", "u2", "theta", "drift_low", "drift_high")
 @event(table="twin", journalled=False, eq=False)
 class TwinEstimate(Event):
     """State of the live model and of the specimen at the last sample for which both are known, `seconds` into `run`.
-    `time` is the instant at which its block had been read.
+    `time` is the instant at which the block with that sample had been read.
 
     `_low` and `_high` are the ends of the model's band, `_measured` the values of the lasers. `alpha_2` is available
     once the protocol has published a gain. `residual` is the root mean square of measured minus modelled drift over the
-    last second, `excess` that of the measured drift outside the band, both relative to the largest drift so far.
-    `members` form the band, together with the nominal model. NaN where a value does not exist.
+    last second, `excess` that of the measured drift outside the band, both relative to the largest drift so far. The
+    band is formed by `members` models together with the nominal one. Values that do not exist are NaN.
 
     `trace`, shape (n, 6), is the model's motion since the previous estimate, every 10 ms, with the columns TWIN_TRACE.
     """
@@ -243,8 +243,8 @@ class TwinEstimate(Event):
     time: float = column("s", "bench time at which the block had been read", default=nan, kw_only=True)
     run: int = column("1", "number of armings of the rig")
     seconds: float = column("s", "time in the run to which the values apply")
-    members: int = column("1", "number of models in the ensemble of the band, excluding the nominal one")
-    standing: float = column("1", "share of these models whose block is standing")
+    members: int = column("1", "number of models that form the band, excluding the nominal one")
+    standing: float = column("1", "fraction of the models of the band whose block is standing")
     u1: float = column("m", "u1 of the model")
     u1_low: float = column("m", "u1, lower end of the model's band")
     u1_high: float = column("m", "u1, upper end of the model's band")
@@ -257,14 +257,14 @@ class TwinEstimate(Event):
     drift_low: float = column("m", "drift, lower end of the model's band")
     drift_high: float = column("m", "drift, upper end of the model's band")
     drift_measured: float = column("m", "drift, measured")
-    drift_peak: float = column("m", "peak drift since arming, of the model")
+    drift_peak: float = column("m", "peak drift of the model since arming")
     drift_peak_low: float = column("m", "peak drift since arming, lower end of the model's band")
     drift_peak_high: float = column("m", "peak drift since arming, upper end of the model's band")
-    drift_peak_measured: float = column("m", "peak drift since arming, measured")
-    alpha_2: float = column("1", "gain of the peak drift, coupled over bare, of the model")
+    drift_peak_measured: float = column("m", "measured peak drift since arming")
+    alpha_2: float = column("1", "gain of the model's peak drift, coupled over bare")
     alpha_2_low: float = column("1", "gain of the peak drift, coupled over bare, lower end of the model's band")
     alpha_2_high: float = column("1", "gain of the peak drift, coupled over bare, upper end of the model's band")
-    alpha_2_measured: float = column("1", "gain of the peak drift, coupled over bare, measured")
+    alpha_2_measured: float = column("1", "measured gain of the peak drift, coupled over bare")
     theta: float = column("rad", "rocking angle of the model")
     residual: float = column("1", "rms of measured minus modelled drift over 1 s, relative to the largest drift")
     excess: float = column("1", "rms of the measured drift outside the band over 1 s, relative to the largest drift")
@@ -296,8 +296,9 @@ class PassFinished(Event):
 
 @event(table="table_response", notice="table", eq=False)
 class TableIdentified(Event):
-    """The response of the table was identified: values at the lines, each shape (n_lines,), in the units of
-    `bench.control.table_model.TableModel`; `text` states date, mounted specimen and level.
+    """The response of the table has been identified. The arrays, each of shape (n_lines,), hold the values at the
+    frequency lines, in the units of `bench.control.table_model.TableModel`; `text` states the date, the mounted
+    specimen and the level.
     """
 
     text: str
@@ -316,7 +317,9 @@ class TableIdentified(Event):
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """Values along the axis of a fit, shape (n,), with unit in SI symbols ("1" for a pure number) and description."""
+    """Values along the axis of a fit, shape (n,), with their unit in SI symbols ("1" for a pure number) and a
+    description.
+    """
 
     values: Array
     unit: str
@@ -334,11 +337,11 @@ class FittedParameter:
 
 @event(notice="fit", eq=False)
 class FitFinished(Event):
-    """A model was fitted to a section of a recording; `name` is short and unique within a session, `text` one line.
+    """A model was fitted to a section of a recording; `name` is short and unique within a session, `text` is one line.
 
-    `columns` by name, all of equal length: first the axis (such as time), then measured values and, for comparison,
-    fitted values, residuals and so on. Raises ValueError unless all names are valid in a data file. Stored by
-    `bench.datafile.declared`.
+    `columns` holds series of equal length by name: first the axis (such as time), then the measured values and, for
+    comparison, the fitted values, residuals and so on. Raises ValueError unless all names are valid in a data file.
+    Stored by `bench.datafile.declared`.
     """
 
     name: str
@@ -413,7 +416,7 @@ class LimitExceeded(Event):
 
 @event(table="operator_requests", notice="asked")
 class OperatorAsked(Event):
-    """The plan waits for the operator: the requested action with its reason, and its kind, if known."""
+    """The plan waits for the operator. `request` is the requested action with its reason, `work` its kind, if known."""
 
     request: str
     work: OperatorTask | None = column("", "kind of the requested action; empty if unknown", default=None)
@@ -425,7 +428,7 @@ class OperatorAsked(Event):
 
 @event(table="operator_answers", notice="done")
 class OperatorAnswered(Event):
-    """The operator, or the policy of an unattended run, named by `by`, confirmed the request."""
+    """The request was confirmed by `by`: the operator, or the policy of an unattended run."""
 
     request: str
     by: str = column("", "person or policy that confirmed the request")

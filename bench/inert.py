@@ -9,13 +9,15 @@ _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 
 
 def shown(text: str) -> str:
-    """The text for a terminal, with control characters, which could move the cursor or run a command, as escapes."""
+    """The text for a terminal, with escapes in place of control characters, which could move the cursor or run a
+    command.
+    """
     return _CONTROL.sub(lambda found: f"\\x{ord(found[0]):02x}", text)
 
 
 def csv_cell(text: str) -> str:
-    """The text for a table cell. Prefixes an apostrophe to anything but a number that a spreadsheet would compute, and
-    replaces carriage returns, which would end the row, by line feeds.
+    """The text for a table cell. Prefixes an apostrophe to text, other than a number, that a spreadsheet would take for
+    a formula, and replaces carriage returns, which would end the row, by line feeds.
     """
     formula, text = text.startswith(_FORMULA), text.replace("\r\n", "\n").replace("\r", "\n")
     if not formula:

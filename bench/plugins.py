@@ -1,7 +1,7 @@
 """Plug-ins by entry points: protocols, rigs and export formats of this program and of other packages.
 
-An entry point is loaded when it is used. One that fails to load is named with its package and the reason, and does not
-affect the others.
+An entry point is loaded when it is used. If it fails to load, the error names it, its package and the reason; the
+others are not affected.
 """
 
 import sys
@@ -55,7 +55,7 @@ def plugin_code(name: str, *, files: bool = False) -> Generator[None]:
 
 
 def plugin_generator(name: str, code: Generator[Y, S, R]) -> Generator[Y, S, R]:
-    """The plug-in's generator with its exceptions converted as by `plugin_code`."""
+    """The plug-in's generator, with exceptions converted as by `plugin_code`."""
     with plugin_code(name):
         return (yield from code)
 
@@ -86,7 +86,7 @@ def load_plugin(group: str, name: str, item: str, kind: type[T]) -> T:
 
 
 def _origin(entry: EntryPoint) -> str:
-    # reads the metadata of the package
+    # `entry.dist` reads the metadata of the package from the disk
     package = "an unknown package" if entry.dist is None else f"{entry.dist.name} {entry.dist.version}"
     return f"{entry.value} of {package}"
 

@@ -5,7 +5,7 @@ from typing import Protocol
 
 
 class Progress(Protocol):
-    """Callable that long computations call in the thread of their caller."""
+    """Callable to which a long computation reports its progress, in the thread of the computation's caller."""
 
     def __call__(self, phase: str, done: int = 0, total: int = 0, /) -> None:
         """Report the present stage, `phase`, with `done` of its `total` parts complete if they can be counted."""
@@ -17,6 +17,6 @@ def silent(phase: str, done: int = 0, total: int = 0, /) -> None:
 
 
 def counting(progress: Progress, phase: str) -> Callable[[int, int], None]:
-    """Report `phase` now; returns a callable `(done, total)` that reports its completed parts."""
+    """Report `phase` and return a callable `(done, total)` that reports its completed parts."""
     progress(phase)
     return lambda done, total: progress(phase, done, total)

@@ -16,7 +16,7 @@ from bench.progress import Progress, silent
 from sim.parameters import Parameters
 
 if TYPE_CHECKING:
-    # imported for types only: listing protocols and their flags must be fast
+    # imported for type checking only: listing protocols and their flags must be fast
     from bench.config.model import BenchConfiguration
     from bench.datafile.reader import DataFile
     from bench.datafile.tables import Column, Table
@@ -82,8 +82,8 @@ def each_step(
 class Prepared(ABC, Generic[P]):
     """Protocol prepared for a bench: checked, and ready to be forecast and run.
 
-    The constructor computes once whatever forecast, prediction and plan share. `stored` holds the tables of the data
-    file that is replayed or analysed again, which replace the input files that a new run reads; None for a new run.
+    The constructor computes, once, the data that forecast, prediction and plan share. `stored` is None for a new run,
+    which reads the input files; a replay or re-analysis uses the tables of its data file instead.
 
     The constructor of a subclass raises InvalidInput for parameters beyond the capabilities of the bench.
     """
@@ -188,10 +188,10 @@ class Axis:
 
 @dataclass(frozen=True)
 class RunView:
-    """What a run shows: `headline` is the field of a point whose value, prediction and verdict are shown largest,
-    by default the first one with an uncertainty. `labels` are the printed names of fields of a point, such as
-    "restitution rₑₓₚ"; without one, the first words of the description are used. `matrix` are the rows and columns of
-    the points, where their values are known beforehand.
+    """Display of a run. `headline` is the field of a point whose value, prediction and verdict are shown largest, by
+    default the first field with an uncertainty. `labels` are the printed names of fields of a point, such as
+    "restitution rₑₓₚ"; a field without a label is shown with the first words of its description. `matrix` has the axes
+    of the rows and the columns in which the points are arranged, if the values on them are known before the run.
     """
 
     headline: str = ""
@@ -212,7 +212,7 @@ class Protocol(Generic[P]):
     without a flag. `log_line` formats a point as one log line: the run is then displayed as a log, not as a plot.
     Without a `reanalysis`, an analysis runs the plan with other parameters on the recorded samples. `report` returns
     the protocol's own sections of a report on its data file; if they include no table, the report lists all fields of
-    the points. `view` declares the names of its results, and what a run shows, for window and report.
+    the points. `view` declares how the window and the report name and display the results.
     """
 
     name: str

@@ -2,7 +2,7 @@
 
 The code that creates one removes it, or renames it when complete. The list here is needed only where no `finally` runs:
 when an interrupted process ends because its main thread does not respond, see `bench.app.cli.interrupt`. A second list
-has the complete results, which the message of a later interrupt names.
+contains the complete results, which the message of a later interrupt names.
 """
 
 import os
@@ -27,7 +27,9 @@ _names: dict[Path, Path] = {}
 
 @contextmanager
 def unfinished(path: Path) -> Generator[Path]:
-    """Context manager to create a file or folder at `path`: removes it at exit unless it was renamed or is `whole`."""
+    """Context manager to create a file or folder at `path`: removes it at exit unless it was renamed or marked as
+    `whole`.
+    """
     _names.pop(path, None)
     _paths.add(path)
     try:
@@ -66,14 +68,15 @@ def replace(source: Path, target: Path) -> None:
 
 
 def finish(temporary: Path, target: Path) -> None:
-    """Give the complete result `temporary` its name. Raises OSError."""
-    # noted before the rename: an interrupt may come between any two instructions, and the files decide
+    """Rename the complete result `temporary` to its final name. Raises OSError."""
+    # listed before the rename: an interrupt may come between any two instructions, and `completed` then looks at the
+    # files
     _names[temporary] = target
     replace(temporary, target)
 
 
 def completed() -> list[Path]:
-    """Results that have been completed since `forget_completed`: they are kept, also after an interrupt."""
+    """Results that have been completed since `forget_completed`: they are kept even after an interrupt."""
     return [path for temporary, path in tuple(_names.items()) if path == temporary or _is_renamed(temporary, path)]
 
 

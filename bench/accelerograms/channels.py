@@ -11,8 +11,8 @@ from sim.errors import InvalidInput
 
 @dataclass(frozen=True)
 class Channel:
-    """Channel of a file: its header begins at line `first`; its accelerations follow line `data`, up to line `last` -
-    1.
+    """Channel of a file: its header begins at line `first`; its accelerations are in the lines after `data`, up to
+    `last` - 1.
     """
 
     number: int

@@ -28,7 +28,8 @@ class Choices:
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """Contents read from a file: `values`, shape (n,), in `unit`, with the step `dt` [s]; None if not stated.
+    """Contents read from a file: `values`, shape (n,), in `unit`, with the step `dt` [s]. `dt` and `unit` are None if
+    the file does not state them.
 
     `part` names the channel or column when the file has several.
     """
@@ -79,7 +80,7 @@ def combine(text: RecordText, choices: Choices, reading: Reading) -> Accelerogra
 
 def _step(name: str, given: float | None, stated: float | None) -> float:
     if given is not None and not (isfinite(given) and given > 0.0):
-        raise InvalidInput(f"dt of {name}", given, "it must be positive seconds")
+        raise InvalidInput(f"dt of {name}", given, "it must be a positive number of seconds")
     if stated is not None and not (isfinite(stated) and stated > 0.0):
         raise InvalidInput(
             f"dt of {name}", stated, "the step stated in the file is not a positive time: the file is damaged"

@@ -33,7 +33,7 @@ _STEP = 34
 
 
 class _Block(NamedTuple):
-    """Header from line `first` on; data from below line `data` to line `last` - 1."""
+    """Block of a file: its header begins at line `first`; its data are in the lines after `data`, up to `last` - 1."""
 
     first: int
     data: int
@@ -82,7 +82,7 @@ def _step(text: RecordText, channel: Channel) -> float:
             values = numbers(text, index + 1, index + 1 + int(reals[2]), int(reals[1]), int(reals[3])).values
             if values.size >= _STEP and values[_STEP - 1] > 0.0:
                 return float(values[_STEP - 1])
-            raise text.refusal(index, f"number {_STEP} of these, the time step, is unknown")
+            raise text.refusal(index, f"real number {_STEP}, the time step, is unknown")
     raise text.refusal(channel.first, "the real header with the time step is missing; the file is damaged")
 
 

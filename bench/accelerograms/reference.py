@@ -17,7 +17,9 @@ from sim.errors import InvalidInput
 GRAMMAR = "FILE[@KEY=VALUE,...] with the keys unit, dt, channel, column and name, or synthetic:NAME[:SEED]"
 
 SHORTEST_STEP, LONGEST_STEP = 1e-4, 0.5
-"""Plausible time steps [s] of a record: strong motion is sampled at 50 to 1000 Hz, old film at 10 Hz or more."""
+"""Plausible time steps [s] of a record: strong motion is sampled at 50 to 1000 Hz, old film records at 10 Hz or
+more.
+"""
 
 _SYNTHETIC = "synthetic:"
 _KEYS = ("unit", "dt", "channel", "column", "name")
@@ -72,7 +74,7 @@ class RecordReference:
     def or_else(
         self, *, unit: str | None, dt: float | None, channel: str | None, column: str | None
     ) -> "RecordReference":
-        """The reference with these defaults for options that it omits; they do not apply to a synthetic motion."""
+        """The reference with the given defaults for options that it omits; they do not apply to a synthetic motion."""
         if self.path is None:
             return self
         return replace(
@@ -133,9 +135,9 @@ def seconds_of(item: str, value: str) -> float:
     try:
         seconds = read_number(value, "s")
     except ValueError as error:
-        raise InvalidInput(item, value, str(error) or "it must be positive seconds") from None
+        raise InvalidInput(item, value, str(error) or "it must be a positive number of seconds") from None
     if seconds <= 0.0:
-        raise InvalidInput(item, value, "it must be positive seconds")
+        raise InvalidInput(item, value, "it must be a positive number of seconds")
     if not SHORTEST_STEP <= seconds <= LONGEST_STEP:
         allowed = f"earthquake records have steps of {SHORTEST_STEP:g} to {LONGEST_STEP:g} s: write the unit, as in 5ms"
         raise InvalidInput(item, value, allowed)

@@ -18,7 +18,7 @@ _TEXT, _INTEGERS, _REALS, _COMMENTS = 11, 17, 27, 27
 _WIDTH, _REAL_WIDTH = 10, 15
 _TYPE = re.compile(r"^\s*([0-6])\s+([A-Z][A-Z ]+)")
 _UNKNOWN = 1e30
-"""Reals above this limit denote unknown values (1.7e38)."""
+"""Limit above which a real denotes an unknown value; the files use 1.7e38."""
 
 _KINDS = {"1": "uncorrected accelerogram", "2": "corrected accelerogram"}
 

@@ -13,8 +13,8 @@ from sim.errors import InvalidInput
 def check_peak(text: RecordText, index: int, stated: str, samples: Samples, resolution: float | None = None) -> None:
     """Check the largest magnitude of the samples against the value stated in line `index`, in the samples' unit.
 
-    Both may be off by one in their last digit; `resolution` replaces that of the samples if they were written in
-    another unit.
+    Both may be off by one in their last digit; `resolution` replaces the last digit of the samples if they were written
+    in another unit.
     """
     at = int(np.abs(samples.values).argmax())
     found = abs(float(samples.values[at]))

@@ -71,7 +71,9 @@ SIGNIFICANT = 2.73905
 """c times the time between 5 and 95 % of the envelope's energy: e^2 is a gamma distribution of shape 3."""
 
 DECAYED = 6.5
-"""c t at which the noise ends, when its envelope is at 2.7 % of the maximum; the filters smooth the end."""
+"""Value of c t at which the noise ends, where its envelope has fallen to 2.7 % of the maximum; the filters smooth the
+end.
+"""
 
 HIGH_PASS_DAMPING = 0.6
 """Usual damping ratio of Clough and Penzien's second filter."""
@@ -120,7 +122,7 @@ HASHED = 1e-6
 """Resolution [m/s2] to which a record is rounded before hashing, since rounding errors may differ between machines."""
 
 FADING = 1.5
-"""Time for the filters to fade after the noise, in periods of the high-pass."""
+"""Time after the noise in which the filters' response decays, in periods of the high-pass."""
 
 
 def synthetic_record(name: str, seed: int = DEFAULT_SEED) -> Accelerogram:

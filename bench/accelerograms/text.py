@@ -25,7 +25,7 @@ class RecordText:
         return f"{self.path.name}, line {index + 1}"
 
     def refusal(self, index: int, allowed: str) -> InvalidInput:
-        """The error for a line, which it quotes."""
+        """The error for a line; its message quotes the line."""
         shown = self.lines[index].strip() if index < len(self.lines) else ""
         return InvalidInput(self.where(index), shown if len(shown) <= 60 else shown[:57] + "...", allowed)
 

@@ -36,11 +36,11 @@ def pseudo_acceleration(acceleration: Array, dt: float, periods: Array, damping:
     if record.ndim != 1 or record.size < 2 or not np.isfinite(record).all():
         raise InvalidInput("record", record.shape, "it must be one-dimensional with at least two finite samples")
     if not dt > 0.0:
-        raise InvalidInput("dt", dt, "it must be positive seconds")
+        raise InvalidInput("dt", dt, "it must be a positive number of seconds")
     if not 0.0 <= damping < 1.0:
         raise InvalidInput("damping", damping, "the damping ratio must be at least 0 and below 1")
     if not np.all(periods > 0.0):
-        raise InvalidInput("periods", periods.tolist(), "every period must be positive seconds")
+        raise InvalidInput("periods", periods.tolist(), "every period must be a positive number of seconds")
     return np.array([_peak(record, dt, 2.0 * np.pi / float(period), damping) for period in periods])
 
 

@@ -93,7 +93,7 @@ class RigBackend:
 
     `open(configuration, settings, realtime)` returns the rig, stopped; the caller closes it. If it raises InvalidInput
     or RigError, it leaves nothing open. `settings` is the class of its table in the configuration, `extras` the
-    optional dependencies of this program required for such settings. `real_time_only`: without virtual time.
+    optional dependencies of this program required for such settings. `real_time_only`: the backend has no virtual time.
     `operator`: a person performs the tasks between two tests.
     """
 
@@ -110,5 +110,5 @@ def backend_names() -> tuple[str, ...]:
 
 
 def load_backend(name: str) -> RigBackend:
-    """The backend `name`. Raises InvalidInput for one that is not installed or fails to load."""
+    """The backend `name`. Raises InvalidInput for a backend that is not installed or fails to load."""
     return load_plugin(RIGS, name, "backend", RigBackend)

@@ -188,7 +188,7 @@ class BenchConfiguration(Parameters):
         return 0.5 * first, 0.5 * second
 
     def at_pace(self, *, realtime: bool) -> "BenchConfiguration":
-        """The configuration with the settings resolved that depend on virtual or real time."""
+        """The configuration with a value for every setting whose default depends on whether time is virtual or real."""
         if self.twin.enabled is not None:
             return self
         twin = self.twin.model_copy(update={"enabled": realtime or self.real_time_only})

@@ -1,7 +1,8 @@
 """Cross-checks of a whole configuration whose parts are valid.
 
 `rockbench config check`, `--dry-run`, a run and the window all use the same function. A limit beyond the bench's
-capabilities would never trip: it is an error unless `limits.confirmed` names it, which every run then reports.
+capabilities would never trip. It is therefore an error unless `limits.confirmed` names it; every run reports such a
+limit.
 """
 
 from collections.abc import Iterator
@@ -22,7 +23,7 @@ are taken as typing errors.
 """
 _LONGEST_WAIT, _LONGEST_DEBOUNCE, _WORST_CLOCK = 60.0, 1.0, 0.1
 """Longest usual delays of the guard for a missing sensor or block and for an exceeded limit [s], given that the table
-at full velocity passes its stroke in a quarter of a second; and a relative clock error greater than that of any quartz
+at full velocity crosses its stroke in a quarter of a second; and a relative clock error greater than that of any quartz
 clock.
 """
 _LEAST_ERROR = 1e-7
@@ -40,7 +41,8 @@ _LEAST_SHARE = 0.01
 """Fraction of a channel's range below which a limit is unusual."""
 _NOISE = (1e-7, 1e-4)
 """Usual spectral density of a channel's noise relative to its range [1/Hz^0.5]: from a 16-bit converter's to 0.3 % of
-the range in a band of 1 kHz."""
+the range in a band of 1 kHz.
+"""
 
 
 @dataclass(frozen=True)
@@ -195,10 +197,10 @@ def _contradictions(configuration: BenchConfiguration) -> Iterator[InvalidInput]
         if needed > (most := shaker.bl * shaker.current_limit):
             frame, block = specimen.frame, specimen.block
             allowed = (
-                f"the uplift acceleration requires {needed:.4g} N, the shaker provides {most:.4g} N: are the masses in "
-                f"kg, the density in kg/m3 (m1 = {frame.m1:g}, m2 = {frame.m2:g}, specimen.block.rho = {block.rho:g}, "
-                f"s = {block.s:g}, specimen.g = {specimen.g:g}, "
-                f"simulation.bench.shaker.moving_mass = {shaker.moving_mass:g})?"
+                f"the uplift acceleration requires {needed:.4g} N, but the shaker provides at most {most:.4g} N: check "
+                f"that the masses are in kg and the density is in kg/m3 (m1 = {frame.m1:g}, m2 = {frame.m2:g}, "
+                f"specimen.block.rho = {block.rho:g}, s = {block.s:g}, specimen.g = {specimen.g:g}, "
+                f"simulation.bench.shaker.moving_mass = {shaker.moving_mass:g})"
             )
             yield InvalidInput("specimen.frame.m1", specimen.frame.m1, allowed)
 

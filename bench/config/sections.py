@@ -28,7 +28,7 @@ class Acquisition(Parameters):
 
 
 Profile = Literal["fast", "steady"]
-"""Reaction profiles: the shortest blocks and lead that a device sustains, or those of a busy computer."""
+"""Reaction profiles: the shortest blocks and lead that a device sustains, or blocks and lead for a busy computer."""
 FAST, FAST_OVER_NETWORK, STEADY = (0.005, 0.01), (0.01, 0.02), (0.1, 0.1)
 """Block duration and lead [s] for inputs connected to this computer, for those behind a gRPC server, and by default."""
 

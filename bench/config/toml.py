@@ -160,12 +160,12 @@ def as_toml(configuration: BenchConfiguration) -> str:
 Kind = Literal["all", "minimal", "hardware"]
 
 _HEADING = """\
-# Configuration of a shake-table bench for rockbench. SI units; a value in another unit is a string: "60 mm".
-# Every key is optional; its meaning [unit] and valid values stand above it. To validate: `rockbench config check`."""
+# Configuration of a shake-table bench for rockbench. SI units; a value in another unit is a string: "60 mm". Every key
+# is optional; its meaning [unit] and valid values are above it. To validate: `rockbench config check`."""
 
 _ALL = """\
-# Every key with its default. A line that begins with # and no space has an example of a key that is absent by default:
-# remove the # to set the key; each works by itself."""
+# Every key with its default. A line that begins with # and no space is an example of a key that is absent by default:
+# remove the # to set the key; each line is valid by itself."""
 
 _MINIMAL = """\
 # The keys to check before the first run; every other key has its default (`rockbench config init` writes them all)."""

@@ -17,7 +17,7 @@ _SLOW, _FAST = 0.6, 2.5
 
 
 _SPRING_OFF = 2.0
-"""Ratio of measured to nominal spring stiffness beyond which it is unusual."""
+"""Ratio of measured to nominal spring stiffness, or its reciprocal, beyond which a stiffness is unusual."""
 
 
 class _Watched(NamedTuple):
@@ -102,7 +102,7 @@ def specimen_notices(specimen: Specimen, prefix: str = "specimen.") -> Iterator[
     for number, dashpot in enumerate(frame.dashpots, 1):
         if dashpot < 0.0:
             ratios = f"{prefix}frame.xi1 = {frame.xi1:g}, xi2 = {frame.xi2:g}"
-            yield f"{ratios} yield dashpot c{number} = {dashpot:.3g} N s/m: a negative one adds energy"
+            yield f"{ratios} yield dashpot c{number} = {dashpot:.3g} N s/m; a negative dashpot adds energy"
     nominal = specimen.spring_k1 or frame.k1
     if not 1.0 / _SPRING_OFF <= nominal / frame.k1 <= _SPRING_OFF:
         yield f"{prefix}spring_k1 = {nominal:g} N/m is {nominal / frame.k1:.3g} times frame.k1 = {frame.k1:g} N/m"

@@ -65,7 +65,9 @@ def former_names(model: type[Parameters], data: Mapping[str, Any], parent: Path 
 
 
 def with_present_names(model: type[Parameters], data: Mapping[str, Any]) -> dict[str, Any]:
-    """The data of a file with the present names of its keys. A key with both names keeps both, to be refused."""
+    """The data of a file with the present names of its keys. A key present under both names keeps both, and validation
+    then refuses it.
+    """
     found = dict(data)
     for entry in declared(model):
         old = entry.formerly
@@ -100,7 +102,9 @@ def read_typed(entry: Declared, typed: Any) -> Any:
 
 
 def read_fields(model: type[Parameters], typed: Mapping[str, Any]) -> dict[str, Any]:
-    """The typed fields of `model`, from flags or a form, as plain data for `validated`; None means "not specified"."""
+    """The typed fields of `model`, from flags or a form, as plain data for `validated`; a field that is None was not
+    specified.
+    """
     return {
         entry.name: read_typed(entry, typed[entry.name])
         for entry in declared(model)
@@ -228,4 +232,4 @@ def _suggestion(model: type[Parameters], path: Path) -> str:
     )
     if elsewhere:
         return f"; the nearest is {elsewhere[0]}"
-    return f"; the keys here are {', '.join(siblings)}" if siblings else ""
+    return f"; the valid keys here are {', '.join(siblings)}" if siblings else ""

@@ -145,7 +145,7 @@ def test_a_byte_order_mark_is_no_error(tmp_path: Path):
         ("[specimen.frame]\nk3 = 1.0", "specimen.frame.k3 = 1.0 is refused: .* nearest is specimen.frame.k[12]"),
         ("[frame]\nk1 = 1.0", "frame = 'a table' is refused: there is no such key"),
         ("k_c = 3.0", "k_c = 3.0 is refused: there is no such key"),
-        ("[limits]\nzzz = 0.1", "limits.zzz = 0.1 .* the keys here are drive_voltage, drive_slew"),
+        ("[limits]\nzzz = 0.1", "limits.zzz = 0.1 .* the valid keys here are drive_voltage, drive_slew"),
         ("[specimen]\nhalf_stroke = 0.1", "the nearest is simulation.bench.shaker.half_stroke"),
         ("limits = 3", "limits = 3 is refused: it must be a table of keys"),
         ("backend = 'cdaq'", "backend = 'cdaq' is refused: one of hardware, simulated"),
