@@ -1,1 +1,1 @@
-"""Other integrators of the same motions, for comparison with `sim.rocking`: fixed steps, scipy, CVODE, heyoka."""
+"""Other integrators of the motions of `sim.rocking`, for comparison: fixed-step methods, scipy, CVODE, heyoka."""

@@ -2,8 +2,8 @@
 
 START and PHASE are the periodic orbit at beta 0.64, Omega 17 rad/s to ten digits: they define the case and are taken as
 exact. END and PEAKS are its solution by heyoka in 80-bit arithmetic at tolerance 1e-19, with an integrator and
-equations independent of ours; `tests/benchmarks/reference.py` recomputes them and checks their beginning with mpmath at
-30 digits.
+equations independent of ours; `tests/benchmarks/reference.py` recomputes them and checks the beginning of the motion
+with mpmath at 30 digits.
 """
 
 import numpy as np
@@ -34,7 +34,7 @@ END: NDArray[np.float64] = np.array(
 """State after DURATION, as `State.as_array`."""
 
 PEAKS = (0.00082052486744979255383, 0.0060632412081126333043, 0.033611621224326909147)
-"""Greatest |u1|, |u2 - u1| [m] and |theta| [rad] of the whole run."""
+"""Largest |u1|, |u2 - u1| [m] and |theta| [rad] of the whole run."""
 
 
 def drive(duration: float = DURATION) -> SineProgram:
@@ -43,11 +43,11 @@ def drive(duration: float = DURATION) -> SineProgram:
 
 
 def error_of(end: NDArray[np.float64]) -> float:
-    """Greatest deviation of an end state, shape (6,), from END, in SI units; velocities are of the order of 1."""
+    """Largest deviation of an end state, shape (6,), from END, in SI units; velocities are of the order of 1 m/s."""
     return float(np.abs(end - END).max())
 
 
 def peak_error_of(peaks: Peaks) -> float:
-    """Greatest relative deviation of the peaks from PEAKS."""
+    """Largest relative deviation of the peaks from PEAKS."""
     found = (peaks.u1, peaks.drift, peaks.theta)
     return max(abs(value / exact - 1.0) for value, exact in zip(found, PEAKS, strict=True))

@@ -1,4 +1,4 @@
-"""Catalogue of solvers with a common call, and the steady-state gain by any of them.
+"""Catalogue of solvers with a common call, and the steady-state gain computed by any of them.
 
 All use the equations of `sim.kernel.equations`; they differ in time integration and event location.
 """
@@ -24,8 +24,8 @@ PAPER_STEP = 1e-3
 """Time step [s] of the paper, section 3.3."""
 
 SEISMIC_PARTS = 10
-"""Number of parts into which a step with an impact is divided under a record. The paper states only "a further
-subdivision".
+"""Number of parts into which a step with an impact is divided when the excitation is a record. The paper states only "a
+further subdivision".
 """
 
 
@@ -37,7 +37,7 @@ def paper(problem: Problem, step: float) -> Motion:
     from bench.comparators.kernel.fixed_step import run_paper
 
     x, samples, report = _outputs(problem)
-    # a record is piecewise linear, without sines
+    # only records have segments without sines
     seismic = not problem.segments[:, 1:5].any()
     run_paper(
         problem.parameters,
@@ -116,7 +116,7 @@ SOLVERS: Mapping[str, Solver] = MappingProxyType(
         )
     }
 )
-"""Solvers by name: the first is the one to use, the others are for comparison."""
+"""Solvers by name. The first is the recommended one; the others are for comparison."""
 
 
 def solve(
@@ -134,7 +134,7 @@ def solve(
     """`sim.rocking.simulate` by the solver `name`; its knob, `tolerance` or `step` [s], has a default.
 
     With `paper` the block never returns to rest, impacts occur at ends of steps and peaks are sampled at steps. The
-    others agree with `taylor` within their order. Raises InvalidInput for an unknown name, the knob of another solver,
+    others converge to `taylor` with their order. Raises InvalidInput for an unknown name, the knob of another solver,
     or a value out of range.
     """
     solver = SOLVERS.get(name)
@@ -165,9 +165,9 @@ def solve(
 LAST_PERIODS = 60
 """Number of drive periods at the end of a run over which its peaks are taken.
 
-A solver that does not locate impacts wanders about its steady state: a short window misses excursions, so the result
-depends on the window (docs/benchmarks.md has the spread). A solver that locates them gives the same result for any
-window.
+The motion of a solver that does not locate impacts fluctuates about its steady state. A short window misses the
+extremes, so the result depends on the window (docs/benchmarks.md states the spread). A solver that locates impacts
+gives the same result for any window.
 """
 
 
@@ -194,10 +194,10 @@ def steady_gain_by_time(
 ) -> TimedGain:
     """Gain coefficients over the last LAST_PERIODS periods of a run of `duration` [s] by the solver `name`.
 
-    Without `state` the run starts on the exact rocking orbit, at its phase [rad] of the base's sine,
-    and settles on the solver's steady state: from rest the outcome would depend on a chaotic transient. The
-    bare frame's peaks are exact. Raises as `bench.comparators.catalogue.solve` and `sim.steady.rocking_orbit` do, and
-    InvalidInput for a run shorter than those periods. Source: Eq. (10).
+    Without `state` the run starts on the exact rocking orbit, at its phase [rad] of the base's sine, and settles on the
+    solver's steady state; from rest, the outcome would depend on a chaotic transient. The peaks of the bare frame are
+    computed exactly. Raises as `bench.comparators.catalogue.solve` and `sim.steady.rocking_orbit` do, and InvalidInput
+    for a run shorter than LAST_PERIODS periods. Source: Eq. (10).
     """
     from sim.steady import rocking_orbit
 

@@ -1,15 +1,16 @@
-"""heyoka and CVODE applied to the standard case. heyoka (Biscani and Izzo, 2021): Taylor series compiled by LLVM.
+"""heyoka and CVODE applied to the standard case. heyoka (Biscani and Izzo, 2021) integrates by Taylor series compiled
+by LLVM.
 
-The equations are deliberately repeated here: an independent reference must not share ours. One system covers both
-corners, with the sign of the corner as a parameter that the impact changes. The event is a falling sg theta. If theta
-itself were the event, the start of the case at theta = 0 would count as an impact, transfer the block to the wrong
-corner, and overturn it. sg theta rises from every impact and from the start, and a rising root is not an event, so that
-no guard time after an impact is required. The impacts of the case are vigorous and do not test heyoka's guard against
-chatter.
+The equations for heyoka are deliberately written out here: an independent reference must not share those of this
+program. One system covers both corners, with the sign of the corner as a parameter that the impact changes. The event
+is a falling sg theta. If theta itself were the event, the start of the case at theta = 0 would count as an impact,
+transfer the block to the wrong corner and overturn it. sg theta rises from every impact and from the start, and a
+rising root is not an event, so that no guard time after an impact is required. The impacts of the case are strong and
+do not test heyoka's protection against chatter.
 
 CVODE (SUNDIALS), used through scikit-sundae, has its own root finding. It is a multistep method and restarts at order 1
-after every impact. It uses our equations, so only the integrators are compared. The root at the start of a phase is
-divided out of the event.
+after every impact. It uses this program's equations, so only the integrators are compared. The root at the start of a
+phase is divided out of the event.
 """
 
 from dataclasses import dataclass

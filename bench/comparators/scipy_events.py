@@ -1,8 +1,8 @@
 # pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false
 """scipy's integrators with their own events, one call for each phase and segment of the excitation.
 
-The first line is needed because scipy's result has no types. The integrator restarts at each event and breakpoint,
-across which its error estimate is invalid.
+The pyright comment in the first line is needed because scipy's result has no types. The integrator restarts at each
+event and breakpoint, across which its error estimate is invalid.
 """
 
 from collections.abc import Callable
@@ -38,8 +38,8 @@ def integrate(method: Method, problem: Problem, tolerance: float, equations: Dri
     """Integrate `problem` by the `method` of `scipy.integrate.solve_ivp`; the absolute tolerance is a hundredth of
     `tolerance`.
 
-    The root theta = 0 at the start of a phase is divided out of the impact event. Peaks and samples cost time only when
-    requested, since both require the dense output. `equations` are the compiled ones by default.
+    The root theta = 0 at the start of a phase is divided out of the impact event. Peaks and samples, which require the
+    dense output, cost time only when they are requested. `equations` defaults to the compiled equations.
     """
     from scipy.integrate import solve_ivp
 
@@ -118,7 +118,7 @@ def integrate(method: Method, problem: Problem, tolerance: float, equations: Dri
 
 
 def python_rates(p: Vector, sg: float, row: Vector, t: float, x: Vector, out: Vector) -> None:
-    """`bench.comparators.kernel.fixed_step.driven_rates` without compilation, as usual with scipy."""
+    """`bench.comparators.kernel.fixed_step.driven_rates` without compilation, as scipy is usually used."""
     from bench.comparators.kernel import fixed_step
 
     plain_base, plain_rates = _python(fixed_step.base), _python(fixed_step.rates)
@@ -165,7 +165,7 @@ def _events(
 
 
 def _raise_peaks(peaks: Vector, solution: Any, start: float) -> None:
-    """Raise `peaks` to the greatest magnitudes on the dense output from `start` on."""
+    """Raise `peaks` to the largest magnitudes of the dense output from `start` on."""
     from scipy.optimize import brentq
 
     times = np.array([start, *(t for t in solution.t if t > start)])

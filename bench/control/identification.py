@@ -1,4 +1,4 @@
-"""Identification of the table: a periodic multisine with random phases as its drive, and the response to it.
+"""Identification of the table: a periodic multisine with random phases as the drive, and the table's response to it.
 
 The lines of the multisine lie on the grid of its period, so a whole number of periods in steady state has no leakage.
 Within a realisation, the periods differ only by noise. Between realisations, which have different phases, they differ
@@ -74,7 +74,7 @@ def band_lines(samples: int, sample_rate: float, band: tuple[float, float], *, o
     """
     low, high = band
     if not 0.0 < low < high < 0.5 * sample_rate:
-        allowed = f"it must ascend from above 0 to below half the sample rate, {0.5 * sample_rate:g} Hz"
+        allowed = f"its ends must be positive, ascending and below half the sample rate, {0.5 * sample_rate:g} Hz"
         raise InvalidInput("band of the multisine", band, allowed)
     spacing = sample_rate / samples
     lines = np.arange(int(np.ceil(low / spacing - 1e-9)), int(np.floor(high / spacing + 1e-9)) + 1)
@@ -86,8 +86,8 @@ def band_lines(samples: int, sample_rate: float, band: tuple[float, float], *, o
 
 
 def drive_amplitudes(frequency: Array, gain: Array, flat: Quantity, corner: float) -> Array:
-    """Relative amplitudes of the drive at `frequency` [Hz] for a motion that is flat in `flat` up to `corner` [Hz]
-    and flat in acceleration above, shape (n,).
+    """Relative amplitudes of the drive at `frequency` [Hz] for a motion whose spectrum is flat in `flat` up to `corner`
+    [Hz] and flat in acceleration above it, shape (n,).
 
     `gain` is the approximate table acceleration per volt, shape (n,); a preliminary `DriveCalibration` suffices.
     """
@@ -105,8 +105,8 @@ def multisine(
 ) -> Multisine:
     """A multisine with `amplitudes` [V] at `lines`, random phases from `seed`, and a low crest factor.
 
-    The crest factor is that of the drive or, with a `response` at the lines, of the acceleration, which must not lift a
-    standing block. Every realisation of an identification needs a different seed, or the same generator.
+    The crest factor is that of the drive or, with a `response` at the lines, of the acceleration, which must not uplift
+    a standing block. Every realisation of an identification needs a different seed, or the same generator.
     """
     random = np.random.default_rng(seed)
     spectrum = _with_phases(amplitudes, random.uniform(0.0, 2.0 * np.pi, lines.size))
@@ -177,8 +177,8 @@ def line_amplitudes(periods: Array, lines: Lines) -> Complex:
 def line_response(drive: Complex, output: Complex, frequency: Array, spacing: float) -> LineResponse:
     """The response from complex amplitudes of drive [V] and output [unit], shape (realisations, periods, n_lines).
 
-    `spacing` [Hz] is the reciprocal of the period. The drive is taken as noise-free. Raises InvalidInput for fewer than
-    two periods, or for inconsistent arrays.
+    `spacing` [Hz] is the reciprocal of the period. The drive is assumed to be free of noise. Raises InvalidInput for
+    fewer than two periods, or for inconsistent arrays.
     """
     realisations, periods = drive.shape[0], drive.shape[1]
     if drive.shape != output.shape or drive.shape[2:] != frequency.shape:
@@ -194,7 +194,7 @@ def line_response(drive: Complex, output: Complex, frequency: Array, spacing: fl
     if realisations > 1:
         total = np.sum(np.abs(each - response) ** 2, axis=0) / (realisations * (realisations - 1))
         distortion = np.sqrt(realisations * np.maximum(total - noise, 0.0))
-        # a few realisations may agree by chance: use at least the uncertainty due to noise
+        # a few realisations may agree by chance; the uncertainty due to noise is therefore the lower bound
         uncertainty = np.sqrt(np.maximum(total, noise))
     else:
         distortion, uncertainty = np.full(frequency.shape, np.nan), np.sqrt(noise)
@@ -247,10 +247,12 @@ def identify_table(
 
 
 def sensor_agreement(acceleration: LineResponse, displacement: LineResponse) -> tuple[float, float]:
-    """Gain [1] and lead [s] of the displacement sensor relative to the accelerometer, from the responses of both.
+    """Gain [1] and lead [s] of the displacement sensor relative to the accelerometer, from the responses of both
+    sensors.
 
-    Two sensors on one rigid table differ in calibration and delay: 1 and 0 if they agree; the gain is negative if one
-    of them is reversed. The fit over the lines is weighted by their uncertainties.
+    Two sensors on one rigid table differ in calibration and delay only. The values are 1 and 0 if they agree; the gain
+    is negative if one sensor is reversed. The fit over the lines
+    is weighted by their uncertainties.
     """
     omega = 2.0 * np.pi * acceleration.frequency
     ratio = -(omega**2) * displacement.response / acceleration.response

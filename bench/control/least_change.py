@@ -1,4 +1,4 @@
-"""Least change of a record that keeps the table within its limits of stroke and velocity at every sample.
+"""Smallest change of a record that keeps the table within its limits of stroke and velocity at every sample.
 
 The change is a sum of slow half sines. Its cost is the integral of its square, weighted by frequency because slow parts
 hardly affect the specimen, plus its effect on the peaks of oscillators at given periods. This is a
@@ -27,7 +27,7 @@ class Infeasible(Exception):
 def shortest(equations: tuple[Array, Array], inequalities: tuple[Array, Array]) -> Array:
     """Vector y, shape (n,), of minimum norm with A y = b and G y >= h.
 
-    After the minimum-norm solution of the equations is separated, a least-distance problem remains, whose dual is a
+    After the minimum-norm solution of the equations has been split off, a least-distance problem remains; its dual is a
     non-negative least-squares problem. `equations` is (A, b), of full row rank, `inequalities` (G, h). Raises
     Infeasible. Source: Lawson and Hanson, Solving Least Squares Problems, 1974, chapter 23.
     """
@@ -39,7 +39,7 @@ def shortest(equations: tuple[Array, Array], inequalities: tuple[Array, Array]) 
     free, needed = g - (g @ inverse) @ a, h - g @ particular
     if not (needed > 0.0).any():
         return particular
-    # in units of the distance to the farthest inequality
+    # scaled by the distance to the farthest inequality
     scale = float((needed / np.linalg.norm(free, axis=1)).max())
     dual = np.vstack((scale * free.T, needed))
     target = np.zeros(dual.shape[0])
@@ -56,7 +56,7 @@ def shortest(equations: tuple[Array, Array], inequalities: tuple[Array, Array]) 
 class SineModes:
     """sin(k pi j / (n - 1)) at the samples j = 0 to n - 1, for every k whose frequency is `lowest` to `highest` [Hz].
 
-    There are at least two. They vanish at both ends of the record.
+    There are at least two modes. They vanish at both ends of the record.
     """
 
     def __init__(self, n: int, dt: float, highest: float, lowest: float = 0.0) -> None:
@@ -97,7 +97,7 @@ class SineModes:
 
 
 def _transformed(values: Array) -> Array:
-    """Twice the discrete sine transform of type I, shape (n,)."""
+    """Twice the type I discrete sine transform, shape (n,)."""
     from scipy.fft import dst
 
     return np.asarray(dst(values, type=1), dtype=np.float64)
@@ -141,13 +141,15 @@ HIGHEST = 2.0
 """Highest frequency of a change [Hz], unless `ABOVE` times its lowest frequency is higher."""
 
 ABOVE = 4.0
-"""Two octaves suffice for a change with a lower frequency limit."""
+"""Smallest ratio of the highest to the lowest frequency of a change with a lower frequency limit: two octaves
+suffice.
+"""
 
 CHEAP = 0.5
 """Frequency [Hz] at which the weight of the squared change is 1; elsewhere it is (f / CHEAP)^4."""
 
 FLOOR = 0.05
-"""Frequency [Hz] below which the weight is constant, since a slower sine would exhaust the stroke at once."""
+"""Frequency [Hz] below which the weight is constant, since a slower sine would use up the stroke at once."""
 
 SPECTRUM = 7.0
 """Duration [s] for which a change as large as the record's peak costs as much as doubling every oscillator's peak."""
@@ -156,7 +158,7 @@ PASSES = 2
 """Number of iterations: each constrains the oscillators' peaks at their previous and new instants."""
 
 CLOSER = 1e-4
-"""Fraction of a limit reserved in the solution for rounding and the samples between peaks."""
+"""Fraction of a limit that the solution reserves for rounding and for the samples between peaks."""
 
 MOST_ROUNDS = 60
 """Largest number of rounds in which samples are added; a dozen is usual."""
@@ -208,16 +210,14 @@ class _Problem:
         self._bounds: list[_Bound] = []
 
     def solved(self, peaks: list[Peak], scales: Array) -> Array:
-        """The record with the least-cost change; the changes of the peaks are weighted relative to their scales
-        [m/s2].
-        """
+        """The record with the change of lowest cost; changes of the peaks are weighted relative to their scales [m/s2]."""
         from scipy.linalg import cholesky, solve_triangular
 
         pulls = np.array([self._modes.products(peak.weights) for peak in peaks]) / scales[:, None]
         root: Array = cholesky(np.diag(self._cost) + SPECTRUM / len(peaks) * (pulls.T @ pulls), lower=True)
 
         def rows(plain: Array) -> Array:
-            """Convert rows over the amplitudes of the modes to rows over y, whose square is the cost."""
+            """Convert coefficients of the modes' amplitudes to coefficients of y, whose squared norm is the cost."""
             return np.asarray(solve_triangular(root, plain.T, lower=True), dtype=np.float64).T
 
         ends = self._equations()
@@ -228,7 +228,7 @@ class _Problem:
             try:
                 y = shortest(equations, (held, needed))
             except Infeasible:
-                raise self._refusal(f"no change {self._kind} keeps it within limits") from None
+                raise self._refusal(f"no change {self._kind} keeps the record") from None
             sizes = np.asarray(solve_triangular(root.T, y, lower=False), dtype=np.float64)
             fitted = at_rest_in_the_end(self._record - self._modes.sum(sizes), self._dt)
             motion = table_motion(fitted, self._dt)
@@ -240,17 +240,19 @@ class _Problem:
             self._bounds += new
             more, values = self._inequalities(new)
             held, needed = np.concatenate((held, rows(more))), np.concatenate((needed, values))
-        raise self._refusal("the search ended before a change kept it")
+        raise self._refusal("the search ended before a change kept the record")
 
     def _equations(self) -> tuple[Array, Array]:
-        """A and b of A sizes = b, which cancel the record's velocity and displacement at its end."""
+        """A and b of the equations A sizes = b, with which the table's velocity and displacement are zero at the
+        record's end.
+        """
         scale = np.array([self._reach.velocity, self._reach.displacement])
         velocity, displacement = self._modes.motions(np.array([self._record.size - 1]))
         last = np.array([self._motion.velocity[-1], self._motion.displacement[-1]])
         return np.concatenate((velocity, displacement)) / scale[:, None], last / scale
 
     def _broken(self, motion: TableMotion) -> list[_Bound]:
-        """The local peaks of a motion beyond a limit."""
+        """The local peaks at which a motion exceeds a limit."""
         found: list[_Bound] = []
         for share, far in (
             (motion.velocity / self._reach.velocity, False),
@@ -262,7 +264,9 @@ class _Problem:
         return found
 
     def _inequalities(self, bounds: list[_Bound]) -> tuple[Array, Array]:
-        """G and h of G sizes >= h, shapes (m, k) and (m,), which keep the sample of each bound within its limit."""
+        """G and h of the inequalities G sizes >= h, shapes (m, k) and (m,), which keep the sample of each bound within
+        its limit.
+        """
         samples = np.array([bound.sample for bound in bounds], dtype=np.intp)
         far = np.array([bound.of_displacement for bound in bounds], dtype=np.bool_)
         signs = np.array([bound.sign for bound in bounds], dtype=np.float64)

@@ -22,8 +22,9 @@ from sim.excitation import SineProgram, Sweep
 class DriveCalibration:
     """Response of the table to the drive, `response` [m/s2 per V] at `omega` [rad/s], ascending, shape (n,).
 
-    Complex with the convention exp(+i omega t), as measured: it includes the delay of the filter before the converter.
-    Real and imaginary part are interpolated linearly between the points and constant outside.
+    The response is complex, with the convention exp(+i omega t). It is the measured one and therefore includes the
+    delay of the filter before the converter. Its real and imaginary parts are interpolated linearly between the points
+    and are constant outside.
     """
 
     omega: tuple[float, ...]
@@ -31,7 +32,7 @@ class DriveCalibration:
 
     @staticmethod
     def flat(response: complex) -> "DriveCalibration":
-        """The same response at every frequency, as the start of a calibration."""
+        """A calibration with the same response at every frequency, from which a measurement of the response starts."""
         return DriveCalibration((1.0,), (response,))
 
     def at(self, omega: NDArray[np.float64]) -> NDArray[np.complex128]:
@@ -39,7 +40,7 @@ class DriveCalibration:
         return np.asarray(np.interp(omega, self.omega, np.asarray(self.response, dtype=np.complex128)), np.complex128)
 
     def beyond(self, other: "DriveCalibration") -> "DriveCalibration":
-        """This calibration, extended beyond its last frequency by `other`."""
+        """This calibration with the points of `other` above its last frequency added."""
         above = [(omega, response) for omega, response in other.points if omega > self.omega[-1]]
         return DriveCalibration(
             (*self.omega, *(omega for omega, _ in above)), (*self.response, *(response for _, response in above))
@@ -53,7 +54,9 @@ class DriveCalibration:
 
 @dataclass(frozen=True)
 class Leg:
-    """A program segment that reaches a table acceleration `amplitude` [m/s2] at `omega` [rad/s] in `duration` [s]."""
+    """A segment of a program that reaches a table acceleration `amplitude` [m/s2] at `omega` [rad/s] in `duration`
+    [s].
+    """
 
     duration: float
     amplitude: float
@@ -73,7 +76,7 @@ def sweeps(legs: Sequence[Leg], amplitude: float, omega: float) -> list[Sweep]:
 
 
 def program(legs: Sequence[Leg], phase: float = 0.0) -> SineProgram:
-    """The base motion of the segments from rest."""
+    """The base motion of the segments, starting from rest."""
     return SineProgram(sweeps(legs, 0.0, legs[0].omega), phase)
 
 
@@ -92,7 +95,7 @@ class ShareRamp:
         self._played = 0
 
     def to(self, shares: tuple[complex, ...], samples: int, wait: int = 0) -> None:
-        """Reach `shares` within `samples` samples, from `wait` samples on; other harmonics go to zero.
+        """Change to `shares` within `samples` samples, beginning after `wait` samples; other harmonics go to zero.
 
         A change that is due later than this one is cancelled.
         """
@@ -108,7 +111,7 @@ class ShareRamp:
         self._length, self._done = max(samples, 1), 0
 
     def to_pure(self, samples: int) -> None:
-        """Reach a pure sine after `samples` more samples."""
+        """Change to a pure sine within the next `samples` samples."""
         if self._waiting or not np.array_equal(self._to, _pure()):
             self.to((1.0,), samples)
 
@@ -165,7 +168,7 @@ class Oscillator:
         self._shares = ShareRamp()
 
     def use(self, calibration: DriveCalibration) -> None:
-        """Divide by the response of `calibration` from now on."""
+        """Use the response of `calibration` from the next sample on."""
         self._calibration = calibration
 
     @property
@@ -185,13 +188,13 @@ class Oscillator:
 
     def trim(self, shares: tuple[complex, ...], blend: float = 1.0, wait: int = 0) -> None:
         """Change to `shares` of fundamental, second harmonic and so on, over `blend` cycles of the present frequency,
-        from `wait` samples on.
+        beginning after `wait` samples.
         """
         self._shares.to(shares, round(blend * self._cycle), wait)
 
     @property
     def phase(self) -> float:
-        """Phase of a held sine at the last sample [rad]."""
+        """Phase [rad] of the present sine at the last sample."""
         return self._phase
 
     @property
@@ -254,8 +257,8 @@ class Oscillator:
     def _factors(
         self, calibration: DriveCalibration, amplitude: Array, omega: Array, shares: NDArray[np.complex128]
     ) -> list[tuple[int, NDArray[np.complex128]]]:
-        """Orders of the harmonics that are driven, ascending, and their complex amplitudes [V]: shape (n,), or (1,)
-        where amplitude, frequency and shares are constant; which are then computed once.
+        """Orders of the driven harmonics, ascending, and their complex amplitudes [V], shape (n,); computed once, with
+        the shape (1,), where amplitude, frequency and shares are constant.
         """
         if amplitude.ndim or len(shares) > 1:
             key = None

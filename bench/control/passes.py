@@ -23,9 +23,9 @@ class Envelope:
 
     @staticmethod
     def of(volts: Array, acceleration: Array, displacement: Array | None, sample_rate: float) -> "Envelope":
-        """Envelope of volts and table acceleration [m/s2]; the mean acceleration is excluded from the integrals.
+        """Envelope of a drive [V] and a table acceleration [m/s2]; the integrals exclude the mean acceleration.
 
-        `displacement` [m] is the measured one; without it the acceleration is integrated twice.
+        `displacement` [m] is the measured displacement; without it the acceleration is integrated twice.
         """
         velocity, integral = integrated(acceleration, sample_rate)
         displacement = integral if displacement is None else displacement
@@ -40,7 +40,9 @@ class Envelope:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Fraction of a change that the limits allow, 0 to 1, and the limit that `binds` if it is less than 1."""
+    """Fraction of a change that the limits allow, 0 to 1; if it is less than 1, `binds` names the limit that determines
+    it.
+    """
 
     share: float
     binds: str | None
@@ -65,7 +67,7 @@ def fitting(present: Envelope, change: Envelope, limits: Limits, margin: float) 
     for name in UNITS:
         base, step = present.series[name], change.series[name]
         limit = float(getattr(limits, name)) / margin
-        # margin in the direction of the step; without margin, no part of the step is possible
+        # room in the direction of the step; without room, no part of the step is possible
         room = limit - np.sign(step) * base
         moving = np.abs(step) > 1e-12 * limit
         fits = float(np.min(room[moving] / np.abs(step[moving]), initial=np.inf))
@@ -81,13 +83,14 @@ CLEAR = 2.0
 
 @dataclass(frozen=True)
 class Pass:
-    """A pass; errors are relative to the target [1], with both filtered by the target's window.
+    """A pass. Errors are relative to the target [1]; motion and target are both filtered by the target's window.
 
     `error` is the measured root mean square; `floor` is its non-repeatable part: measurement noise and, after a drive
     has been played twice, every difference between the two plays. `repeatable` is the remainder, which a correction can
     remove. `peak_error` is the largest error divided by the target's peak, `spectrum_error` the largest deviation of
     the response spectrum. A pass is `accepted` when its error is the smallest so far; otherwise the drive is rolled
-    back. `replayed`: the best drive was played again; `gain` and `verdict` are those of the preceding correction.
+    back. `replayed` states whether the pass played the best drive again; `gain` and `verdict` are those of the
+    preceding correction.
     """
 
     number: int
@@ -121,7 +124,7 @@ class SpectrumCheck:
     def __init__(
         self, target: Array, sample_rate: float, band: tuple[float, float], periods: tuple[float, ...]
     ) -> None:
-        """`band` [s] and single `periods` [s] at which spectra are compared."""
+        """The spectra are compared over the `band` of periods [s] and at single `periods` [s]."""
         self._dt = 1.0 / sample_rate
         self._periods = np.concatenate((logarithmic_periods(*band), np.array(periods)))
         self._wanted = self._spectrum(target)
@@ -134,8 +137,8 @@ class SpectrumCheck:
         """Largest relative deviation not explained by noise, and its period [s]; both zero if there is none.
 
         `noise`, shape (n_lines,), is the expected |numpy.fft.rfft|^2 of the non-repeatable part of `achieved`, at
-        `frequency` [Hz], above zero. Noise shifts a peak by about the noise of the oscillator's response: a deviation
-        of more than `CLEAR` times its standard deviation counts in full.
+        `frequency` [Hz], above zero. Noise shifts a peak by about the noise of the oscillator's response; a deviation
+        of more than `CLEAR` standard deviations of that noise counts in full, a smaller one is ignored.
         """
         natural = 1.0 / self._periods[:, None]
         answer = natural**2 / np.abs(natural**2 - frequency**2 + 2j * DAMPING * natural * frequency)

@@ -33,9 +33,9 @@ def scaled(record: SampledRecord, length_ratio: float) -> SampledRecord:
 def resampled(record: SampledRecord, dt: float) -> SampledRecord:
     """`record` at a step of `dt` [s], not longer than its own, by linear interpolation.
 
-    If `dt` divides the record's step the motion is unchanged; otherwise the corners of the motion are cut. If it does
-    not divide the duration, a final sample of zero is added. Raises InvalidInput for a longer step, which would lose
-    content or alias it to lower frequencies.
+    If `dt` divides the record's step, the motion is unchanged; otherwise its corners are cut off. If it does not divide
+    the duration, a final sample of zero is added. Raises InvalidInput for a longer step, which would lose content or
+    alias it to lower frequencies.
     """
     if not 0.0 < dt <= record.dt * (1.0 + ROUNDING):
         raise InvalidInput("dt", dt, f"it must be above 0 and at most the record's step, {record.dt:g} s")
@@ -53,20 +53,23 @@ TRIM = 0.0005
 """Largest fraction of the Arias intensity that may be trimmed at each end of a record."""
 
 TAPER = 0.5
-"""Duration [s] of the half-cosine taper of a trimmed record, outside the part kept."""
+"""Duration [s] of the half-cosine taper of a trimmed record, outside the part that is kept."""
 
 BETWEEN = 0.02
-"""Fraction of the reach by which a motion may exceed it between samples; `reach.SHARE` reserves more."""
+"""Fraction of the reach by which a motion may exceed the reach between samples; `bench.control.target.SHARE` reserves
+more than this.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class PreparedMotion:
     """A motion of the table with its derivation from a record.
 
-    `record` begins `begin` [s] on the original record's clock; before that the table is at rest. All accelerations were
-    multiplied by `factor`. `peak_before` and `peak` are the greatest accelerations [m/s2] of the original record and of
-    the motion; `motion` has the table's velocity and displacement. `band` [Hz] is None without a filter, `reach` and
-    `fit` are None without a stroke; `steps` describes the processing, in order.
+    `record` begins at `begin` [s] on the original record's clock; before that time the table is at rest. All
+    accelerations were multiplied by `factor`. `peak_before` and `peak` are the largest accelerations [m/s2] of the
+    original record and of the motion; `motion` has the table's velocity and displacement. `band` [Hz] is None if the
+    record was not filtered, `reach` and `fit` are None if no stroke was given; `steps` describes the processing steps
+    in order.
     """
 
     record: SampledRecord
@@ -83,11 +86,11 @@ class PreparedMotion:
     def target(self, sample_rate: float) -> Target:
         """The motion at `sample_rate` [1/s], for its replication on the table.
 
-        Raises InvalidInput if there is no band, if it exceeds the range of the rate, if the rate is below the record's,
-        or if the motion exceeds `reach` by more than `BETWEEN`.
+        Raises InvalidInput if there is no band, if the band extends beyond the range of the sample rate, if the rate is
+        below the record's, or if the motion exceeds `reach` by more than `BETWEEN`.
         """
         if self.band is None:
-            raise InvalidInput("band", None, "a band is required for motion of the table: specify its ends")
+            raise InvalidInput("band", None, "the motion of the table requires a band: specify its ends")
         check_band(self.band, sample_rate)
         wave = resampled(self.record, 1.0 / sample_rate).acceleration
         # linear interpolation between the record's samples has slight content above the band
@@ -114,11 +117,11 @@ def prepare(
 ) -> PreparedMotion:
     """The motion of the table for `record`: similitude, then `trim`, `band`, `peak` and `reach`, in this order.
 
-    `length_ratio`: model over prototype length, with unchanged acceleration. `trim`: keep the part between this
-    fraction of the Arias intensity and its complement; None keeps everything. `band` [Hz]: -6 dB points of zero-phase
-    filters, with rest before and after; the table then ends at rest where it began. `peak` [m/s2]: of the trimmed and
-    filtered record. `reach`: limits of the table's motion; the fit by `method`, which preserves the response spectrum
-    at `periods` [s], then changes the peak slightly. Raises InvalidInput.
+    `length_ratio`: model over prototype length, with unchanged acceleration. `trim`: fraction of the Arias intensity
+    removed at each end; None keeps the whole record. `band` [Hz]: -6 dB points of zero-phase filters, with rest before
+    and after; the table then ends at rest where it began. `peak` [m/s2]: of the trimmed and filtered record. `reach`:
+    limits of the table's motion, to which the record is fitted by `method`, with the response spectrum preserved at
+    `periods` [s]; this changes the peak slightly. Raises InvalidInput.
     """
     peak_before = float(np.abs(record.acceleration).max())
     if not peak_before > 0.0:
@@ -195,7 +198,8 @@ def _filtered(record: SampledRecord, band: tuple[float, float]) -> tuple[Sampled
         raise InvalidInput(
             "band",
             band,
-            f"it must ascend from above 0, and begin below {most:g} Hz, half the sample rate of the record",
+            "its ends must be positive and ascending, and its lower end must be below "
+            f"{most:g} Hz, half the sample rate of the record",
         )
     rest = round(REST / low / record.dt)
     padded = np.zeros(next_fast_len(record.acceleration.size + 2 * rest, real=True))

@@ -1,11 +1,12 @@
-"""Waveform replication: iterative learning of the drive that makes the table follow a record.
+"""Waveform replication: iterative learning of the drive with which the table follows a record.
 
 A pass plays the drive u and measures the table. The error E is corrected through the inverse of the table: u <- u + Q
 IFFT{ W K conj(H) / (|H|^2 + eps^2 max|H|^2) E }, where K contains the coherence and the fraction of E that is not
-noise. It converges where |1 - Q H_true / H| < 1. After a pass with a large error, H is corrected by its measurement. A
-pass worse than the best one is rolled back; the best drive is played once more to measure the non-repeatable part, and
-the correction is halved. Thus the accepted error never grows, and neither noise nor non-repeatable motion is learned
-(De Cuyper, Linear feedback control for durability test rigs in the automotive industry, thesis, KU Leuven 2006).
+noise. It converges where |1 - Q H_true / H| < 1. After a pass with a large error, H is corrected by the response
+measured in that pass. A pass worse than the best one is rolled back; the best drive is played once more to measure the
+non-repeatable part, and the correction is halved. Thus the accepted error never grows, and neither noise nor
+non-repeatable motion is learned (De Cuyper, Linear feedback control for durability test rigs in the automotive
+industry, thesis, KU Leuven 2006).
 
 The passes end when the repeatable error is small enough both as root mean square, over the whole record, and in the
 response spectrum, which is sensitive to the few cycles that excite a structure.
@@ -29,9 +30,9 @@ Complex = NDArray[np.complex128]
 Status = Literal["running", "converged", "out of passes", "limited"]
 
 _REFINE_ABOVE, _REFINE_ON_ABOVE = 0.05, 0.01
-"""Error above which refinement of the response starts, and error down to which it then continues."""
+"""Error above which the refinement of the response starts, and error down to which it then continues."""
 _LEAST_SHARE = 0.02
-"""Fraction of a correction permitted by the limits below which no further pass is made."""
+"""No further pass is made if the limits permit less than this fraction of a correction."""
 
 
 class ReplicationParameters(Parameters):
@@ -67,7 +68,7 @@ class ReplicationParameters(Parameters):
 
 
 class Replication:
-    """Finds the drive for `target`: play `drive` and pass the measurement to `learn`, until `finished`.
+    """Determines the drive for `target`. Use: play `drive` and pass the measurement to `learn`, until `finished`.
 
     ::
 
@@ -110,12 +111,12 @@ class Replication:
 
     @property
     def drive(self) -> Array:
-        """Volts of the next pass, shape (n,); zero at both ends."""
+        """Drive [V] of the next pass, shape (n,); zero at both ends."""
         return self._drive
 
     @property
     def best(self) -> Array:
-        """Volts of the best pass so far, shape (n,)."""
+        """Drive [V] of the best pass so far, shape (n,)."""
         return self._best
 
     @property
@@ -130,7 +131,7 @@ class Replication:
 
     @property
     def verdict(self) -> Verdict:
-        """Effect of the limits on `drive` or, with the status "limited", on the correction that was not played."""
+        """Effect of the limits on `drive` or, if the status is "limited", on the correction that was not played."""
         return self._verdict
 
     @property
@@ -141,7 +142,7 @@ class Replication:
 
     @property
     def spectrum_error(self) -> tuple[float, float]:
-        """Largest deviation of the response spectrum with the best drive in excess of noise, and its period [s].
+        """Largest deviation, in excess of noise, of the response spectrum with the best drive, and its period [s].
 
         Both are zero if there is none.
         """
@@ -162,7 +163,7 @@ class Replication:
         """
         for name, values in (("acceleration", acceleration), ("displacement", displacement)):
             if values is not None and (values.shape != self._drive.shape or not np.isfinite(values).all()):
-                raise InvalidInput(f"measured {name}", values.shape, "every sample of the pass is required; repeat it")
+                raise InvalidInput(f"measured {name}", values.shape, "every sample is required; repeat the pass")
         measured = self._table.spectrum(acceleration)
         missing = self._wanted - measured
         error = self._size(np.abs(missing) ** 2) / self._norm
@@ -194,7 +195,7 @@ class Replication:
     def _compare(self, missing: Complex) -> None:
         """Update noise and mean error from the second play of the best drive."""
         difference = 0.5 * octave_mean(np.abs(missing - self._missing) ** 2, self._table.frequency)
-        # two plays may agree by chance: use the largest scatter so far
+        # two plays may agree by chance: the largest scatter so far is used
         self._noise = np.maximum(self._noise, difference)
         self._missing = 0.5 * (self._missing + missing)
         self._plays = 2
@@ -249,7 +250,9 @@ class Replication:
         return self._best + verdict.share * step, gain, verdict
 
     def _ends(self) -> Array:
-        """A factor that ramps the drive up from zero and down to zero within the rest before and after the record."""
+        """Factor that ramps the drive up from zero in the rest before the record, and down to zero in the rest after
+        it.
+        """
         n = max(self._target.rest // 4, 2)
         ramp = 0.5 * (1.0 - np.cos(np.pi * np.arange(n) / n))
         ends = np.ones(self._target.acceleration.size)
@@ -257,5 +260,5 @@ class Replication:
         return ends
 
     def _size(self, power: Array) -> float:
-        """Root of the power of a spectrum, filtered by the window."""
+        """Square root of the total power of a spectrum, filtered by the window."""
         return float(np.sqrt(np.sum(self._table.window**2 * power)))

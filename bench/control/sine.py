@@ -35,7 +35,9 @@ class Sine:
     calibration: DriveCalibration
 
     def turn(self, cycle: Cycle) -> complex:
-        """exp(i phi) at zero phase of the cycles, from a cycle with a pure sine."""
+        """Factor exp(i phi), with the oscillator's phase phi where the phase of the cycles is zero, from a cycle with a
+        pure sine drive.
+        """
         asked = complex(cycle.harmonics(_DRIVE)[0] * self.calibration.at(np.array(self.omega)))
         return asked / abs(asked)
 
@@ -96,21 +98,21 @@ GAIN = 0.9
 """Fraction of an error removed by one step, below 1 because gains are uncertain."""
 
 PATIENCE = 6
-"""Number of steps after which that fraction falls as 1, 1/2, 1/3 and so on: the mean of a non-repeating motion is then
-corrected; following each deviation would change the motion.
+"""Number of steps after which that fraction falls as 1, 1/2, 1/3 and so on. The mean of a non-repeating motion is then
+corrected; a correction of each deviation would change the motion.
 """
 
 LARGEST_STEP = 0.10
 """Largest change of a share per measurement."""
 
 NOTICED = 1.5
-"""Number of standard deviations above which a harmonic is corrected; anything less is noise."""
+"""Number of standard deviations above which a harmonic is corrected; smaller harmonics are noise."""
 
 TELLING = 5.0
 """Number of standard deviations of a step above which its secant is used."""
 
 PLAUSIBLE = (0.5, 2.0)
-"""Range of plausible magnitudes of a table's secant; an unsettled block causes others."""
+"""Range of plausible magnitudes of a table's secant; a block whose motion has not settled causes values outside it."""
 
 
 @dataclass(frozen=True)

@@ -1,11 +1,13 @@
 """Stabiliser of an unstable periodic motion: corrections of the drive's fundamental, once per cycle.
 
 The state of the cycle map (`sim.cycle_map`) is estimated by a Kalman filter and fed back by a linear-quadratic
-regulator. The filter does not know the orbit: the Fourier coefficients y* of the periodic motion are a random walk that
-it estimates as well, with steps large compared with the noise. It therefore reacts only to differences between cycles:
-any motion that repeats is taken for the orbit and receives no control, whatever the error of the model.
+regulator. The orbit is not an input of the filter: it also estimates the Fourier coefficients y* of the periodic
+motion, as a random walk with steps that are large compared with the noise. The stabiliser therefore reacts only to
+differences between cycles: any motion that repeats is taken for the orbit and receives no control, however large the
+error of the model.
 
-A correction computed from cycle n takes effect at the beginning of cycle n + 2; cycle n + 1 is under way by then.
+A correction computed from cycle n takes effect at the beginning of cycle n + 2, because cycle n + 1 has already begun
+when it is computed.
 """
 
 from collections import deque
@@ -34,13 +36,13 @@ control on every deviation and captures less often; with a high cost capture tak
 """
 
 READING, DISTURBANCE, WANDER = 3e-6, 1e-3, 1e-2
-"""Standard deviations assumed by the filter: of a measured coefficient [m], of the disturbance of a state in a cycle
-relative to its size, and of the change of y* in a cycle relative to its size.
+"""Standard deviations assumed by the filter: of a measured coefficient [m], of the disturbance of a state in a cycle,
+and of the change of y* in a cycle, both relative to the magnitude of the quantity.
 """
 
 
 def observed(cycle: Cycle, turn: complex) -> Array:
-    """The vector y of a measured cycle; `turn` is that of `bench.control.sine.Sine.turn`."""
+    """The vector y of a measured cycle; `turn` is the result of `bench.control.sine.Sine.turn`."""
     by = turn ** np.arange(1, cycle.harmonics(U1).size + 1)
     return coefficients(cycle.harmonics(U1) / by, cycle.harmonics(DRIFT) / by)
 
@@ -57,7 +59,7 @@ class StabiliserDesign:
 
     @staticmethod
     def of(cycle_map: CycleMap) -> "StabiliserDesign":
-        """Solve the two Riccati equations, which takes up to half a second. Raises numpy.linalg.LinAlgError or
+        """Solve the two Riccati equations; this takes up to half a second. Raises numpy.linalg.LinAlgError or
         ValueError if no control stabilises the orbit.
         """
         return StabiliserDesign(cycle_map, _regulator(cycle_map), _filter(cycle_map))
@@ -77,12 +79,14 @@ class Stabiliser:
 
     @property
     def deviation(self) -> float:
-        """Estimated deviation of y from the orbit's, relative to its size, at the beginning of the next cycle."""
+        """Estimated deviation of y from that of the orbit, relative to the latter, at the beginning of the next
+        cycle.
+        """
         return float(np.linalg.norm(self._map.outputs @ self._state) / np.linalg.norm(self._map.orbit))
 
     def next(self, y: Array | None) -> complex:
-        """Control of the cycle after next, from the coefficients of the cycle just measured; None stands for a lost
-        cycle.
+        """Control of the cycle after next, from the coefficients `y` of the cycle just measured; `y` is None for a
+        cycle without a measurement.
         """
         a, (b1, b0), c, (d1, d0) = (
             self._map.transition,
@@ -119,7 +123,7 @@ def _regulator(found: CycleMap) -> Array:
     cost = COST * np.eye(2)
     value = np.asarray(solve_discrete_are(a, b, weight, cost), dtype=np.float64)
     gain = np.asarray(np.linalg.solve(cost + b.T @ value @ b, b.T @ value @ a), dtype=np.float64)
-    # the solver does not always recognise an equation without a stabilising solution
+    # the solver does not always detect that an equation has no stabilising solution
     if np.abs(np.linalg.eigvals(a - b @ gain)).max() >= 1.0:
         raise np.linalg.LinAlgError("the regulator does not stabilise the orbit")
     return gain
@@ -151,20 +155,20 @@ MISSING = 3
 """Number of successive cycles without a measurement after which the hold ends."""
 
 ANSWER = 0.15
-"""Largest difference of the table's fundamental from that expected of the drive, as a share; a phase error of 9 degrees
-or a gain error of 15 % causes it.
+"""Largest difference between the table's fundamental and that expected from the drive, as a share; a phase error of 9
+degrees or a gain error of 15 % causes a difference of this size.
 """
 
 GROWTH = 1.5
-"""Largest peak of a cycle relative to the largest of the free motion."""
+"""Largest allowed peak of a cycle, relative to the largest peak of the free motion."""
 
 
 @dataclass
 class HoldMonitor:
     """Test for capture, and reasons to release the hold.
 
-    `patience` is the number of cycles within which the motion must be captured, `largest` [m] the largest peak drift
-    allowed, and `answer` the table's fundamental per share of the drive before the hold.
+    `patience` is the number of cycles within which the motion must be captured, `largest` [m] the largest allowed peak
+    drift, and `answer` the table's fundamental before the hold, per share of the drive.
     """
 
     authority: float
@@ -185,8 +189,8 @@ class HoldMonitor:
         return self._late()
 
     def push(self, control: complex, drift: float, played: complex, achieved: complex) -> str | None:
-        """Count a cycle with its `control`, peak `drift` [m], and shares of drive and table. Returns the same as
-        `missed`.
+        """Count a cycle with its `control`, peak `drift` [m], and shares of drive and table. Returns the reason to
+        release the hold, if any.
         """
         self.cycles += 1
         self._missing = 0

@@ -1,10 +1,10 @@
 """Start-ups that bring the block to its steady rocking motion, planned with the model before the test.
 
-Switching the sine on topples the block at many points, and at high frequencies leaves it at rest. The transient is
-chaotic and the specimen is uncertain, so each candidate is simulated with specimens drawn from the identification's
-uncertainty and with slightly different drives. A few draws select candidates and new draws rate those that remain, so
-the stated probability is not biased by the selection. Each selection round tries short candidates first and ends once
-enough of them have succeeded with every draw, since no longer candidate could displace them.
+At many points, switching the sine on overturns the block; at high frequencies it leaves the block at rest. The
+transient is chaotic and the specimen is uncertain, so each candidate is simulated with specimens drawn from the
+identification's uncertainty and with slightly different drives. A few draws select candidates and new draws rate those
+that remain, so the stated probability is not biased by the selection. Each selection round tries short candidates first
+and ends once enough of them have succeeded with every draw, since no longer candidate could displace them.
 """
 
 from collections.abc import Sequence
@@ -37,8 +37,8 @@ DIRECT_RAMPS = (8.0, 16.0)
 """Durations of a ramp at the requested frequency [s]."""
 
 OVERSHOOTS = (1.0, 1.2)
-"""Ratio of the amplitude of ramp and chirp to the requested amplitude; a larger amplitude lifts a block that would stay
-at rest.
+"""Ratios of the amplitude of ramp and chirp to the requested amplitude; a larger amplitude uplifts a block that would
+stay at rest.
 """
 
 EASE = 6.0
@@ -47,7 +47,7 @@ EASE = 6.0
 
 @dataclass(frozen=True)
 class Candidate:
-    """A candidate start: its sweeps end at the requested amplitude and frequency."""
+    """A candidate start-up: its sweeps end at the requested amplitude and frequency."""
 
     name: str
     legs: tuple[Leg, ...]
@@ -59,7 +59,7 @@ class Candidate:
 
 
 def candidates(omega: float, amplitude: float) -> list[Candidate]:
-    """All candidate start-ups to `amplitude` [m/s2] at `omega` [rad/s], each once."""
+    """All candidate start-ups to `amplitude` [m/s2] at `omega` [rad/s], without duplicates."""
     found = [_direct(omega, amplitude, *values) for values in product(DIRECT_RAMPS, OVERSHOOTS)]
     above = [top for top in TOPS if top > omega]
     found += [_from_above(omega, amplitude, *values) for values in product(above, RAMPS, CHIRPS, OVERSHOOTS)]
@@ -96,10 +96,10 @@ DRIVE = 0.03
 """Relative half width of the table's amplitude during a start-up, before amplitude control takes effect."""
 
 SIEVES = ((5, 2.0), (10, 1.0))
-"""Number of draws in each selection round, and number of candidates kept per requested start-up."""
+"""For each selection round: number of draws, and number of candidates kept per requested start-up."""
 
 RATING = 32
-"""Number of draws that rate the remaining candidates."""
+"""Number of draws with which the remaining candidates are rated."""
 
 SEED = 1
 """Random seed of the draws, for reproducible results."""
@@ -119,7 +119,7 @@ CLOSE = 0.10
 
 @dataclass(frozen=True)
 class Start:
-    """A start to the steady state: its sweeps end at the requested amplitude and frequency.
+    """A start-up to the steady state: its sweeps end at the requested amplitude and frequency.
 
     `chance`, between 0 and 1, is estimated from s successes of n draws as (s + 1) / (n + 2) (rule of succession).
     """
@@ -151,11 +151,12 @@ def plan_starts(
     count: int,
     uncertainty: SpecimenKnowledge | None = None,
 ) -> list[Start]:
-    """The `count` most robust starts to `amplitude` [m/s2] at `omega` [rad/s], best first, shorter first among equals.
+    """The `count` most robust start-ups to `amplitude` [m/s2] at `omega` [rad/s], best first, shorter first among
+    equals.
 
-    `orbit` is the rocking orbit of `specimen`, None if it does not exist. A start succeeds with a drawn specimen if the
-    simulated motion ends close to that specimen's stable orbit or, if there is none, if the block is left standing.
-    Raises InvalidInput for a bare frame or meaningless numbers. Results are cached.
+    `orbit` is the rocking orbit of `specimen`, None if it does not exist. A start-up succeeds with a drawn specimen if
+    the simulated motion ends close to that specimen's stable orbit or, if there is no such orbit, if the block remains
+    standing. Raises InvalidInput for a bare frame or an invalid number. Results are cached.
     """
     allowed = uncertainty or SpecimenKnowledge()
     aim = None if orbit is None else [*orbit.section.tolist(), orbit.peaks.drift, orbit.peaks.theta, orbit.stable]
@@ -196,8 +197,8 @@ def _search(
 def _sifted(
     ways: list[Candidate], won: Counts, cases: Sequence[_Case], keep: int, most: int
 ) -> tuple[list[Candidate], Counts]:
-    """The `keep` best candidates after these cases as well, best first, with the number of cases in which each has
-    succeeded.
+    """The `keep` best candidates, best first, after adding these cases, with the total number of cases in which each
+    has succeeded.
 
     `most` is the total number of cases so far. Candidates are simulated in the order in which equals are preferred;
     once `keep` of them have succeeded in every case, the others are dropped without simulation.
@@ -209,7 +210,7 @@ def _sifted(
         batch = order[len(simulated) : len(simulated) + max(keep - np.count_nonzero(total[simulated] == most), 1)]
         total[batch] += _successes([ways[i] for i in batch], cases)
         simulated += batch
-    # in the given order, which equals of one length keep
+    # the sort below is stable: equally good candidates of equal duration keep the given order
     simulated.sort()
     best = [simulated[k] for k in _best_first([ways[i] for i in simulated], total[simulated])][:keep]
     return [ways[i] for i in best], total[best]

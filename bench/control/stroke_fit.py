@@ -45,8 +45,8 @@ def fit_by_high_pass(acceleration: Array, dt: float, reach: Reach) -> HighPassed
     found = high_passed(acceleration, dt, high)
     motion = table_motion(found.acceleration, dt)
     if not reach.holds(motion):
-        needs = f"even high-passed at {high:g} Hz it requires {1e3 * motion.peak_displacement:.3g} mm and"
-        allowed = f"{1e3 * reach.displacement:.3g} mm and {reach.velocity:.3g} m/s are allowed: scale it down"
+        needs = f"even high-passed at {high:g} Hz, the record requires {1e3 * motion.peak_displacement:.3g} mm and"
+        allowed = f"{1e3 * reach.displacement:.3g} mm and {reach.velocity:.3g} m/s are allowed: scale the record down"
         raise InvalidInput("record", "", f"{needs} {motion.peak_velocity:.3g} m/s; {allowed}")
     for _ in range(HALVINGS):
         corner = (low * high) ** 0.5
@@ -64,7 +64,7 @@ def high_passed(acceleration: Array, dt: float, corner: float) -> HighPassed:
     """
     lead = int(np.ceil(PAD * ORDER / (corner * dt)))
     padded = np.pad(acceleration, lead)
-    # as many zeros again prevent wrap-around of the periodic transform
+    # as many zeros again, to prevent wrap-around of the periodic transform
     length = 2 * padded.size
     frequencies = np.fft.rfftfreq(length, dt)
     gain = np.zeros_like(frequencies)
@@ -80,10 +80,10 @@ SHORTEST = 16
 """Minimum number of samples of a record."""
 
 TURNS = 8
-"""Maximum number of fits within a band; each leaves about a tenth of its change to the next."""
+"""Maximum number of fits within a band; after each, about a tenth of the change remains for the next."""
 
 TIGHTER = 0.995
-"""Fraction of one fit's reach that is available to the next."""
+"""Factor by which the reach is reduced from one fit to the next."""
 
 SAME = 0.01
 """Largest difference between the fitted motion and its band-limited version, as a fraction of the reach."""
@@ -146,7 +146,7 @@ def fit_stroke(
     """
     original, dt = record.acceleration, record.dt
     if original.size < SHORTEST or not original.any():
-        needs = f"fitting requires at least {SHORTEST} samples, and some that are not zero"
+        needs = f"fitting requires at least {SHORTEST} samples, not all of them zero"
         raise InvalidInput("record", f"{original.size} samples", needs)
     before = table_motion(original, dt)
     lead = 0
@@ -176,8 +176,9 @@ def fit_stroke(
 def _least_change(
     original: Array, dt: float, reach: Reach, periods: Array, damping: float, band: tuple[float, float] | None
 ) -> Array:
-    """The least change. Half sines end with the record and therefore have slight content below their frequency, outside
-    the table's `band`. This content is removed, and any resulting excess of reach or final motion is fitted again.
+    """The record with the least change. Half sines end with the record and therefore have slight content below their
+    frequency, outside the table's `band`. This content is removed; if the motion then exceeds the reach or does not end
+    at rest, the record is fitted again.
     """
     if band is None:
         return fit_by_least_change(original, dt, reach, periods, damping)
@@ -193,7 +194,7 @@ def _least_change(
             return made
         made, share = kept[: made.size], TIGHTER ** (turn + 1)
         asked = Reach(share * reach.displacement, share * reach.velocity)
-    needs = f"no change from {band[0] / FLAT:.3g} Hz upward was found, {1e3 * reach.displacement:.3g} mm and"
+    needs = f"no change from {band[0] / FLAT:.3g} Hz upward is sufficient: {1e3 * reach.displacement:.3g} mm and"
     raise InvalidInput("record", "", f"{needs} {reach.velocity:.3g} m/s are allowed; {NOT_BOTH}")
 
 

@@ -19,7 +19,7 @@ from sim.parameters import Parameters, quantity
 Number = TypeVar("Number", np.float64, np.complex128)
 
 _REACH = exp2(1.0 / 6.0)
-"""Ratio of the outermost averaged frequency to the centre: a sixth of an octave to either side."""
+"""Ratio of the highest averaged frequency to the centre frequency: a sixth of an octave on either side."""
 
 
 def octave_mean(values: NDArray[Number], frequency: NDArray[np.float64]) -> NDArray[Number]:
@@ -65,7 +65,7 @@ class TableModel(Parameters):
             if len(getattr(self, name)) != n:
                 raise InvalidInput(name, len(getattr(self, name)), f"it must have {n} values, one per frequency")
         if not np.all(np.diff(self.frequency) > 0.0) or self.frequency[0] <= 0.0:
-            raise InvalidInput("frequency", self.frequency[0], "the frequencies must be positive and ascend")
+            raise InvalidInput("frequency", self.frequency[0], "the frequencies must be positive and ascending")
         return self
 
     @property
@@ -74,8 +74,8 @@ class TableModel(Parameters):
         return self.frequency[0], self.frequency[-1]
 
     def response(self, frequency: Array) -> NDArray[np.complex128]:
-        """The response at `frequency` [Hz], same shape. Raises InvalidInput outside the band: nothing is
-        extrapolated.
+        """The response at `frequency` [Hz], same shape. Raises InvalidInput outside the band, because a response is
+        never extrapolated.
         """
         self._require(frequency)
         return np.interp(frequency, self.frequency, self._complex)
@@ -103,7 +103,7 @@ class TableModel(Parameters):
     def require_rate(self, sample_rate: float) -> None:
         """Raise InvalidInput if drive and channels run at a rate other than that of the identification."""
         if sample_rate != self.sample_rate:
-            allowed = f"the table model was identified at {self.sample_rate:g}; identify the table again"
+            allowed = f"the table model was identified at {self.sample_rate:g} 1/s; identify the table again"
             raise InvalidInput("sample_rate", sample_rate, allowed)
 
     def write(self, path: Path) -> None:
@@ -172,7 +172,7 @@ class TableInverse:
         """Expected |spectrum|^2 of the measurement noise [(m/s2)^2], shape (n_lines,)."""
 
     def spectrum(self, record: Array) -> Complex:
-        """The lines within the support of a record."""
+        """The lines of a record's spectrum within the support."""
         return np.fft.rfft(record)[self._inside]
 
     def record(self, spectrum: Complex) -> Array:
@@ -188,8 +188,8 @@ class TableInverse:
     def correction(self, missing: Complex, noise: Array) -> Array:
         """Drive [V] for the spectrum of a `missing` acceleration, at unit gain.
 
-        Every line is weighted by its coherence and by the fraction of its power that is not `noise`, so that noise is
-        not learned.
+        Every line is weighted by its coherence and by the fraction of its power that is not `noise`, so that the drive
+        does not reproduce noise.
         """
         power = octave_mean(np.abs(missing) ** 2, self.frequency)
         real_share = np.maximum(1.0 - noise / np.maximum(power, _TINY * power.max(initial=1e-300)), 0.0)

@@ -16,17 +16,18 @@ ORDER = 4
 """Order of the Butterworth filters, applied forwards and backwards, that limit a record to the band."""
 
 FLAT, REACH = 1.6, 2.0
-"""Factors on the ends of the band: the weight is 1 up to the first and 0 beyond the second."""
+"""Factors by which the band is widened at both ends: the weight is 1 up to the first and 0 beyond the second."""
 
 REST = 4.0
-"""Rest before and after the record, in which the filters settle, in periods of the band's lower end."""
+"""Rest before and after the record, in which the filters settle, in periods of the band's lowest frequency."""
 
 
 @dataclass(frozen=True)
 class Target:
-    """Table acceleration [m/s2] at `sample_rate` [1/s], shape (n,); rest at either end lasts `rest` samples.
+    """Table acceleration [m/s2] at `sample_rate` [1/s], shape (n,); the rest at each end lasts `rest` samples.
 
-    `band` [Hz] are the -6 dB points of the filters that shaped it. Its spectrum is zero outside `support`.
+    `band` [Hz] contains the -6 dB points of the filters applied to the motion, whose spectrum is zero outside
+    `support`.
     """
 
     acceleration: Array
@@ -79,7 +80,7 @@ def check_band(band: tuple[float, float], sample_rate: float) -> None:
     """Raise InvalidInput unless `sample_rate` [1/s] covers `band` [Hz] and its transition bands."""
     low, high = band
     if not 0.0 < low < high or REACH * high > 0.5 * sample_rate:
-        allowed = f"it must ascend from above 0 to at most {0.5 * sample_rate / REACH:g} Hz"
+        allowed = f"its ends must be positive, ascending and at most {0.5 * sample_rate / REACH:g} Hz"
         raise InvalidInput("band", band, allowed)
 
 
@@ -104,8 +105,8 @@ def integrated(acceleration: Array, sample_rate: float) -> tuple[Array, Array]:
 
 
 def band_window(frequency: Array, band: tuple[float, float]) -> Array:
-    """Weight: 1 within the band extended by FLAT, 0 from REACH on, half a cosine in the logarithm between; same
-    shape.
+    """Weight at each frequency, same shape: 1 within the band widened by FLAT, 0 beyond REACH, and half a cosine in the
+    logarithm of the frequency in between.
     """
     low, high = band
     inside = (frequency > low / REACH) & (frequency < high * REACH)

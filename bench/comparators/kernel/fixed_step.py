@@ -93,7 +93,9 @@ def between(
     t: float,
     out: NDArray[np.float64],
 ) -> None:
-    """The cubic Hermite polynomial of a step of length `h`, at time `t` of it: fourth order, as the step."""
+    """The cubic Hermite polynomial of a step of length `h`, at time `t` from its start; it is of fourth order, like the
+    step.
+    """
     s = t / h
     for j in range(6):
         rise = following[j] - x[j]
@@ -103,13 +105,13 @@ def between(
 
 @compiled("float64(float64, float64, float64, float64, float64, float64)")
 def cubic_peak(y: float, slope: float, end: float, end_slope: float, h: float, start: float) -> float:
-    """Greatest magnitude on [start, h] of the cubic with these values and slopes at 0 and h."""
+    """Largest magnitude on [start, h] of the cubic with these values and slopes at 0 and h."""
     a, rise = h * slope, end - y
     b, c = 3.0 * rise - 2.0 * a - h * end_slope, a + h * end_slope - 2.0 * rise
     s = start / h
     best = max(abs(end), abs(y + s * (a + s * (b + s * c))))
     if slope * end_slope < 0.0:
-        # the one zero of a + 2 b s + 3 c s^2 between the ends, in the form that does not cancel
+        # the one zero of a + 2 b s + 3 c s^2 between the ends, in the form without cancellation
         root = sqrt(max(0.0, b * b - 3.0 * a * c))
         q = -(b + root) if b >= 0.0 else root - b
         s = q / (3.0 * c) if c != 0.0 else -1.0
@@ -139,9 +141,9 @@ def run_paper(
     """Section 3.3 of the paper, literally: steps `dt` on one grid, impacts detected by theta_{i-1} theta_i < 0.
 
     parts : 1 for the harmonic procedure, with the impact at the step's end; more for the seismic one, which repeats the
-    step in this many parts, with the impact at the end of the part in which the sign changes.
-    Other arguments as for `sim.kernel.rocking.run`. The block lifts when a step begins with |m| > b g M (Eq. 9, A.3)
-    and never returns to rest; peaks are the greatest values on the grid; samples are interpolated between its points.
+    step in this many parts, with the impact at the end of the part in which the sign changes. Other arguments as for
+    `sim.kernel.rocking.run`. The block lifts when a step begins with |m| > b g M (Eq. 9, A.3) and never returns to
+    rest. Peaks are the largest values on the grid; samples are interpolated between grid points.
     """
     following, k, part_slope = np.zeros(6), np.zeros((STAGES, 6)), np.zeros(6)
     peaks = report[PEAKS:]

@@ -1,6 +1,6 @@
 """The classical Runge-Kutta method with a fixed step and events located to its own order.
 
-An event is located by steps of other lengths from the same state, not by interpolation, which preserves order 4. It
+An event is located not by interpolation but by steps of other lengths from the same state, which preserves order 4. It
 uses the equations of `sim.kernel.equations` and the report of `sim.kernel.rocking.run`.
 """
 
@@ -68,10 +68,11 @@ def located(
     k: NDArray[np.float64],
     out: NDArray[np.float64],
 ) -> float:
-    """Length in (0, h] of the step that ends at `event`, or with `turning` where the distance to it is least.
+    """Length in (0, h] of the step that ends at `event` or, with `turning`, where the distance to the event is
+    smallest.
 
     Every trial is a whole Runge-Kutta step from `x` to `out`. The `known` roots theta = 0 at the start are divided out:
-    the target is a zero of distance / h^known, which is `first` at h = 0. False position, with the halving of
+    the target is a zero of distance / h^known, which is `first` at h = 0. Method: false position with the halving of
     Dowell and Jarratt (1971).
     """
     a0, side = base(row, tau)[0], 0
@@ -118,8 +119,8 @@ def run_located(
 ) -> None:
     """Integrate with steps of at most `dt` that end at segment ends and events: order 4 across both.
 
-    Arguments and the rest criterion as for `sim.kernel.rocking.run`; the run fails after `most_impacts`. A dip to the
-    ground within a step is detected if the step's ends slope towards it.
+    Arguments and the rest criterion as for `sim.kernel.rocking.run`; the run fails after `most_impacts`. A block that
+    touches the ground within a step is detected if the distance falls at the step's start and rises at its end.
     """
     following, k, slope = np.zeros(6), np.zeros((STAGES, 6)), np.zeros(6)
     peaks = report[PEAKS:]
