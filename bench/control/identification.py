@@ -251,8 +251,7 @@ def sensor_agreement(acceleration: LineResponse, displacement: LineResponse) -> 
     sensors.
 
     Two sensors on one rigid table differ in calibration and delay only. The values are 1 and 0 if they agree; the gain
-    is negative if one sensor is reversed. The fit over the lines
-    is weighted by their uncertainties.
+    is negative if one sensor is reversed. The fit over the lines is weighted by their uncertainties.
     """
     omega = 2.0 * np.pi * acceleration.frequency
     ratio = -(omega**2) * displacement.response / acceleration.response

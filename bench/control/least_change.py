@@ -210,7 +210,7 @@ class _Problem:
         self._bounds: list[_Bound] = []
 
     def solved(self, peaks: list[Peak], scales: Array) -> Array:
-        """The record with the change of lowest cost; changes of the peaks are weighted relative to their scales [m/s2]."""
+        """The record with the least-cost change; changes of the peaks are weighted relative to their scales [m/s2]."""
         from scipy.linalg import cholesky, solve_triangular
 
         pulls = np.array([self._modes.products(peak.weights) for peak in peaks]) / scales[:, None]

@@ -11,9 +11,9 @@ if TYPE_CHECKING:
 def open(path: str | PathLike[str]) -> "DataFile":
     """Open the file of a campaign; its runs, channels, points and other contents are read on access.
 
-    Use it in a `with` statement. Raises InvalidInput if the file does not exist or is of another kind, DataFileError
-    when it cannot be read.
+    Use it in a `with` statement. Raises InvalidInput if the file does not exist or is of another kind, and
+    DataFileError if it cannot be read.
     """
-    from bench.datafile.reader import open_datafile  # HDF5 is loaded only for reading
+    from bench.datafile.reader import open_datafile  # h5py is imported only when a file is read
 
     return open_datafile(Path(path))

@@ -1,5 +1,5 @@
 # pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false
-"""How HDF5 opens files: format, locks and retries."""
+"""Settings with which HDF5 opens files: format, locks and retries."""
 
 import ctypes
 import os
@@ -14,15 +14,16 @@ import h5py.h5p
 
 h5f, h5p = cast(Any, h5py.h5f), cast(Any, h5py.h5p)
 
-# The oldest format that can be read while it is being written; fixed, so that older tools can read the files of newer
-# writers.
+# The oldest format in which a file can be read while it is being written; fixed, so that older tools can read the files
+# of newer writers.
 VERSIONS = ("v110", "v110")
 
 RETRIES = 28
-"""Attempts to read metadata of a file that is being written, with pauses that double from 1 ns, 0.3 s in total.
+"""Number of attempts to read metadata of a file that is being written; the pauses between them double from 1 ns and
+last 0.3 s in total.
 
-HDF5's default of 100 attempts would take practically forever on data that another program has truncated, and block the
-whole process, including the drive.
+With HDF5's default of 100 attempts, reading data that another program has truncated would practically never end, and
+would block the whole process, including the drive.
 """
 
 
@@ -30,7 +31,7 @@ def locking(system: str = sys.platform) -> Literal["best-effort"] | bool:
     """The locking mode of every file, for h5py.
 
     On Windows locks are mandatory: a reader of a file that is being written would make its writer fail at the next
-    flush or at the end, with errno 13. There no locks are used; single-writer mode and creation without replacement
+    flush or at the end, with errno 13. No locks are used there; single-writer mode and creation without replacement
     protect the file. Elsewhere locks are advisory, and network shares may have none.
     """
     return False if system == "win32" else "best-effort"
@@ -42,9 +43,9 @@ def open_living(path: Path) -> Any:
 
 
 def open_to_write(path: Path) -> Any:
-    """Open a new, closed file in single-writer mode to append to its datasets.
+    """Open a new file, which its creator has closed, in single-writer mode to append to its datasets.
 
-    A file that is switched to this mode while open would use HDF5's default number of attempts.
+    A file switched to this mode while it is open would use HDF5's default number of attempts.
     """
     return _opened(path, h5f.ACC_RDWR | h5f.ACC_SWMR_WRITE)
 

@@ -1,8 +1,8 @@
 """Checksums of datasets: those of fixed datasets at the start of the run, those of growing datasets at its end.
 
-A checksum is the SHA-256 of the stored values' bytes, uncompressed and in order, in hexadecimal digits. Those of
-attributes cover their names and values as JSON, so that a later change to a conversion is detected. Checksums of groups
-cover their attributes and link targets, such as the plotted data and their axes.
+The checksum of a dataset is the SHA-256 of its values' bytes, uncompressed and in order, in hexadecimal digits.
+Checksums of attributes cover names and values as JSON, so that a later change to a conversion is detected. Checksums of
+groups cover their attributes and link targets, such as the plotted data and their axes.
 """
 
 import json
@@ -30,7 +30,7 @@ class Checksums:
     """The checksum table of a new file, created last, when every dataset exists."""
 
     def __init__(self, entry: hdf5.Group, changing: Iterable[str]) -> None:
-        """`changing` are the paths of datasets not yet final: their checksums are empty until `seal`."""
+        """`changing` holds the paths of the datasets that are not yet final; their checksums are empty until `seal`."""
         stored, groups = list[hdf5.Dataset](), {"/": of_group(hdf5.group(entry, "/"))}
         _walk(entry, stored, groups)
         later = {*changing}
@@ -46,17 +46,21 @@ class Checksums:
             description="SHA-256 of its uncompressed values; empty until closing for datasets that grow",
         )
         hdf5.write_texts(group, "attributes", attributes, description="SHA-256 of its attributes as JSON")
-        hdf5.write_texts(group, "group", groups, description="path of each group other than this one and views of fits")
+        hdf5.write_texts(
+            group, "group", groups, description="path of each group other than this one and the views of fits"
+        )
         hdf5.write_texts(
             group, "group_attributes", groups.values(), description="SHA-256 of its attributes and links as JSON"
         )
 
     def reopen(self, entry: hdf5.Group) -> None:
-        """Continue in the reopened file."""
+        """Use the datasets of the reopened file from now on."""
         self._entry, self._stored = entry, hdf5.dataset(entry, f"{GROUP}/values")
 
     def seal(self, grown: Mapping[str, str]) -> None:
-        """Add the missing checksums: `grown` by path, the others from the file."""
+        """Add the missing checksums: those in `grown`, by path, and for the other datasets those computed from the
+        file.
+        """
         for path, known in self._values.items():
             if not known:
                 self._values[path] = grown.get(path) or of_values(hdf5.dataset(self._entry, path))
@@ -126,7 +130,8 @@ def _bytes(values: NDArray[Any]) -> bytes:
 
 
 def _of_json(content: Mapping[str, Any]) -> str:
-    # an attribute of a type that this software never writes may have no JSON form: its checksum counts as wrong
+    # an attribute of a type that this software never writes may have no JSON form: `repr` then gives a checksum that
+    # counts as wrong
     return sha256(json.dumps(content, sort_keys=True, default=repr).encode()).hexdigest()
 
 
@@ -146,8 +151,8 @@ SMALL = 2**20
 class Integrity:
     """`failing` holds the changed datasets by path; `compared` is the number of datasets compared with a checksum.
 
-    `unchecked` are the others: those without a checksum, as in a file that was not closed, and those too large for the
-    requested check.
+    `unchecked` holds the paths of the other datasets: those without a checksum, as in a file that was not closed, and
+    those too large for the requested check.
     """
 
     compared: int
@@ -163,7 +168,7 @@ class Integrity:
 
 
 def integrity(entry: hdf5.Group, largest: int | None = SMALL, done: Done = lambda _done, _all: None) -> Integrity:
-    """Compare with the checksums all attributes, and the datasets of at most `largest` bytes or, if None, all datasets.
+    """Compare all attributes, and all datasets of at most `largest` bytes (None for no limit), with their checksums.
 
     `done` receives the number of datasets processed.
     """
@@ -197,7 +202,7 @@ def integrity(entry: hdf5.Group, largest: int | None = SMALL, done: Done = lambd
 
 
 def added(entry: hdf5.Group) -> Iterator[str]:
-    """Problems of objects added to the file after its checksums."""
+    """Problem messages for the objects added to the file after its checksums."""
     known, groups = read(entry), read_groups(entry)
     for each in hdf5.datasets(entry):
         if each.name not in known and not each.name.startswith(f"/entry/{GROUP}/"):

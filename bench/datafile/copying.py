@@ -1,4 +1,4 @@
-"""Copy of a damaged file: its intact, readable objects, truncated to complete rows."""
+"""Copying of the intact, readable objects of a damaged file, truncated to complete rows."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -19,7 +19,7 @@ BYTES_AT_ONCE = 2**22
 
 @dataclass
 class Copying:
-    """Scope of a copy: `counted` rows of every part, from a file of `size` bytes, excluding the paths in `leave`.
+    """A copy of `counted` rows of every part, from a file of `size` bytes, without the paths in `leave`.
 
     `lost` receives the reason for each unreadable path; growing datasets are copied up to the last readable row.
     """
@@ -53,10 +53,10 @@ class Copying:
             elif is_within(stored, self.size):
                 copied = target.create_dataset(name, data=stored[()], dtype=stored.dtype)
             else:
-                self.lost[stored.name] = f"{stored.name} lies beyond the end of the file"
+                self.lost[stored.name] = f"{stored.name} lies beyond the end of the file: the file is truncated"
                 return
         except UNREADABLE as error:
-            # without its attributes the numbers have no meaning
+            # the numbers are meaningless without their attributes
             self.lost[stored.name] = f"{stored.name} cannot be read ({reason(error)})"
             return
         for each, value in attributes.items():
@@ -85,7 +85,7 @@ class Copying:
 
 
 def copy_attributes(source: Group, target: Group, lost: dict[str, str]) -> None:
-    """Every readable attribute of a group, unchanged."""
+    """Copy every readable attribute of a group, unchanged."""
     try:
         for name in source.attrs:
             target.attrs[name] = source.attrs[name]
@@ -109,7 +109,7 @@ def drop_channels(entry: hdf5.Group, lost: dict[str, str]) -> None:
 
 
 def renew_drive(entry: hdf5.Group) -> None:
-    """Replace a lost drive by NaN at every sample."""
+    """Replace the dataset of the drive, if it is lost, by NaN at every sample."""
     instrument = hdf5.group(entry, "instrument")
     if hdf5.has(instrument, "drive/voltage"):
         return
@@ -123,7 +123,7 @@ def renew_drive(entry: hdf5.Group) -> None:
 
 
 def renew_tables(entry: hdf5.Group, lost: Iterable[str]) -> None:
-    """Empty every table that has a `lost` path; the journal may refill it."""
+    """Empty every table of which a dataset is among the `lost` paths; the journal may refill it."""
     gone = tuple(lost)
     for path, fields in TABLES.items():
         if any(each == f"/entry/{path}" or each.startswith(f"/entry/{path}/") for each in gone):
@@ -135,7 +135,7 @@ def renew_tables(entry: hdf5.Group, lost: Iterable[str]) -> None:
 
 
 def cut(entry: hdf5.Group, counted: Mapping[str, int]) -> dict[str, int]:
-    """Truncate the datasets of each part to the shortest one, and make samples and blocks consistent.
+    """Truncate the datasets of each part to the length of the shortest, and make samples and blocks consistent.
 
     The last known block is omitted if later `counted` blocks were lost, because its end is unknown. Returns the number
     of rows of every part.
@@ -161,13 +161,14 @@ def _placed(
 ) -> tuple[int, int]:
     """Numbers of blocks and samples at valid positions.
 
-    Rows begin at 0 and ascend, run numbers never fall, and within a run samples may be missing but not repeated.
+    At valid positions, rows begin at 0 and ascend, run numbers never decrease, and within a run samples may be missing
+    but not repeated.
     """
     if not len(row) or row[0] != 0 or run[0] < 1 or first[0] < 0:
         return 0, 0
     length, runs = np.diff(row), np.diff(run)
     fits = (length > 0) & (runs >= 0) & (first[1:] >= np.where(runs == 0, first[:-1] + length, 0))
-    # of two inconsistent blocks either may be wrong
+    # either of two inconsistent blocks may be the wrong one
     last = len(row) - 1 if fits.all() else int(np.argmin(fits))
     if lost or not fits.all():
         samples = min(samples, int(row[last]))

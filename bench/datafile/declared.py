@@ -1,11 +1,11 @@
-"""The growing tables of the file other than the samples, and their names.
+"""The growing tables of the file, except the samples, and their names.
 
 The tables of events follow from the declarations in `bench.events`; fitted models and identified
 values have their own tables, whose rows refer to one another.
 
-No group can be added to a file that is being read, so the values of all fits are concatenated in one dataset. The
-NXdata groups of a closed file are views of it (HDF5 virtual datasets) without their own values, for viewers such as
-silx, NexPy and h5web.
+No group can be added to a file that is being read, so one dataset holds the concatenated values of all fits. The NXdata
+groups of a closed file are views of it (HDF5 virtual datasets) without their own values, for viewers such as silx,
+NexPy and h5web.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -58,7 +58,7 @@ def add_fit(rows: Mapping[str, Rows], fit: FitFinished) -> None:
 
 
 def read_fits(entry: hdf5.Group, whole: int) -> list[FitFinished]:
-    """The first `whole` fits, as they were published."""
+    """The first `whole` fits in the file, as published."""
     columns, parameters = _table(entry, "fit_columns"), _table(entry, "fit_parameters")
     values = hdf5.dataset(entry, "fit_values/value")
     found: list[FitFinished] = []
@@ -104,7 +104,7 @@ def add_fit_views(entry: hdf5.Group, whole: int) -> None:
 
 
 def whole_fits(entry: hdf5.Group) -> int:
-    """Number of complete fits in a file with truncated tables."""
+    """Number of complete fits in a file whose tables may be truncated."""
     if "fits" not in entry:
         return 0
     fits = _table(entry, "fits")
@@ -154,7 +154,7 @@ def add_findings(rows: Mapping[str, Rows], time: float, identified: Identified) 
 def last_findings(
     findings: Sequence[Mapping[str, Any]], correlations: Sequence[Mapping[str, Any]]
 ) -> Identified | None:
-    """The last findings, from the rows of both tables; None without any."""
+    """The last findings, from the rows of both tables; None if there are none."""
     if not findings:
         return None
     number = findings[-1]["number"]
@@ -190,7 +190,7 @@ RAW_VALUES = tuple(
     Field(name, Kind.WHOLE, unit, description, packed=True)
     for name, unit, description in (
         ("run", "1", "number of armings of the rig"),
-        ("sensor", "1", "number of its channel, in the order of the rig, from 0"),
+        ("sensor", "1", "number of the sensor's channel, in the order of the rig, from 0"),
         ("index", "1", "number of the measurement, counted by the sensor; it jumps where values were lost"),
         ("time", "us", "time of the measurement on the sensor's clock"),
         ("code", "1", "word of the sensor"),
@@ -202,10 +202,10 @@ RAW_VALUES = tuple(
 
 @dataclass(frozen=True)
 class EventTable:
-    """The table of a kind of events at `path` below /entry.
+    """The table for one kind of event, at `path` below /entry.
 
-    An event whose columns are arrays of equal length, or that has a tuple of `parts` with their own columns, adds as
-    many rows, which have no time column.
+    An event adds several rows, which have no time column, if its columns are arrays of equal length or if it has a
+    tuple of `parts` with columns of their own.
     """
 
     path: str
@@ -219,11 +219,11 @@ class EventTable:
 
     @property
     def name(self) -> str:
-        """The table's own name."""
+        """Name of the table: the last part of its path."""
         return self.path.rpartition("/")[2]
 
     def rows(self, event: Event) -> Iterator[tuple[Any, ...]]:
-        """The rows of an event, each with a value per field."""
+        """The rows of an event, each with one value per field."""
         if self.parts is not None:
             attribute, inner = self.parts
             outer = [getattr(event, field.name) for field in self.fields if field.name not in inner]
@@ -257,7 +257,7 @@ EVENT_TABLES: Mapping[type[Event], EventTable] = {
 ENTRY_TABLES: Mapping[type[Event], EventTable] = {
     kind: table for kind, table in EVENT_TABLES.items() if kind.journalled and table.single
 }
-"""The tables with one row per journal entry."""
+"""The tables with exactly one row for each journal entry of their kind."""
 
 TABLES: Mapping[str, tuple[Field, ...]] = {
     "instrument/blocks": BLOCKS,
@@ -278,10 +278,12 @@ _FIRST = (
     *("identified", "identified_correlations", "live_values"),
     *("state_changes", "operator_actions", "warnings", "exceeded_limits", "operator_requests", "operator_answers"),
 )
-"""Indices of the tables of earlier versions: later tables follow in the order of declaration."""
+"""Tables in the order of their indices in earlier versions; later tables follow in the order of declaration."""
 
 COUNTED = (*_FIRST, *(name for name in _PATHS if name not in _FIRST))
-"""Counters in the dataset `complete`: rows beyond these counts were incomplete when the disk or the writer failed."""
+"""Names of the counters in the dataset `complete`: rows beyond these counts were incomplete when the disk or the writer
+failed.
+"""
 
 FIXED_GROUPS = (
     *("checksums", "data", "fitted", "instrument", "metadata", "notes", "recovery", "user"),

@@ -1,4 +1,4 @@
-"""Fields of a row, with file types, units and missing values, and the tables that grow during the run.
+"""Fields of a row, with their types in the file, units and missing values, and the tables that grow during the run.
 
 Rows are buffered in memory and written together.
 """
@@ -107,7 +107,7 @@ def _decoded(kind: Kind, optional: bool, values: NDArray[Any]) -> list[Any]:
 
 
 def field_of(name: str, stored: hdf5.Dataset) -> Field:
-    """The field of a dataset."""
+    """The field that a dataset stores."""
     with reading(stored.name):
         attrs = stored.attrs
         unit, told = str(attrs.get("units", "")), str(attrs["description"])
@@ -141,7 +141,9 @@ def fields_of(row_type: type[Any]) -> tuple[Field, ...]:
 
 
 def parts_of(row_type: type[Any]) -> tuple[str, type[Any]] | None:
-    """The column of a dataclass that is a tuple of dataclasses, and their type; None if there is none."""
+    """Name and item type of the column of a dataclass that is a tuple of dataclasses; None if there is no such
+    column.
+    """
     for name, hint, _ in _columns(row_type):
         if get_origin(hint) is tuple and dataclasses.is_dataclass(inner := get_args(hint)[0]):
             assert isinstance(inner, type)
@@ -179,7 +181,7 @@ def _classify(item: str, annotation: Any) -> tuple[Kind, bool]:
             if issubclass(annotation, types):
                 return kind, False
     raise InvalidInput(
-        item, repr(annotation), "a recorded field must be a number, a switch or a text, or one of them or None"
+        item, repr(annotation), "a recorded field must be a number, a switch or a text, or optionally None"
     )
 
 
@@ -187,7 +189,7 @@ THREADS = 2
 
 
 class Packer:
-    """Appends to compressed datasets, using threads that start on demand."""
+    """Appends to compressed datasets; the compression runs in threads that start on demand."""
 
     def __init__(self) -> None:
         self._pool = ThreadPoolExecutor(THREADS, "record packer")
@@ -220,7 +222,7 @@ def pack(values: NDArray[Any]) -> bytes:
 
 
 class Growing:
-    """Appends rows and hashes them, so that they need not be read again at the end of a long run."""
+    """Appends rows to a dataset and hashes them, so that they need not be read again at the end of a long run."""
 
     def __init__(self, stored: hdf5.Dataset, packer: Packer | None = None) -> None:
         """`packer` writes compressed chunks."""
@@ -229,7 +231,7 @@ class Growing:
         self._digest = sha256()
 
     def reopen(self, file: hdf5.File) -> None:
-        """Continue in the reopened file."""
+        """Append to the dataset of the reopened file from now on."""
         self._stored = hdf5.dataset(file, self.path)
 
     @property
@@ -244,7 +246,7 @@ class Growing:
             hdf5.append(self._stored, kept)
         else:
             self._packer.append(self._stored, kept)
-        # a view of bytes, because strings have no buffer
+        # hashed through a view of bytes, because strings have no buffer
         self._digest.update(kept.view(np.uint8).data)
 
 
@@ -267,21 +269,21 @@ class Rows:
 
     @property
     def grown(self) -> list[Growing]:
-        """The datasets."""
+        """Growing datasets of the group."""
         return [stored for _, stored in self._columns]
 
     def add(self, *values: Any) -> None:
-        """Append one row: a value per field, in order; None for an absent value."""
+        """Append one row: one value per field, in order; None for an absent value."""
         self._pending.append(
             tuple(field.encode(value) for (field, _), value in zip(self._columns, values, strict=True))
         )
 
     def extend(self, *columns: NDArray[Any]) -> None:
-        """Append many rows: a column per field, in order, all of equal length and without absent values."""
+        """Append many rows: one column per field, in order, all of equal length and without absent values."""
         self._pending += zip(*(column.tolist() for column in columns), strict=True)
 
     def write(self, *, partial: bool = True) -> None:  # noqa: ARG002 - uncompressed rows are appended in place
-        """Write the buffered rows to the file; incomplete chunks of packed fields only if `partial`."""
+        """Write the buffered rows to the file; an incomplete chunk of packed fields is written only if `partial`."""
         if not self._pending:
             return
         for (field, stored), values in zip(self._columns, zip(*self._pending, strict=True), strict=True):
@@ -306,7 +308,7 @@ class PackedRows(Rows):
         self._waiting += len(columns[0])
 
     def write(self, *, partial: bool = True) -> None:
-        # a compressed chunk that is written again leaves its first copy as unused space
+        # rewriting a compressed chunk leaves its first copy as unused space
         end = len(self) if partial else len(self) // ROWS_PER_PACKED_CHUNK * ROWS_PER_PACKED_CHUNK
         count = end - self._written
         if count <= 0:
@@ -320,5 +322,5 @@ class PackedRows(Rows):
 
 
 def rows_of(parent: hdf5.Group, name: str, fields: Sequence[Field]) -> Rows:
-    """A new table of these fields."""
+    """Create a table of these fields."""
     return (PackedRows if all(field.packed for field in fields) else Rows)(parent, name, fields)

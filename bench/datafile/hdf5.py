@@ -65,8 +65,8 @@ def let_go(file: File) -> None:
     """Close a file that can no longer be written, keeping the flushed data on the disk.
 
     HDF5 tries to write its pending data. If that fails, it frees half of its state and later crashes the process, at
-    the latest on exit, which is unacceptable in a program that drives a shaker. So the remaining writes go to the null
-    device.
+    the latest on exit, which is unacceptable in a program that drives a shaker. The remaining writes are therefore
+    redirected to the null device.
     """
     with suppress(OSError, RuntimeError, ValueError):
         nowhere = os.open(os.devnull, os.O_RDWR)
@@ -83,14 +83,15 @@ def open_again(path: Path) -> AbstractContextManager[File]:
 
 def open_to_read(path: Path) -> File:
     """Open a finished file, one being written, or one left by a killed writer."""
-    # in single-writer mode HDF5 retries damaged data for hours, so only files that were not closed use it
+    # in single-writer mode HDF5 retries reading damaged data for hours, so only files that were not closed are opened
+    # in it
     if not is_let_go(path):
         return cast(File, open_living(path))
     return cast(File, h5py.File(path, "r", libver=VERSIONS, locking=locking()))
 
 
 def open_to_judge(path: Path) -> File:
-    """Open any file, even a damaged one, as if its writer had closed it at full length."""
+    """Open any file, even a damaged one, as if its writer had closed it and no bytes were missing."""
     return cast(File, h5py.File(Quiet(path), "r", libver=VERSIONS))
 
 
@@ -141,7 +142,7 @@ def grow_numbers(
 
 
 def text_type(width: int) -> np.dtype[Any]:
-    """Type for UTF-8 strings of `width` bytes, in memory and in the file: HDF5 does not convert from plain bytes."""
+    """Type for UTF-8 strings of `width` bytes, in memory and in the file, because HDF5 does not convert plain bytes."""
     return cast("np.dtype[Any]", h5py.string_dtype("utf-8", width))
 
 
@@ -198,7 +199,7 @@ def append(target: Dataset, values: NDArray[Any]) -> None:
 
 
 def append_chunks(target: Dataset, packed: Iterable[bytes], count: int, rows: int) -> None:
-    """Append `count` complete, already filtered chunks of `rows` rows each."""
+    """Append `count` complete chunks of `rows` rows each, which have already been filtered."""
     raw, start = cast(h5py.Dataset, target).id, target.shape[0]
     target.resize((start + count * rows,))
     for number, data in enumerate(packed):
@@ -211,23 +212,23 @@ _32_BITS = 0xFFFFFFFF
 
 
 def is_let_go(path: Path) -> bool:
-    """Whether the file was closed by its writer; also True for another layout or a damaged superblock."""
+    """Whether the writer has closed the file; also True for a file with another layout or a damaged superblock."""
     head = _superblock(path)
     return head is None or head[4] == 0 or lookup3(_SUPERBLOCK.pack(*head)[:-4]) != head[-1]
 
 
 MISSING = b"\xff"
-"""Value returned for every byte beyond the end. A string heap has no checksum, and in one of zeros HDF5 would loop for
-ever.
+"""Value returned for every byte beyond the end. A string heap has no checksum, and HDF5 would loop for ever in a heap
+of zeros.
 """
 
 
 class Quiet(io.RawIOBase):
-    """A file presented as if its writer had closed it, with the length stated in its superblock; missing bytes are
-    MISSING.
+    """A file presented to HDF5 as if its writer had closed it, with the length stated in its superblock; missing bytes
+    are read as MISSING.
 
-    Metadata have checksums, which these bytes do not pass. Uncompressed values have none: their readers must first
-    determine their end with `bench.datafile.opening`.
+    In metadata such bytes fail the checksums. Uncompressed values have no checksums: their readers must first determine
+    where they end with `bench.datafile.opening`.
     """
 
     def __init__(self, path: Path) -> None:
@@ -256,7 +257,8 @@ class Quiet(io.RawIOBase):
     def readinto(self, buffer: "WriteableBuffer", /) -> int:
         target = memoryview(buffer).cast("B")
         self._file.seek(self._place)
-        # always return the requested length, even beyond the end: otherwise h5py would repeat the request for ever
+        # always return the requested number of bytes, even beyond the end; otherwise h5py would repeat the request for
+        # ever
         wanted = len(target)
         found = self._file.read(wanted).ljust(wanted, MISSING)
         covered = self._head[self._place :][:wanted]

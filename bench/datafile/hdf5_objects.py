@@ -1,6 +1,7 @@
 # pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
 # pyright: reportUnknownArgumentType=false
-"""Members and attributes through the lower level of h5py, in a third of the time that its dictionaries take.
+"""Access to members and attributes through h5py's low-level interface, in a third of the time that its dictionaries
+take.
 
 A file has some 200 objects and 600 attributes, which are created before a run starts and read whenever it is opened.
 """
@@ -22,14 +23,14 @@ _TEXT_STORED, _SCALAR = h5py.h5t.py_create(_TEXT, logical=True), h5py.h5s.create
 
 
 def is_hard_link(parent: Any, name: str) -> bool:
-    """Whether the member `name` is stored in the file, rather than named by a link. Raises KeyError if there is no such
-    member.
+    """Whether the member `name` is an object stored in the file, not a soft or external link. Raises KeyError if there
+    is no such member.
     """
     return parent.id.links.get_info(_encoded(name)).type == h5py.h5l.TYPE_HARD
 
 
 def stored_member(parent: Any, name: str, *, read_only: bool = False) -> Any:
-    """The member `name`, as `parent[name]` returns it, but without querying the mode of the file each time.
+    """The member `name`, as returned by `parent[name]`, but without a query for the mode of the file each time.
 
     In a `read_only` file, a dataset keeps its shape in memory.
     """
@@ -40,7 +41,7 @@ def stored_member(parent: Any, name: str, *, read_only: bool = False) -> Any:
 
 
 def attributes(owner: Any) -> dict[str, Any]:
-    """All attributes by name, with the values of `owner.attrs`."""
+    """All attributes by name, with the same values as in `owner.attrs`."""
     found: dict[str, Any] = {}
     for number in range(h5py.h5a.get_num_attrs(owner.id)):
         stored: Any = h5py.h5a.open(owner.id, index=number)

@@ -1,5 +1,5 @@
 # pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false
-"""Access to a file's objects through h5py; damage raises a DataFileError that names the object."""
+"""Access to a file's objects through h5py. Damage raises a DataFileError that names the object."""
 
 import re
 from collections.abc import Generator, Iterator
@@ -76,7 +76,7 @@ class File(Group, Protocol):
 
 
 class DataFileError(RockbenchError):
-    """Error: the file could not be written or read any further; complete earlier data stay readable."""
+    """Error: the file could not be written or read any further; complete data written earlier stay readable."""
 
     error_code = "data_file"
 
@@ -86,7 +86,9 @@ UNREADABLE = (OSError, RuntimeError, KeyError, ValueError, TypeError, IndexError
 
 
 def reason(error: BaseException) -> str:
-    """One line for a multi-line error of the HDF5 library: the system's message, if it contains one."""
+    """One-line text for a multi-line error of the HDF5 library: the operating system's message, if the error contains
+    one.
+    """
     text = str(error).strip()
     found = re.search(r"error message = '([^']+)'", text)
     return found.group(1) if found else text.partition("\n")[0] or type(error).__name__
@@ -114,9 +116,9 @@ def group(parent: Group, path: str) -> Group:
 
 
 def members(parent: Group, lost: dict[str, str] | None = None) -> Iterator[tuple[str, "Dataset | Group | str"]]:
-    """Members of a group, by name: datasets, groups, and the target path of a soft link.
+    """Members of a group, by name: datasets, groups, and target paths of soft links.
 
-    For unreadable members the reason is added to `lost` by path; without `lost`, DataFileError is raised.
+    The reason for each unreadable member is added to `lost` by path; without `lost`, DataFileError is raised.
     """
     try:
         names, read_only = list(parent), _is_read_only(parent)
@@ -158,7 +160,7 @@ def names(parent: Group) -> list[str]:
 
 
 def has(parent: Group, path: str) -> bool:
-    """Whether `path` exists below `parent`. Raises DataFileError if damage prevents the answer."""
+    """Whether `path` exists below `parent`. Raises DataFileError if this cannot be determined because of damage."""
     with reading(f"{parent.name.rstrip('/')}/{path}"):
         return path in parent
 
@@ -181,8 +183,8 @@ def place(stored: Dataset) -> tuple[int, int] | None:
 
 
 def places_of_chunks(stored: Dataset) -> dict[int, tuple[int, int]]:
-    """Offset and size in the file [bytes] of every written chunk, by its first row, as far as the index can be read.
-    Reads them in one pass, since HDF5 searches from the first chunk for every single lookup.
+    """Offset and size in the file [bytes] of every written chunk, by the chunk's first row, as far as the index is
+    readable. The index is read in one pass, since HDF5 searches from the first chunk for every single lookup.
     """
     found: dict[int, tuple[int, int]] = {}
 
@@ -201,7 +203,7 @@ def read(stored: Dataset, key: object = ()) -> Any:
 
 
 def attribute(owner: Group | Dataset, name: str) -> Any:
-    """An attribute. Raises DataFileError if there is none, or it cannot be read."""
+    """The attribute `name` of `owner`. Raises DataFileError if there is no such attribute or it cannot be read."""
     with reading(f"the attribute {name} of {owner.name}"):
         return owner.attrs[name]
 
@@ -223,7 +225,9 @@ def _is_read_only(parent: Group) -> bool:
 
 
 def _member_or_target(parent: Group, name: str, read_only: bool = False) -> "Dataset | Group | str":
-    """A member; of a soft link, its target. Raises KeyError for a link without one."""
+    """The member `name`, or the path of the target if it is a soft link. Raises KeyError for any other link without a
+    target.
+    """
     if is_hard_link(parent, name):
         return cast("Dataset | Group", stored_member(parent, name, read_only=read_only))
     found = cast(object, cast(h5py.Group, parent).get(name, getlink=True))

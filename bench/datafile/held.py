@@ -17,9 +17,9 @@ from bench.datafile.hdf5_reading import DataFileError
 HELD = 10.0
 """Time for which another program, such as a virus scanner, may hold the file [s]; samples meanwhile wait in memory."""
 PAUSE = 0.02
-"""Pause between two attempts [s]."""
+"""Pause between two attempts to write [s]."""
 GUARD = 2**62
-"""Position of the locked byte."""
+"""Position of the byte that the writer locks."""
 
 _ERRNO = re.compile(rf"errno = {errno.EACCES}\b|\[Errno {errno.EACCES}\]")
 
@@ -53,10 +53,10 @@ def keep_lockers_out(handle: int) -> None:
 
 
 def wait_until_free(touch: Callable[[], None], held: float | None = None) -> None:
-    """Wait until `touch`, a write without effect, succeeds; called before HDF5 writes, because HDF5 cannot repeat a
+    """Wait until `touch`, a write without effect, succeeds. Called before HDF5 writes, because HDF5 cannot repeat a
     write.
 
-    Raises DataFileError after `held` [s], `HELD` by default; other errors of `touch` at once.
+    Raises DataFileError after `held` [s], by default `HELD`; an error of `touch` with another cause is raised at once.
     """
     patience = HELD if held is None else held
     end = time.monotonic() + patience
@@ -77,6 +77,6 @@ def is_held(error: BaseException) -> bool:
 
 
 def in_use(error: BaseException) -> str:
-    """Message for an error for which `is_held` is true."""
+    """Message for an error that `is_held` recognises."""
     number = getattr(error, "errno", None) or errno.EACCES
     return f"another program has locked it (errno {number}): close the program that displays or scans it"

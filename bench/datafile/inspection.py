@@ -28,7 +28,7 @@ def file_hash(path: Path) -> str:
 
 
 def analysis_overview(file: hdf5.File, path: Path) -> dict[str, Any]:
-    """The contents, ready for JSON."""
+    """The contents of a re-analysis file as JSON content."""
     entry = hdf5.group(file, "entry")
     source, process = hdf5.group(entry, "original"), hdf5.group(entry, "process")
     points = hdf5.group(entry, "points")
@@ -48,17 +48,17 @@ def analysis_overview(file: hdf5.File, path: Path) -> dict[str, Any]:
 
 
 def analysis_problems(file: hdf5.File, path: Path) -> Iterator[str]:
-    """Problems other than wrong checksums: missing checksums, or a changed campaign file."""
+    """Problems of a re-analysis file other than wrong checksums: missing checksums, or a changed campaign file."""
     entry = hdf5.group(file, "entry")
     if GROUP not in entry:
         yield "the file has no checksums because an older version wrote it; write it again"
     source = hdf5.group(entry, "original")
     if _original(source, path) == "changed":
-        yield f"the file of its campaign, {hdf5.read_text(source, 'file')}, is not the one that was analysed"
+        yield f"the file of its campaign, {hdf5.read_text(source, 'file')}, is not the file that was analysed"
 
 
 def _original(source: hdf5.Group, path: Path) -> str:
-    """Whether the campaign file in the same folder is the one that was analysed."""
+    """State of the analysed campaign file in the same folder: "unchanged", "changed" or "not in the same folder"."""
     beside = path.with_name(Path(hdf5.read_text(source, "file")).name)
     if not beside.is_file():
         return "not in the same folder"
@@ -78,7 +78,7 @@ def overview(path: Path) -> dict[str, Any]:
             return heading | _content(DataFile(file)) | {"journal": _journal(path)}
         except UNREADABLE as error:
             raise DataFileError(
-                f"{path} is damaged ({reason(error)}): `rockbench file recover` keeps the rest"
+                f"{path} is damaged ({reason(error)}): `rockbench file recover` restores the readable part"
             ) from error
 
 
@@ -120,7 +120,7 @@ def _journal(path: Path) -> str | None:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Number of datasets, number compared with a checksum, and every problem."""
+    """Number of datasets, number of those compared with a checksum, and a message for every problem."""
 
     datasets: int
     compared: int
@@ -186,8 +186,8 @@ def _of_layout(stored: hdf5.Dataset, counted: Mapping[str, int], size: int, *, c
             yield f"{path} lies beyond the end of the file: it is truncated"
         return
     length, rows = stored.shape[0], counted[part_of(path)]
-    # in a file that was not closed, additional rows are incomplete
+    # in a file that was not closed, rows beyond the count are incomplete
     if length < rows or (closed and length > rows):
-        yield f"{path} has {length} rows, {rows} were written"
+        yield f"{path} has {length} rows, but {rows} were written"
     if (there := intact_rows(stored, size)) < min(length, rows):
         yield f"the file has only {there} of the {rows} rows of {path}: it is truncated or damaged"

@@ -1,5 +1,5 @@
-"""The skeleton of the file. Everything is created before the first sample, because nothing can be added to a file that
-is being read. `docs/file-format.md` describes the layout for users.
+"""The skeleton of the file. All groups and datasets are created before the first sample, because none can be added to a
+file that is being read. `docs/file-format.md` describes the layout for users.
 """
 
 from collections.abc import Mapping, Sequence
@@ -38,7 +38,7 @@ class Status(StrEnum):
 
 @dataclass(frozen=True)
 class Skeleton:
-    """Planned contents of the file; checked before its creation."""
+    """Planned contents of the file, checked before the file is created."""
 
     title: str
     channels: Sequence[Channel]
@@ -52,7 +52,7 @@ class Skeleton:
         if not self.channels:
             raise InvalidInput("channels", 0, "a data file needs at least one channel")
         if not self.sample_rate > 0.0:
-            raise InvalidInput("sample_rate", self.sample_rate, "it must be positive samples per second")
+            raise InvalidInput("sample_rate", self.sample_rate, "it must be a positive number of samples per second")
         names = [channel.name for channel in self.channels]
         _check_names("channel", names, (*FIXED_INSTRUMENTS, *(each for name in names for each in companions(name))))
         _check_names("metadata entry", list(self.metadata), ())
@@ -77,7 +77,7 @@ class Parts:
     checksums: Checksums
 
     def reopened(self, file: hdf5.File) -> "Parts":
-        """Replace groups and datasets by those of the reopened file."""
+        """Switch every part to the reopened file, and return the parts."""
         for each in self.grown:
             each.reopen(file)
         self.checksums.reopen(hdf5.group(file, "entry"))
@@ -123,7 +123,7 @@ def build(file: hdf5.File, skeleton: Skeleton) -> Parts:
 
 
 def create_ends(entry: hdf5.Group) -> tuple[hdf5.Dataset, hdf5.Dataset, hdf5.Dataset, hdf5.Dataset]:
-    """`complete`, `status`, `summary` and `end_time`, with their initial values."""
+    """Create `complete`, `status`, `summary` and `end_time` with their initial values."""
     return (
         hdf5.write_numbers(
             entry, "complete", np.zeros(len(COUNTED), dtype=np.int64), unit="1", description=f"rows of {COUNTED}"

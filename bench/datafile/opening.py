@@ -1,6 +1,6 @@
-"""Opening of a data file: checks of kind, version and completeness.
+"""Opening of a data file, with checks of kind, version and completeness.
 
-Files of wording version 1 hold some data only in the sentences of their journal, from which `columns_from` extracts
+In files of wording version 1 some data exist only in the sentences of the journal, from which `columns_from` extracts
 them.
 """
 
@@ -59,10 +59,14 @@ FORMAT, FORMAT_VERSION = "rocking-bench record", 2
 """Format of a campaign file."""
 
 WORDING = 5
-"""Version of the sentences in journal and results; replay compares them with those of a file of the same version."""
+"""Version of the sentences in journal and results. Replay compares these sentences only with those of a file of the
+same version.
+"""
 
 INTERVALS = 2
-"""Version of the evaluation of uncertainties; replay compares them with those of a file of the same version."""
+"""Version of the evaluation of uncertainties. Replay compares uncertainties only with those of a file of the same
+version.
+"""
 
 ANALYSIS, ANALYSIS_VERSION = "rocking-bench analysis", 1
 """Format of a re-analysis file, stored next to the campaign file."""
@@ -75,9 +79,9 @@ _HINT = "`rockbench file recover` restores the readable part"
 
 
 def open_file(path: Path, *, judging: bool = False, kinds: tuple[str, ...] = (FORMAT,)) -> hdf5.File:
-    """Open a file of one of the `kinds`, see `bench.datafile.reader.open_datafile`."""
+    """Open a file of one of the `kinds`; see `bench.datafile.reader.open_datafile`."""
     if path.is_dir():
-        raise InvalidInput("record", str(path), "it is a directory; name the file in it")
+        raise InvalidInput("record", str(path), "it is a directory; specify a file in it")
     if not path.is_file():
         raise InvalidInput("record", str(path), "there is no such file")
     file = _opened(path, judging)
@@ -107,7 +111,7 @@ def _opened(path: Path, judging: bool) -> hdf5.File:
 
 
 def _rehearse(path: Path) -> None:
-    """Raise an exception if the file is damaged; in single-writer mode HDF5 would try to read it for hours."""
+    """Raise an exception if the file is damaged; in single-writer mode HDF5 would try for hours to read it."""
     for left in reversed(range(_ATTEMPTS)):
         try:
             with hdf5.open_to_judge(path) as file:

@@ -42,9 +42,9 @@ class JournalEntry:
 def open_datafile(path: Path, *, judging: bool = False) -> "DataFile":
     """Open the file of a campaign; use it in a `with` statement.
 
-    A file being written can be followed, except if `judging`: then its state on the disk is read, and damage raises
-    an error at once. Raises InvalidInput when the file does not exist or is of another kind, DataFileError when it
-    cannot be read.
+    A file that is being written can be followed, unless `judging` is set: the state on the disk is then read, and
+    damage raises an error at once. Raises InvalidInput if the file does not exist or is of another kind, and
+    DataFileError if it cannot be read.
     """
     file = open_file(path, judging=judging)
     try:
@@ -78,7 +78,9 @@ class DataFile(SampleReader):
         self._file.close()
 
     def refresh(self) -> None:
-        """Include data that the writer has since added. Raises DataFileError if the file was truncated meanwhile."""
+        """Include data that the writer has added since the last call. Raises DataFileError if the file has been
+        truncated.
+        """
         self._check_size()
         self._count_again()
         for path in self._growing:
@@ -86,11 +88,13 @@ class DataFile(SampleReader):
                 hdf5.dataset(self._entry, path).refresh()
 
     def _check_size(self) -> None:
-        # HDF5 would search for the truncated data
+        # HDF5 would search for the truncated data, for hours
         with reading(str(self._file.filename)):
             size = Path(self._file.filename).stat().st_size
         if size < self._size:
-            raise DataFileError(f"{self._file.filename} was truncated from {self._size} to {size} bytes meanwhile")
+            raise DataFileError(
+                f"{self._file.filename} was truncated from {self._size} to {size} bytes while it was open"
+            )
         self._size = size
 
     @property
@@ -115,27 +119,30 @@ class DataFile(SampleReader):
 
     @property
     def recoveries(self) -> list[str]:
-        """Notes of the recovery from another file, one line each; usually none."""
+        """Notes on the recovery from another file, one line each; usually there are none."""
         if not hdf5.has(self._entry, "recovery/description"):
             return []
         return hdf5.read_text(self._entry, "recovery/description").splitlines()
 
     @property
     def checksums(self) -> dict[str, tuple[str, str]]:
-        """SHA-256 of values and attributes by dataset; those of values are empty if the file was not closed."""
+        """SHA-256 of values and attributes by dataset; that of the values is empty if the file was not closed."""
         return checksums.read(self._entry) if hdf5.has(self._entry, checksums.GROUP) else {}
 
     def integrity(self, largest: int | None = SMALL, done: Done = lambda _done, _all: None) -> Integrity:
-        """Check for changed datasets: `record.integrity().failing` has a line for each path, and `str` of the result is
-        one line.
+        """Check for changed datasets. In the result, `failing` has a line for each changed path, and `str` gives a
+        summary in one line.
 
-        Reads datasets of at most `largest` bytes, or all if None. `done` receives the number processed.
+        Reads the datasets of at most `largest` bytes, or all datasets if None. `done` receives the number of datasets
+        processed.
         """
         return integrity(self._entry, largest, done)
 
     @property
     def status(self) -> str:
-        """Status of the campaign; "running" while it is being written, and permanently if its writer was killed."""
+        """Status of the campaign: "running" while the file is being written, and permanently if its writer was
+        killed.
+        """
         return hdf5.read_text(self._entry, "status")
 
     @property
@@ -155,7 +162,7 @@ class DataFile(SampleReader):
 
     @property
     def end_time(self) -> str:
-        """Time of its closing, ISO 8601 with time zone; empty when it was not closed."""
+        """Time at which the file was closed, ISO 8601 with time zone; empty if it was not closed."""
         return hdf5.read_text(self._entry, "end_time")
 
     @property
@@ -182,12 +189,12 @@ class DataFile(SampleReader):
 
     @property
     def results(self) -> dict[str, Column]:
-        """The results as a table: columns with units, rows as in `points`; missing values in their stored form."""
+        """The results as a table: columns with units, rows as in `points`; missing values are in their stored form."""
         group, whole = hdf5.group(self._entry, "points"), len(self.points)
         return {name: Column(c.values[:whole], c.unit, c.description) for name, c in tables.read(group).items()}
 
     def columns_of(self, event: type[Event]) -> dict[str, list[Any]]:
-        """Recorded events of a kind with a table, one list per column, in the order of declaration.
+        """Recorded events of a kind that has a table: one list per column, in the order of declaration.
 
         An absent value is None, an unknown one NaN. Empty for an older file without this table.
         """
@@ -218,7 +225,9 @@ class DataFile(SampleReader):
         return last_findings(*(self._rows(name) for name in FINDING_TABLES))
 
     def raw_values(self, name: str, run: int) -> RawValues:
-        """The values of a channel's sensor with its own clock received in `run`; empty without such a sensor."""
+        """The values received in `run` from a channel's sensor with a free-running clock; empty if the channel has no
+        such sensor.
+        """
         sensor = [channel.name for channel in self.channels].index(self._channel_named(name).name)
         columns = ("index", "time", "code", "arrival")
         found = {column: [np.zeros(0, np.int64)] for column in columns}
@@ -233,8 +242,8 @@ class DataFile(SampleReader):
         return RawValues(name, *(np.concatenate(found[column]) for column in columns))
 
     def resampled(self, name: str, run: int) -> NDArray[np.float64]:
-        """Values of a serial laser at the samples of `run` in its unit, from all values received in it: also from those
-        that had arrived after their block. NaN where there is none.
+        """Values of a serial laser at the samples of `run`, in its unit, from all values received in that run,
+        including those that arrived after their block had been read. NaN where there is no value.
 
         Raises InvalidInput for a channel without raw values in that run.
         """
@@ -251,7 +260,9 @@ class DataFile(SampleReader):
 
     @property
     def alignments(self) -> dict[int, tuple[Alignment, ...]]:
-        """Alignments of sensors with free clocks to the sample clock, by run; empty without such sensors."""
+        """Alignments of sensors with free-running clocks to the sample clock, by run; empty if there are no such
+        sensors.
+        """
         found: dict[int, list[Alignment]] = {}
         for row in self.rows_of(SensorsAligned):
             found.setdefault(row.pop("run"), []).append(Alignment(**row))

@@ -26,16 +26,18 @@ from sim.errors import InvalidInput
 from sim.parameters import Parameters
 
 PERIOD = 0.5
-"""Longest time between two writes of waiting data [s]; the length of a chunk of samples in real time."""
+"""Longest time between two writes of pending data [s]; in real time, the duration of a chunk of samples."""
 
 PAUSE = 0.05
-"""Shortest time between two writes of events [s], so that on a slow disk many are written at once."""
+"""Shortest time between two writes of events [s], so that many events are written at once on a slow disk."""
 
 BATCH = 100
 """Number of chunks written at once when samples arrive faster than real time."""
 
 BACKLOG = 4096
-"""Largest number of events that may wait for the disk, minutes in real time. A longer backlog ends the run."""
+"""Largest number of events that may wait for the disk; in real time, those of several minutes. A longer backlog ends
+the run.
+"""
 
 PATIENCE = 60.0
 """Longest wait for the disk with the bench at rest [s]: at the end, and in `sync`."""
@@ -64,12 +66,12 @@ class _End:
 class Recorder:
     """Writes a new HDF5 file; called with each event of the engine, and closed at the end.
 
-    Samples are on the disk within a second, journalled events almost at once. An error of the disk is raised as
-    DataFileError by the next call, once; later data are not recorded, and earlier data stay readable. A disk that does
-    not keep up also causes this error: a call waits at most `hold_up` seconds, which is non-zero only in virtual time.
+    Samples are on the disk within a second, journalled events almost at once. The next call after a disk error raises
+    DataFileError, once; later data are not recorded, and earlier data stay readable. A disk that is too slow causes the
+    same error: a call waits for it at most `hold_up` seconds, which is non-zero only in virtual time.
 
     `metadata` is stored as strings under /entry/metadata, `tables` (such as {"prediction": ...}) under /entry. Raises
-    InvalidInput, without creating a file, when `path` exists or cannot be created, or a name or table is invalid.
+    InvalidInput, without creating a file, if `path` exists or cannot be created, or if a name or table is invalid.
     """
 
     def __init__(
@@ -121,7 +123,7 @@ class Recorder:
             self._offer(event)
 
     def sync(self) -> None:
-        """Wait until all queued events are in the file. Raises DataFileError, once, when they could not be written."""
+        """Wait until all queued events are in the file. Raises DataFileError, once, if they could not be written."""
         if not self._closed:
             marker = _Sync(threading.Event())
             if not (self._put(marker, PATIENCE) and waiting.wait(marker.done, PATIENCE)):
@@ -141,7 +143,7 @@ class Recorder:
             return
         self._closed = True
         self._end = _End(Status(status), summary)
-        # wakes a waiting thread; a busy one checks for the end itself
+        # wakes a waiting thread; a thread that is writing checks for the end itself
         self._put(_Sync(threading.Event()), 0.0)
         if not waiting.join(self._thread, PATIENCE):
             self._fall_behind(f"has not responded for {PATIENCE:g} s")
@@ -157,7 +159,7 @@ class Recorder:
         return waiting.put(self._queue, item, patience)
 
     def _fall_behind(self, how: str) -> None:
-        """Record the failure of a slow disk: pending data are still written if it recovers, new data are ignored."""
+        """Note that the disk is too slow: pending data are still written if it recovers, new data are ignored."""
         told = f"recording to {self.path} has stopped because its disk {how}: earlier data are readable; check the disk"
         self._behind = self._behind or DataFileError(told)
 
@@ -173,7 +175,9 @@ class Recorder:
         return _Block(event.time, event.run, event.block.first, copy, event.drive.astype(np.float32))
 
     def _raise_failure(self) -> None:
-        """Raise a failure only once: events that follow while the bench is brought to rest must not raise it again."""
+        """Raise the failure, if any, only once: later events, while the bench is brought to rest, must not raise it
+        again.
+        """
         failure = self._failure or self._behind
         if failure is not None and not self._told:
             self._told = True
@@ -222,7 +226,7 @@ class Recorder:
             case _Sync():
                 self._commit(partial=True)
             case None:
-                # no events for a while: flush the rows that wait for a full chunk
+                # no events for a while: write the rows of the incomplete chunk too
                 self._commit(partial=self._partial or not self._pressing)
         waited, chunks = time.monotonic() - self._committed, self._writer.full_chunks
         at_once = self._pressing and waited >= PAUSE and self._queue.empty()

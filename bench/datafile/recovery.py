@@ -1,6 +1,7 @@
-"""Recovery of a clean file after a killed writer, a full disk or truncation, or from a file of an old version.
+"""Recovery of a clean file from one whose writer was killed, whose disk was full or that was truncated, or from one of
+an old version.
 
-The original is only read. The copy has the intact data in the present layout, with checksums.
+The original is not changed. The copy has the intact data in the present layout, with checksums.
 """
 
 from collections.abc import Mapping, Sequence
@@ -32,10 +33,11 @@ Row = Mapping[str, Any]
 
 
 def add_lost_events(entry: hdf5.Group, lines: Sequence[Row]) -> tuple[int, int]:
-    """Append the journal's additional rows to the tables of events and points; returns the number of each.
+    """Append the rows that only the journal has to the tables of events and points; returns the numbers of added events
+    and points.
 
     Points are checked separately, because a point can be missing although its event is present. Raises DataFileError,
-    without appending, for the journal of another file, whose beginning differs.
+    without appending, for the journal of another file, which is recognised by a different beginning.
     """
     points = [line["point"] for line in lines if "point" in line]
     events = _beyond(hdf5.group(entry, "events"), lines, ("time", "kind"))
@@ -77,10 +79,10 @@ NOTE = "recovery"
 
 @dataclass(frozen=True)
 class Recovery:
-    """Result: the new file, its rows of samples, and the numbers of events and points from the journal.
+    """Result of a recovery: the new file, its rows of samples, and the numbers of events and points from the journal.
 
-    `lost` holds the counted rows of the original that the copy lacks, by part. `damage` names objects that are missing,
-    or were copied although they differ from their checksum.
+    `lost` holds, by part, the number of counted rows of the original that the copy lacks. `damage` names objects that
+    are missing, or were copied although they differ from their checksum.
     """
 
     target: Path
@@ -102,7 +104,7 @@ class Recovery:
 
 
 def write_ends(record: DataFile, path: Path, entry: hdf5.Group, lengths: Mapping[str, int], loss: str) -> None:
-    """Write the values that are set at the end of a run: the original ones, or replacements with the reason.
+    """Write the values that are set at the end of a run: those of the original, or replacements with the reason.
 
     `lengths` are the numbers of rows of every part; `loss` describes the missing data.
     """
@@ -110,7 +112,7 @@ def write_ends(record: DataFile, path: Path, entry: hdf5.Group, lengths: Mapping
     complete[...] = [lengths.get(name, 0) for name in COUNTED]
     was, told, end = (_text(record, name) for name in ("status", "summary", "end_time"))
     if was not in [each.value for each in Status] or was == Status.RUNNING:
-        # the last known activity of the crashed writer
+        # the time of the crashed writer's last known activity
         end = datetime.fromtimestamp(path.stat().st_mtime).astimezone().isoformat(timespec="milliseconds")
         was, told = Status.INTERRUPTED, "the recording ended without being closed; recovered from the data on the disk"
         told += f", without {loss}" if loss else ""
@@ -152,7 +154,7 @@ _ROWS_TOGETHER = 2**18
 def recover(path: Path, target: Path, progress: Progress = silent) -> Recovery:
     """Recover the contents of `path` to `target`.
 
-    Raises InvalidInput if `target` exists or `path` is not a data file, DataFileError when it is too damaged.
+    Raises InvalidInput if `target` exists or `path` is not a data file, and DataFileError if the file is too damaged.
     """
     with open_datafile(path, judging=True) as record:
         temporary = target.with_name(f"{target.name}.part")
@@ -192,7 +194,7 @@ def _rebuild(record: DataFile, path: Path, temporary: Path, target: Path, progre
         grown = {each.name: each.shape[0] for each in hdf5.datasets(entry) if hdf5.grows(each)}
         lengths = {part_of(at): rows for at, rows in grown.items()}
         lost = {part: left for part, rows in copying.counted.items() if (left := rows - lengths.get(part, 0)) > 0}
-        # a truncated dataset differs from its checksum, and has been reported
+        # a truncated dataset differs from its checksum, but its loss has already been reported
         damage = {at: told for at, told in damage.items() if at not in grown or part_of(at) not in lost}
         _fill_plot(entry, lengths["samples"])
         result = Recovery(target, lengths["samples"], events, points, lost, tuple(damage.values()))

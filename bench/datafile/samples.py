@@ -1,7 +1,7 @@
 """The samples of all channels and of the drive with their times, appended in whole chunks.
 
-Rewriting a compressed chunk leaves its first copy as unused space, so rows are buffered until a chunk is full, unless
-they must be written immediately.
+Rewriting a compressed chunk leaves its first copy as unused space. Rows are therefore buffered until a chunk is full,
+unless they must be written immediately.
 """
 
 import json
@@ -19,8 +19,8 @@ PLOT, TIME = "data", "time"
 
 
 def create_plot(entry: hdf5.Group, channels: Sequence[Channel], chunk: int) -> hdf5.Dataset:
-    """Create the plot of the first channel, and the others of its kind, against time, with links to all others; the
-    time axis is filled later. The counts are not converted: by the NXdata standard, values are (counts +
+    """Create the plot of the first channel, and of all channels of the same kind, against time, with links to the other
+    channels; the time axis is filled later. The counts are not converted: by the NXdata standard, values are (counts +
     `<name>_offset`) * `<name>_scaling_factor`.
     """
     data = hdf5.create_group(entry, PLOT, "NXdata")
@@ -60,8 +60,8 @@ def companions(name: str) -> tuple[str, str]:
 class Timeline:
     """Times that rise by one sample period within a run, and jump where samples are missing.
 
-    A run is positioned by the time at which its first block had been read; all its times include the delay of that
-    read.
+    A run is placed in time by the instant at which its first block had been read; all its times include the delay of
+    that read.
     """
 
     def __init__(self, sample_rate: float) -> None:
@@ -73,7 +73,7 @@ class Timeline:
     def seconds(self, time: float, run: int, first: int, n: int) -> NDArray[np.float64]:
         """Times [s], shape (n,), of a block from sample `first` of `run`, read at `time` [s]."""
         if run != self._run:
-            # whole microseconds compress better; runs never overlap, whatever the bench clock reads
+            # whole microseconds compress better; `max` prevents overlapping runs, whatever the bench clock reads
             begin = max(time - n / self._rate, self._last + 1.0 / self._rate)
             self._run, self._origin = run, round(begin - first / self._rate, 6)
         times = self._origin + np.arange(first, first + n) / self._rate
@@ -146,13 +146,13 @@ def chunk_of(sample_rate: float) -> int:
 
 
 def read_channels(instrument: hdf5.Group) -> tuple[Channel, ...]:
-    """The inputs, in the order of the rig. Raises DataFileError if one is damaged."""
+    """The input channels, in the order of the rig. Raises DataFileError if one is damaged."""
     names = [name for name in hdf5.names(instrument) if hdf5.has(instrument, f"{name}/counts")]
     return tuple(read_channel(instrument, name) for name in names)
 
 
 def read_channel(instrument: hdf5.Group, name: str) -> Channel:
-    """The stored channel."""
+    """The channel `name` as stored."""
     stored = hdf5.dataset(instrument, f"{name}/counts")
     with reading(f"the conversion of {stored.name}"):
         attrs = stored.attrs

@@ -23,7 +23,7 @@ ROWS_AT_ONCE = 2**18
 class Series:
     """A one-dimensional array in the file: `series[i]`, `series[a:b]`, `series[:]` and `numpy.asarray(series)`.
 
-    `unit` and `quantity` describe its values. Nothing is kept in memory.
+    `unit` and `quantity` describe its values. No values are kept in memory.
     """
 
     name: str
@@ -107,7 +107,7 @@ class SampleReader:
         return self._cut(self._counts(self._channel_named(name).name), rows)
 
     def values(self, name: str, rows: slice = ALL) -> NDArray[np.float64]:
-        """Values of a channel in its unit; NaN where the counts are invalid."""
+        """Values of a channel, in its unit; NaN where the counts are invalid."""
         return self._channel_named(name).to_unit(self.counts(name, rows))
 
     def drive(self, rows: slice = ALL) -> NDArray[np.float32]:

@@ -2,8 +2,8 @@
 # pyright: reportUnknownArgumentType=false
 """Validation of the structure of an untrusted file before its contents are read.
 
-Values, link targets and external storage are not accessed. The structures rejected here would take hours or all memory,
-crash the process, or refer to other files.
+Values, link targets and external storage are not accessed. Reading the structures rejected here would take hours or all
+memory, crash the process, or open other files.
 """
 
 from pathlib import Path
@@ -25,21 +25,21 @@ DEEPEST = 8
 MOST_ATTRIBUTES = 64
 LARGEST_ATTRIBUTE = 2**20
 LARGEST_CHUNK = 2**25
-"""Maximum size of a chunk [bytes], which is decompressed as a whole."""
+"""Maximum size of a chunk [bytes]; a chunk is decompressed as a whole."""
 LARGEST_VALUE = 2**24
 """Maximum size of one text or number [bytes]."""
 UNPACKED = 200
 """Largest ratio of the size of all values to that of the file; constant columns are compressed about a hundredfold."""
 SPARE = 2**26
-"""Total size of the values up to which `UNPACKED` does not apply [bytes]."""
+"""Total size of the values [bytes] up to which the limit `UNPACKED` does not apply."""
 FILTERS = frozenset({1, 2, 3})
-"""Compression, shuffling and checksum filters built into HDF5; others are loaded as plugins."""
+"""Compression, shuffling and checksum filters built into HDF5; HDF5 would load any other filter as a plug-in."""
 KINDS = frozenset("iufSb")
-"""Kinds of values: numbers, fixed-length strings, Booleans."""
+"""NumPy kinds of allowed values: numbers, fixed-length strings, Booleans."""
 
 
 class _Judge:
-    """Checks every object of a file of `size` bytes once."""
+    """Check of every object of a file of `size` bytes, each once."""
 
     def __init__(self, size: int) -> None:
         self._size = size
@@ -104,7 +104,7 @@ class _Judge:
             self._view(made, path)
             return
         if made.get_external_count():
-            raise DataFileError(f"{path} has its values in another file, which is never read")
+            raise DataFileError(f"{path} has its values in another file; other files are never read")
         for number in range(made.get_nfilters()):
             if made.get_filter(number)[0] not in FILTERS:
                 raise DataFileError(f"{path} is compressed by a filter that this program does not use")
@@ -116,7 +116,7 @@ class _Judge:
                 raise DataFileError(f"{path} has chunks of {chunk} bytes; at most {LARGEST_CHUNK} are allowed")
         self._values += int(stored.nbytes)
         if self._values > UNPACKED * self._size + SPARE:
-            told = f"the datasets up to {path} declare {self._values} bytes in a file of {self._size}"
+            told = f"the datasets up to {path} declare {self._values} bytes of values in a file of {self._size} bytes"
             raise DataFileError(f"{told}: it is truncated or invalid")
 
     def _view(self, made: Any, path: str) -> None:
@@ -125,7 +125,7 @@ class _Judge:
             raise DataFileError(f"{path} is a virtual dataset; only views of fits may be virtual")
         for number in range(made.get_virtual_count()):
             if made.get_virtual_filename(number) != ".":
-                raise DataFileError(f"{path} shows values of another file, which is never read")
+                raise DataFileError(f"{path} shows values of another file; other files are never read")
 
 
 def check_attributes(owner: Any, path: str) -> None:
@@ -135,7 +135,10 @@ def check_attributes(owner: Any, path: str) -> None:
     for number in range(count):
         stored = h5py.h5a.open(owner.id, index=number)
         if (size := stored.get_storage_size()) > LARGEST_ATTRIBUTE:
-            raise DataFileError(f"the attribute {stored.name.decode(errors='replace')} of {path} has {size} bytes")
+            name = stored.name.decode(errors="replace")
+            raise DataFileError(
+                f"the attribute {name} of {path} has {size} bytes; at most {LARGEST_ATTRIBUTE} are allowed"
+            )
 
 
 def check_structure(file: File, path: Path) -> None:

@@ -1,4 +1,4 @@
-"""A table stored before the run, such as the prediction: named columns with units."""
+"""Tables stored before the run, such as the prediction: named columns with units."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -39,12 +39,12 @@ def check(name: str, table: Table) -> None:
             raise InvalidInput(item, column.unit, 'numbers need a unit, "1" for pure numbers')
         lengths.add(len(values))
     if len(lengths) > 1:
-        raise InvalidInput(f"table {name}", sorted(lengths), "its columns must have equal length")
+        raise InvalidInput(f"table {name}", sorted(lengths), "its columns must be of equal length")
 
 
 def write(parent: "hdf5.Group", name: str, table: Table) -> None:
     """Store a table as a group with one dataset per column; booleans become int8."""
-    from bench.datafile import hdf5  # HDF5 is needed only to store a table
+    from bench.datafile import hdf5  # h5py is imported only when a table is stored
 
     group = hdf5.create_group(parent, name, "NXcollection")
     for key, column in table.items():

@@ -1,4 +1,4 @@
-"""Writer of a campaign file, which can be read at any time and survives a crash of the writer."""
+"""Writer of a campaign file. The file can be read at any time and survives a crash of the writer."""
 
 import json
 import os
@@ -32,8 +32,8 @@ from sim.errors import InvalidInput
 
 
 class FileSync:
-    """Flushes a file from the system's cache to the disk through a separate handle, since HDF5 does not share its own
-    on some systems. Detects changes to the file by other programs.
+    """Flushes a file from the system's cache to the disk through a separate handle, since HDF5 does not give access to
+    its own handle on some systems. Detects changes to the file by other programs.
     """
 
     def __init__(self, path: Path) -> None:
@@ -46,7 +46,7 @@ class FileSync:
         sync_folder(path.parent)
 
     def sync(self) -> None:
-        """Flush the file to the disk. Raises OSError if the disk fails, DataFileError as `check` does."""
+        """Flush the file to the disk. Raises OSError if the disk fails, and DataFileError like `check`."""
         os.fsync(self._handle)
         self.check()
         self._size = os.fstat(self._handle).st_size
@@ -61,7 +61,7 @@ class FileSync:
     def check(self) -> None:
         """Raise DataFileError if another program has truncated, renamed, replaced or deleted the file.
 
-        Must be called before HDF5 looks for data in the file: it would search for hours for truncated data.
+        Must be called before HDF5 looks for data in the file, because HDF5 would search for hours for truncated data.
         """
         if (size := os.fstat(self._handle).st_size) < self._size:
             raise DataFileError(f"another program has truncated it from {self._size} to {size} bytes")
@@ -73,7 +73,7 @@ class FileSync:
             raise DataFileError("another program has replaced it")
 
     def restore(self) -> None:
-        """Write a deleted file again, with the data flushed so far, unless another file has its name."""
+        """Write the file again, with the data flushed so far, if it was deleted and no other file has its name."""
         with suppress(OSError):
             if os.fstat(self._handle).st_nlink or self._path.exists():
                 return
@@ -92,14 +92,14 @@ class FileSync:
         if not os.fstat(self._handle).st_nlink:
             return "deleted it"
         with suppress(OSError):
-            # Linux knows the present name of an open file
+            # on Linux the present name of an open file can be queried
             return f"renamed it to {Path(os.readlink(f'/proc/self/fd/{self._handle}')).name}"
         return "renamed or deleted it"
 
 
 def sync_folder(folder: Path) -> None:
     """Flush the directory entry of a new file to the disk, if the system requires it."""
-    # Windows cannot open folders, and flushes their entries itself
+    # Windows cannot open folders, and flushes their entries without a request
     with suppress(OSError):
         handle = os.open(folder, os.O_RDONLY)
         try:
@@ -123,7 +123,7 @@ class JournalWriter:
     def add(self, time: float, kind: str, text: str, more: Mapping[str, Any]) -> None:
         """Append one event at `time` [s], with `more` content."""
         line = json.dumps({"time": time, "kind": kind, "text": text, **more}, ensure_ascii=False) + "\n"
-        # one unbuffered call: a killed program leaves complete lines
+        # one unbuffered call per line, so that a killed program leaves complete lines
         os.write(self._handle, line.encode())
         self._written = True
 
@@ -144,7 +144,7 @@ def read_journal(path: Path) -> Iterator[dict[str, Any]]:
     """The lines of a journal before the first truncated or damaged one; empty if there is no journal."""
     if not path.is_file():
         return
-    # not splitlines, because a text may contain other line separators
+    # not `splitlines`, because a text may contain other line separators
     for line in path.read_text(encoding="utf-8", errors="replace").split("\n"):
         try:
             read = json.loads(line)
@@ -164,7 +164,8 @@ ROOM = 1_000_000
 def _try_folder(folder: Path) -> None:
     """Raise OSError unless a file of some size can be created in `folder`.
 
-    HDF5 does not report the cause of a failure clearly, and crashes the process when the disk fills up during creation.
+    HDF5 does not report the cause of a failure clearly, and crashes the process if the disk becomes full during
+    creation.
     """
     with tempfile.TemporaryFile(dir=folder, prefix=".room-") as room:
         room.write(bytes(ROOM))
@@ -173,8 +174,9 @@ def _try_folder(folder: Path) -> None:
 class DataFileWriter:
     """Creates the file and appends to it.
 
-    If the disk fails, methods raise h5py's exceptions, mostly OSError. Raises InvalidInput if the file exists, cannot
-    be created, or has contents that cannot be stored, and DataFileError when the disk fails during creation.
+    If the disk fails, the methods raise h5py's exceptions, mostly OSError. The constructor raises InvalidInput if the
+    file exists, cannot be created, or has contents that cannot be stored, and DataFileError if the disk fails during
+    creation.
     """
 
     def __init__(self, path: Path, skeleton: Skeleton) -> None:
@@ -266,8 +268,8 @@ class DataFileWriter:
         complete = [samples.written, *(rows.written for rows in tables)]
         if complete == self._complete:
             return
-        # a failing disk or computer may store a dataset's new length without its rows, so the count of complete rows is
-        # written afterwards, in place
+        # if the disk or computer fails, a dataset's new length may be stored without its rows; the count of complete
+        # rows is therefore written afterwards, in place
         self._journal.sync()
         self._flush()
         self._parts.complete[...] = complete
@@ -285,14 +287,14 @@ class DataFileWriter:
         wait_until_free(self._file_sync.touch)
         self._file.close()
         if whole := len(self._parts.rows["fits"]):
-            # the data are complete without them; if another program holds the file now, recovery adds them later
+            # the data are complete without the views; if another program holds the file now, a recovery adds them later
             with suppress(OSError, RuntimeError), hdf5.open_again(self._path) as file:
                 add_fit_views(hdf5.group(file, "entry"), whole)
         self._file_sync.sync()
         self._let_go()
 
     def abandon(self) -> None:
-        """Release the file after an error; committed data stay readable."""
+        """Release the file after an error. Committed data stay readable."""
         hdf5.let_go(self._file)
         self._file_sync.restore()
         self._let_go()
