@@ -12,12 +12,12 @@ class Verdict(StrEnum):
     PASSED = "passed"
     FAILED = "failed"
     STATED = "stated"
-    """Verdict for a line without tolerance."""
+    """Verdict for a line that has no tolerance."""
     UNTESTED = "untested"
 
 
 _OWN_UNIT = "any"
-"""Unit of the numbers in the declaration of a line, since every line states its unit."""
+"""Unit in the declaration of a line's numbers, since every line states its own unit."""
 
 
 class CheckLine(Parameters):
@@ -46,7 +46,9 @@ def judged(
     expected: float | None = None,
     uncertainty: float | None = None,
 ) -> CheckLine:
-    """A line that passes if the measured value is within `allowed`, ends included; the upper end may be infinite."""
+    """A line that passes if the measured value is within `allowed`, including its ends; the upper end may be
+    infinite.
+    """
     lowest, highest = allowed
     passed = lowest <= measured <= highest
     return CheckLine(
@@ -64,7 +66,7 @@ def judged(
 
 
 def stated(subject: str, what: str, measured: float, unit: str, *, uncertainty: float | None = None) -> CheckLine:
-    """A line with a measured value and no tolerance."""
+    """A line with a measured value but no tolerance."""
     return CheckLine(
         subject=subject,
         what=what,
@@ -76,12 +78,12 @@ def stated(subject: str, what: str, measured: float, unit: str, *, uncertainty: 
 
 
 def passed(subject: str, what: str) -> CheckLine:
-    """A passed line that has no number."""
+    """A line that has passed and has no number."""
     return CheckLine(subject=subject, what=what, verdict=Verdict.PASSED)
 
 
 def failed(subject: str, what: str, remedy: str) -> CheckLine:
-    """A failed line that has no number."""
+    """A line that has failed and has no number."""
     return CheckLine(subject=subject, what=what, verdict=Verdict.FAILED, remedy=remedy)
 
 

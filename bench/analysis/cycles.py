@@ -16,7 +16,9 @@ HARMONICS = 10
 """Number of jointly fitted harmonics; the drift of a rocking frame has less than 1e-5 of its peak above them."""
 
 COMPLETE = 0.98
-"""Minimum fraction of valid samples in a cycle: a laser that leaves its range at every peak would bias the fit."""
+"""Minimum fraction of valid samples in a cycle: with fewer, a laser that leaves its range at every peak would bias the
+fit.
+"""
 
 _GRID = 256
 _ANGLES: NDArray[np.float64] = np.arange(_GRID, dtype=np.float64) * (tau / _GRID)
@@ -43,9 +45,9 @@ class Cycle:
     """One cycle of the drive's period. The last column of every array is for the drive [V], the others for the signals.
 
     `coefficients`, shape (1 + 2 H, m): mean, cosines and sines of the harmonics of phase = omega (sample index) / rate.
-    `fundamental` are complex amplitudes c with signal = Re(c exp(-i phase)); `peak` is the largest magnitude of the
-    fitted motion, including its mean; `noise` is the rms of the residual; shape (m,) each. `extreme`, shape (m,), is
-    the largest magnitude of the samples: the fit overshoots a motion that differs at both ends of the cycle.
+    `fundamental` holds the complex amplitudes c with signal = Re(c exp(-i phase)); `peak` is the largest magnitude of
+    the fitted motion, including its mean; `noise` is the rms of the residual; shape (m,) each. `extreme`, shape (m,),
+    is the largest magnitude of the samples: the fit overshoots a motion that differs at both ends of the cycle.
     """
 
     index: int
@@ -57,7 +59,8 @@ class Cycle:
     noise: NDArray[np.float64]
 
     def harmonics(self, column: int) -> NDArray[np.complex128]:
-        """Complex amplitudes z_k of one signal, shape (HARMONICS,): it is Im(sum of z_k exp(i k phase)) and its mean.
+        """Complex amplitudes z_k of one signal, shape (HARMONICS,): the signal is its mean plus Im(sum of z_k exp(i k
+        phase)).
 
         Harmonics that were not fitted are zero; higher ones are omitted.
         """
@@ -98,7 +101,7 @@ def fit_cycle(
 
 
 _SHARE = 16
-"""Fraction of a cycle to which a parabola is fitted, whose vertex is the peak: this averages the noise; the error of
+"""Fraction of a cycle to which a parabola is fitted. Its vertex is the peak, with averaged noise; the relative error of
 the vertex is 5e-6 for a sine and 3e-3 for a fifth harmonic.
 """
 
@@ -148,9 +151,10 @@ class Waves:
 
 
 def mean_waves(cycles: Sequence[Cycle], bound: Mapping[int, int] | None = None) -> Waves:
-    """Mean of the coefficients, which, unlike a mean of peaks, is not biased by noise.
+    """Mean of the cycles' coefficients. Unlike a mean of peaks, it is not biased by noise.
 
-    `bound` is the highest harmonic of each column whose signal has no mean and no higher harmonics.
+    `bound` maps a column to the highest harmonic of its signal; the mean and the higher harmonics of such a signal are
+    set to zero.
     """
     all_coefficients = np.array([cycle.coefficients for cycle in cycles])
     harmonics = (all_coefficients.shape[1] - 1) // 2
@@ -179,7 +183,7 @@ def mean_waves(cycles: Sequence[Cycle], bound: Mapping[int, int] | None = None) 
 
 
 def _peak(waveform: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Largest magnitude of periodic columns, refined by a parabola through three points."""
+    """Largest magnitude of each periodic column, refined by a parabola through three points."""
     magnitude = np.abs(waveform)
     at = np.argmax(magnitude, axis=0)
     left, top, right = (
@@ -191,7 +195,7 @@ def _peak(waveform: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 class CycleAnalyser:
-    """Splits a stream of samples into cycles of `omega` [rad/s] and fits each completed one."""
+    """Splits a stream of samples into cycles of `omega` [rad/s] and fits each cycle when it is complete."""
 
     def __init__(self, omega: float, sample_rate: float, first: int, highest: int = HARMONICS) -> None:
         self._highest = highest
@@ -204,7 +208,7 @@ class CycleAnalyser:
 
     @property
     def completed(self) -> int:
-        """Cycles so far, including those without a fit."""
+        """Number of cycles so far, including those without a fit."""
         return self._count
 
     @property

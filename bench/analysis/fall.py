@@ -17,16 +17,17 @@ PERIODS = 2.0
 """Periods of the frame's first mode covered by the mean.
 
 In violent rocking without a fall (30 simulated records, up to 3 times the uplift acceleration) the mean over one period
-reaches 1.28 times the threshold, the mean over two periods 0.68 times; a fall is detected 0.2 to 0.9 s after the block
-has passed `FALLEN_TILT`.
+reaches 1.28 times the threshold, and the mean over two periods 0.68 times. A fall is detected 0.2 to 0.9 s after the
+tilt of the block has exceeded `FALLEN_TILT`.
 """
 
 
 class FallWatch:
-    """Detector of a fallen block, which deflects the frame permanently: mean u1 is k_C h1 sin(theta) / (k1 + k_C).
+    """Detector of a fallen block. Such a block deflects the frame permanently: the mean of u1 is k_C h1 sin(theta) /
+    (k1 + k_C).
 
     The mean is taken over the blocks that fill `PERIODS` of the frame's first mode, which suppresses the forced motion
-    and that mode; the threshold is half the offset at `FALLEN_TILT`.
+    and the motion in that mode; the threshold is half the offset at `FALLEN_TILT`.
     """
 
     def __init__(self, specimen: Specimen, sample_rate: float) -> None:

@@ -1,7 +1,7 @@
 """Description of an unsteady motion: peaks of its cycles, period, and rate of approach to a periodic motion.
 
-The peak of a cycle is taken from its samples. A fit of one cycle by harmonics of the drive overshoots it, by 10 % if
-the amplitude changes by half within a few cycles, because the motion then differs at the two ends of the cycle.
+The peak of a cycle is taken from its samples. A fit of one cycle by harmonics of the drive overshoots the peak, by 10 %
+if the amplitude changes by half within a few cycles, because the motion then differs at the two ends of the cycle.
 """
 
 from collections.abc import Sequence
@@ -30,24 +30,26 @@ stated.
 
 
 KNOWN, TURNS = 0.02, 2.0
-"""Largest standard uncertainty of the modulus, and minimum number of turns of the spiral, for the orbit's peak to be
-stated: the mean over less than a turn covers only one side.
+"""Largest standard uncertainty of the modulus, and minimum number of turns of the spiral about the orbit, for which the
+orbit's peak is stated: a mean over less than a turn covers only one side of the orbit.
 """
 
 UNKNOWN = 0.1
-"""Standard uncertainty of a modulus above which no rate is stated, since the multiplier is then due to noise."""
+"""Standard uncertainty of the modulus above which no rate is stated, since the multiplier is then due to noise."""
 
 SMALL = 0.15
 """Largest relative deviation of the peaks from their mean at which the peak of the orbit is still stated."""
 
 SHORTEST, SINGULAR, STEP = 24, 1e8, 1e-6
-"""Smallest number of changes for a rate, largest condition number of its equations, step of its finite differences."""
+"""For a rate: smallest number of changes, largest condition number of the equations, and step of the finite
+differences.
+"""
 
 
 @dataclass(frozen=True)
 class Rate:
-    """Slowest pair of multipliers of a motion near a periodic one: modulus per cycle, and its standard
-    uncertainty; `angle` [rad] per cycle.
+    """Slowest pair of multipliers of a motion near a periodic motion: modulus per cycle and its standard uncertainty,
+    and `angle` [rad] per cycle.
     """
 
     modulus: float
@@ -90,9 +92,9 @@ def free_motion(cycles: Sequence[Cycle]) -> FreeMotion:
 def orbit_peak(cycles: Sequence[Cycle], motion: FreeMotion, omega: float) -> SteadyPeak | None:
     """Peak of the mean of the last `CYCLES` cycles at `omega` [rad/s], which to second order in the deviation is the
     peak of the periodic motion about which the motion revolves. None if the deviation is large or the changes are not
-    linear.
+    those of a linear system.
 
-    The square of the relative deviation, as a rectangular distribution, is added as a transient. On exact motions of
+    The square of the relative deviation is added as a transient with a rectangular distribution. On exact motions of
     the model near their boundaries of stability, with deviations up to 10 %, the error was at most 5.1e-4.
     """
     deviation, rate = 0.5 * (motion.greatest - motion.least) / motion.mean, motion.rate
@@ -104,8 +106,8 @@ def orbit_peak(cycles: Sequence[Cycle], motion: FreeMotion, omega: float) -> Ste
 def _rate(amplitudes: NDArray[np.complex128]) -> Rate | None:
     """Rate from the linear map of changes from cycle to cycle, in the plane of their two largest components.
 
-    The preceding changes are the instrumental variables of the least-squares problem: noise of the amplitudes would
-    bias the multipliers towards zero, but is independent for changes that share no cycle.
+    Earlier changes are the instrumental variables of the least-squares problem. Without them, noise of the amplitudes
+    would bias the multipliers towards zero; the noise is independent for changes that share no cycle.
     """
     moved = np.diff(np.concatenate((amplitudes.real, amplitudes.imag), axis=1), axis=0)
     size = float(np.sum(moved**2))

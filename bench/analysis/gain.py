@@ -1,4 +1,4 @@
-"""Gain coefficient from measured cycles, with its uncertainty (GUM, and the Monte Carlo method of GUM Supplement 1)."""
+"""Gain coefficient from measured cycles, with its uncertainty (GUM, and Monte Carlo method of GUM Supplement 1)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -17,8 +17,8 @@ from bench.analysis.uncertainty import COVERAGE as COVERAGE
 from bench.analysis.uncertainty import Budget
 
 DRAWS, SEED = 4000, 1
-"""Number of Monte Carlo draws of the sensors' errors; with it, the expanded uncertainty has a statistical scatter of
-1.1 %.
+"""Number of Monte Carlo draws of the sensors' errors; with this number, the expanded uncertainty has a statistical
+scatter of 1.1 %.
 """
 
 ZERO_PLACES = 32
@@ -28,20 +28,22 @@ CHECK_PLACES = 64
 """Number of points of a cycle whose readings check the linearity of a laser."""
 
 FRAME_SHARE = 0.3
-"""Standard uncertainty of a harmonic of the bare frame computed from that of the table, relative."""
+"""Relative standard uncertainty of a harmonic of the bare frame that is computed from the same harmonic of the
+table.
+"""
 
 PEAK_HARMONICS = 5
 """Highest harmonic used for the peak of a steady drift. An impact acts on the second storey through two springs and two
-masses: higher harmonics change the peak by less than 1e-4, less than the laser resolution does.
+masses, so higher harmonics change the peak by less than 1e-4, which is less than the effect of the laser resolution.
 """
 
 PEAK_ROUNDINGS = 0.6 * (((PEAK_HARMONICS + 1) // 2) ** 2 + (PEAK_HARMONICS // 2) ** 2)
 """Mean square error of a steady peak due to a laser's resolution, relative to that of the averaged rounding errors of a
-cycle. A sine of amplitude A, rounded to steps q, has in harmonic k the errors 2 q / (pi m) J_k(2 pi m A / q), m = 1, 2,
-..., times the sine (k odd) or cosine (k even) of the position of the steps. Their mean square, J_k^2 being 1 / (pi z)
-in the mean, sums up to zeta(3) q^3 / (pi^4 A); the roundings of 4 A / q steps, each q^2 / 12, averaged, would be q^3 /
-(48 A). At the turning point the errors of all odd harmonics have the same sign, as do those of all even ones, so they
-add up.
+cycle. A sine of amplitude A, rounded to steps q, has in harmonic k the errors 2 q / (pi m) J_k(z), z = 2 pi m A / q, m
+= 1, 2, ..., times the sine (k odd) or cosine (k even) of the position of the steps. Since the mean of J_k^2 is 1 / (pi
+z), the sum of their mean squares is zeta(3) q^3 / (pi^4 A). The mean of the rounding errors of 4 A / q steps, each with
+the variance q^2 / 12, would have the variance q^3 / (48 A). At the turning point the errors of all odd harmonics have
+the same sign, as do those of all even ones, so they add up.
 """
 
 
@@ -49,10 +51,11 @@ add up.
 class SteadyPeak:
     """The drift over measured cycles.
 
-    `drift` [m] is its peak, `scatter` [m] the standard uncertainty of that peak from the cycles themselves, and
-    `transient` [m] that of a remaining transient; `u1` [m] is the first storey's peak; `amplitude` [m/s2] is the
-    table's and `harmonics` the relative rms of its harmonics; `readings` are those of the lasers at the peak, `cycles`
-    the number of cycles, `checks` the harmonics of both readings in a test of the bare frame.
+    `drift` [m] is its peak; `scatter` [m] and `transient` [m] are the standard uncertainties of that peak due to the
+    scatter of the cycles and to a remaining transient. `u1` [m] is the first storey's peak, `amplitude` [m/s2] the
+    table's amplitude and `harmonics` the relative rms of the table's harmonics. `readings` are the lasers' readings at
+    the peak, `cycles` is the number of cycles, and `checks` holds the harmonics of both lasers' readings in a test of
+    the bare frame.
     """
 
     drift: float
@@ -88,13 +91,13 @@ def steady_peak(
 ) -> SteadyPeak:
     """Peak of the mean cycle at `omega` [rad/s], counted from the mean over the cycle.
 
-    Over a period of a steady motion the second storey gains no momentum, so the force k2 drift that alone drives it has
-    zero mean, whatever the block does: the mean is a better zero of the sensors than a rest before the test, which has
-    one rounding error of each laser. The larger of both sides then does not include that error. The scatter is that of
-    the cycles at the peak, corrected for the correlation of neighbours, M_eff = M (1 - r1) / (1 + r1). A remaining
-    transient is estimated from `cycles` and those `before` them at the same drive; `residual`, the relative bound of a
-    further systematic effect, is taken as a rectangular distribution. The harmonics of the readings of a linear
-    `frame` check the linearity of the lasers.
+    Over a period of a steady motion the second storey gains no momentum, so the force k2 times drift, which alone
+    drives it, has zero mean, whatever the block does. The mean is therefore a better zero of the sensors than a rest
+    before the test, which has one rounding error of each laser; the larger of the peaks to both sides then does not
+    include that error. The scatter is that of the cycles at the peak, corrected for the correlation of neighbouring
+    cycles, M_eff = M (1 - r1) / (1 + r1). A remaining transient is estimated from `cycles` and those `before` them at
+    the same drive; `residual`, the relative bound of a further systematic effect, is treated as a rectangular
+    distribution. The harmonics of the readings of a linear `frame` check the linearity of the lasers.
     """
     waves = mean_waves([*before, *cycles], {DRIFT: PEAK_HARMONICS})
     series = waves.there[:, DRIFT]
@@ -136,7 +139,7 @@ def _peak(
 
 
 def _readings(waves: Waves, omega: float, drift: float, *, at_rest: bool) -> PeakReadings:
-    """Readings of the lasers at the peak of the mean cycle."""
+    """Lasers' readings at the peak of the mean cycle."""
     lasers = waves.waveform[:, [LASER_1, LASER_2]].T
     peak = waves.at[DRIFT]
     speeds = omega * waves.rates[peak, [LASER_1, LASER_2]]
@@ -160,7 +163,7 @@ def _readings(waves: Waves, omega: float, drift: float, *, at_rest: bool) -> Pea
 
 
 def _checks(cycles: Sequence[Cycle], waves: Waves, omega: float, frame: LinearFrame) -> Checks:
-    """Harmonics of the readings of both lasers, without those due to the table."""
+    """Harmonics of both lasers' readings, without those due to the table."""
     fitted = min((cycle.coefficients.shape[0] - 1) // 2 for cycle in cycles)
     table = np.array([cycle.harmonics(ACCELERATION)[1:fitted] for cycle in cycles]).mean(axis=0)
     orders = range(2, table.size + 2)
@@ -211,9 +214,10 @@ def gain(
 
     `amplitude_slope` is d ln alpha_2 / d ln amplitude: the effect of a scale error of the table's acceleration on the
     gain at the stated amplitude; it cancels for a proportional response. The bare test checks the linearity of the
-    lasers, unless `sensors` has the checks of several.
+    lasers, unless `sensors` has checks already, from several tests.
 
-    With `shared` draws the uncertainty differs by at most 1e-9, relative, and takes a fraction of the time.
+    With `shared` draws the uncertainty differs by at most 1e-9 (relative), and its calculation takes a fraction of the
+    time.
     """
     alpha = coupled.drift / bare.drift
     draws = Draws(np.random.default_rng(SEED), DRAWS) if shared is None else shared.again()

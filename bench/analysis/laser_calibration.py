@@ -1,6 +1,6 @@
 """Calibration of the two lasers and of the table's sensors against them, and its application to readings.
 
-A laser's error is a Chebyshev polynomial of its reading over the covered readings; beyond them it is constant. The
+A laser's error is a Chebyshev polynomial in its reading over the covered readings, and constant beyond them. The
 table's sensors have one factor each: true = factor times reading.
 """
 
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 
 class LaserCurve(Parameters):
-    """Error of one laser as a function of its reading [m] relative to mid range."""
+    """Error of one laser [m] as a function of its reading [m] relative to mid range."""
 
     sensor: str = quantity(..., "", "description of the laser in the data file of its calibration")
     lowest: float = quantity(..., "m", "least reading covered", usual=(1e-3, 1.0))
@@ -48,13 +48,13 @@ class LaserCurve(Parameters):
         return self
 
     def corrected(self, readings: Array) -> Array:
-        """Readings [m] without the laser's error, same shape; NaN stays NaN."""
+        """Readings [m] corrected for the laser's error, same shape; NaN remains NaN."""
         place = (2.0 * readings - self.highest - self.lowest) / (self.highest - self.lowest)
         return readings - chebyshev.chebval(np.clip(place, -1.0, 1.0), np.array(self.error))
 
 
 class LaserCalibration(Parameters):
-    """Both lasers calibrated against one motion. Standard uncertainties throughout."""
+    """Both lasers calibrated against one motion. All uncertainties are standard uncertainties."""
 
     date: AwareDatetime = quantity(..., "", "date of the measurement")
     valid_days: float = quantity(..., "d", "period of validity", gt=0, usual=(7.0, 1100.0))
@@ -76,7 +76,7 @@ class LaserCalibration(Parameters):
 
     @property
     def lasers(self) -> tuple[LaserCurve, LaserCurve]:
-        """The curves of storey 1 and storey 2."""
+        """The curves of the lasers on storey 1 and storey 2."""
         return self.laser_1, self.laser_2
 
     @property
@@ -85,7 +85,7 @@ class LaserCalibration(Parameters):
         return self.date + timedelta(days=self.valid_days)
 
     def expired(self, now: datetime) -> str | None:
-        """Warning if the calibration has expired at `now`, which must have a time zone; None while it is valid."""
+        """Warning if the calibration has expired by `now`, which must have a time zone; None while it is valid."""
         if now <= self.expires:
             return None
         return (
@@ -94,7 +94,7 @@ class LaserCalibration(Parameters):
         )
 
     def strange(self, devices: Mapping[str, str]) -> tuple[str, ...]:
-        """Warnings about `devices`, by channel, that differ from the calibrated ones."""
+        """Warnings about `devices` (by channel) that differ from the calibrated lasers."""
         return tuple(
             f"the laser calibration is for {name} = {curve.sensor}, but the mounted laser is {devices[name]}: "
             "calibrate again with `rockbench run laser-calibration`"

@@ -1,17 +1,17 @@
-"""Linearity error of a laser whose shape is unknown, and the errors of measured peaks that it causes.
+"""Linearity error of a laser, as a curve of unknown shape, and the resulting errors of measured peaks.
 
-A data sheet states the largest error over the measuring range, not its shape. The error is modelled as a Gaussian
-process of the reading at the height of the data sheet, with the squared exponential covariance of an irregular curve,
-or as a sine of random phase; the number of waves over the range is unknown. Without further information the curve or
-sine with the largest effect is assumed.
+A data sheet states the largest error over the measuring range, not its shape. The error is modelled as a function of
+the reading with the amplitude of the data sheet: either a Gaussian process with squared exponential covariance, for an
+irregular curve, or a sine of random phase. The number of waves over the range is unknown. Without further information,
+the curve or sine with the largest effect is assumed.
 
-The bare frame is a running check: it is linear and driven by a sine, so that the readings of a linear laser have no
-harmonics but the small ones of the table. The harmonics of a reading x(phase) are those of its error e(x(phase)): for a
-pure sine they are the Chebyshev coefficients of the curve over the swing. The posterior of the curve given the
-harmonics is that of Gaussian process regression (Rasmussen and Williams, 2006, section 2.2), averaged over the numbers
-of waves by their evidence (section 5.2). A lower height is not assumed, since a small swing shows neither the height
-nor the number of waves alone. Its mean is not subtracted from the result: it is part of the uncertainty as an
-uncorrected effect (GUM F.2.4.5).
+Every test of the bare frame is a check: the frame is linear and driven by a sine, so that the readings of a linear
+laser have no harmonics except the small ones caused by those of the table. The harmonics of a reading x(phase) are
+those of its error e(x(phase)): for a pure sine they are the Chebyshev coefficients of the curve over the swing. The
+posterior of the curve given the harmonics is that of Gaussian process regression (Rasmussen and Williams, 2006, section
+2.2), averaged over the numbers of waves with their evidence as weights (section 5.2). The amplitude is not estimated,
+since a small swing does not determine amplitude and number of waves separately. The posterior mean is not subtracted
+from the result: it is part of the uncertainty, as an uncorrected effect (GUM F.2.4.5).
 """
 
 from collections.abc import Sequence
@@ -29,28 +29,31 @@ Array = NDArray[np.float64]
 
 FEWEST, NUMBERS = 0.25, 13
 WAVES: Array = np.array([FEWEST * 2.0 ** (0.5 * k) for k in range(NUMBERS)])
-"""Numbers of waves within the measuring range, from 0.25 to 16. Fewer are a scale error, which tests share; more are
-averaged over a swing. They grow by the root of 2, so that the exponent of the covariance doubles.
+"""Numbers of waves within the measuring range, from 0.25 to 16. A curve with fewer waves is a scale error, which the
+tests have in common; a curve with more waves is averaged over a swing. The numbers increase by a factor of sqrt(2), so
+that the exponent of the covariance doubles.
 """
 
 SMOOTH = 1.5
-"""Waves above which a linearity error is not smooth. A sine of 1.5 periods over the range is found to have 1.2 waves,
-one of 3 to have 1.9.
+"""Estimated number of waves above which a linearity error is not smooth. The estimate is 1.2 waves for a sine with 1.5
+periods over the range, and 1.9 for one with 3.
 """
 
 ZETA_3 = 1.2020569
-"""Sum of 1 / m^3."""
+"""zeta(3), the sum of 1 / m^3 over m = 1, 2, ..."""
 
 CAUTION = 0.3
-"""Share of the logarithm of the evidence that counts: no curve is a draw of the process, and the harmonics of a small
-swing hardly tell their number.
+"""Factor on the logarithm of the evidence, below 1 because a true curve is not a draw from the process, and because the
+harmonics of a small swing hardly determine the number of waves.
 """
 
 LEAST = 1e-5
-"""Smallest uncertainty of a harmonic, relative to the limit of the data sheet; it admits exact harmonics."""
+"""Smallest uncertainty of a harmonic, relative to the limit of the data sheet, so that exact harmonics can be
+evaluated.
+"""
 
 ROUNDING = 1e-12
-"""Smallest share of a variance that is not due to rounding."""
+"""Smallest fraction of a variance that is not due to rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,21 +61,22 @@ class Harmonics:
     """Harmonics of the reading of one laser in a test of a linear frame.
 
     `readings`, shape (n,) [m], over one period at equal steps of the phase, relative to the rest; `found`, shape (m,),
-    complex [m], are those of the orders from 2, as signal = Re(sum of c_k exp(-i k phase)); `uncertainty`, (m,) [m],
-    that of the real and the imaginary part.
+    complex [m], are the amplitudes c_k of the orders from 2 in signal = Re(sum of c_k exp(-i k phase)); `uncertainty`,
+    shape (m,) [m], is the standard uncertainty of their real and imaginary parts.
     """
 
     readings: Array
     found: NDArray[np.complex128]
     uncertainty: Array
 
-    @lru_cache(maxsize=64)  # noqa: B019 - few objects, which serve many gains
+    @lru_cache(maxsize=64)  # noqa: B019 - few objects, used for many gains
     def rounded(self, step: float) -> "Harmonics":
-        """The harmonics with the uncertainty due to readings in steps [m], at most that of one rounding; the same
-        object for the same step.
+        """The harmonics with the additional uncertainty due to the `step` [m] of the readings, at most that of one
+        rounding. Returns the same object for the same step.
 
-        It is not in the scatter, since all cycles are rounded alike: see `bench.analysis.gain.PEAK_ROUNDINGS`, of which
-        one harmonic has 2 zeta(3) q^3 / (pi^4 A), half of it in each part.
+        The scatter of the cycles does not contain this uncertainty, since all cycles are rounded alike. By
+        `bench.analysis.gain.PEAK_ROUNDINGS` the variance of one harmonic is 2 zeta(3) q^3 / (pi^4 A), half of it in
+        each part.
         """
         swing = max(0.5 * float(np.ptp(self.readings)), step, np.finfo(np.float64).tiny)
         rounding = min(sqrt(ZETA_3 * step**3 / (pi**4 * swing)), step / sqrt(12.0))
@@ -80,23 +84,27 @@ class Harmonics:
 
     @lru_cache(maxsize=64)  # noqa: B019 - as above
     def widened(self, uncertainty: float) -> "Harmonics":
-        """The harmonics with a further standard uncertainty [m] of each part; the same object for the same one."""
+        """The harmonics with an additional standard `uncertainty` [m] of each part. Returns the same object for the
+        same uncertainty.
+        """
         return replace(self, uncertainty=np.hypot(self.uncertainty, uncertainty))
 
 
 Checks = tuple[Harmonics, Harmonics]
-"""Harmonics of both lasers in one test."""
+"""Harmonics of both lasers' readings in one test."""
 
 
 @dataclass(frozen=True)
 class LinearFrame:
-    """The frame without block, seen by lasers on the ground or (`grounded` False) on the table."""
+    """The frame without block, measured by lasers on the ground or (`grounded` False) on the table."""
 
     specimen: Specimen
     grounded: bool
 
     def readings(self, omega: float, acceleration: complex) -> tuple[complex, complex]:
-        """Complex amplitudes [m] of both readings under that of the table [m/s2] at `omega` [rad/s]."""
+        """Complex amplitudes [m] of both readings for a complex amplitude of the table's acceleration [m/s2] at `omega`
+        [rad/s].
+        """
         table = -acceleration / omega**2 if self.grounded else 0.0
         first, second = (acceleration * each for each in steady_response(self.specimen, omega, 1.0))
         return first + table, second + table
@@ -104,7 +112,9 @@ class LinearFrame:
 
 @dataclass(frozen=True, eq=False)
 class Effect:
-    """Error of a peak caused by the error e of one laser: sum of `weights` e(`places` [m]), shapes (n,)."""
+    """Error of a peak caused by the error e of one laser: the sum of weights * e(places). `weights` and the readings
+    `places` [m] have the shape (n,).
+    """
 
     places: Array
     weights: Array
@@ -112,21 +122,21 @@ class Effect:
 
 @dataclass(frozen=True, eq=False)
 class LinearityErrors:
-    """Second moments of the errors of peaks [m2], shape (tests, tests), about zero; `waves` of the curve over the
-    range, as found by a check or as assumed.
+    """Errors of the peaks in several tests: `moments` are their second moments about zero [m2], shape (tests, tests);
+    `waves` is the number of waves of the curve over the range, estimated by a check or assumed.
     """
 
     moments: Array
     waves: float
 
     def draws(self, normal: Array) -> Array:
-        """Errors [m], shape (tests, n), from standard normal numbers of that shape."""
+        """Draws of the errors [m], shape (tests, n), from standard normal numbers of that shape."""
         tests = len(self.moments)
         root = np.zeros((tests, tests))
         for i in range(tests):
             for j in range(i + 1):
                 rest = self.moments[i, j] - root[i, :j] @ root[j, :j]
-                # equal motions have equal errors: nothing remains of the second
+                # equal motions have equal errors: the second error has no independent part
                 if i == j:
                     root[i, j] = sqrt(max(rest, 0.0)) if rest > ROUNDING * self.moments[i, i] else 0.0
                 elif root[j, j] > 0.0:
@@ -137,10 +147,10 @@ class LinearityErrors:
 def linearity_errors(
     effects: Sequence[Effect], shares: Array, limit: float, whole: float, checks: Sequence[Harmonics] = ()
 ) -> LinearityErrors:
-    """Errors of peaks measured by one laser of the range `whole` [m] and the largest error `limit` [m].
+    """Errors of peaks measured by one laser with the measuring range `whole` [m] and the largest error `limit` [m].
 
-    `shares`, shape (tests,), are the derivatives of the result with respect to the peaks: they select the worst number
-    of waves where there is no check. What the checks tell is kept for later calls with the same objects.
+    `shares`, shape (tests,), are the derivatives of the result with respect to the peaks: without `checks`, they
+    determine the worst number of waves. The evaluation of the checks is cached for later calls with the same objects.
     """
     tests = len(effects)
     if limit == 0.0:
@@ -163,9 +173,10 @@ def linearity_errors(
 
 @dataclass(frozen=True, eq=False)
 class _Learned:
-    """What m harmonics tell of the curve, for each of K numbers of waves: `whitening`, shape (K, m, m), makes them
-    independent with unit variance, `measured`, (K, m), are then their values, and `likely`, (K,), is the weight of each
-    number. `observed`, (m, n), gives the harmonics of a curve at the `places` (n,).
+    """Information from m measured harmonics about the curve, for each of K curves with different numbers of waves.
+    `whitening`, shape (K, m, m), transforms the harmonics to independent numbers of unit variance; `measured`, shape
+    (K, m), are the transformed harmonics; `likely`, shape (K,), is the weight of each curve. `observed`, shape (m, n),
+    computes the harmonics of a curve from its values at the `places`, shape (n,).
     """
 
     places: Array
@@ -191,18 +202,19 @@ def _learned(checks: tuple[Harmonics, ...], limit: float, whole: float) -> _Lear
 
 
 def _covariances(one: Array, left: Array, other: Array, right: Array, whole: float) -> Array:
-    """Covariances of linear functions of the curve, `left` (l, n) of its values at the places `one` (n,) and `right`
-    (r, m) of those at `other` (m,), relative to the variance; shape (2 NUMBERS, l, r), irregular curves before sines.
+    """Covariances of linear functions of the curve, relative to the variance, shape (2 NUMBERS, l, r), irregular curves
+    before sines. `left`, shape (l, n), applies to the values at the places `one`, shape (n,), and `right`, shape (r,
+    m), to those at `other`, shape (m,).
     """
     first = 2.0 * pi * FEWEST / whole
     distances: Array = one[:, None] - other[None, :]
     curve: Array = np.exp(-0.5 * (first * distances) ** 2)
     found = np.empty((2 * NUMBERS, left.shape[0], right.shape[0]))
     for k in range(NUMBERS):
-        # there are fewer rows on the right
+        # this order of products is faster, because `right` has fewer rows
         found[k] = left @ (curve @ right.T)
         curve *= curve
-    # a sine has equal errors at places a wave apart
+    # covariance of a sine of random phase: the cosine of the phase difference
     angles = 2.0 * pi / whole * WAVES
     for part in (np.cos, np.sin):
         near, far = part(np.outer(angles, one)) @ left.T, part(np.outer(angles, other)) @ right.T
@@ -212,7 +224,7 @@ def _covariances(one: Array, left: Array, other: Array, right: Array, whole: flo
 
 
 def _rows(blocks: Sequence[Array]) -> Array:
-    """Matrix with the blocks on its diagonal."""
+    """Block-diagonal matrix with these blocks."""
     found = np.zeros((sum(len(each) for each in blocks), sum(each.shape[1] for each in blocks)))
     top = left = 0
     for each in blocks:
@@ -223,6 +235,8 @@ def _rows(blocks: Sequence[Array]) -> Array:
 
 @lru_cache(maxsize=8)
 def _fourier(points: int, orders: int) -> Array:
-    """Cosine and sine coefficients of the orders from 2 of a period of `points`, shape (2 orders, points)."""
+    """Matrix, shape (2 * orders, points), from one period at `points` places to its cosine and sine coefficients of the
+    orders from 2.
+    """
     angles = np.outer(np.arange(2, 2 + orders), np.arange(points) * (2.0 * pi / points))
     return np.concatenate((np.cos(angles), np.sin(angles))) * (2.0 / points)

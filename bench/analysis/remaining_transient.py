@@ -1,9 +1,10 @@
-"""Transient that remains in the mean of the measured cycles, from the decay that the cycles themselves show.
+"""Remaining transient in the mean of the measured cycles, estimated from the decay in the cycles themselves.
 
-A slow mode of a settling motion changes the peak from cycle to cycle by C rho^n cos(psi n + phase). Modes that turn by
-a large angle per cycle, as those of a rocking frame do (2 to 3 rad), average out within a few cycles; a mode that does
-not turn shifts the mean. The modes are fitted to all cycles at a constant drive, and the shift of the measured ones is
-averaged over decays and angles by their likelihood. It is not subtracted: its mean square is the squared uncertainty.
+A slow mode of a settling motion changes the peak from cycle to cycle by C rho^n cos(psi n + phase). Modes with a large
+angle psi per cycle, such as those of a rocking frame (2 to 3 rad), average out within a few cycles; a mode with psi = 0
+shifts the mean. The modes are fitted to all cycles at a constant drive, and the squared shift of the mean of the
+measured cycles is averaged over decays and angles with their likelihood as weight. The shift is not subtracted: its
+mean square is the squared uncertainty.
 """
 
 from collections.abc import Sequence
@@ -15,26 +16,26 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 DECAYS = (0.7, 0.85, 0.92, 0.95, 0.97, 0.98, 0.988, 0.993)
-"""Moduli of the multipliers. The slowest modes of the rocking and of the bare frame have 0.97 to 0.985; a slower one
-would have been judged as unsteady.
+"""Moduli rho of the multipliers. The slowest modes of the rocking frame and of the bare frame have 0.97 to 0.985; with
+a slower mode, the motion would have been assessed as unsteady.
 """
 
 ANGLES = (0.0, 0.015, 0.03, 0.05, 0.08, 0.12, 0.2, 0.3, 0.45, 0.6, 0.8, 1.1, 1.4, 1.7, 2.0, 2.3, 2.6, 2.9, pi)
-"""Angles of the multipliers [rad]."""
+"""Angles psi of the multipliers [rad]."""
 
 CAUTION = 0.3
-"""Share of the logarithm of the likelihood that counts: decays and slow turns of nearly equal likelihood shift the mean
-by different amounts, and the grid holds few of them.
+"""Factor on the logarithm of the likelihood, below 1 because decays and small angles of nearly equal likelihood shift
+the mean by different amounts, and the grid contains only few of them.
 """
 
 FINER = 9
-"""Number of moduli and of angles around the best ones of the grid."""
+"""Number of moduli, and of angles, in the finer grid around the best ones."""
 
 FEWEST = 8
-"""Least number of cycles of a fit."""
+"""Minimum number of cycles for a fit."""
 
 ROUNDING = 1e-12
-"""Scatter relative to the values that is due to rounding."""
+"""Scatter, relative to the values, up to which it is due to rounding."""
 
 
 def remaining_transient(series: Array, measured: int) -> float:
@@ -57,23 +58,25 @@ def remaining_transient(series: Array, measured: int) -> float:
 
 
 def _around(grid: Sequence[float], k: int) -> Array:
-    """Finer grid between the neighbours of its element `k`."""
+    """Finer grid between the neighbours of element `k` of `grid`."""
     return np.linspace(grid[max(k - 1, 0)], grid[min(k + 1, len(grid) - 1)], FINER)
 
 
 def _modes(decays: Array, angles: Array, n: int) -> Array:
-    """A constant and both parts of each mode over `n` cycles, of the order of one at the first; shape (modes, n, 3)."""
+    """A constant and both parts of each mode over `n` cycles, with amplitude 1 in the first cycle; shape (modes, n,
+    3).
+    """
     at = np.arange(n)
     turned = (decays.ravel() * np.exp(1j * angles.ravel()))[:, None] ** at
     return np.stack((np.ones(turned.shape), turned.real, turned.imag), axis=2)
 
 
 def _fitted(series: Array, modes: Array, measured: int) -> tuple[Array, Array, Array]:
-    """Sum of squares of the residuals, mean of the mode over the measured cycles, and its variance relative to that of
-    white noise, of each mode.
+    """For each mode: sum of squares of the residuals, mean of the fitted mode over the measured cycles, and variance of
+    this mean relative to that of white noise.
     """
     transposed = modes.transpose(0, 2, 1)
-    # one part of a mode that does not turn is zero
+    # the imaginary part of a mode with psi = 0 or pi is zero
     inverse = np.linalg.pinv(transposed @ modes, rcond=1e-13, hermitian=True)
     found = np.einsum("kij,kj->ki", inverse, transposed @ series)
     residuals = series - np.einsum("kni,ki->kn", modes, found)

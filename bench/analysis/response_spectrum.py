@@ -21,8 +21,8 @@ DAMPING = 0.05
 _COARSEST_STEP = 0.25
 """Largest omega dt [rad].
 
-A turning point lies between two samples: the error of the cubic through displacement and velocity at both is below
-(omega dt)^4 / 384 of the amplitude, 1e-5.
+A turning point lies between two samples: the error of the cubic through displacement and velocity at both samples is
+below (omega dt)^4 / 384 of the amplitude, 1e-5.
 """
 
 
@@ -45,7 +45,7 @@ def pseudo_acceleration(acceleration: Array, dt: float, periods: Array, damping:
 
 
 def logarithmic_periods(shortest: float, longest: float, per_octave: int = 6) -> Array:
-    """Periods [s] from `shortest` to `longest`, both included, about `per_octave` of them per octave."""
+    """Periods [s] from `shortest` to `longest`, both included, about `per_octave` per octave."""
     count = max(round(per_octave * float(np.log2(longest / shortest))), 1) + 1
     return np.geomspace(shortest, longest, count)
 
@@ -82,7 +82,7 @@ def _turning_points(u: Array, v: Array, dt: float) -> float:
     u0, v0, v1 = u[at], v[at] * dt, v[at + 1] * dt
     rise = u[at + 1] - u0
     second, third = 3.0 * rise - 2.0 * v0 - v1, v0 + v1 - 2.0 * rise
-    # the one root in (0, 1) of v0 + 2 second s + 3 third s^2, in a form without cancellation
+    # the root in (0, 1) of v0 + 2 second s + 3 third s^2, in a form without cancellation
     q = -second - np.copysign(np.sqrt(np.maximum(second**2 - 3.0 * third * v0, 0.0)), second)
     s = np.where((q * v0 > 0.0) & (np.abs(v0) <= np.abs(q)), v0 / q, q / np.where(third == 0.0, 1.0, 3.0 * third))
     return float(np.abs(u0 + s * (v0 + s * (second + s * third))).max())

@@ -1,10 +1,11 @@
 """Uncertainty of the sensors from data sheets and calibration, and its effect on the peak of a drift.
 
-Two tests share their sensors, so every draw has one pair of lasers for both (GUM Supplement 1): common
+Two tests use the same sensors, so every draw has the same pair of lasers for both tests (GUM Supplement 1): common
 errors cancel in the ratio of their drifts to the extent that they are equal.
 
-The shape of a laser's linearity error is unknown (`bench.analysis.linearity`); the bare frame's test checks it. For a
-calibrated laser the data sheet applies beyond the covered readings; within them the uncertainty of the calibration.
+The shape of a laser's linearity error is unknown (`bench.analysis.linearity`); the test of the bare frame checks it.
+For a calibrated laser, the uncertainty of the calibration applies to the covered readings, and the data sheet beyond
+them.
 """
 
 from collections.abc import Sequence
@@ -33,7 +34,7 @@ class SensorAccuracy(Parameters):
     """Standard uncertainties of the sensors from data sheets and calibrations."""
 
     laser_slope: float = quantity(
-        0.003, "1", "relative error of one laser's slope over its motion (linearity)", ge=0, le=0.1
+        0.003, "1", "relative error of one laser's slope over its motion, due to linearity", ge=0, le=0.1
     )
     laser_mismatch: float = quantity(
         0.001, "1", "relative difference between the scales of the two lasers", ge=0, le=0.1
@@ -55,16 +56,14 @@ class SensorAccuracy(Parameters):
 
 @dataclass(frozen=True, eq=False)
 class PeakReadings:
-    """Readings of both lasers at the peak of a drift, from the rest position of the storeys.
+    """Readings of both lasers at the peak of a drift, relative to the rest position of the storeys.
 
-    drift, sign : the peak [m], and its side, 1 or -1.
-    lasers, speeds : reading of each laser [m] and its rate [m/s].
-    zero : readings [m] whose mean is the zero of the peak, shape (2, n): (0, 0) for a zero taken at rest.
-    swings : span of each laser's readings [m] in the fit of the peak; `terms`: number of independent rounding errors in
-    the peak: 1 for a mean.
-    at_rest : whether the zero was taken at rest, where the rounding is not averaged.
-    weights : derivatives of the peak with respect to the readings at the places of `zero`, shape (n,), for a peak of a
-    fitted cycle; None for the reading at the peak minus the mean of `zero`.
+    drift, sign : the peak [m], and its sign, 1 or -1. lasers, speeds : reading of each laser [m] and its rate [m/s].
+    zero : readings [m] whose mean is the zero of the peak, shape (2, n): (0, 0) for a zero taken at rest. swings : span
+    of each laser's readings [m] in the fit of the peak; `terms`: number of independent rounding errors in the peak: 1
+    for a mean. at_rest : whether the zero was taken at rest, where the rounding is not averaged. weights : derivatives
+    of the peak with respect to the readings at the places of `zero`, shape (n,), for a peak of a fitted cycle; None for
+    the reading at the peak minus the mean of `zero`.
     """
 
     drift: float
@@ -78,7 +77,7 @@ class PeakReadings:
     weights: Array | None = None
 
     def effect(self, laser: int) -> Effect:
-        """Effect on the peak of the error of laser 0 or 1."""
+        """Effect of the error of laser 0 or 1 on the peak."""
         zero = self.zero[laser]
         if self.weights is not None:
             return Effect(zero, self.weights)
@@ -105,7 +104,7 @@ class SensorUncertainty:
         return self.accuracy.table_scale if self.calibration is None else self.calibration.table_uncertainty
 
     def drift_errors(self, seen: Sequence[PeakReadings], draws: "Draws") -> dict[str, Array]:
-        """Errors [m] of the peaks in tests with the same lasers, by contribution, shape (tests, n) each."""
+        """Errors [m] of the peaks in tests with the same lasers, by contribution; each has the shape (tests, n)."""
         first, second = (self.linearity(k, seen, draws) for k in range(2))
         errors = {LINEARITY: second - first + self._common(seen, draws)}
         mismatch = self.accuracy.laser_mismatch
@@ -119,7 +118,7 @@ class SensorUncertainty:
         return {name: sides * each for name, each in errors.items()}
 
     def linearity(self, laser: int, seen: Sequence[PeakReadings], draws: "Draws") -> Array:
-        """Errors [m] of one laser, 0 or 1, in each test, shape (tests, n)."""
+        """Errors [m] of the peaks due to the linearity of laser 0 or 1, in each test, shape (tests, n)."""
         normal = draws.normal(len(seen))
         if self.calibration is None:
             return self.shape(laser, seen).draws(normal)
@@ -134,14 +133,14 @@ class SensorUncertainty:
         return errors + linearity_errors(beyond, _shares(seen), limit, whole).draws(normal)
 
     def shape(self, laser: int, seen: Sequence[PeakReadings]) -> LinearityErrors:
-        """Errors of laser 0 or 1, not calibrated, and the number of waves of its curve."""
+        """Linearity errors of laser 0 or 1 without calibration, with the number of waves of its curve."""
         whole = self.ranges[laser]
         checks = [each[laser].rounded(self.accuracy.laser_resolution) for each in self.checks]
         effects = [each.effect(laser) for each in seen]
         return linearity_errors(effects, _shares(seen), self.accuracy.laser_linearity * whole, whole, checks)
 
     def rough(self, seen: Sequence[PeakReadings]) -> tuple[str, ...]:
-        """Remarks on lasers whose linearity error the bare frame has shown not to be smooth."""
+        """Remarks on lasers whose linearity error is not smooth according to the tests of the bare frame."""
         if self.calibration is not None or not self.checks or self.accuracy.laser_linearity == 0.0:
             return ()
         waves = [self.shape(laser, seen).waves for laser in (0, 1)]
@@ -161,7 +160,7 @@ class SensorUncertainty:
             first, second = each.effect(0), each.effect(1)
             places = np.append(first.places, second.places)
             effects.append(Effect(places, np.append(-first.weights, second.weights)))
-        # what remains in the corrected readings of the bare frame checks the reference
+        # the harmonics that remain in the corrected readings of the bare frame check the reference sensor
         curves, step = self.calibration.lasers, self.accuracy.laser_resolution
         checks = [
             each.rounded(step).widened(curve.uncertainty)
@@ -173,7 +172,9 @@ class SensorUncertainty:
         return errors.draws(draws.normal(len(seen)))
 
     def late(self, seen: PeakReadings, laser: int, draws: "Draws") -> Array:
-        """Errors [m] due to the delay of a laser with a free clock, uniform within one measuring period; shape (n,)."""
+        """Errors [m] due to the delay of a laser with a free-running clock, uniform within one measuring period, shape
+        (n,).
+        """
         return seen.speeds[laser] * self.accuracy.laser_timing * draws.uniform(-0.5, 0.5)
 
     def steps(self, seen: PeakReadings, laser: int, draws: "Draws") -> Array:
@@ -189,15 +190,17 @@ class SensorUncertainty:
 
 
 def _shares(seen: Sequence[PeakReadings]) -> Array:
-    """Derivatives of the logarithm of the last peak over the first, or of a single one, with respect to the peaks."""
+    """Derivatives, with respect to the peaks, of the logarithm of the ratio of the last peak to the first, or of a
+    single peak.
+    """
     shares = np.array([each.sign / each.drift for each in seen])
     shares[:-1] *= -1.0
     return shares
 
 
 def _beyond(effect: Effect, low: float, high: float) -> Effect:
-    """Part of an effect due to errors outside the readings from `low` to `high` [m], relative to those at the nearer
-    end.
+    """Part of an effect that is due to errors at readings outside `low` to `high` [m], relative to the error at the
+    nearer end.
     """
     out = (effect.places < low) | (effect.places > high)
     places, weights = effect.places[out], effect.weights[out]
@@ -220,7 +223,7 @@ class Draws:
 
 
 class SharedDraws(Draws):
-    """Equal draws for every pair of peaks: those of a new generator, made once."""
+    """The same draws for every pair of peaks, generated once."""
 
     def __init__(self, seed: int, n: int) -> None:
         super().__init__(np.random.default_rng(seed), n)
@@ -229,7 +232,7 @@ class SharedDraws(Draws):
         self._kept: dict[object, Array] = {}
 
     def again(self) -> "SharedDraws":
-        """These draws, restarted from the first one."""
+        """Restart the draws from the first one. Returns this object."""
         self._asked = ()
         return self
 
@@ -242,7 +245,8 @@ class SharedDraws(Draws):
     def _repeated(self, kind: str, *arguments: Any) -> Array:
         self._asked += ((kind, arguments),)
         if self._asked not in self._kept:
-            # a new order of calls: a zero at rest, for example, needs draws that a mean over a cycle does not
+            # a new order of calls: a zero at rest, for example, requires draws that a mean over a cycle does not
+            # require
             random = np.random.default_rng(self._seed)
             self._kept[self._asked] = [getattr(random, name)(*given) for name, given in self._asked][-1]
         return self._kept[self._asked]

@@ -13,8 +13,9 @@ from sim.channel import STOREYS, TABLE_ACCELERATION, TABLE_DISPLACEMENT
 from sim.errors import InvalidInput
 
 SIGNALS = ("acceleration", "displacement", "u1", "drift", *STOREYS)
-"""First columns of a signal array: table acceleration [m/s2], table displacement [m], first storey relative to the
-table [m], drift u2 - u1 [m], and the readings of the two lasers [m]."""
+"""First columns of a signal array: table acceleration [m/s2], table displacement [m], displacement of the first storey
+relative to the table [m], drift u2 - u1 [m], and readings of the two lasers [m].
+"""
 
 ACCELERATION, DISPLACEMENT, U1, DRIFT, LASER_1, LASER_2 = range(6)
 
@@ -24,7 +25,7 @@ MEASURED_BY = (TABLE_ACCELERATION, TABLE_DISPLACEMENT, *STOREYS)
 
 @dataclass(frozen=True)
 class Further:
-    """An additional signal: the values of one channel."""
+    """An additional signal, with the values of one channel."""
 
     name: str
     unit: str
@@ -39,9 +40,9 @@ def further_of(channels: Sequence[Channel]) -> tuple[Further, ...]:
 class SignalMap:
     """Converts channel values to signals relative to the zero taken at rest; one instance per run, owned by the guard.
 
-    Lasers on the ground measure x_g + u; lasers on the table measure u. The drift does not depend on x_g in either
-    case. A `calibration` corrects lasers and table sensors for their identified errors. All other channels are
-    `further` columns after those of SIGNALS. Raises InvalidInput if a channel is missing.
+    Lasers on the ground measure x_g + u, lasers on the table measure u; in both cases the drift does not depend on x_g.
+    A `calibration` corrects lasers and table sensors for their identified errors. All other channels are `further`
+    columns after those of SIGNALS. Raises InvalidInput if a channel is missing.
     """
 
     def __init__(
@@ -61,7 +62,7 @@ class SignalMap:
         self._calibration = calibration
         self._zero = np.zeros(len(SIGNALS) + len(self.further))
         self.taken = np.zeros(self._zero.size, dtype=np.bool_)
-        """Mask of the signals with a value when the zero was taken, shape (n_signals,)."""
+        """Mask of the signals that had a value when the zero was taken, shape (n_signals,)."""
 
     def tare(self, values: NDArray[np.float64]) -> None:
         """Take the mean of channel values at rest, shape (n, n_channels), as the zero of every signal.

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from bench.analysis.cycles import Cycle
 
 WINDOW = 12
-"""Cycles per window; two windows are compared."""
+"""Number of cycles per window; two windows are compared."""
 
 LONGEST_SUBHARMONIC = 6
 
@@ -18,16 +18,16 @@ SPREAD = 5.0
 """Largest deviation of a cycle of a steady motion from the mean of its window [tolerances]."""
 
 KIN_SHARE = 0.25
-"""A storey that hardly moves is assessed relative to a quarter of the other's motion."""
+"""Fraction of the other storey's motion relative to which a storey that hardly moves is assessed."""
 
 
 @dataclass(frozen=True)
 class Steadiness:
     """Steadiness of a dwell. `spread` and `drift` are relative to each signal's mean amplitude; they are the largest
-    values over the signals.
+    values of all signals.
 
-    `repeats` is the number of cycles after which the motion repeats: 1 when it is steady, 2..6 for a
-    subharmonic, 0 when it does not repeat.
+    `repeats` is the number of cycles after which the motion repeats: 1 if it is steady, 2 to 6 for a subharmonic, 0 if
+    it does not repeat.
     """
 
     steady: bool
@@ -39,12 +39,13 @@ class Steadiness:
 class SteadyDetector:
     """Compares the complex amplitudes of every signal over the last two windows of cycles.
 
-    Steady means: the means of the two windows differ by less than a third of the tolerance, which bounds the remainder
-    of a transient that decays by 2 % per cycle (0.98^12 / (1 - 0.98^12) / 3 = 1.2 tolerances); and within the last
-    window no cycle deviates from the mean by more than `SPREAD` tolerances. A weakly damped orbit excited by noise, or
-    a transient that rotates from cycle to cycle, spreads the cycles more than it shifts their mean; what remains of it
-    is part of the scatter of the measured cycles. Every signal is allowed a noise floor of four standard deviations of
-    a fitted amplitude, sigma sqrt(2 / N), and every phase the jitter of a sensor with a free clock.
+    A motion is steady if the means of the two windows differ by less than a third of the tolerance, which bounds the
+    remainder of a transient that decays by 2 % per cycle (0.98^12 / (1 - 0.98^12) / 3 = 1.2 tolerances), and if within
+    the last window no cycle deviates from the mean by more than `SPREAD` tolerances. A weakly damped orbit excited by
+    noise, or a transient that rotates from cycle to cycle, spreads the cycles more than it shifts their mean; its
+    remainder is part of the scatter of the measured cycles. Every signal is allowed a noise floor of four standard
+    deviations of a fitted amplitude, sigma sqrt(2 / N), and every phase the jitter of a sensor with a free-running
+    clock.
     """
 
     def __init__(
@@ -55,10 +56,10 @@ class SteadyDetector:
         jitter: float = 0.0,
         reference: Sequence[int] = (),
     ) -> None:
-        """`columns` are the assessed signals, by default all; `kin` holds the indices among them of signals of the same
-        kind, each assessed relative to at least `KIN_SHARE` of the largest. `reference` are signals not assessed; every
-        other one is assessed relative to at least `KIN_SHARE` of them. `jitter` [rad] is the wander of a phase due to a
-        sensor's free clock.
+        """`columns` are the assessed signals, by default all. `kin` holds the indices, within `columns`, of signals of
+        the same kind, each of which is assessed relative to at least `KIN_SHARE` of the largest. `reference` are
+        signals that are not assessed; every assessed signal is assessed relative to at least `KIN_SHARE` of the largest
+        of them. `jitter` [rad] is the wander of a phase due to a sensor's free-running clock.
         """
         self._tolerance = tolerance
         self._columns = slice(None) if columns is None else list(columns)
@@ -96,7 +97,9 @@ class SteadyDetector:
     def _compare(
         self, series: NDArray[np.complex128] | NDArray[np.float64], sigma: NDArray[np.float64]
     ) -> tuple[float, float]:
-        """Largest relative spread within the last window and drift between the windows, above the noise."""
+        """Largest relative spread within the last window, and largest relative drift between the windows, in excess of
+        the noise.
+        """
         before, last = series[:WINDOW].mean(axis=0), series[WINDOW:].mean(axis=0)
         size = self._size(last)
         spread = np.max(self._distance(series[WINDOW:], last), axis=0) - 4.0 * sigma
@@ -108,7 +111,7 @@ class SteadyDetector:
         these: NDArray[np.complex128] | NDArray[np.float64],
         those: NDArray[np.complex128] | NDArray[np.float64],
     ) -> NDArray[np.float64]:
-        """Distance between amplitudes, in magnitude or in phase beyond the jitter."""
+        """Distance between amplitudes, in magnitude, or in phase in excess of the jitter."""
         size = np.abs(those)
         turned = np.abs(np.angle(these * np.conj(those))) * size
         return np.maximum(np.abs(np.abs(these) - size), turned - self._jitter * size)

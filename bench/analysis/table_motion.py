@@ -19,12 +19,12 @@ class TableMotion(NamedTuple):
 
     @property
     def peak_velocity(self) -> float:
-        """Greatest |v| [m/s]."""
+        """Largest |v| [m/s]."""
         return float(np.abs(self.velocity).max())
 
     @property
     def peak_displacement(self) -> float:
-        """Greatest |d| [m]."""
+        """Largest |d| [m]."""
         return float(np.abs(self.displacement).max())
 
 
@@ -40,9 +40,9 @@ def table_motion(acceleration: Array, dt: float) -> TableMotion:
 def at_rest_in_the_end(acceleration: Array, dt: float) -> Array:
     """`acceleration` minus the two lowest sines over its duration, so that the table ends at rest where it began.
 
-    The final velocity and displacement are linear in the two amplitudes, so this is exact except for
-    rounding; the second iteration corrects the rounding of the first. The sines vanish at both ends: the record's end
-    values are unchanged.
+    The final velocity and displacement are linear in the two amplitudes, so this is exact except for rounding; the
+    second iteration corrects the rounding of the first. The sines vanish at both ends and do not change the record's
+    end values.
     """
     place = np.linspace(0.0, np.pi, acceleration.size)
     shapes = np.array([np.sin(place), np.sin(2.0 * place)])

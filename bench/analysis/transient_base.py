@@ -1,8 +1,8 @@
-"""Base motion of a transient from both table sensors, as the input of its prediction.
+"""Base motion of a transient, from both table sensors, as the input of the transient's prediction.
 
-At low frequencies a displacement sensor measures the acceleration far more precisely than an accelerometer, at high
-frequencies far less precisely, since its noise grows with omega^2. At each frequency both are combined, weighted by
-their noise at rest,
+A displacement sensor measures the acceleration far more precisely than an accelerometer at low frequencies, and far
+less precisely at high frequencies, since its noise grows with omega^2. At each frequency the two are combined with
+weights from their noise at rest,
 
     A = w (-omega^2 X) + (1 - w) A_a,    w = S_a / (S_a + omega^4 S_x),
 
@@ -10,10 +10,10 @@ after X has been aligned with the accelerometer's delay at the frequencies where
 their scales serves as a check, not a correction: calibrations determine the scales more precisely than one motion. The
 remaining noise has the density S_a omega^4 S_x / (S_a + omega^4 S_x).
 
-A sensor whose noise is below its resolution is constant at rest and has an error of up to half a step in motion. That
-error has the variance step^2 / 12, spread over frequencies up to the number of steps passed per second, at most half
-the rate (Bennett, Bell Syst. Tech. J. 27, 1948): for slow motions it is at low frequencies. It limits the weight of a
-sensor.
+The output of a sensor whose noise is below its resolution is constant at rest and has an error of up to half a step in
+motion. That error has the variance step^2 / 12, spread over frequencies up to the number of steps passed per second, at
+most half the sample rate (Bennett, Bell Syst. Tech. J. 27, 1948); for slow motions it lies at low frequencies. It
+limits the weight of a sensor.
 """
 
 from dataclasses import dataclass
@@ -41,7 +41,7 @@ def noise_density(rest: Array, sample_rate: float) -> tuple[Array, Array]:
 
 
 MODEL_RATE = 1000.0
-"""Sample rate of the model's input [1/s], at most the bench's."""
+"""Sample rate of the model's input [1/s], at most that of the bench."""
 
 _TOP = 0.4
 """Fraction of that rate up to which the motion is retained."""
@@ -62,8 +62,8 @@ class BaseMotion:
     """Acceleration of the table [m/s2], shape (n,), every `dt` [s]; `draw` adds random errors.
 
     `agreement` is the ratio of the displacement sensor's scale to the accelerometer's, from the motion itself; None if
-    the motion is too small. If it differs from 1, only the accelerometer is used. `noise` is the spectral density of
-    the error [(m/s2)^2/Hz] at the frequencies of `numpy.fft.rfft` for n samples.
+    the motion is too small. If it is None or differs from 1 by more than `ALIKE`, only the accelerometer is used.
+    `noise` is the spectral density of the error [(m/s2)^2/Hz] at the frequencies of `numpy.fft.rfft` for n samples.
     """
 
     acceleration: Array
@@ -82,7 +82,9 @@ class BaseMotion:
         return float(np.abs(self.acceleration).max())
 
     def draw(self, random: Generator, scale: float = 1.0) -> SampledRecord:
-        """A possible true motion: scaled by `scale`, with a random realisation of the noise."""
+        """A possible true motion: the measured motion scaled by `scale`, with a random realisation of the noise
+        added.
+        """
         lines = self.noise.size
         waves = random.standard_normal(lines) + 1j * random.standard_normal(lines)
         spectrum = np.sqrt(self.noise * self.acceleration.size / (4.0 * self.dt)) * waves
@@ -90,13 +92,14 @@ class BaseMotion:
 
 
 def base_motion(signals: Array, rest: Array, sample_rate: float) -> BaseMotion:
-    """The table's motion in `signals` that begin and end at rest; `rest` is the noise, shapes (n or m, n_signals).
+    """The table's motion from `signals`, shape (n, n_signals), that begin and end at rest; `rest`, shape (m,
+    n_signals), is the noise at rest.
 
     Raises InvalidInput if samples of a table sensor are missing.
     """
     sensors = signals[:, [ACCELERATION, DISPLACEMENT]]
     if not (np.isfinite(sensors).all() and np.isfinite(rest[:, [ACCELERATION, DISPLACEMENT]]).all()):
-        raise InvalidInput("motion of the table", len(signals), "every sample of both table sensors is needed")
+        raise InvalidInput("motion of the table", len(signals), "every sample of both table sensors is required")
     still = len(rest)
     size = len(signals)
     frequency = np.fft.rfftfreq(size, 1.0 / sample_rate).astype(np.float64)
@@ -111,7 +114,7 @@ def base_motion(signals: Array, rest: Array, sample_rate: float) -> BaseMotion:
         share = noise_a / (noise_a + noise_x)
     every = max(round(sample_rate / MODEL_RATE), 1)
     dt = every / sample_rate
-    # higher frequencies are noise, and would alias
+    # higher frequencies contain only noise, which would alias
     kept = 1.0 / np.sqrt(1.0 + (frequency * dt / _TOP) ** 16)
     whole = np.fft.irfft(kept * (share * x + (1.0 - share) * a), size)[::every]
     lines = np.fft.rfftfreq(whole.size, dt)
@@ -120,7 +123,9 @@ def base_motion(signals: Array, rest: Array, sample_rate: float) -> BaseMotion:
 
 
 def _density(rest: Array, values: Array, sample_rate: float) -> float:
-    """Spectral density of a sensor's white noise [unit^2/Hz], at `rest` or due to the steps of its `values`."""
+    """Spectral density of a sensor's white noise [unit^2/Hz]: that at `rest` or, if larger, that due to the steps of
+    its `values`.
+    """
     frequency, power = noise_density(rest, sample_rate)
     inside = (frequency >= _NOISE_BAND[0]) & (frequency <= _NOISE_BAND[1])
     return max(float(np.mean(power[inside])), _of_steps(values, sample_rate), 1e-30)
@@ -159,8 +164,8 @@ def _alignment(
     noise_x: Array,
     duration: float,
 ) -> tuple[float | None, float]:
-    """Ratio of the scales of displacement sensor and accelerometer, None if not measurable, and the displacement
-    sensor's lead [s].
+    """Ratio of the displacement sensor's scale to the accelerometer's, None if it cannot be measured, and the
+    displacement sensor's lead [s].
     """
     # a density and the spectrum of n samples at rate f: |S|^2 = density n f / 2
     to_power = 0.5 * duration * (2.0 * frequency[-1]) ** 2

@@ -2,9 +2,9 @@
 
 The largest of many noisy samples is too large by several standard deviations, and the relative error grows as the
 motion becomes smaller. Here a polynomial of degree four is fitted by least squares around each maximum that may be the
-greatest, and its extremum is the peak. The window follows from the signal's bandwidth: of the terms missing in the
-polynomial, the sixth derivative is the first that shifts the centre of the window. The residual of x^6 over a window of
-half width h is the monic Legendre polynomial P_6 there, so the shift is
+largest, and its extremum is the peak. The width of the window follows from the signal's bandwidth: of the terms missing
+from the polynomial, the one with the sixth derivative is the first that shifts the value at the centre of the window.
+The residual of x^6 over a window of half width h is the monic Legendre polynomial P_6 there, so the shift is
 
     (5 / 231) h^6 s^(6) / 720,    s^(6) ~ A omega_6^6,    omega_6^12 = sum omega^12 |S|^2 / sum |S|^2,
 
@@ -56,15 +56,15 @@ _VARIANCE = 225.0 / 64.0
 _NARROWEST = 6
 """Minimum half width of the window in samples."""
 _WIDEST = 0.5 * pi
-"""Largest omega_6 h, a quarter of a period to either side."""
+"""Largest omega_6 h: a quarter of a period to either side."""
 _BAND = (4.0, 50.0)
 """Frequencies [Hz] at which the noise of a fit is evaluated; below them, a frame may still vibrate at rest."""
 _STANDS_OUT, _SMOOTHED = 4.0, 0.5
-"""Power relative to the noise above which a frequency counts as signal, and width of the average taken beforehand
-[Hz].
+"""Power, relative to the noise, above which a frequency counts as signal, and width [Hz] over which the power is
+averaged first.
 """
 _RIVALS = 6.0
-"""Number of standard deviations below the greatest maximum within which another maximum may be the true greatest."""
+"""Number of standard deviations below the largest maximum within which another maximum may be the true largest."""
 _RAISED = 0.5
 _DRAWS, _SEED, _HALVINGS = 2000, 20, 30
 _MISSING = 0.25
@@ -73,12 +73,12 @@ _MISSING = 0.25
 
 @dataclass(frozen=True)
 class TransientPeak:
-    """The greatest magnitude of a signal, in its unit.
+    """The largest magnitude of a signal, in the unit of the signal.
 
-    `value` is corrected for the selection of the greatest; `uncertainty` is standard and due to noise alone; `bias` is
-    the largest shift due to the fit's degree. `time` [s] is the time of the greatest maximum since the first sample,
-    `sign` its side, `window` [s] the half width of the fit, and `rivals` the number of other maxima that may be the
-    greatest.
+    `value` is corrected for the selection of the largest maximum; `uncertainty` is the standard uncertainty due to
+    noise alone; `bias` is the largest shift due to the degree of the fitted polynomial. `time` [s] is the time of the
+    largest maximum since the first sample, `sign` its sign, `window` [s] the half width of the fit, and `rivals` the
+    number of other maxima that may be the largest.
     """
 
     value: float
@@ -91,14 +91,15 @@ class TransientPeak:
 
 
 def transient_peak(signal: Array, rest: Array, sample_rate: float) -> TransientPeak:
-    """The peak of |`signal`|, shape (n,), zero at rest; `rest`, shape (m,), is its noise without motion.
+    """The peak of |`signal`|, shape (n,), which is zero at rest; `rest`, shape (m,), is its noise without motion.
 
     NaN stands for a missing sample. Raises InvalidInput if there is no motion above the noise, or if samples are
-    missing where it is greatest.
+    missing around the largest motion.
     """
     known = np.isfinite(signal)
     if rest.size < 16 * _NARROWEST or not np.isfinite(rest).all():
-        raise InvalidInput("rest before the transient", rest.size, "it must have samples, none of them missing")
+        allowed = f"it must have at least {16 * _NARROWEST} samples, none of them missing"
+        raise InvalidInput("rest before the transient", rest.size, allowed)
     if not known.any():
         raise InvalidInput("transient", signal.size, "it has no valid sample")
     whole = np.interp(np.arange(signal.size), np.flatnonzero(known), signal[known])
@@ -133,9 +134,9 @@ class _Maximum:
 
 
 def _equivalent_noise(density: tuple[Array, Array], sample_rate: float) -> float:
-    """Standard deviation of the white noise that has the density of the slow part of the true one.
+    """Standard deviation of white noise with the spectral density of the slow part of the true noise.
 
-    Only that part affects a fit; filtered samples scatter less, but are not independent.
+    Only that part affects a fit. Filtered samples scatter less, but are not independent.
     """
     frequency, power = density
     slow = (frequency > _BAND[0]) & (frequency < _BAND[1])
@@ -143,10 +144,11 @@ def _equivalent_noise(density: tuple[Array, Array], sample_rate: float) -> float
 
 
 def _sixth_moment(signal: Array, density: tuple[Array, Array], sample_rate: float) -> float:
-    """omega_6 [rad/s]: sixth-moment frequency of the part above the noise."""
+    """omega_6 [rad/s]: sixth-moment frequency of the part of the signal above the noise."""
     from scipy.signal.windows import tukey
 
-    # a transient begins at rest but may still vibrate at its end: without a taper that step would have all frequencies
+    # a transient begins at rest but may still vibrate at its end: without a taper, the step at the end would contain
+    # all frequencies
     taper: Any = tukey(signal.size, 0.1)
     frequency = np.fft.rfftfreq(signal.size, 1.0 / sample_rate)
     power = np.abs(np.fft.rfft(signal * taper)) ** 2 * (2.0 / (sample_rate * signal.size))
@@ -161,7 +163,7 @@ def _sixth_moment(signal: Array, density: tuple[Array, Array], sample_rate: floa
 
 def _half_width(amplitude: float, sigma: float, omega: float, samples: int) -> int:
     """Half width of the window in samples; `omega` is omega_6 in rad per sample."""
-    # the derivative of squared shift and variance: 12 c^2 h^11 = 225/64 sigma^2 / (2 h^2)
+    # zero derivative of the sum of squared shift and variance: 12 c^2 h^11 = 225/64 sigma^2 / (2 h^2)
     best = (_VARIANCE * sigma**2 / (24.0 * (_REMAINDER * amplitude * omega**6) ** 2)) ** (1.0 / 13.0)
     return max(int(min(best, _WIDEST / omega, (samples - 1) // 8)), _NARROWEST)
 
@@ -199,19 +201,19 @@ def _maximum(signal: Array, known: NDArray[np.bool_], place: int, half: int, sig
     at, along = top**order @ inverse, (order * top ** np.maximum(order - 1, 0)) @ inverse
     value = sign * float(polynomial(top))
     if bend(top) * sign < 0.0:
-        # an extremum shifted by noise is higher than the true one
+        # an extremum whose position is shifted by noise is higher than the true one
         value -= 0.5 * sigma**2 * float(along @ along) / abs(float(bend(top)))
     return _Maximum(value, sigma * float(np.linalg.norm(at)), place + top * half, sign)
 
 
 def _greatest(maxima: Array) -> tuple[float, float]:
-    """The greatest of noisy maxima and its standard uncertainty.
+    """The largest of several noisy maxima and its standard uncertainty.
 
-    `maxima`: (value, uncertainty), shape (n, 2). The largest of several noisy values is too large. The estimate mu is
-    the value for which the expected maximum equals the observed one, with no true value above mu. The others are raised
-    by half a standard deviation, because near mu they appear too low once the greatest has been selected. The bias, 2
-    standard deviations for 24 equal maxima, thus falls below one half, also for fewer maxima. The uncertainty is that
-    of one maximum; rivals do not reduce it.
+    `maxima` has the rows (value, uncertainty), shape (n, 2). The largest of several noisy values is too large on
+    average. The estimate mu is the value for which the expected maximum equals the observed one, with no true value
+    above mu. The other values are raised by half a standard deviation, because near mu they appear too low once the
+    largest has been selected. The bias, 2 standard deviations for 24 equal maxima, is thus reduced to less than one
+    half, also for fewer maxima. The uncertainty is that of one maximum; rivals do not reduce it.
     """
     values, spreads = maxima.T
     top, widest = float(values.max()), float(spreads.max())

@@ -1,11 +1,12 @@
 """Statement of uncertainties: mean of a few repeats, budgets, and rounding of values.
 
-The Birge ratio, the root of chi2 / (R - 1), shows whether R repeats scatter more than stated (Birge, Physical Review 40
-(1932) 207). Where it exceeds 1, the same term is added to each variance to reduce it to 1 (Mandel and Paule, Analytical
-Chemistry 42 (1970) 1194): a dominant scatter makes the weights equal. A few repeats determine the scatter only roughly,
-so its contribution follows Student's t with R - 1 degrees of freedom: it is enlarged until +-1.96 times the combined
-uncertainty covers 95 %, as elsewhere (GUM:2008, G.4). If the scatter is one to four times as large as stated, repeats
-may agree by chance: the interval then covers 87 % for two repeats, 91 % for three, and 93 % for five or more.
+The Birge ratio, the square root of chi2 / (R - 1), shows whether R repeats scatter more than their uncertainties state
+(Birge, Physical Review 40 (1932) 207). Where it exceeds 1, the same term is added to each variance to reduce the ratio
+to 1 (Mandel and Paule, Analytical Chemistry 42 (1970) 1194), so that a dominant scatter makes the weights equal. A few
+repeats determine the scatter only roughly, so its contribution follows Student's t with R - 1 degrees of freedom: it is
+enlarged until +-1.96 times the combined uncertainty covers 95 %, as for other uncertainties (GUM:2008, G.4). If the
+scatter is one to four times as large as stated, repeats may agree by chance: the interval then covers 87 % for two
+repeats, 91 % for three, and 93 % for five or more.
 """
 
 import json
@@ -24,9 +25,9 @@ _STEPS, _CLOSE = 200, 1e-10
 
 @dataclass(frozen=True, eq=False)
 class Repeats:
-    """`values`, shape (n,), the means; `weights`, shape (R, n), of the repeats, which sum to 1; `scatter`, shape (n,),
-    the contribution of the scatter to the standard uncertainties, with Student's t; `birge`, shape (n,), NaN for a
-    single repeat.
+    """Mean of R repeats of n quantities: `values`, shape (n,), are the means; `weights`, shape (R, n), are the weights
+    of the repeats, which sum to 1; `scatter`, shape (n,), is the contribution of the scatter to the standard
+    uncertainties, with Student's t; `birge`, shape (n,), are the Birge ratios, NaN for a single repeat.
     """
 
     values: Array
@@ -56,7 +57,7 @@ def enlarged(covariance: Array, scatter: Array) -> Array:
 
 
 def student_factor(number: int) -> float:
-    """Factor on the scatter for this number of repeats: ratio of the 95 % intervals of Student's t and the normal
+    """Factor on the scatter for this number of repeats: ratio of the 95 % interval of Student's t to that of the normal
     distribution.
     """
     from scipy.stats import norm, t
@@ -73,7 +74,7 @@ def _squares(values: Array, variances: Array) -> Array:
 
 
 def _addition(values: Array, variances: Array) -> Array:
-    """Common addition to the variances for Birge ratios of 1, shape (n,); zero where the ratios are smaller.
+    """Common addition to the variances that makes the Birge ratios 1, shape (n,); zero where the ratios are below 1.
 
     Newton's method from zero converges from below (DerSimonian and Kacker, Contemporary Clinical Trials 28 (2007) 105),
     and doubles the addition per step while far from the solution.
@@ -112,7 +113,7 @@ class Budget:
 
     @property
     def dominating(self) -> str:
-        """The largest contribution; empty if none is above zero."""
+        """Name of the largest contribution; empty if none is above zero."""
         name, value = next(iter(self.largest_first.items()), ("", 0.0))
         return name if value > 0.0 else ""
 
@@ -123,7 +124,9 @@ class Budget:
 
 
 def decimals(uncertainty: float) -> int | None:
-    """Decimal places up to the second digit of an uncertainty; None for one that is not finite and positive."""
+    """Number of decimal places up to the second digit of an uncertainty; None unless the uncertainty is finite and
+    positive.
+    """
     if not (isfinite(uncertainty) and uncertainty > 0.0):
         return None
     return max(1 - floor(log10(uncertainty)), 0)

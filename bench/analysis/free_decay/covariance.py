@@ -7,14 +7,15 @@ in how the error is described:
 filters); each quantity has the noise at the frequencies that determine it;
 - table: the noise of the table's sensor, filtered by the frame's response while a mode rings; its
 density is measured at rest before the motion;
-- clock: the lasers' clocks run freely, so that their delay wanders by up to one of their measuring periods;
-- linearity: smooth sine waves over the lasers' range, of any phase and typical numbers of periods, mostly absorbed by
-the fitted curvature;
-- masses: the uncertainty of weighing;
+- clock: the lasers' clocks run freely, so that the delay of a laser wanders by up to one of its measuring periods;
+- linearity: sine waves over the lasers' range, of any phase and typical numbers of periods, mostly absorbed by the
+fitted curvature;
+- masses: the uncertainty of the weighing;
 - timebase: a relative error of the sample clock enters once in frequencies and dashpots, twice in stiffnesses, not in
 damping ratios.
 
-Noise, table and clock are independent between decays. Linearity, masses and timebase are common to all.
+Errors due to noise, table and clock are independent between decays. Those due to linearity, masses and timebase are
+common to all decays.
 """
 
 from dataclasses import dataclass
@@ -33,10 +34,12 @@ WAVES = np.arange(0.5, 3.01, 0.5)
 """Numbers of periods of a linearity error within the range of a laser."""
 
 CLOCKS = np.array([5e-6, 1e-5, 2e-5, 5e-5, 1e-4])
-"""Relative errors of a laser's clock, which determine how often a measurement is gained or lost."""
+"""Relative errors of a laser's clock; they determine how often the laser has one measurement more or less than the
+sample clock.
+"""
 
 PHASES = 8
-"""Number of phases of such a wander that are evaluated."""
+"""Number of phases of the delay's wander that are evaluated."""
 
 
 def waves(fit: Fit, size: float, ranges: tuple[float, float]) -> Array:
@@ -70,10 +73,10 @@ def clocks(fit: Fit, wander: float) -> Array:
 
 
 OWN, COMMON = ("noise", "table", "clock"), ("linearity", "masses", "timebase")
-"""Sources that are independent between decays, and those common to all."""
+"""Sources that are independent between decays, and sources common to all decays."""
 
 _RATES = np.array([2.0, 2.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0])
-"""Exponents with which the sample rate enters the quantities of `modal.NAMES`."""
+"""Exponents of the sample rate in the quantities of `modal.NAMES`."""
 
 SEGMENT = 4.0
 """Duration of the segments for the spectrum of the residual [s]."""
@@ -85,7 +88,8 @@ BAND = 30.0
 @dataclass(frozen=True, eq=False)
 class Errors:
     """Description of the errors: the `accuracy` of the sensors, the lasers' `ranges` [m], the time [s] until which the
-    section is at rest (`quiet`, 0 if it is not), and the covariance of the `masses` [kg2], shape (2, 2).
+    section is at rest (`quiet`, 0 if it does not begin at rest), and the covariance of the `masses` [kg2], shape (2,
+    2).
     """
 
     accuracy: SensorAccuracy
@@ -166,7 +170,7 @@ def _noise(fit: Fit) -> Array:
         found = welch(residual, nperseg=length)
         frequency, density = np.asarray(found[0], np.float64), np.asarray(found[1], np.float64)
         turned = np.fft.rfft(jacobian)
-        # half the one-sided density is the variance of white noise of this strength
+        # half the one-sided density is the variance of the equivalent white noise
         left = _left_alone(frequency, fit)
         power = np.interp(np.fft.rfftfreq(n), frequency[left], density[left] / 2.0)
         twice = np.full(power.size, 2.0)
@@ -176,7 +180,9 @@ def _noise(fit: Fit) -> Array:
 
 
 def _left_alone(frequency: Array, fit: Fit) -> NDArray[np.bool_]:
-    """Mask of the frequencies (in cycles per sample) at which the fit absorbs no noise: not near a mode or zero."""
+    """Mask of the frequencies (in cycles per sample) at which the fit absorbs no noise: those away from the modes and
+    from zero.
+    """
     modes = np.abs(fit.response.poles) * fit.stretch.step / (2.0 * np.pi)
     apart = 1.5 * frequency[1]
     return (frequency > 0.0) & (np.abs(frequency[:, None] - modes) > apart).all(axis=1)
@@ -189,7 +195,7 @@ def _table(fit: Fit, quiet: float) -> Array:
         return np.zeros_like(fit.inverse)
     lines = np.fft.rfftfreq(rest.size, fit.stretch.step)
     power = np.abs(np.fft.rfft(rest - rest.mean())) ** 2 / rest.size
-    # up to the modes; above, filters and averaging have reduced the noise
+    # only up to the modes, because filters and averaging have reduced the noise above them
     variance = float(power[(lines > 0.0) & (lines <= BAND)].mean())
     response = fit.response
     response_to_scores = np.array(

@@ -23,7 +23,7 @@ WINDOWS = 5
 """Number of windows in which a mode's damping is evaluated; the amplitude falls by the same factor in each."""
 
 FLOOR = 0.03
-"""Fraction of its largest amplitude down to which a mode is evaluated."""
+"""Fraction of a mode's largest amplitude down to which the mode is evaluated."""
 
 _DAMPING = slice(2, 4)
 
@@ -33,8 +33,9 @@ class DampingCourse:
     """Damping of one mode as a function of its amplitude.
 
     `slope` [1/m] is the change of the damping ratio with the amplitude of the drift, `own` and `common` [1/m2] its
-    variances: independent between decays, and common to all. `amplitude` [m], shape (WINDOWS,), is the mean of each
-    window, `damping` the ratio there and `uncertainty` its standard uncertainty, without the common part.
+    variances: independent between decays, and common to all. `amplitude` [m], shape (WINDOWS,), is the mean amplitude
+    in each window, `damping` the damping ratio in it and `uncertainty` the standard uncertainty of that ratio, without
+    the common part.
     """
 
     slope: float
@@ -48,7 +49,7 @@ class DampingCourse:
 def damping_courses(
     fit: Fit, errors: Errors, begin: float, ratios: Array, omegas: Array
 ) -> tuple[DampingCourse, DampingCourse]:
-    """The damping of both modes against amplitude, from `begin` [s] on, when the excitation is over.
+    """The damping of both modes against amplitude, from the end of the excitation at `begin` [s].
 
     `ratios` and `omegas` [rad/s], shape (2,), are the damping ratios and undamped frequencies as fitted.
     """
@@ -80,7 +81,7 @@ class _Mode:
     """One mode: its circular frequency, the amplitude of its drift, shape (n,), and its part of the laser signals, (2,
     n).
 
-    `windows` are the samples of each window.
+    `windows` holds the samples of each window.
     """
 
     omega: float
@@ -103,7 +104,7 @@ def _mode(fit: Fit, which: int, begin: float, omega: float) -> _Mode:
     amplitude = 2.0 * np.abs(drift) * np.abs(q[which])
     after = stretch.time >= begin
     largest = float(amplitude[after].max())
-    # windows follow the model's decay: later amplitudes are noise
+    # windows follow the decay of the model, because late measured amplitudes are noise
     rate = -float(found.poles[which].real)
     last = min(np.log(1.0 / FLOOR) / rate, float(stretch.time[-1]) - begin)
     edges = [begin + last * share for share in np.linspace(0.0, 1.0, WINDOWS + 1).tolist()]

@@ -24,7 +24,7 @@ _HELD = 0.5
 """Time at the start of a recording during which the storey is still held [s]."""
 
 _SLIPPED = 0.1
-"""Fraction of its later motion at which a storey counts as released."""
+"""Fraction of a storey's later motion at which the storey counts as released."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ class Decay:
 def pulsed_decay(signals: Array, setting: Setting, quiet: float, begin: float) -> Decay:
     """Decay after a pulse of the table, from `signals` in the order of `bench.analysis.signals`.
 
-    Everything is at rest until `quiet` [s], and the pulse is over at `begin`. Raises Unusable if the fit fails.
+    Table and frame are at rest until `quiet` [s], and the pulse ends at `begin` [s]. Raises Unusable if the fit fails.
     """
     seen = signals[:, [LASER_1, LASER_2]].T
     stretch = stretch_of(signals[:, DISPLACEMENT], seen, setting.sample_rate, on_table=setting.on_table)
@@ -95,7 +95,7 @@ def _decay(stretch: Stretch, setting: Setting, quiet: float, begin: float) -> De
 
 
 def _released(stretch: Stretch) -> float:
-    """Time of the release of storey 2 [s], at which it has moved by a fraction of its later motion. Raises Unusable if
+    """Time [s] at which storey 2 is released: it has then moved by a fraction of its later motion. Raises Unusable if
     there was no release.
     """
     seen = stretch.seen[1] - np.nanmedian(stretch.seen[1][stretch.time < _HELD])
@@ -107,8 +107,8 @@ def _released(stretch: Stretch) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Combined:
-    """`values`, shape (n,), and their covariance, shape (n, n): the part independent between decays (`own`), and the
-    `common` one.
+    """`values`, shape (n,), and their covariance, shape (n, n): the part that is independent between decays (`own`),
+    and the `common` part.
 
     `birge` are the Birge ratios, shape (n,), NaN for a single decay; `weights`, shape (R, n), sum to 1; `scatter`,
     shape (n,), is the excess scatter of the decays as a standard uncertainty, included in `own`.

@@ -3,9 +3,9 @@
     laser_i = G_i z_i(t - tau_i) + o_i + sum_k a_ik (z_i / R_i)^k,    i = 1, 2
 
 z is the response to the table's displacement from a free initial state (`response`). Gain, delay, offset and smooth
-curvature of each laser are nuisance parameters, which are fitted as well, so that they do not bias the stiffness. Those
-that the motion does not determine (such as the common gain for a released frame on a locked table) keep their expected
-value and its uncertainty.
+curvature of each laser are nuisance parameters, which are fitted as well, so that they do not bias the stiffness.
+Parameters that the motion does not determine (such as the common gain for a released frame on a locked table) keep
+their expected value and its uncertainty.
 """
 
 from dataclasses import dataclass, replace
@@ -27,7 +27,7 @@ CONSTANTS, STATE = slice(0, 4), slice(4, 8)
 GAINS, DELAYS, OFFSETS = slice(8, 10), slice(10, 12), slice(12, 14)
 BENDS = slice(14, 14 + 2 * len(BEND))
 COUNT = BENDS.stop
-"""Indices of the values: k1, k2, c1, c2 of the frame, the frame's initial state, then the lasers' parameters."""
+"""Indices of the fitted values: k1, k2, c1, c2 of the frame, the frame's initial state, then the lasers' parameters."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,23 +95,25 @@ class Shown:
 
 
 GAIN_UNCERTAINTY, DELAY_UNCERTAINTY = 0.01, 2e-3
-"""Standard uncertainties of the lasers' expected gain, 1, and expected delay after the table's sensor, 0 [s]."""
+"""Standard uncertainties of the lasers' gain, expected to be 1, and of their delay after the table's sensor, expected
+to be 0 [s].
+"""
 
 BEND_UNCERTAINTY = 1e-3
 """Standard uncertainty of the curvature terms at the largest motion [m]: several times the data sheet's limit."""
 
 NOISE = 2e-5
-"""Noise of a laser, which weights the samples against the expected values [m]."""
+"""Noise of a laser [m], which determines the weight of the samples relative to that of the expected values."""
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
     """Result of a fit: `values`, shape (COUNT,), in SI units, k1 to c2 first.
 
-    `jacobian`, shape (COUNT, 2, n), are the derivatives of the laser signals, zero where a sample is missing;
-    `mass_jacobian`, shape (2, 2, n), those to the masses; `residual` [m], shape (2, n), measured minus fitted, zero
-    where missing; `expected`, shape (COUNT, COUNT), is the contribution of the expected values to the normal matrix,
-    and `inverse` the inverse of the total matrix.
+    `jacobian`, shape (COUNT, 2, n), holds the derivatives of the laser signals with respect to the values, zero where a
+    sample is missing; `mass_jacobian`, shape (2, 2, n), those with respect to the masses; `residual` [m], shape (2, n),
+    measured minus fitted, zero where missing; `expected`, shape (COUNT, COUNT), is the contribution of the expected
+    values to the normal matrix, and `inverse` the inverse of the total matrix.
     """
 
     stretch: Stretch
@@ -135,7 +137,7 @@ class Fit:
         return response(self.constants, self.stretch.step)
 
     def moved(self, error: Array) -> Array:
-        """Shifts of the values, shape (..., count), by errors of the laser signals [m], shape (..., 2, n)."""
+        """Shifts of the values, shape (..., count), due to errors of the laser signals [m], shape (..., 2, n)."""
         return np.tensordot(error, self.jacobian, ([-2, -1], [-2, -1])) @ self.inverse
 
 
@@ -150,7 +152,7 @@ def fit(stretch: Stretch, masses: tuple[float, float], start: Constants) -> Fit:
     expected, uncertainty = _expectations()
     begin = expected.copy()
     begin[CONSTANTS] = start[2:]
-    # for a given frame the initial state and the offsets are linear
+    # for a given frame the signals are linear in the initial state and the offsets
     linear = [*range(COUNT)[STATE], *range(COUNT)[OFFSETS]]
     left = (model.jacobian(begin)[linear] * there).reshape(len(linear), -1).T
     begin[linear] += np.linalg.lstsq(left, ((seen - model.shown(begin)) * there).ravel(), rcond=None)[0]
@@ -160,7 +162,7 @@ def fit(stretch: Stretch, masses: tuple[float, float], start: Constants) -> Fit:
         try:
             shown = model.shown(values)
         except ArithmeticError:
-            # not a valid frame, so the solver takes a shorter step
+            # the frame is invalid: an infinite residual makes the solver take a shorter step
             return np.full(seen.size + rows.size, np.inf)
         return np.concatenate((((shown - seen) * there).ravel() / NOISE, ((values - expected) / uncertainty)[rows]))
 
@@ -213,7 +215,7 @@ def _mass_slope(model: Shown, values: Array, which: int) -> Array:
 
 
 def _expectations() -> tuple[Array, Array]:
-    """Expected values and their standard uncertainties, which are infinite for values without expectation."""
+    """Expected values and their standard uncertainties, which are infinite for values without an expected value."""
     expected, uncertainty = np.zeros(COUNT), np.full(COUNT, np.inf)
     expected[GAINS] = 1.0
     uncertainty[GAINS], uncertainty[DELAYS], uncertainty[BENDS] = GAIN_UNCERTAINTY, DELAY_UNCERTAINTY, BEND_UNCERTAINTY

@@ -52,8 +52,8 @@ def modes_of(stretch: Stretch) -> tuple[Complex, Array]:
 def constants_of(poles: Complex, ratios: Array, m1: float, m2: float) -> Constants:
     """The frame with these modes.
 
-    Two frequencies are compatible with two pairs of stiffnesses: k2 from (1/m1 + 1/m2) k2^2 - T k2 + m2 P = 0 with T
-    the sum and P the product of the squared frequencies; the shape of the first mode selects one.
+    Two pairs of stiffnesses have the same two frequencies: k2 follows from (1/m1 + 1/m2) k2^2 - T k2 + m2 P = 0 with T
+    the sum and P the product of the squared frequencies; the shape of the first mode selects one pair.
     """
     squares = np.abs(poles) ** 2
     total, product = float(squares.sum()), float(squares.prod())
@@ -64,7 +64,7 @@ def constants_of(poles: Complex, ratios: Array, m1: float, m2: float) -> Constan
     shown = pairs / (pairs - squares[0] * m2)
     k2 = float(pairs[np.argmin(np.abs(shown - ratios[0]))])
     k1 = product * m1 * m2 / k2
-    # the initial damping of a weak mode is arbitrary
+    # the damping of a weak mode is arbitrary in the initial estimate
     rates = 2.0 * np.abs(poles) * np.clip(-poles.real / np.abs(poles), *DAMPING)
     rows: list[Array] = []
     for square in squares:
@@ -75,7 +75,7 @@ def constants_of(poles: Complex, ratios: Array, m1: float, m2: float) -> Constan
 
 
 def _filled(values: Array) -> Array:
-    """Values with missing ones interpolated linearly."""
+    """The values, with missing ones interpolated linearly."""
     there, index = np.isfinite(values), np.arange(values.size)
     return np.interp(index, index[there], values[there])
 

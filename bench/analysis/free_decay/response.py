@@ -23,7 +23,7 @@ Complex = NDArray[np.complex128]
 class Constants(NamedTuple):
     """Masses [kg], stiffnesses [N/m] and dashpots [N s/m] of the frame.
 
-    A spring from storey 1 to the table is part of k1: with the block held, k1 + k_C is measured.
+    A spring between storey 1 and the table is part of k1: if the block is held, k1 + k_C is measured.
     """
 
     m1: float
@@ -36,10 +36,11 @@ class Constants(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """The frame's two modes; `poles`, shape (2,) [1/s], lie in the upper half plane, the slower first.
+    """The frame's two modes; `poles`, shape (2,) [1/s], are those in the upper half plane, the slower first.
 
-    `shapes`, shape (4, 2), are of (z1, z2, w1, w2); `adjoint`, shape (2, 4), maps a state to the modes; `push`, shape
-    (2,), is the input vector for x. `step` is the time between samples [s], `feed` [1/s] the direct feed of x to z1'.
+    `shapes`, shape (4, 2), are the mode shapes in (z1, z2, w1, w2); `adjoint`, shape (2, 4), maps a state to the modes;
+    `push`, shape (2,), is the input vector for x. `step` is the time between samples [s], `feed` [1/s] the direct feed
+    of x to z1'.
     """
 
     poles: Complex
@@ -66,7 +67,7 @@ class Response:
         q = np.zeros((2, x.size), np.complex128)
         for mode in range(2):
             taps = self.push[mode] * h * np.array([second[mode], first[mode] - second[mode]])
-            # the first sample is only the start of the first line
+            # the first sample is only the start of the first line segment
             q[mode] = lfilter(taps, [1.0, -turn[mode]], x, zi=-taps[:1] * x[0])[0]
         return q
 
@@ -82,7 +83,7 @@ class Response:
 
 
 def response(constants: Constants, step: float) -> Response:
-    """The modes of a frame. Raises ArithmeticError if it does not oscillate in both."""
+    """The modes of a frame. Raises ArithmeticError unless the frame oscillates in both."""
     m1, m2, k1, k2, c1, c2 = constants
     inverse = np.array([[1.0 / m1], [1.0 / m2]])
     stiffness = inverse * np.array([[k1 + k2, -k2], [-k2, k2]])
@@ -126,7 +127,7 @@ def quantities(constants: Constants) -> Array:
 
 
 def slopes(constants: Constants) -> tuple[Array, Array]:
-    """Derivatives of `quantities` with respect to (k1, k2, c1, c2), shape (8, 4), and (m1, m2), shape (8, 2)."""
+    """Derivatives of `quantities` with respect to (k1, k2, c1, c2), shape (8, 4), and to (m1, m2), shape (8, 2)."""
     columns: list[Array] = []
     for place, value in enumerate(constants):
         step = 1e-6 * max(abs(value), 1e-3)

@@ -48,7 +48,7 @@ class Stretch:
 
     @cached_property
     def _course(self) -> tuple[Array, Array, Array]:
-        """The table's motion, corrected for linear interpolation, and its two derivatives.
+        """The table's motion, corrected for linear interpolation, and its first two derivatives.
 
         Linear interpolation reduces a sine by the fraction (omega step)^2 / 12; the second difference restores it.
         """

@@ -2,13 +2,13 @@
 
 Linearity: a smooth error, size sin(2 pi n x / range + phase), with `size` from the data sheet, and with uniformly
 distributed phase and number n of periods within the measuring range; it is common to all tilts. The fitted curvature
-absorbs its smooth part. Over the phase its mean square is that of two components, with sin and cos - 1 of the
-displacement from the rest, each of size / sqrt(2).
+absorbs its smooth part. Averaged over the phase, its mean square is that of two components, proportional to sin and cos
+- 1 of the displacement from the rest, each of size / sqrt(2).
 
-Timing: a laser with a free clock delays its values by up to one measuring period. The delay grows with the difference
-of the clocks and may jump back at any moment of a recording.
+Timing: a laser with a free-running clock delays its values by up to one measuring period. The delay grows with the
+difference between the clocks and may jump back at any moment of a recording.
 
-Noise and resolution are included in the residual of a fit.
+Noise and resolution are contained in the residual of a fit.
 """
 
 from collections.abc import Sequence
@@ -36,12 +36,14 @@ Impacts that differ by 1 % cause about 0.1.
 """
 
 PUSH = 0.03
-"""Relative difference of fitted and held tilt up to which a release counts as from rest."""
+"""Relative difference between fitted and held tilt up to which a release counts as a release from rest."""
 
 
 @dataclass(frozen=True, eq=False)
 class Tilt:
-    """Result of one tilt. The `relation` uses the critical angle of the geometry, the `fit` identifies it."""
+    """Result of one tilt. The `relation` uses the critical angle from the geometry, the `fit` identifies the critical
+    angle.
+    """
 
     seen: Recording
     swings: Swings
@@ -51,7 +53,7 @@ class Tilt:
 
     @property
     def push(self) -> float:
-        """Relative difference between the equivalent tilt from rest and the held tilt."""
+        """Relative difference between the tilt of the equivalent release from rest and the held tilt."""
         return abs(self.fit.motion.tilt / self.swings.held) - 1.0
 
 
@@ -63,7 +65,7 @@ def analyse_tilt(seen: Recording, specimen: Specimen, least: float) -> Tilt:
     alpha = critical_angle(specimen.block)
     seen = without_gaps(seen)
     swings = find_swings(seen, least)
-    # the reading at rest is limited by the laser's resolution, so the motion to both sides yields a better zero
+    # the laser's resolution limits the reading at rest, so the motion to both sides gives a better zero
     fit = fit_rocking(
         seen, swings, find_points(seen, swings, swings.zero), alpha, frequency_parameter(specimen.block, specimen.g)
     )
@@ -79,12 +81,14 @@ def analyse_tilt(seen: Recording, specimen: Specimen, least: float) -> Tilt:
 
 
 WAVES = (0.5, 3.0)
-"""Minimum and maximum number of periods of the linearity error in the measuring range: fewer act as a scale error, more
-are not smooth.
+"""Minimum and maximum number of periods of the linearity error in the measuring range: an error with fewer periods acts
+as a scale error, one with more is not smooth.
 """
 
 CLOCK = 50e-6
-"""Largest relative difference between the laser's clock and the sample clock, both quartz clocks."""
+"""Largest relative difference between the rates of the laser's clock and of the sample clock, which are quartz
+clocks.
+"""
 
 _NUMBERS, _RATES, _PHASES = 24, 12, 12
 """Numbers of equally likely values of periods, clock differences and initial delays."""
@@ -92,7 +96,7 @@ _NUMBERS, _RATES, _PHASES = 24, 12, 12
 
 @dataclass(frozen=True, eq=False)
 class LaserErrors:
-    """A laser's errors from its data sheet; `measuring_range` in m."""
+    """A laser's errors from its data sheet; `measuring_range` is in m."""
 
     accuracy: SensorAccuracy
     measuring_range: float
@@ -102,7 +106,7 @@ class LaserErrors:
         return _carried(fit, self._components(fit.fitted - fit.values[ZERO]))
 
     def timing(self, fit: RockingFit) -> Array:
-        """Standard uncertainty of the values and of the trend due to the laser's free clock, shape (9,)."""
+        """Standard uncertainty of the values and of the trend due to the laser's free-running clock, shape (9,)."""
         longest = self.accuracy.laser_timing
         if longest == 0.0:
             return np.zeros(fit.values.size + 1)
@@ -116,12 +120,12 @@ class LaserErrors:
         """Shifts of the amplitude relation's r due to the components of the linearity error, shape (components,)."""
         seen = block_face.displacement(relation.angles, fit.height, fit.block)
         rate = block_face.displacement_rate(relation.angles, fit.height, fit.block)
-        # the fit has removed zero and curvature of this error from the relation's angles
+        # the fit has removed the zero and the curvature of this error from the relation's angles
         found = np.column_stack((np.ones(seen.size), seen**2, seen**3)) @ self.linearity(fit)[ZERO : BEND_3 + 1]
         return np.asarray(relation.weights @ ((self._components(seen) - found) / rate[:, None]))
 
     def _components(self, displacement: Array) -> Array:
-        """The error's components [m] at displacements from the rest, shape (n,); shape (n, components)."""
+        """Components of the error [m], shape (n, components), at displacements from the rest, shape (n,)."""
         size = self.accuracy.laser_linearity * self.measuring_range / np.sqrt(2.0 * _NUMBERS)
         turned = 2.0 * np.pi / self.measuring_range * displacement[:, None] * _middles(*WAVES, _NUMBERS)
         return size * np.concatenate((np.sin(turned), np.cos(turned) - 1.0), axis=1)
@@ -166,9 +170,9 @@ class Combined:
 def combined(values: ArrayLike, noise: ArrayLike, timing: ArrayLike, linearity: Array, scale: float) -> Combined:
     """Mean of n `values`, weighted by their independent standard uncertainties `noise` and `timing`.
 
-    `linearity`, shape (n, components), are shifts due to errors that are common to all values, component by component,
-    and `scale` is a common standard uncertainty. Scatter beyond the independent uncertainties widens the result and
-    makes the weights more equal (`bench.analysis.uncertainty`).
+    `linearity`, shape (n, components), holds the shifts due to errors common to all values, component by component, and
+    `scale` is a common standard uncertainty. Scatter beyond the independent uncertainties widens the result and makes
+    the weights more equal (`bench.analysis.uncertainty`).
     """
     found, own, wander = (np.asarray(each, dtype=np.float64) for each in (values, noise, timing))
     repeats = mean_of_repeats(found[:, None], (own**2 + wander**2)[:, None])
@@ -189,14 +193,16 @@ _TREND = -1
 
 
 SCATTERED = 2.0
-"""Birge ratio of the fits above which the amplitudes give the restitution. A deviating impact shifts the times of all
-later ones, so the error of a fit exceeds the scatter of the impacts; amplitudes do not accumulate that error.
+"""Birge ratio of the fits above which the restitution is taken from the amplitudes. A deviating impact shifts the times
+of all later impacts, so the error of a fit exceeds the scatter of the impacts; the amplitudes do not accumulate that
+error.
 """
 
 
 @dataclass(frozen=True)
 class Findings:
-    """`motion` is the restitution of the fits and `trend` its change, `relation` that of the amplitudes alone.
+    """`motion` is the restitution from the fits, `trend` its change with the impact speed, and `relation` the
+    restitution from the amplitudes alone.
 
     `alpha` [rad] and `p` [rad/s] are the identified critical angle and frequency parameter.
     """
@@ -210,20 +216,21 @@ class Findings:
 
     @property
     def by_amplitudes(self) -> bool:
-        """Whether impacts differ so much that the amplitudes are the better estimator."""
+        """Whether the impacts differ so much that the amplitudes give the better estimate."""
         return self.motion.birge > SCATTERED
 
     @property
     def restitution(self) -> Combined:
-        """The restitution from the better of the two estimators."""
+        """The better of the two estimates of the restitution."""
         return self.relation if self.by_amplitudes else self.motion
 
 
 def findings(tilts: Sequence[Tilt], laser: LaserErrors, height: float, height_uncertainty: float) -> Findings:
-    """Combine the tilts; for a single tilt, the scatter is only that of its residual.
+    """Combine the tilts. For a single tilt, the uncertainty contains only the scatter of its residual.
 
-    Errors of the beam's `height` [m] and of the laser's scale affect the conversion to an angle: alpha fully, the
-    amplitude relation slightly, and r and p, which depend on time, not at all. p has the error of the sample clock.
+    Errors of the beam's `height` [m] and of the laser's scale affect the conversion to an angle: they affect alpha
+    fully, the amplitude relation slightly, and r and p, which depend on time, not at all. p has the error of the sample
+    clock.
     """
     fits = [tilt.fit for tilt in tilts]
     linearity = np.array([laser.linearity(fit) for fit in fits])

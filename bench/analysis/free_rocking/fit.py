@@ -1,11 +1,11 @@
 """Fit of the exact nonlinear motion to the laser signal, from shortly after the release to the last usable impact.
 
 Six values describe the motion: alpha, p and r of `sim.free_rocking`, the tilt (as a fraction of alpha) and instant of
-an equivalent release from rest, and the laser's reading for the block at rest. A release by hand is neither
+an equivalent release from rest, and the laser's reading when the block is at rest. A release by hand is neither
 instantaneous nor free of a push: tilt and instant account for its energy and phase, and the samples until the block is
 free are excluded. Two more describe the laser: at the displacement D its reading is D + c_2 D^2 + c_3 D^3, which
-includes the smooth part of its linearity error. Its scale is not fitted: a scale factor s multiplies alpha and tilt by
-s and does not affect r and p, which depend on the times of the impacts.
+includes the smooth part of its linearity error. The laser's scale is not fitted: a scale factor s multiplies alpha and
+tilt by s and does not affect r and p, which depend on the times of the impacts.
 """
 
 from collections.abc import Callable
@@ -34,8 +34,7 @@ FEWEST = 12
 """Minimum number of impacts that determine the parameters."""
 
 _RATE = 250.0
-"""Sample rate of the fit [1/s], to which the laser's samples are averaged; the motion is smooth at this rate.
-"""
+"""Sample rate of the fit [1/s], to which the laser's samples are averaged; it is high enough for the motion."""
 
 _IMPACT, _ANGLE = 1e-4, 1e-4
 """Standard uncertainties of single impacts [s] and turning points [rad] in the preliminary fit."""
@@ -49,9 +48,9 @@ class RockingFit:
     """Result of a fit: `values`, shape (8,), in the order of `NAMES`, in SI units, for `block` measured at `height`
     [m].
 
-    `times` [s], `displacement` [m] and `swing` (the number of impacts before), all of shape (n,), are the data,
-    `fitted` [m] the model; `jacobian`, shape (n, 9), holds the derivatives with respect to the values and, last, to the
-    trend of r with impact velocity about its mean.
+    `times` [s], `displacement` [m] and `swing` (the number of earlier impacts), all of shape (n,), are the data,
+    `fitted` [m] is the displacement of the model; `jacobian`, shape (n, 9), holds the derivatives with respect to the
+    values and, last, to the trend of r with impact velocity about its mean.
     """
 
     values: Array
@@ -80,7 +79,7 @@ class RockingFit:
 
     @property
     def impacts(self) -> int:
-        """Number of impacts within the fitted data, the last one at its end."""
+        """Number of impacts within the fitted data, including the one at its end."""
         return int(self.swing[-1]) + 1
 
     @cached_property
@@ -90,7 +89,9 @@ class RockingFit:
 
     @cached_property
     def trend_gain(self) -> Array:
-        """Sensitivity of the trend, fitted jointly with the values, to errors of the displacement, shape (n,) [1/m]."""
+        """Sensitivity of the trend, which is fitted jointly with the values, to errors of the displacement, shape (n,)
+        [1/m].
+        """
         return np.asarray(np.linalg.pinv(self.jacobian)[-1], dtype=np.float64)
 
     @property
@@ -109,7 +110,9 @@ class RockingFit:
         return float(np.sqrt(self._scattered(self.trend_gain[None, :])[0, 0]))
 
     def straightened(self, displacement: Array) -> Array:
-        """A laser signal [m], any shape, relative to the block at rest and without the fitted curvature."""
+        """A laser signal [m], any shape, relative to its value for the block at rest and without the fitted
+        curvature.
+        """
         seen = displacement - self.values[ZERO]
         return seen - self.values[BEND_2] * seen**2 - self.values[BEND_3] * seen**3
 
@@ -168,7 +171,7 @@ def _motion(values: Array, side: float, trend: float = 0.0, trend_at: float = 0.
 
 
 def _freed(seen: Recording, swings: Swings) -> float:
-    """Time after which the block is free [s]; before it, the hand may tremble."""
+    """Time [s] after which the block is free; until then, the operator's hand may still disturb it."""
     before = seen.angle(swings.zero)[: int(swings.crossings[0] * seen.sample_rate)]
     return float(np.flatnonzero(np.abs(before) >= FREE * abs(swings.held))[-1]) / seen.sample_rate
 
@@ -179,8 +182,8 @@ def _thinned(samples: Array, size: int) -> Array:
 
 
 def _bounds(alpha: float, p: float) -> tuple[Array, Array]:
-    """Bounds: within a factor of two of the geometry; tilt ratio and r where a motion exists; wide bounds for the
-    others.
+    """Bounds: within a factor of two of the geometry; tilt ratio and r where a motion exists; wide bounds for the other
+    values.
     """
     lowest = np.array([0.5 * alpha, 0.5 * p, 0.05, 1e-3, -1e4, -1.0, -10.0, -1e3])
     return lowest, np.array([2.0 * alpha, 2.0 * p, 0.9999, 0.999, 1e4, 1.0, 10.0, 1e3])

@@ -1,7 +1,7 @@
 """Single points of the motion, each from the samples around it: impact times and turning points, and the restitution
-that follows from them. They assume only a smooth motion between impacts, and so check a model fitted to the entire
-motion. A Butterworth low-pass delays a smooth motion without distortion: its gain has no term in omega^2, so its
-impulse response has no second cumulant, and a parabola passes unchanged. Its response to the kink at an impact has
+that follows from them. They assume only a smooth motion between impacts, and are therefore a check of a model fitted to
+the entire motion. A Butterworth low-pass delays a smooth motion without distortion: its gain has no term in omega^2, so
+its impulse response has no second cumulant, and a parabola passes unchanged. Its response to the kink at an impact has
 decayed after `AFTER`, and those samples are excluded.
 
 Between impacts the energy is constant, so the largest angles before and after an impact give the restitution of the
@@ -31,7 +31,7 @@ exp(-6).
 """
 
 _WINDOW, _PART = 0.08, 0.45
-"""Largest half width of the fit around an impact [s], and as a fraction of the shorter adjacent half swing."""
+"""Largest half width of the fit around an impact: in seconds, and as a fraction of the shorter adjacent half swing."""
 
 _TURN = 0.6
 """Half width of the fit around a turning point, relative to half of the half swing."""
@@ -54,7 +54,7 @@ class Points:
 
 
 def find_points(seen: Recording, swings: Swings, zero: float) -> Points:
-    """The points of all `swings`, when the laser reads `zero` [m] for the block at rest."""
+    """The points of all `swings`, for a laser that reads `zero` [m] when the block is at rest."""
     times, angle = seen.times, seen.angle(zero)
     marks = np.append(swings.crossings, np.nan)
     impacts: list[tuple[float, float]] = []
@@ -96,7 +96,7 @@ def _closer(times: Array, angle: Array, instant: float, window: float) -> tuple[
 
 
 def _turn(times: Array, angle: Array, crossing: float, length: float) -> tuple[float, float]:
-    """Largest angle of the half swing after `crossing`, signed, and its uncertainty [rad]."""
+    """Largest angle of the half swing after `crossing`, signed, and its standard uncertainty [rad]."""
     middle, half = crossing + 0.5 * length, 0.5 * _TURN * length
     used = slice(*np.searchsorted(times, (max(middle - half, crossing + AFTER), middle + half)))
     s = (times[used] - middle) / half
@@ -130,12 +130,12 @@ def functional_uncertainty(weights: Array, residual: Array, parameters: int) -> 
 
 @dataclass(frozen=True, eq=False)
 class Relation:
-    """r of single impacts, and of all from the fitted line.
+    """r of each impact, and r of all impacts from the fitted line.
 
-    `speed`, shape (n,), of each impact relative to that of a fall from alpha; `each` and `each_uncertainty`, shape
-    (n,), are single values and their standard uncertainties due to noise; neighbours share a turning point and are
-    correlated. `restitution` has the standard `uncertainty` due to the scatter about the line; `weights`, shape (m,),
-    are its sensitivities to the turning `angles` [rad], shape (m,).
+    `speed`, shape (n,), is the speed of each impact relative to that of a fall from alpha; `each` and
+    `each_uncertainty`, shape (n,), are the values of single impacts and their standard uncertainties due to noise.
+    Neighbouring values share a turning point and are correlated. `restitution` has the standard `uncertainty` due to
+    the scatter about the line; `weights`, shape (m,), are its sensitivities to the turning `angles` [rad], shape (m,).
     """
 
     speed: Array

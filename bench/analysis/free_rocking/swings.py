@@ -21,7 +21,7 @@ STILL = 2e-4
 """Largest standard deviation of the displacement at rest [m]: resolution and noise of a laser."""
 
 _HELD = 0.5
-"""Time at the beginning over which the held tilt is averaged [s]."""
+"""Time at the beginning of a recording over which the held tilt is averaged [s]."""
 
 _SHARE = 0.25
 """Fraction of the smallest usable angle that the block must reach on the other side."""
@@ -50,7 +50,7 @@ class Recording:
         return np.arange(self.displacement.size) / self.sample_rate
 
     def angle(self, zero: float) -> Array:
-        """theta [rad], shape (n,), when the laser reads `zero` [m] for the block at rest."""
+        """theta [rad], shape (n,), for a laser that reads `zero` [m] when the block is at rest."""
         return block_face.rotation(self.displacement - zero, self.height, self.block)
 
 
