@@ -242,7 +242,7 @@ def test_what_cannot_fit_is_refused_with_the_reason(method: Method, frequency: f
 
 
 def test_a_record_without_motion_is_refused() -> None:
-    with pytest.raises(InvalidInput, match="not zero"):
+    with pytest.raises(InvalidInput, match="not all of them zero"):
         fit_stroke(SampledRecord(np.zeros(100), 0.005), Reach(0.05, 0.5))
     with pytest.raises(InvalidInput, match="positive number"):
         Reach(0.0, 0.5)
