@@ -29,7 +29,7 @@ def protocol_names() -> tuple[str, ...]:
 
 
 def load_protocol(name: str, item: str = "protocol") -> "Protocol[Any]":
-    """The protocol `name`. Raises InvalidInput, naming `item`, for one that is not installed or fails to load."""
+    """The protocol `name`. Raises InvalidInput, naming `item`, if the protocol is not installed or fails to load."""
     from bench.protocol import Protocol
 
     return cast("Protocol[Any]", load_plugin(PROTOCOLS, name, item, Protocol))
@@ -80,8 +80,8 @@ def parameters_of(record: "DataFile", protocol: "Protocol[Any]", changed: dict[s
     """The stored parameters of a run, updated with `changed`. Raises InvalidInput for parameters unknown to this
     version.
 
-    A parameter missing in the file of an earlier version stays absent if allowed, so that the run is repeated without
-    it.
+    A parameter that the file of an earlier version lacks stays absent where that is allowed; the run is then repeated
+    without it.
     """
     from bench.config.validation import dotted, validated
 

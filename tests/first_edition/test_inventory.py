@@ -38,6 +38,11 @@ CHANGED: dict[str, Any] = {
     "configuration: backend: allowed": "a text",
     # the profile fast has blocks of 5 ms
     "configuration: acquisition.block_duration: allowed": "a number at least 0.005 and at most 0.2",
+    # the same defaults in plainer words
+    "options: analyse --out: default": "<name>.analysis-<n>.h5 in the same folder",
+    "options: emulate --sample-rate: default": "that of the simulation",
+    "options: export --out: default": "<name>-<format> in the folder of FILE",
+    "options: gui --config: default": "the paper's specimen on the simulated bench, with a guided tour",
 }
 """What another value is meant for today, as "part: name: what" (such as "options: run harmonic --starts: default") to
 that value, each with the reason beside it.

@@ -17,7 +17,7 @@ from sim.rocking import Motion, State, simulate, simulate_many
 from sim.specimen import Block, Specimen
 
 OMEGAS, BETAS = (12.0, 21.0), (0.1, 1.2)
-"""Ranges of the map [rad/s], [1]."""
+"""Ranges of the map: Omega [rad/s] and beta [1]."""
 
 AMPLITUDE = 1.01 * 9.81 / 8.0
 
@@ -35,8 +35,8 @@ MAP_COLUMNS = (
 
 
 def gain_maps(n: int, runs: int, repetitions: int) -> Section:
-    """Time the map of n x n points, and 120 s runs that start on the orbit at `runs` x `runs` of them, scaled to all
-    points.
+    """Time the map of n x n points, and 120 s runs that start on the orbit at `runs` x `runs` of these points; the time
+    of the runs is scaled to all points.
     """
     betas, omegas = np.linspace(*BETAS, n), np.linspace(*OMEGAS, n)
     specimen = Specimen()
@@ -122,8 +122,8 @@ DT, DURATION = 0.005, 40.0
 ROCKING = Specimen(beta=0.4)
 ROCKING_START = State(-0.0010828, 0.00037455, 0.049398, -0.11073, 0.0, 0.67994)
 ROCKING_PHASE, ROCKING_OMEGA = 3.11068, 16.0
-"""State on the steady orbit at beta 0.4, Omega 16 rad/s, to five digits: under the sampled sine the block never
-rests.
+"""State on the steady orbit at beta 0.4, Omega 16 rad/s, to five digits. From this state, the block never comes to rest
+under the sampled sine.
 """
 
 SEED = 20

@@ -36,7 +36,7 @@ def timed(run: Callable[[], T], repetitions: int) -> Timing[T]:
 
 
 def in_turn(runs: Mapping[str, tuple[Callable[[], Any], int]]) -> dict[str, Timing[Any]]:
-    """Times of several runs, each repeated its own number of times, interleaved evenly. Garbage collection is disabled
+    """Time several runs, each with its own number of repetitions, interleaved evenly. Garbage collection is disabled
     during the runs.
     """
     times: dict[str, list[float]] = {name: [] for name in runs}

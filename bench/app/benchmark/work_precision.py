@@ -196,9 +196,9 @@ COLUMNS = (
 NOTES = (
     "Errors: greatest deviation of the end state from the reference, in SI units (components reach about 1); errors "
     "of the peaks are relative. The reference is heyoka in 80-bit arithmetic, an independent integrator.",
-    "First call: compiling or loading of compiled code, and a tenth of a second of motion (none for "
-    "CVODE). It is excluded from the times; the methods run in turn. Only rows with an error of the "
-    "peaks compute peaks; the others do less work.",
+    "First call: compilation or loading of the compiled code, and a tenth of a second of motion (none for CVODE). It "
+    "is excluded from the times; the methods run in turn. Only rows with an error of the peaks compute peaks; the "
+    "others do less work.",
     'scipy and CVODE call the compiled equations; "Python" marks uncompiled equations, the usual practice.',
     "A method with a different number of impacts has missed or doubled one: its time is meaningless.",
 )
@@ -268,7 +268,9 @@ def _targets(rows: list[dict[str, Cell]]) -> list[Target]:
     fine_error, fine_time = of("taylor", setting, "error"), of("taylor", setting, "ratio")
 
     def at_equal_error(ours: str, theirs: str) -> float | None:
-        """Time of our fastest setting that is at least as accurate as `theirs` at 1e-10, relative to the latter."""
+        """Time of the engine's fastest setting that is at least as accurate as `theirs` at 1e-10, relative to the time
+        of `theirs`.
+        """
         error, time = of(theirs, "tolerance 1e-10", "error"), of(theirs, "tolerance 1e-10", "ratio")
         pairs = [(row.get("ratio"), row.get("error")) for row in rows if row["method"] == ours]
         times = [

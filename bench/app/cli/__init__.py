@@ -1,1 +1,1 @@
-"""The command line, a client of the engine with the same standing as the window."""
+"""The command line, a client of the engine with the same functions as the window."""

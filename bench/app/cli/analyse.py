@@ -66,7 +66,12 @@ def analyse(
     ] = None,
     out: Annotated[
         Path | None,
-        Parameter(name="--out", metavar="FILE", help="File to write.", show_default="<name>.analysis-<n>.h5 beside it"),
+        Parameter(
+            name="--out",
+            metavar="FILE",
+            help="File to write.",
+            show_default="<name>.analysis-<n>.h5 in the same folder",
+        ),
     ] = None,
     list_: Annotated[
         bool, Parameter(name="--list", negative=(), show_default=False, help="List the settings and exit.")

@@ -1,7 +1,7 @@
-"""A console that is closed on Windows, where no signal states it: the run ends as after Ctrl-C.
+"""Closing of the console on Windows, which sends no signal for it: the run ends as after Ctrl-C.
 
-Windows ends the process as soon as the handler returns, and after 5 s in any case: the handler waits for the end of the
-run, whose fast ramp and file need about a second.
+Windows ends the process when the handler returns, and after 5 s at the latest. The handler therefore waits for the end
+of the run, which needs about a second for the fast ramp and the data file.
 """
 
 import signal
@@ -17,7 +17,7 @@ GRANTED = 4.5
 """Longest wait for the end of the process [s]."""
 
 _kept: list[Any] = []
-"""The registered handler; Windows does not keep it alive."""
+"""The registered handler, referenced here because Windows does not keep it alive."""
 
 
 def handler(interrupt: Callable[[int], object], number: int) -> Callable[[int], bool]:
@@ -36,7 +36,7 @@ def handler(interrupt: Callable[[int], object], number: int) -> Callable[[int], 
 
 
 def watch_console() -> None:
-    """Handle a console that is closed as SIGBREAK; no effect on other systems, which send SIGHUP."""
+    """Treat the closing of the console as SIGBREAK. Has no effect on other systems, which send SIGHUP."""
     if sys.platform != "win32":
         return
     import ctypes

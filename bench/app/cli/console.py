@@ -98,7 +98,7 @@ class LiveConsole:
             self._console.print(log_line(self._grave.popleft()))
 
     def _show(self) -> None:
-        # a new Live each time, since restarting a stopped one would move the cursor over later output
+        # a new Live each time: a restarted one would move the cursor over later output
         self._live = Live(console=self._console, auto_refresh=False, transient=True, redirect_stdout=False)
         self._live.start()
 
@@ -132,7 +132,7 @@ _WIDE = 100
 _NUMBERS = ("omega\n[rad/s]", "beta", "alpha_2\n(k = 2)", "predicted", "off by")
 _WORDS = ("agrees", "status", "measured over")
 _AROUND_TABLE = 11 + NOTICES
-"""Number of lines used by everything except the rows of the table."""
+"""Number of lines of the display without the rows of the table."""
 
 
 def draw(scene: RunDisplay, width: int, height: int) -> RenderableType:

@@ -55,7 +55,7 @@ def emulate(
         Parameter(
             metavar="HZ",
             help="Samples per second of drive, inputs and virtual bench (at most 20000).",
-            show_default="as the simulation's",
+            show_default="that of the simulation",
         ),
     ] = None,
     seed: Seed = None,
@@ -63,7 +63,7 @@ def emulate(
         str | None,
         Parameter(
             metavar="S",
-            help="Lead of the drive in the written configuration; a busy computer needs more.",
+            help="Lead of the drive in the written configuration; a busy computer needs a longer one.",
             show_default="as configured",
         ),
     ] = None,
@@ -128,7 +128,7 @@ def emulate(
         with _until_asked() as over:
             _hand_out(configuration, laboratory, write)
             waiting.wait(over)
-            # under the same handler, so that a second Ctrl-C does not interrupt it
+            # closed under the same handler, so that a second Ctrl-C does not interrupt the closing
             laboratory.close()
     finally:
         laboratory.close()
@@ -181,7 +181,7 @@ def _with_lead(configuration: "BenchConfiguration", lead: str | None) -> "BenchC
 
 
 def _hand_out(configuration: "BenchConfiguration", laboratory: "Laboratory", path: Path | None) -> None:
-    """Output the configuration of a client, and instructions on standard error. Raises InvalidInput."""
+    """Print or write the configuration of a client, and print instructions on standard error. Raises InvalidInput."""
     from bench.config.toml import as_toml
 
     hardware = laboratory.hardware
@@ -198,7 +198,7 @@ def _hand_out(configuration: "BenchConfiguration", laboratory: "Laboratory", pat
     _say(f"DAQ at {hardware.daq.server}, {hardware.sample_rate:g} samples per second")
     for name, laser in (("laser 1", hardware.laser_1), ("laser 2", hardware.laser_2)):
         _say(f"{name} at {laser.port if hardware.lasers.connection == 'serial' else laser.terminal}")
-    named = path if path is not None else "FILE, with the text above in FILE"
+    named = path if path is not None else "FILE, after saving the text above in FILE"
     _say(f"in another terminal: rockbench check --config {named}")
     _say("Ctrl-C closes the laboratory")
 

@@ -124,7 +124,7 @@ def export(
     out: Annotated[
         Path | None,
         Parameter(
-            metavar="DIR", help="New folder for the files.", show_default="<name>-<format> beside the campaign's file"
+            metavar="DIR", help="New folder for the files.", show_default="<name>-<format> in the folder of FILE"
         ),
     ] = None,
     raw: Annotated[

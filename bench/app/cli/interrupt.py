@@ -55,7 +55,9 @@ class Interrupts:
 
 
 class Leaving(Interrupts):
-    """Signal handler where an exception would be harmful: Qt prints it in a callback, and aborts a start-up."""
+    """Signal handler for code in which an exception would be harmful: Qt only prints an exception raised in a callback,
+    and aborts the process on one raised during start-up.
+    """
 
     def __call__(self, number: int, frame: FrameType | None) -> None:  # noqa: ARG002 - the signature is Python's
         """End the process at once."""
@@ -193,7 +195,7 @@ def handle_signals(interrupts: Interrupts) -> None:
     global _watch
 
     def unraisable(error: "sys.UnraisableHookArgs") -> None:
-        # errors in destructors and callbacks after an interrupt are irrelevant: the process ends
+        # errors in destructors and callbacks after an interrupt are irrelevant, since the process ends
         if interrupts.first is None and not isinstance(error.exc_value, KeyboardInterrupt):
             sys.__unraisablehook__(error)
 

@@ -34,7 +34,7 @@ GROUPS = {
 COMMANDS = {
     "check": (
         "run:check",
-        "Check the loop of the configured bench at low level, line by line: passed or failed, with the remedy.",
+        "Check the loop of the configured bench at low level, and give a remedy for each line that fails.",
         "",
     ),
     "queue": (
@@ -50,8 +50,8 @@ COMMANDS = {
     ),
     "doctor": (
         "support:doctor",
-        "Check the machine for a bench: versions, clocks, disk, power settings, serial ports and graphics, "
-        "with remedies.",
+        "Check whether this computer can run a bench: versions, clocks, disk, power settings, serial ports and "
+        "graphics, with remedies.",
         "--out runs",
     ),
     "emulate": (
@@ -226,12 +226,14 @@ def reads_files(arguments: Sequence[str]) -> bool:
 
 
 def unreadable(error: BaseException) -> str:
-    """Message for an unexpected error on reading a file, with its place in the program."""
+    """Message for an unexpected error while a file is read, with its location in the source code."""
     frame = traceback.extract_tb(error.__traceback__)[-1]
     said = " ".join(str(error).split())
     told = f"{type(error).__name__}{': ' if said else ''}{said:.200}"
     place = f"{Path(frame.filename).name}, line {frame.lineno}"
-    return f"the contents of the file cannot be evaluated ({told}; {place}): `rockbench file verify` checks it"
+    return (
+        f"the contents of the file cannot be evaluated ({told}; {place}): check the file with `rockbench file verify`"
+    )
 
 
 def _version() -> str:

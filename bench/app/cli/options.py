@@ -22,7 +22,7 @@ _METAVAR: dict[Any, str] = {int: "INT", float: "NUMBER", str: "TEXT"}
 
 
 def switch(text: str) -> Parameter:
-    """An option without a value, which has no opposite."""
+    """An option without a value and without a negative form."""
     return Parameter(negative=(), show_default=False, help=text)
 
 
@@ -170,9 +170,11 @@ class RunOptions:
     profile: Annotated[
         Literal["fast", "steady"] | None,
         Parameter(
-            help="Timing of the acquisition, in place of block_duration and lead of [acquisition]: fast reacts to a "
-            "limit within 20 ms (35 ms behind a gRPC server, without serial lasers) and needs an idle computer; steady "
-            "within 0.2 s.",
+            help=(
+                "Timing of the acquisition, instead of block_duration and lead in [acquisition]. With fast, the bench "
+                "reacts to a limit within 20 ms (35 ms through a gRPC server, without serial lasers), but needs an "
+                "idle computer; with steady, it reacts within 0.2 s."
+            ),
         ),
     ] = None
     operator: Annotated[str, Parameter(metavar="NAME", help="Name of the operator, stored in the data file.")] = ""

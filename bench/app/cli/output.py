@@ -48,7 +48,7 @@ def print_result(
     """Print the result of a command on standard output: its text, or one JSON object in which a number that is not
     finite is null.
 
-    An `error` in which the result ends is in the object only, under the key "error".
+    The `error` with which a result ended is only part of the object, under the key "error".
     """
     if not as_json:
         print(shown(text()))

@@ -77,8 +77,8 @@ def _sine(
     documentation: str,
     drawable: int | None = None,
 ) -> "Callable[..., int]":
-    """A command with the flags of a request, computed by a `function` of `predict_sine`. Its figure has room for
-    `drawable` points.
+    """A command with the flags of a request, computed by a `function` of `predict_sine`. Its figure can hold `drawable`
+    points.
     """
 
     def command(
@@ -114,8 +114,8 @@ def _sine(
 def _under_records(
     request_type: type[RecordsRequest], function: str, documentation: str, drawable: int
 ) -> "Callable[..., int]":
-    """A command with the flags of a request for records, computed by a `function` of `predict_seismic`. Its figure has
-    room for `drawable` records.
+    """A command with the flags of a request for records, computed by a `function` of `predict_seismic`. Its figure can
+    hold `drawable` records.
     """
 
     def command(

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 def run() -> None:
     """Entry point of the console script."""
-    # everything else is imported once signals are handled: the imports take a third of a second
+    # everything else is imported after the signal handlers are installed, because the imports take a third of a second
     signal.signal(signal.SIGINT, _at_once)
     # read when numpy is imported: BLAS threads busy-wait for longer than these small matrices take, and the last digits
     # of a product would depend on the number of threads

@@ -36,9 +36,9 @@ def replay(
 ) -> int:
     """Replay a recorded campaign through the same engine, guard, analysis and displays.
 
-    The stored plan is executed on the stored blocks and so takes the same decisions; questions get their recorded
-    answers, and a requested end is requested again. No device is opened and no other file is read. Every drive sample,
-    journal entry and result is compared with the file.
+    The stored plan is executed on the stored blocks and therefore makes the same decisions; questions get their
+    recorded answers, and a recorded request to end is repeated. No device is opened and no other file is read. Every
+    drive sample, journal entry and result is compared with the file.
 
     The exit code is 0 if everything agrees with the recording to within rounding, even if the recording is incomplete;
     1 if there are differences, which are printed; 2 if the file cannot be replayed; 130 after Ctrl-C.
@@ -110,7 +110,7 @@ def _text(replayed: "Replayed", table: str) -> str:
     ]
     compared = ", ".join(f"{count} {part}" for part, count in replayed.found.compared.items() if count)
     if not replayed.same_wording:
-        lines.append("The file is from an older version; its sentences were not compared")
+        lines.append("The file is from an older version; the wording of its messages was not compared")
     if not replayed.same_intervals:
         lines.append("The file is from an older version; its uncertainties were not compared")
     if replayed.identical:

@@ -192,7 +192,7 @@ def carry_out(
                 from bench.app.session import run_session
 
                 prepared = prepare(progress.prepare)
-            # windows can attach to the run, and stop it
+            # operator's windows can attach to the run and stop it
             run = Run(protocol.name, prepared.parameters, prepared.configuration, out, realtime=realtime, about=about)
             server = SessionServer(None, requests, lambda _why: None, lambda: person is not None and person.asking)
             teller = Publisher(server)

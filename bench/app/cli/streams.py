@@ -9,8 +9,8 @@ from typing import Any, TextIO, cast
 class _Lasting:
     """A stream whose errors are ignored: a closed pipe or terminal, and a full disk behind it.
 
-    Nothing is written to it afterwards. Its buffer goes to the null device, or the interpreter would report the same
-    error at the end.
+    Nothing is written to it after the first error. Its buffer is then sent to the null device; otherwise the
+    interpreter would report the same error at exit.
     """
 
     def __init__(self, stream: TextIO) -> None:

@@ -14,22 +14,23 @@ def doctor(
     *,
     out: Annotated[
         Path | None,
-        Parameter(metavar="DIR", help="Folder of results, whose disk is checked.", show_default="the current folder"),
+        Parameter(metavar="DIR", help="Folder of results; its disk is checked.", show_default="the current folder"),
     ] = None,
     server: Annotated[
         str | None,
         Parameter(
-            metavar="HOST:PORT", help="Address of a device server whose connection is checked.", show_default=False
+            metavar="HOST:PORT", help="Address of a device server; the connection to it is checked.", show_default=False
         ),
     ] = None,
     as_json: Json = False,
     progress: Handed = silent,
 ) -> int:
-    """Check the machine for a bench: versions, clocks, disk, power settings, serial ports and graphics, with remedies.
+    """Check whether this computer can run a bench: versions, clocks, disk, power settings, serial ports and graphics,
+    with remedies.
 
     Nothing is changed and no device is opened. The exit code is 0, or 1 if a check is bad.
     """
-    progress("checking the machine")
+    progress("checking the computer")
     from bench.app.support.doctor import Health, examine
     from bench.figures.text_table import TextColumn, text_table
     from sim.errors import InvalidInput

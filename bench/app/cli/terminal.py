@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 _YES = frozenset({"", "y", "yes", "done", "ok"})
 _NO = frozenset({"n", "no"})
-_HOW = "Press Enter when it is done, or n and Enter to end the run: "
+_HOW = "Press Enter when the task is done, or n and Enter to end the run: "
 
 
 class PlainLines:
@@ -98,7 +98,9 @@ def progress_on(
 
 
 class AtTheConsole:
-    """A person at the keyboard. Questions go to standard error: standard output is reserved for the result."""
+    """The operator at the keyboard. Questions are written to standard error, because standard output is reserved for
+    the result.
+    """
 
     name = "operator at the console"
 

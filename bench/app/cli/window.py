@@ -60,7 +60,7 @@ def gui(
         Parameter(
             metavar="FILE",
             help="Configuration of the bench (TOML).",
-            show_default="the paper's specimen on the simulated bench, with a first minute that is guided",
+            show_default="the paper's specimen on the simulated bench, with a guided tour",
         ),
     ] = None,
     seed: Seed = None,
@@ -85,7 +85,7 @@ def gui(
     protocols, failed = all_protocols()
     for line in failed:
         print_warning(line)
-    # the paper's campaign is the first choice
+    # the paper's campaign is selected first
     protocols = sorted(protocols, key=lambda each: each.name != "harmonic")
     # until the window installs its own handler, which closes it
     with leaving():

@@ -55,7 +55,7 @@ class Signal:
 
 @dataclass(frozen=True)
 class TableColumn:
-    """A column of a table of results; None where a value is absent. `unit` is empty for strings and switches."""
+    """A column of a table of results; None where a value is absent. `unit` is empty for strings and Booleans."""
 
     name: str
     unit: str

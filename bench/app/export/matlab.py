@@ -119,7 +119,7 @@ def _units(columns: Sequence[TableColumn]) -> dict[str, str]:
 
 
 def _values(column: TableColumn) -> NDArray[Any]:
-    """Numbers and switches (0, 1) as doubles, NaN where absent; strings as a cell array."""
+    """Numbers and Booleans (0, 1) as doubles, NaN where absent; strings as a cell array."""
     if column.kind == "text":
         cells = np.empty(len(column.values), dtype=object)
         cells[:] = ["" if value is None else value for value in column.values]

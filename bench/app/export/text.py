@@ -35,7 +35,7 @@ def write(content: Content, folder: Path) -> None:
 
 
 def write_table(columns: Sequence[TableColumn], path: Path) -> None:
-    """Write one table; absent values are empty fields, switches are `yes` or `no`."""
+    """Write one table; absent values are empty fields, Booleans are `yes` or `no`."""
     with path.open("w", encoding="utf-8", newline="\n") as file:
         rows = csv.writer(file, lineterminator="\n")
         rows.writerow(headed(column.name, column.unit) for column in columns)

@@ -49,7 +49,9 @@ def write(content: Content, folder: Path) -> None:
 
 
 def _append(pyuff: Any, file: Any, dataset: dict[str, Any], folder: Path) -> None:
-    """Write through a separate file: pyuff reads a whole file after each addition."""
+    """Append a dataset that was written to a separate file first, because pyuff rereads the whole file after each
+    addition.
+    """
     with tempfile.TemporaryDirectory(dir=folder, prefix=".part-") as parts:
         path = Path(parts, "part.uff")
         with warnings.catch_warnings():

@@ -1,1 +1,1 @@
-"""The operator's window, a client of the session with the same standing as the command line."""
+"""The operator's window, a client of the session with the same functions as the command line."""

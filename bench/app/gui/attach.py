@@ -22,7 +22,7 @@ class SessionWatch(QObject):
         QTimer.singleShot(0, self, self._attach_at_once)
 
     def look(self) -> None:
-        """Update the session that is under way elsewhere."""
+        """Update `controller.elsewhere`, the session of another window or terminal."""
         controller = self._controller
         if controller.running:
             return
@@ -32,7 +32,7 @@ class SessionWatch(QObject):
             controller.changed.emit()
 
     def toggle(self) -> None:
-        """Attach to the session elsewhere, or detach from the present one."""
+        """Attach to the session under way elsewhere, or detach from the one attached to."""
         if self._controller.attached is not None and self._controller.running:
             self._controller.detach()
             self.look()

@@ -19,8 +19,8 @@ BELOW_NORMAL = 0x4000
 
 
 class Reader(QObject):
-    """Calls functions in a thread, one at a time; only the last call returns its result, in the window's thread. The
-    functions must only compute; drawing is left to the slots of `found`.
+    """Calls functions in a thread, one at a time; `found` emits the result of the last call only, in the window's
+    thread. The functions must only compute; the slots of `found` do the drawing.
     """
 
     found = Signal(object)

@@ -52,9 +52,9 @@ class Ring:
         """The last `seconds` as a line through the extremes of `buckets` parts of equal length, and of the part in
         which the displayed interval begins.
 
-        Returns times relative to the newest sample [s], shape (n,), not above zero, and values, shape (n, n_signals),
-        minimum and maximum of each part in turn. Parts begin at multiples of their length in bench time, independently
-        of the blocks, so that a scrolling line does not flicker.
+        Returns times relative to the newest sample [s], shape (n,), zero or negative, and values, shape (n, n_signals):
+        the minimum, then the maximum of each part. Parts begin at multiples of their length in bench time,
+        independently of the blocks, so that a scrolling line does not flicker.
         """
         if not self._size:
             return np.zeros(0), np.zeros((0, self._low.shape[1]), dtype=np.float32)
@@ -115,13 +115,13 @@ class BlockAngle:
         self._time, self._angle = np.zeros(0), np.zeros(0)
 
     def place(self, traces: Traces) -> None:
-        """Store when the run of these traces began."""
+        """Store the bench time at which the run of these traces began, and discard the angles of an earlier run."""
         if traces.run != self._run:
             self._run, self._origin = traces.run, traces.origin
             self._time, self._angle = np.zeros(0), np.zeros(0)
 
     def add(self, estimate: TwinEstimate) -> None:
-        """Append a part of the twin's trace; one of another run than that of the traces is ignored."""
+        """Append a part of the twin's trace; a part of a different run is ignored."""
         if estimate.run != self._run:
             return
         stood = estimate.trace[np.isfinite(estimate.trace[:, _THETA])]
@@ -130,13 +130,13 @@ class BlockAngle:
 
     def nearest(self, time: float) -> float:
         """The latest bench time [s] up to `time` at which the angle is known, so that frame and block are shown at the
-        same instant; `time` itself without an angle in the last `BEHIND` seconds.
+        same instant; `time` itself if no angle is known in the last `BEHIND` seconds.
         """
         newest = float(self._time[-1]) if self._time.size else float("-inf")
         return newest if time - BEHIND <= newest < time else time
 
     def at(self, time: float) -> tuple[float, float] | None:
-        """Angle [rad] at a bench time [s], and time since the last impact [s], infinite before the first. None where no
+        """Angle [rad] at a bench time [s], and time since the last impact [s], infinite before the first. None if no
         angle is available for that time.
         """
         times, angles = self._time, self._angle

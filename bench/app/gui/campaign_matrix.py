@@ -23,7 +23,7 @@ Place = tuple[int, int]
 
 @dataclass
 class Cell:
-    """A point: a status of its protocol, or one of `texts.WAITING` and `texts.MEASURED_NOW`; its result as text."""
+    """A point: its status, which is one of its protocol or one of `texts`, and its result as text."""
 
     status: str = texts.POINT_WAITS
     result: str = ""
@@ -66,7 +66,7 @@ class Campaign:
                 pass
 
     def expected(self, place: Place, remaining: float, now: datetime) -> datetime | None:
-        """About when a point ends, with equal shares of the `remaining` time [s]; None if that is not known."""
+        """Estimated end of a point, if the remaining points share the `remaining` time [s] equally; None if unknown."""
         left = [*([] if self.current is None else [self.current]), *self.waiting]
         if place not in left or not isfinite(remaining):
             return None
@@ -136,7 +136,7 @@ class MatrixView(QTableWidget):
             self.refresh(remaining)
 
     def refresh(self, remaining: float) -> None:
-        """Show every point, and when those to come end."""
+        """Show every point, and the expected end of each one that is not complete."""
         campaign = self.campaign
         if campaign is None:
             return

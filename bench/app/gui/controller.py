@@ -87,15 +87,17 @@ class Controller(QObject):
         self.driven = False
         """Whether the rig was armed in the current or last run."""
         self.run: Run | None = None
-        """The current or last run; None before the first, and until an attached session has introduced itself."""
+        """The current or last run; None before the first run, and until an attached session has sent its description.
+        """
         self.attached: RunningSession | None = None
         """The session of another window, or of a terminal, whose current or last run is shown."""
         self.controls = True
-        """Whether this window drives the run: it answers questions and may ramp out. STOP acts in any case."""
+        """Whether this window controls the run: whether it may answer questions and ramp out. STOP is always effective.
+        """
         self.elsewhere: RunningSession | None = None
         """A session under way on this machine to which this window is not attached."""
         self.held = ""
-        """Why only the queue may start a run; empty otherwise."""
+        """Reason why only the queue may start a run; empty if there is none."""
         self.lost = (0, 0)
         self._quiet, self._longest_quiet = 0.0, inf
         self._failure = ""
@@ -115,9 +117,7 @@ class Controller(QObject):
 
     @property
     def why_busy(self) -> str:
-        """Reason why no run can begin in addition to those under way; empty if one can. Simulated benches may run
-        concurrently.
-        """
+        """Reason why no further run can begin; empty if one can. Simulated benches may run concurrently."""
         if self._running:
             return texts.START_BUSY
         return texts.START_ELSEWHERE if self.elsewhere is not None and self.elsewhere.real else ""
@@ -175,7 +175,7 @@ class Controller(QObject):
             # no rig is open: a busy computer may delay the messages of a process that plans
             late = "" if link.status == "linked" else f" ({texts.PLANNING_LATE.format(age=link.silence)})"
             return Status(texts.PLANNING, f"{scene.reason}{late}", "wait", "ring")
-        # the reason of a change of state is over when the plan goes on
+        # the reason for the change of state no longer applies once the plan continues
         reason = scene.step if scene.state is State.RUNNING and scene.step else scene.reason
         return bench_status(link.status, scene.state, reason, link.silence)
 
@@ -235,8 +235,8 @@ class Controller(QObject):
         self.changed.emit()
 
     def press_stop(self) -> None:
-        """STOP: the first press ramps out fast, another at least `DELIBERATE` later cuts the enable line. STOP
-        latches.
+        """Handle a press of STOP, which latches: the first press ramps the output to zero fast; another one, at least
+        `DELIBERATE` later, cuts the enable line.
         """
         first = not self.latched
         if first:
@@ -252,12 +252,12 @@ class Controller(QObject):
         self.changed.emit()
 
     def ramp_out(self) -> None:
-        """End the run gently."""
+        """Request a gentle ramp-out, which ends the run."""
         if self._link is not None and self.controls:
             self._link.ask("stop")
 
     def note(self, text: str) -> None:
-        """Add a note to log and file of the run."""
+        """Add a note to the log and to the data file of the run."""
         if self._link is not None and text.strip():
             by = "" if self.run is None else self.run.about.get("operator", "")
             self._link.note(text.strip(), by or texts.UNNAMED)
@@ -316,7 +316,7 @@ class Controller(QObject):
             self._handle_waiting()
 
     def _handle_waiting(self) -> None:
-        """Handle messages in order for up to `BUDGET` seconds, and emit the change once."""
+        """Handle messages in order for up to `BUDGET` seconds, and emit `changed` once."""
         end = now() + BUDGET
         while self._waiting:
             self._take(self._waiting.popleft())
@@ -341,7 +341,7 @@ class Controller(QObject):
                 if isinstance(event, StateChanged):
                     self._entered(event.after)
             case Beat():
-                # holds even if the event of the change was lost
+                # correct even if the event with the change of state was lost
                 self.scene.state, self.scene.time = message.state, message.time
                 if not self.scene.preparing:
                     self.scene.reason = message.reason

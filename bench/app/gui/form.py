@@ -97,7 +97,9 @@ class Form(QWidget):
 
 
 def _parts(entry: Declared, text: str) -> list[str]:
-    """Split a list of values: strings, which may contain spaces, at semicolons; numbers at spaces, as everywhere."""
+    """Split a list of values: strings, which may contain spaces, at semicolons; numbers at spaces, as on the command
+    line.
+    """
     return [part.strip() for part in text.split(";") if part.strip()] if entry.kind is str else [text]
 
 

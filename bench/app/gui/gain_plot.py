@@ -84,7 +84,7 @@ class GainPlot(pg.PlotWidget):
     def predict(self, prediction: Table) -> None:
         """Replace the content by predicted lines; a prediction without gains leaves the plot empty."""
         self.clear()
-        # names added without a curve would remain
+        # legend entries without a curve would remain
         self._legend.clear()
         self.setToolTip("")
         self._prediction, self._added = prediction, []
@@ -226,7 +226,7 @@ class GainPlot(pg.PlotWidget):
 
 
 def evenly(low: float, high: float) -> list[tuple[float, str]]:
-    """About four evenly spaced gains between two, with their positions on a logarithmic axis."""
+    """About four evenly spaced gains between two gains, with their positions on a logarithmic axis."""
     step = round_down((high - low) / 3.0)
     gains = [step * k for k in range(ceil(low / step), floor(high / step) + 1)]
     return [(log10(gain), f"{gain:g}") for gain in gains if gain > 0.0]

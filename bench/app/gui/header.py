@@ -88,7 +88,9 @@ class StopFilter(QObject):
 STALE = 2.0
 """Age above which the safety inputs are unknown [s]."""
 SIDE, HEIGHT, LOW = 56, 96, 72
-"""Side of the lamp, height of the header, and its height in a small window [px]: its text never moves STOP."""
+"""Side of the lamp, height of the header, and its height in a small window [px]. The height is fixed, so that text
+never moves STOP.
+"""
 ROOMY, MEDIUM = (1150, 600), 700
 """Window size below which the header is low, and width below which it shows no times [px]."""
 
@@ -161,7 +163,7 @@ class Header(QWidget):
         self.stop, self.clear = StopButton(controller), QPushButton(texts.CLEAR)
         self.clear.setObjectName("clear")
         self.clear.setToolTip(texts.CLEAR_TIP)
-        # a key press meant for the form must not clear it
+        # a key press meant for the form must not clear STOP
         self.clear.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         give_key(self.clear, "Ctrl+Shift+K")
         self.clear.clicked.connect(controller.clear_stop)
@@ -226,11 +228,11 @@ class Header(QWidget):
         self.word.setText(shown.word)
         set_level(self.word, shown.level)
         key_acts = application().applicationState() == Qt.ApplicationState.ApplicationActive
-        # a roomy header has the step at its own place
+        # a high header shows the step in a separate field
         reason = "" if shown.reason == scene.step and self.details.isVisibleTo(self) else shown.reason
         said = ([texts.STOPPED + "."] if controller.latched else []) + [typeset(reason)]
         if controller.attached is not None and controller.running:
-            # whose run it is has priority over the rest of the reason
+            # the owner of the run has priority over the rest of the reason
             said.insert(0, controller.owner)
         if not key_acts:
             said.insert(0, texts.KEY_NEEDS_FOCUS)

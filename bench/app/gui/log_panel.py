@@ -1,4 +1,4 @@
-"""The log of a run: all lines or those with a text, and the field for notes of the operator."""
+"""The log of a run: all lines or those that contain a search text, and the field for the operator's notes."""
 
 from collections import deque
 
@@ -17,7 +17,7 @@ LOG_LINES = 2000
 
 
 class LogPanel(QWidget):
-    """Lines of the log, oldest first. A note appears in it when the data file has it."""
+    """Lines of the log, oldest first. A note appears in the log once it is stored in the data file."""
 
     def __init__(self, controller: Controller) -> None:
         super().__init__()

@@ -28,13 +28,13 @@ WARNED = 0.9
 LEAST_ROW, LARGEST_ROW = 30, 52
 """Height of a meter [px]."""
 HIDDEN = ("drive_voltage", "drive_slew")
-"""Limits of the command, which is refused beyond them, and not measured."""
+"""Limits of the command: a command beyond them is refused, and nothing is measured against them."""
 
 
 @dataclass
 class Meter:
-    """Magnitude of a quantity with its `limit`, both in SI units; `warning` and `planned` are shares of the limit, the
-    latter what 95 % of the specimens stay below, NaN if not predicted.
+    """Magnitude of a quantity with its `limit`, both in SI units; `warning` and `planned` are shares of the limit. 95 %
+    of the specimens stay below `planned`, which is NaN if not predicted.
     """
 
     key: str
@@ -72,7 +72,7 @@ class Meter:
 
     @property
     def level(self) -> str:
-        """Level of the style: that of the present magnitude."""
+        """Style level for the present magnitude."""
         share = self.value / self.limit
         return "alarm" if share >= 1.0 else "wait" if share >= self.warning else "good"
 

@@ -31,8 +31,8 @@ _T, _U1, _U2 = (TWIN_TRACE.index(name) for name in ("seconds", "u1", "u2"))
 
 
 def spectrum(time: NDArray[np.float64], drift: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Frequencies [Hz] and amplitudes of the drift, in its unit, of equally spaced samples, both shape (n,); a sine has
-    its amplitude at its line (Hann window).
+    """Frequencies [Hz] and amplitudes of equally spaced samples of the drift, in their unit, both shape (n,). The line
+    of a sine has the height of the sine's amplitude (Hann window).
     """
     window = np.hanning(drift.size)
     lines: NDArray[np.float64] = np.abs(np.fft.rfft((drift - drift.mean()) * window)) * 2.0 / window.sum()
@@ -40,7 +40,7 @@ def spectrum(time: NDArray[np.float64], drift: NDArray[np.float64]) -> tuple[NDA
 
 
 def stroboscopic(time: NDArray[np.float64], values: NDArray[np.float64], omega: float) -> NDArray[np.float64]:
-    """Values, shape (n, m), once per period of `omega` [rad/s], at multiples of the period, shape (k, m)."""
+    """`values`, shape (n, m), interpolated at multiples of the period of `omega` [rad/s], shape (k, m)."""
     period = 2.0 * pi / omega
     at = period * np.arange(np.ceil(time[0] / period), np.floor(time[-1] / period) + 1.0)
     return np.column_stack([np.interp(at, time, column) for column in values.T])

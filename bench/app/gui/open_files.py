@@ -106,7 +106,7 @@ def read_file(path: Path) -> RunFile:
 
 
 def _labels(protocol: str) -> Mapping[str, str]:
-    """Printed names of the results of a protocol; none for one that is not installed."""
+    """Printed names of the results of a protocol; empty for a protocol that is not installed."""
     try:
         return load_protocol(protocol).view.labels
     except RockbenchError:
@@ -144,7 +144,7 @@ def read_stretch(path: Path, run: int, channel: str, begin: float, end: float, p
 
 
 class Place(Enum):
-    """Selection state of an added file: ticked TOO, ticked ALONE, or only listed (ASIDE)."""
+    """Selection of an added file: ticked in addition to others (TOO), ticked ALONE, or only listed (ASIDE)."""
 
     TOO = auto()
     ALONE = auto()

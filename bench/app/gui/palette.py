@@ -62,7 +62,7 @@ def qt_palette(theme: Theme) -> QPalette:
 
 
 def style_sheet(theme: Theme) -> str:
-    """Style beyond the palette; the dynamic property `level` selects the colours of states."""
+    """Style sheet that supplements the palette; the dynamic property `level` selects the colours of states."""
     return f"""
     * {{ font-size: {BASE}pt; }}
     QPushButton {{ min-height: 32px; padding: 2px 14px; }}

@@ -58,7 +58,7 @@ TASKS = {
         "monitor the drift while the laser points at the block. The table is not driven.",
     ),
     OperatorTask.WATCH_STOREYS: (
-        f"Laser 2 must point at storey 2 again: the guard needs it for the drift. {_AT_ZERO}",
+        f"Laser 2 must point at storey 2 again, since the guard monitors the drift with it. {_AT_ZERO}",
         _NOT_CHECKED.format(what="The next test zeroes the signal at the new target."),
     ),
     OperatorTask.TILT_BLOCK: (
@@ -116,7 +116,7 @@ class Prompt(QFrame):
         controller.asked.connect(self._ask)
 
     def _tell(self, event: Event) -> None:
-        """The event precedes the question and contains the kind of task."""
+        """Store the event, which precedes the question and contains the kind of task."""
         if isinstance(event, OperatorAsked):
             self._asked = event
 
@@ -253,7 +253,7 @@ class Tour(QFrame):
         self.setVisible(False)
 
     def give_way(self, reason: str, *, to: bool) -> None:
-        """Hide for a `reason`: more important content needs the space, or the bench is a real one."""
+        """Hide for a `reason`: more important content needs the space, or the bench is not simulated."""
         (self._reasons.add if to else self._reasons.discard)(reason)
         self.setVisible(self._wanted and not self._reasons)
 

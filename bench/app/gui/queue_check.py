@@ -17,7 +17,7 @@ from bench.config.model import BenchConfiguration
 
 @dataclass(frozen=True, eq=False)
 class Checked:
-    """A test whose plan was accepted, with the bench that the `plan` is for."""
+    """A test whose plan was accepted, and the bench for which the `plan` was computed."""
 
     test: Queued
     plan: PlanCheck
@@ -38,7 +38,7 @@ class QueueCheck(QObject):
     good = Signal()
     """All plans were accepted."""
     refused = Signal(object, str)
-    """The test whose plan was refused, or None for all together, and the reason."""
+    """The test whose plan was refused, or None if the tests were refused together, and the reason."""
     changed = Signal()
     """The check of another test has begun."""
 

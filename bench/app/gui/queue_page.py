@@ -225,7 +225,7 @@ class QueuePage(QWidget):
 
 
 def _plain(default: object) -> object:
-    """A default, formatted as in a file."""
+    """A default value, formatted as in a file."""
     return [*cast(tuple[object, ...], default)] if isinstance(default, tuple) else getattr(default, "value", default)
 
 

@@ -20,8 +20,8 @@ GOOD = ("completed", "stopped")
 
 
 class QueueRunner(QObject):
-    """The queue and its running test. The `store` is locked until `close`; without one the queue is not saved. Raises
-    InvalidInput for a store that cannot be read, or that another program has locked.
+    """The queue and its running test. The `store` is locked until `close`; without a store the queue is not saved.
+    Raises InvalidInput for a store that cannot be read, or that another program has locked.
     """
 
     changed = Signal()

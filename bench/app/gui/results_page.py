@@ -114,7 +114,7 @@ def _fill(table: QTableWidget, headings: Sequence[str], tips: Sequence[str], row
 
 
 class ResultsPage(QWidget):
-    """Results of the last run or of any files; ticked files are drawn together."""
+    """Results of the last run or of selected files; ticked files are drawn together."""
 
     def __init__(self, controller: Controller, theme: Theme) -> None:
         super().__init__()

@@ -59,9 +59,9 @@ from bench.events import (
 from bench.protocol import Protocol
 
 GAINS_HEIGHT, LOWEST = 150, 540
-"""Minimum heights of the plot of the protocol, for a readable axis, and of the page, for a whole picture [px]."""
+"""Minimum heights [px] of the protocol's plot, for a readable axis, and of the page, for a complete picture."""
 OLD = 0.5
-"""Age of the newest sample above which it is shown during a run [s]."""
+"""Age of the newest sample above which the age is shown during a run [s]."""
 SHARES = (20, 50, 30)
 """Widths of meters, verdict with plot, and picture with traces, in per cent."""
 
@@ -258,14 +258,14 @@ class RunPage(QWidget):
                 pass
 
     def _finish(self, event: PointFinished) -> None:
-        """Show the result of a point, with the uncertainty that the log and the file state."""
+        """Show the result of a point, with the same uncertainty as in the log and the data file."""
         point, protocol = event.point.model_dump(), self._protocol
         if protocol is None:
             return
         if protocol.log_line is not None:
             self.verdict.say(typeset(protocol.log_line(event.point)))
         elif protocol.view.headline or not self._has_live_value:
-            # a protocol that declares no headline has said it with its live value
+            # for a protocol without a headline, the live value is the verdict
             self.verdict.say(verdict_of(protocol.view, event.point))
         if "alpha_2" not in point:
             return

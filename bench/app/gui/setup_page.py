@@ -1,4 +1,4 @@
-"""The Setup page: configuration, devices, and the check of the loop."""
+"""The Setup page: configuration, devices, and loop check."""
 
 from pathlib import Path
 from typing import cast
@@ -89,7 +89,9 @@ class ConfigurationTree(QTreeWidget):
 
 
 def _line(of: Declared, value: object) -> QTreeWidgetItem:
-    """Add a key with everything below it; its first column stores whether any value there differs from the default."""
+    """Add a key with all keys below it; the first column of its item stores whether any of their values differs from
+    the default.
+    """
     changed = value != of.default
     item = QTreeWidgetItem([of.name, "", ""])
     if isinstance(value, Parameters):
@@ -120,7 +122,7 @@ def _fill(item: QTreeWidgetItem, group: Parameters) -> None:
 
 
 def _groups(value: object) -> list[Parameters]:
-    """The groups of parameters in a value; empty for other values."""
+    """The parameter groups that a value contains; empty for a value without any."""
     several = cast(tuple[object, ...], value) if isinstance(value, tuple) else ()
     return [each for each in several if isinstance(each, Parameters)]
 

@@ -26,7 +26,7 @@ DRIVEN = frozenset({State.ARMED, State.RUNNING, State.STOPPING, State.ABORTING})
 
 @dataclass(frozen=True)
 class Status:
-    """Displayed word and reason, and the style that conveys them by colour and shape."""
+    """Displayed word and reason, and the level and shape by which the style conveys them."""
 
     word: str
     reason: str
@@ -57,7 +57,8 @@ class Arrangement:
     """The specimen on the table and the target of laser 2, from the operator's actions.
 
     `face` is the height above the table [m] at which laser 2 measures the block's face, None while it measures storey
-    2; `tilt` is the rotation [rad] from which the block was released, at which that displacement is zero.
+    2. `tilt` is the rotation [rad] from which the block was released; the displacement measured on the face is zero
+    there.
     """
 
     block: bool = False

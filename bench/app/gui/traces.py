@@ -136,7 +136,7 @@ class TracePlot(QWidget):
         self._fresh = True
 
     def draw(self) -> None:
-        """Update the curves; without new samples they only scroll, and stop after a while."""
+        """Update the curves; without new samples they only scroll, for at most a limited time."""
         if self.stale != self._stale:
             self._stale = self.stale
             self.use_theme(self._theme)
@@ -156,7 +156,9 @@ class TracePlot(QWidget):
             self._fit(k, plot, line)
 
     def _fit(self, k: int, plot: Any, line: NDArray[np.float64]) -> None:
-        """Widen the axis at once, but narrow it only when it is much too wide, since every change redraws it."""
+        """Widen the axis at once, but narrow it only when it is much too wide, since every change of its range causes a
+        redraw.
+        """
         most = max(float(np.nanmax(np.abs(line))) if np.isfinite(line).any() else 0.0, LEAST)
         if not most <= self._reach[k] <= WIDE * most:
             self._reach[k] = HEADROOM * most

@@ -93,7 +93,7 @@ class Trouble:
 
 
 def trouble_of(ended: Ended | Refused, *, driven: bool) -> Trouble | None:
-    """The report of a run that ended with a fault, else None. `driven`: the rig was armed in the run."""
+    """The fault report of a run, None if it ended without a fault. `driven`: whether the rig was armed in the run."""
     if isinstance(ended, Refused):
         return _of_refusal(ended, driven=driven)
     if ended.status in QUIET:

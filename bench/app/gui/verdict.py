@@ -1,4 +1,4 @@
-"""The verdict of a run in one sentence, as large as its space allows."""
+"""The verdict of a run in one sentence, in the largest font that fits."""
 
 from collections.abc import Mapping, Sequence
 from math import isfinite, nan
@@ -20,11 +20,11 @@ from sim.parameters import Parameters, unit_of
 LARGEST, SMALLEST = 48, 14
 """Range of the font size [px]."""
 STRETCH = 80
-"""Width of the letters relative to the usual one [%]."""
+"""Width of the letters relative to their normal width [%]."""
 UNBROKEN = 24
-"""Length of a part of the sentence up to which it is not broken."""
+"""Greatest length of a part of the sentence that is kept on one line."""
 SPACE = 0.31
-"""Largest share of the page's height."""
+"""Largest share of the page's height that the sentence may take."""
 
 
 def verdict_of(view: RunView, finished: Parameters) -> str:
@@ -39,7 +39,7 @@ def verdict_of(view: RunView, finished: Parameters) -> str:
 
 
 def running_verdict(event: Estimate | RunningGain | LiveValue) -> str:
-    """A running value, with its prediction, difference and effort."""
+    """A running value with its prediction, its difference from the prediction, and the measured duration."""
     if isinstance(event, LiveValue):
         label = typeset(event.label)
         value, effort = f"{label}  {measurement(event.value, event.uncertainty, unit_text(event.unit))}", ""
@@ -70,7 +70,7 @@ FLAGS = int(Qt.TextFlag.TextWordWrap | Qt.AlignmentFlag.AlignVCenter | Qt.Alignm
 
 
 class VerdictLabel(QLabel):
-    """Wrapped text in the largest size with which it fits; its tooltip has all of it."""
+    """Wrapped text in the largest font size with which it fits; the tooltip shows the complete text."""
 
     def __init__(self) -> None:
         super().__init__(wordWrap=True)
@@ -95,7 +95,7 @@ class VerdictLabel(QLabel):
         self._fit()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Choose the size again in another width."""
+        """Choose the font size for the new width."""
         super().resizeEvent(event)
         if event.size().width() != event.oldSize().width():
             self._fit()
@@ -128,7 +128,7 @@ class VerdictLabel(QLabel):
 
 
 def _unbroken(part: str) -> str:
-    """A short part without places for a line break."""
+    """A short part of the sentence, with its spaces replaced so that no line break occurs."""
     joined = part.replace(" ", "\N{NO-BREAK SPACE}").replace("/", "/\N{WORD JOINER}")
     return joined if len(part) <= UNBROKEN else part
 

@@ -19,7 +19,7 @@ from bench.document.typography import unit_text as unit_text
 
 
 def set_level(label: QLabel, level: str) -> None:
-    """Give a label the style of a level; Qt re-reads a property only on request."""
+    """Give a label the style of a level; Qt evaluates a changed property only on request."""
     if label.property("level") != level:
         label.setProperty("level", level)
         label.style().unpolish(label)
@@ -27,14 +27,16 @@ def set_level(label: QLabel, level: str) -> None:
 
 
 class ElidingLabel(QLabel):
-    """A line that ends with an ellipsis where its space ends, and has its tooltip then. It never widens a page."""
+    """A one-line label that shortens its text with an ellipsis to the available width and then has a tooltip. It never
+    widens a page.
+    """
 
     def __init__(self, text: str = "") -> None:
         super().__init__(text)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002 - the signature is Qt's
-        """Draw the part that fits."""
+        """Draw the part of the text that fits."""
         painter = QPainter(self)
         area = self.contentsRect()
         shown = self.fontMetrics().elidedText(self.text(), Qt.TextElideMode.ElideRight, area.width())
@@ -85,7 +87,7 @@ def in_screen_unit(unit: str) -> tuple[float, str]:
 class _WheelFilter(QObject):
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: ARG002 - the signature is Qt's
         if event.type() == QEvent.Type.Wheel:
-            # the event scrolls the page below
+            # an ignored event is passed on to the page, which scrolls
             event.ignore()
             return True
         return False

@@ -333,7 +333,7 @@ def test_the_command_says_that_another_wording_was_not_compared(
     path.write_bytes(checked.read_bytes())
     _reworded(path)
     assert main(["replay", str(path)]) == 0
-    assert "older version; its sentences were not compared" in capsys.readouterr().out
+    assert "older version; the wording of its messages was not compared" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
