@@ -74,7 +74,7 @@ class Branch:
 
 @dataclass(frozen=True, eq=False)
 class SteadyPrediction:
-    """Steady motions under a sine: the block rocks or rests. Both, one or neither exist at a point."""
+    """Steady motions under a sine, with the block rocking and at rest. Both, one or neither exist at a point."""
 
     omega: Quantity
     beta: Quantity

@@ -26,7 +26,7 @@ from sim.loading import BENCH, load_model
 from sim.parameters import Parameters
 
 SPARE = 3.0
-"""Factor on the expected duration, since every start may fail and every motion may settle slowly."""
+"""Factor on the expected duration: every start may fail, and every motion may settle slowly."""
 
 OVERHEAD = 1.1
 """Factor for everything but the samples: blocks, events, estimates, tables, and the overhead of the format."""
@@ -84,7 +84,7 @@ def _readable(size: int) -> str:
 
 
 DIGITS = 9
-"""Significant digits of computed numbers in the hash, independent of differences between processors."""
+"""Significant digits of computed numbers in the hash, few enough to be equal on all processors."""
 
 
 def plan_hash(
@@ -139,7 +139,7 @@ class Preflight:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Processing of the input."""
+        """Notes on the processing of the input."""
         return (*self.scales, *self.forecast.notes)
 
     @property

@@ -59,11 +59,11 @@ def run_session(
     progress: Progress = silent,
 ) -> SessionResult:
     """Run a `prepared` protocol on its bench; write data file, figures and summary to the folder `out`. `opened` is
-    called before the table moves, with the rig and a function that publishes an event of the run; both may be used
-    only while the engine calls a subscriber. `about` is
-    stored in the data file with the metadata of the run: the operator's name, notes. `progress` reports the stages
-    before the rig is opened and after it is closed. Raises InvalidInput before the table moves, or KeyboardInterrupt if
-    an end was requested by then. Once the rig is armed, every ending is a result with a status.
+    called before the table moves, with the rig and a function that publishes an event of the run; both may be used only
+    while the engine calls a subscriber. `about` (the operator's name, notes) is stored in the data file with the
+    metadata of the run. `progress` reports the stages before the rig is opened and after it is closed. Raises
+    InvalidInput before the table moves, or KeyboardInterrupt if an end was requested by then. Once the rig is armed,
+    every ending is a result with a status.
     """
     started = time.monotonic()
     name = f"the protocol {protocol.name}"
@@ -74,7 +74,7 @@ def run_session(
         with plugin_code(name, files=True):
             preflight = compile_run(protocol.name, prepared, out, progress)
         preflight.require()
-        # after the hash of the plan, which does not depend on the speed
+        # set after the plan was hashed, because the hash must not depend on the speed
         configuration = prepared.configuration.at_pace(realtime=realtime)
         progress("predicting the results")
         with plugin_code(name):

@@ -85,7 +85,7 @@ class Campaign:
 
     @cached_property
     def known(self) -> SpecimenKnowledge:
-        """Knowledge of the specimen in a steady motion on the table of the file."""
+        """The specimen's properties with their uncertainty, for steady motions on the table of the recorded bench."""
         return SpecimenKnowledge() if self.configuration is None else self.configuration.known_on_table
 
     @cached_property

@@ -17,9 +17,9 @@ COLUMNS = 2
 
 
 def attractor_figure(points: Mapping[str, NDArray[Any]], gains: Sequence[NDArray[np.float64]]) -> "Figure":
-    """Arguments are the arrays of the table from `bench.prediction.attractors`, and the gains of the last cycles for
+    """`points` are the arrays of the table from `bench.prediction.attractors`; `gains` are those of the last cycles for
     each of its rows, empty after a fall. A dot is the peak of a cycle; the line is the orbit, dashed where it is
-    unstable on the table.
+    unstable on the shake table.
     """
     betas = np.unique(points["beta"])
     across = min(COLUMNS, betas.size)

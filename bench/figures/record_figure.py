@@ -48,7 +48,7 @@ FIT_COLOURS = (GREY, BLUE, VERMILLION)
 
 @dataclass(frozen=True, eq=False)
 class RecordPicture:
-    """Record: `acceleration` [m/s2], `velocity` [m/s] and `displacement` [m], shape (n,), every `dt` [s].
+    """A record: `acceleration` [m/s2], `velocity` [m/s] and `displacement` [m], shape (n,), every `dt` [s].
 
     `spectrum` is the pseudo-acceleration [m/s2] at `periods` [s] of oscillators with the damping ratio `damping`.
     """

@@ -205,7 +205,7 @@ class RunOptions:
     ask: Annotated[
         bool, switch("Ask the operator even on the simulated bench, which otherwise performs the tasks itself.")
     ] = False
-    realtime: Annotated[bool, switch("Run the simulated bench in real time, not as fast as possible.")] = False
+    realtime: Annotated[bool, switch("Run the simulated bench in real time instead of as fast as possible.")] = False
     json: Annotated[
         bool,
         switch("Print one JSON object, the summary of the run or its margins, on standard output, and nothing else."),

@@ -18,7 +18,7 @@ WORDS = {
 NO_SESSION, STARTING, PLANNING, NO_LINK = "NO RUN", "STARTING", "PLANNING", "NO LINK"
 NO_SESSION_WHY = "no run has been started in this window; choose a protocol"
 RUN_ELSEWHERE, ATTACHING = "RUN ELSEWHERE", "ATTACHING"
-ELSEWHERE = "a run is under way on this machine: {run}; attach to see and stop it"
+ELSEWHERE = "a run is under way on this computer: {run}; attach to watch or stop it"
 ATTACHING_WHY = "waiting for the session: {run}"
 PLANNING_LATE = "no message for {age:.0f} s: the computer is busy; nothing is armed"
 ATTACHED_RUN = "{owner}'s run: {run}."
@@ -27,7 +27,7 @@ ATTACHED_CONTROLS = "Its window is lost; its questions can be answered in this w
 OWNERS = {"window": "another window", "terminal": "a terminal"}
 UNNAMED = "operator at the window"
 OWN_RUN = "This window's run: {run}."
-ATTACH, ATTACH_TIP = "Attach", "Shows the run that is under way on this machine, with its STOP (Ctrl+Shift+A)."
+ATTACH, ATTACH_TIP = "Attach", "Shows the run that is under way on this computer; STOP then stops it (Ctrl+Shift+A)."
 DETACH, DETACH_TIP = "Detach", "Leaves the run, which is not affected (Ctrl+Shift+A)."
 STARTING_WHY = "starting the session process"
 NO_LINK_WHY = (
@@ -66,15 +66,15 @@ CHECKING = "Computing the plan …"
 START = "Start"
 START_TIP = "Starts the run (Ctrl+Return)."
 START_BUSY = "a run is under way"
-START_ELSEWHERE = "another program is driving a real bench on this machine: attach to its run"
+START_ELSEWHERE = "another program is driving a real bench on this computer: attach to its run"
 START_UNCHECKED = "check the plan first"
 START_BAD = "a value is invalid: see the form"
 START_REFUSED = "the plan was refused"
-REALTIME, REALTIME_TIP = "&Real time", "Runs the simulated bench in real time, not as fast as possible."
-ASK, ASK_TIP = "Ask me", "Requests operator tasks even if the bench can perform them."
+REALTIME, REALTIME_TIP = "&Real time", "Runs the simulated bench in real time instead of as fast as possible."
+ASK, ASK_TIP = "Ask me", "Asks you to confirm operator tasks even if the simulated bench can perform them."
 ASK_REAL_TIP = (
-    "Every question waits for your answer. If unchecked, the run is unattended: every question is "
-    "answered yes, as with --yes. Only for runs without operator tasks."
+    "Every question waits for your answer. If unchecked, the run is unattended: every question is answered yes, as "
+    "with --yes. Uncheck only for runs without operator tasks."
 )
 UNATTENDED = "Unattended: every question of this run is answered yes. Complete all operator tasks before the start."
 GO_ON = "Continue without this window"
@@ -153,7 +153,7 @@ ON_BLOCK = {
 }
 """Labels of the laser 2 traces while it measures the block."""
 FRAME_AND_BLOCK = "Frame: measured. Block: model, driven by the measured table motion"
-FACTOR = "motion drawn"
+FACTOR = "magnification"
 FACTOR_TIP = "Magnification of the motion relative to the frame: use the wheel, or + and −, on the picture."
 
 OPEN, OPEN_TIP = "Open a file …", "Opens the campaign.h5 of a run (Ctrl+O)."
@@ -161,8 +161,8 @@ OPEN_BESIDE = "{why}; a path can be typed at any time"
 FILE_TOLD = "{path}\n{start}, {status}: {summary} ({length} of samples)"
 RUN_FILES = "campaign (*.h5)"
 CONFIGURATION_FILES, SPECIMEN_FILES = "configuration (*.toml)", "specimen (*.json)"
-REMOVE, REMOVE_TIP = "Close file", "Removes the selected file from this page; the file itself is kept."
-PATH, FILES = "or type a path, Enter", "open files"
+REMOVE, REMOVE_TIP = "Close file", "Removes the selected file from this page; it is not deleted."
+PATH, FILES = "or type a path and press Enter", "open files"
 FILES_TIP = "The selected file is shown. Ticked files are drawn together; the first ticked file is the reference."
 GAINS, POINTS, COMPARISON, SAMPLES, FIGURE = "Points", "points", "Comparison", "Samples", "Figure"
 NO_FIGURE = "The run wrote no figure."
@@ -213,9 +213,8 @@ FAILED = (
 )
 
 WELCOME = (
-    "Guided tour: this is the simulated bench; no hardware moves. The form contains one harmonic point, "
-    "which runs as fast as the computer allows; tick Real time for the speed of a real bench, about four "
-    "minutes."
+    "Guided tour: this is the simulated bench; no hardware moves. The form contains one harmonic point, which runs as "
+    "fast as the computer allows; tick Real time for the speed of a real bench (about four minutes)."
 )
 TOUR = (
     "Check the plan (Ctrl+K)",
@@ -228,13 +227,13 @@ CONFIGURATION = "Configuration"
 VIRTUAL_SHORT = "simulated bench"
 VIRTUAL = "the simulated bench with the paper's specimen (no configuration file was given)"
 
-OWN_ERROR = "an error in the window, not in the bench: {error}. The run continues; details are in the terminal."
+OWN_ERROR = "error in the window, not in the bench: {error}. The run continues; details are in the terminal."
 
 
 TROUBLE, TROUBLE_DETAILS, TROUBLE_CLOSE = "Needs attention", "Details", "Hide"
 TROUBLE_PARTS = ("Event", "Reaction of the bench", "Next step")
 TROUBLE_DETAILS_TIP = "Shows the full error message, for the developers (Ctrl+Shift+I)."
-TROUBLE_CLOSE_TIP = "Hides this message; it stays in the log and in the file (Ctrl+Shift+H)."
+TROUBLE_CLOSE_TIP = "Hides this message; it stays in the log and in the data file (Ctrl+Shift+H)."
 CONFIGURATION_TITLES = ("key", "value", "unit")
 OPEN_CONFIGURATION = "Open a configuration …"
 OPEN_CONFIGURATION_TIP = (
@@ -268,12 +267,12 @@ CHECK_IN = "Results are in {out}."
 CHECK_CUT = "The check was interrupted."
 CHECK_TABLE_TIP = "The tooltip of a failed line gives the remedy."
 ASK_CHECK_TIP = "The frame is clamped and unclamped by hand, so on this bench the check always asks."
-CHECK_TITLES = ("verdict", "of", "what", "measured", "U (k = 2)", "allowed")
+CHECK_TITLES = ("verdict", "signal", "quantity", "measured", "U (k = 2)", "allowed")
 
 ADD, ADD_TIP = "Add to queue", "Appends the checked plan to the queue (Ctrl+J)."
 SAVE, SAVE_TIP = "Save in queue", "Replaces test {number} of the queue by the checked plan (Ctrl+J)."
-LEAVE, LEAVE_TIP = "Discard changes", "Ends the editing; the test in the queue stays unchanged (Esc)."
-TAKE_IN = "Take in"
+LEAVE, LEAVE_TIP = "Discard changes", "Ends editing; the test in the queue stays unchanged (Esc)."
+TAKE_IN = "Restore"
 QUEUE_TIP = "Tests run from top to bottom. Enter opens a pending test in the form."
 QUEUE_TITLES = ("", "state", "protocol", "parameters", "results in", "result or options")
 STAGES = {
@@ -291,13 +290,13 @@ QUEUE_HOLDS = "the queue is running: pause it first"
 QUEUE_IDLE, QUEUE_GOING, QUEUE_LAST = "{n} waiting.", "Running; {n} waiting.", "Pausing after this test; {n} waiting."
 QUEUE_CHECKING = "Checking the plan of test {number}; {n} waiting."
 QUEUE_PAUSED = "▲ Paused: {why} {n} waiting."
-QUEUE_STOPPED = "STOP was pressed; clear it next to STOP."
+QUEUE_STOPPED = "STOP was pressed: use Clear STOP first."
 QUEUE_ENDED = "test {number} was {status}."
 QUEUE_REFUSED = "the plan of test {number} was refused."
 QUEUE_FILE = "Saved in {path}; `rockbench queue` runs the same file."
 QUEUE_UNKEPT = "Not saved: the queue is lost when this window closes."
 QUEUE_OWNER = "the operator's window"
-QUEUE_GONE = "The edited test has begun, or was skipped or removed: it was not changed."
+QUEUE_GONE = "The edited test has begun or was skipped or removed, so it was not changed."
 QUEUE_GONE_DID = "The queue is unchanged."
 QUEUE_GONE_NOW = "The edited values are still on the Protocol page: check and add them, or edit the test again."
 QUEUE_DID = "The queue is paused. The pending tests are unchanged in the file."
@@ -311,7 +310,7 @@ QUEUE_NOW = (
 )
 OPTIONS = {
     "realtime": "real time",
-    "ask": "asks",
+    "ask": "asks operator",
     "unattended": "unattended",
     "keep_going": "continues without the window",
 }
@@ -325,7 +324,7 @@ POINT_MARKS = {
     "overturned": ("✕", "alarm"),
     "not played": ("–", "calm"),
 }
-"""Mark of a point and level of its style, by its status; that of a finished point for any other."""
+"""Mark of a point and level of its style, by its status; any other status has those of a finished point."""
 EXPECTED = "≈ {time:%H:%M}"
 METERS = {
     "displacement": "table displacement",
@@ -334,8 +333,8 @@ METERS = {
     "force": "force on the table",
     "current": "coil current",
     "heating": "coil heating",
-    "laser_1": "laser 1, of its range",
-    "laser_2": "laser 2, of its range",
+    "laser_1": "laser 1 range used",
+    "laser_2": "laser 2 range used",
     "drift": "drift",
 }
 MOTION_AXES = {
@@ -350,8 +349,8 @@ MOTION_NAMES = {
     "Poincaré": "Poincaré section of the drift, once per period of the sine",
 }
 TRACES_TAB = "traces"
-LOG_FILTER, LOG_FILTER_TIP = "filter the log", "Shows only the lines with this text (Ctrl+Shift+L)."
-NOTE_FIELD, NOTE_ADD = "note for log and file, Enter", "Note"
+LOG_FILTER, LOG_FILTER_TIP = "filter the log", "Shows only the lines that contain this text (Ctrl+Shift+L)."
+NOTE_FIELD, NOTE_ADD = "add a note, press Enter", "Note"
 NOTE_ADD_TIP = "Adds the text to the log and to the data file, with the bench time (Ctrl+Shift+N)."
 NO_VALUE = "–"
 TIME_TO_LIMIT = "limit in {seconds:.0f} s"

@@ -60,12 +60,12 @@ _NOW_DISK = (
 NOW = {
     "request": "Clear STOP in the bar at the top when the bench is safe. A new run starts from the beginning.",
     "client_lost": (
-        "This window did not respond for some seconds. Close other programs, then start again; *Continue without this "
-        "window* lets a run continue."
+        "This window did not respond for some seconds. Close other programs, then start again. With *Continue without "
+        "this window*, a run would continue in this case."
     ),
     "declined": "Complete the task, or remove it from the plan, then start again.",
     "safety_input": (
-        "Find the cause at the bench and reset the input there; the header shows it as good in the next run."
+        "Find the cause at the bench and reset the input there; in the next run, the header shows the input as good."
     ),
     "limit": NOW_LIMIT,
     "disk": _NOW_DISK,

@@ -86,8 +86,8 @@ FIRST = (1280, 800)
 
 
 class Window(QMainWindow):
-    """The operator's window. Every part is a client of `controller`. `settings` stores the layout, None does not;
-    `queue` is the file of the queue, None does not store it. With `tour` the guided tour is shown.
+    """The operator's window. Every part is a client of `controller`. `settings` stores the layout (None: not stored);
+    `queue` is the file of the queue (None: not stored). With `tour` the guided tour is shown.
     """
 
     def __init__(
@@ -114,7 +114,7 @@ class Window(QMainWindow):
         self.runner = self._runner(configuration, queue)
         self.setup = SetupPage(controller, configuration, path, theme)
         self.protocol = ProtocolPage(controller, configuration, entries, tour)
-        # the tour is finished within a minute
+        # not in real time, so that the tour takes less than a minute
         self.protocol.realtime.setChecked(not tour)
         self.queue = QueuePage(controller, self.runner, entries)
         self.run, self.results = RunPage(controller, theme), ResultsPage(controller, theme)
@@ -164,7 +164,7 @@ class Window(QMainWindow):
         return super().eventFilter(watched, event)
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        """Ask before closing during a run that this window drives; otherwise store the layout and disconnect."""
+        """Ask before closing during a run that this window controls; otherwise store the layout and disconnect."""
         drives = self._controller.running and self._controller.attached is None
         if drives and not self._leaving:
             self.leave_panel.ask(goes_on=self._goes_on)
@@ -182,7 +182,7 @@ class Window(QMainWindow):
         self.close()
 
     def _runner(self, configuration: BenchConfiguration, queue: Path | None) -> QueueRunner:
-        """The queue of the file; a file that cannot be read is not changed, and the queue is then not saved."""
+        """The queue stored in the file. A file that cannot be read is not changed, and the queue is then not saved."""
         try:
             store = None if queue is None else QueueFile(queue)
             return QueueRunner(self._controller, configuration, store, self)

@@ -22,7 +22,7 @@ from sim import waiting
 @contextmanager
 def announced(server: SessionServer, run: Run, owner: str) -> Generator[None]:
     """Context manager in which clients can attach to the session of `server`, which carries out `run` for its `owner`,
-    "window" or "terminal". If that is impossible, the run has a warning, and its owner is the only client.
+    "window" or "terminal". If that is impossible, a warning is published and the owner is the only client.
     """
     folder = sessions_folder()
     if folder is None:
@@ -61,7 +61,7 @@ def announced(server: SessionServer, run: Run, owner: str) -> Generator[None]:
         try:
             _authenticate(connection, key)
         except (OSError, EOFError, AuthenticationError, ValueError, AssertionError):
-            # another program of this user, or a client that left at once
+            # the connection is from another program of this user, or from a client that left at once
             connection.close()
             return
         if over.is_set():
@@ -93,7 +93,7 @@ def announced(server: SessionServer, run: Run, owner: str) -> Generator[None]:
 
 
 class _Limited:
-    """A connection whose other side must send each message within `PATIENCE`; otherwise raises TimeoutError."""
+    """A connection that raises TimeoutError unless each message arrives within `PATIENCE`."""
 
     def __init__(self, connection: Connection) -> None:
         self._connection = connection

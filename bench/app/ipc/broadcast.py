@@ -98,7 +98,7 @@ class Broadcast:
             self._queues = [each for each in self._queues if each is not queue]
 
     def answered(self) -> None:
-        """The open question is answered: clients that join later do not receive it."""
+        """Discard the answered question: clients that join later do not receive it."""
         with self._lock:
             self._last.pop(Question, None)
 

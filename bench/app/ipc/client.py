@@ -1,4 +1,4 @@
-"""The client's side of the connection: starts the session process, sends requests, buffers its messages."""
+"""The client's side of the connection: starts the session process, sends requests, buffers the session's messages."""
 
 import json
 import secrets
@@ -52,7 +52,8 @@ class ClientConnection:
 
     The client's main loop must call `alive` at least every `bench.app.ipc.messages.BEAT` seconds; otherwise the session
     considers the client frozen. `heard` is called in a thread of the connection when messages have arrived. `out` is
-    the folder of a run, whose files tell how it ended if its last message was lost; None without one.
+    the folder of a run, from whose files the end of the run is read if its last message was lost; None for other
+    sessions.
     """
 
     def __init__(self, out: Path | None, heard: Callable[[], None]) -> None:
@@ -76,7 +77,7 @@ class ClientConnection:
         self._outgoing.put(Answer(number, agreed))
 
     def note(self, text: str, by: str) -> None:
-        """Add a note of the operator `by` name to log and file."""
+        """Add a note to the log and to the data file; `by` is the operator's name."""
         self._outgoing.put(Note(text, by))
 
     def take(self) -> list[FromSession]:
@@ -136,18 +137,20 @@ class ClientConnection:
                 connection.send(message)
 
     def _end_unheard(self, text: str, details: str, *, by_files: bool = True) -> None:
-        """Report a session that ended without a final message: by its files if it wrote them, else with `text`."""
+        """Report a session that ended without a final message: from its files if it wrote them, else with `text`."""
         if self._over:
             return
         if by_files and (ended := self._by_the_files()) is not None:
             self._keep(ended)
         else:
-            # not a message of the session: the status stays "no link"
+            # not a final message of the session, so the status stays "no link"
             self._received.append(Refused(text, failed=True, details=details))
         self._tell()
 
     def _by_the_files(self) -> Ended | None:
-        """If the final message was lost, the end of a run from its summary file, if any."""
+        """The end of a run as stated in its summary file, to replace a lost final message; None without a readable
+        file.
+        """
         if self._out is None:
             return None
         with suppress(OSError, ValueError, KeyError):

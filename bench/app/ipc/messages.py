@@ -69,7 +69,7 @@ class Answer:
 
 @dataclass(frozen=True)
 class Note:
-    """A note of the operator for log and file, by the person of this name."""
+    """A note for the log and the data file; `by` is the operator's name."""
 
     text: str
     by: str
@@ -252,8 +252,8 @@ FromClient = Ask | Answer | Note | Alive | Leave
 
 
 def receive(connection: Connection) -> object | None:
-    """The next message; None for one that only another version of the program knows, which can be stopped nevertheless.
-    Raises EOFError or OSError at the end of the connection.
+    """The next message; None for a message that only another version of the program defines, so that a session of that
+    version can be stopped nevertheless. Raises EOFError or OSError at the end of the connection.
     """
     data = connection.recv_bytes()
     try:

@@ -1,4 +1,4 @@
-"""The session's side of the connection: sends events and traces, handles the client's requests and detects its loss."""
+"""The session's side of the connection: sends events and traces, handles requests, detects the loss of the client."""
 
 import signal
 import threading
@@ -90,10 +90,11 @@ _LOOK = 0.1
 class SessionServer:
     """Serves the clients of a session, each by a sending and a receiving thread; the engine waits for none of them.
 
-    The `owner` is the client that started the session, None for a session that a terminal drives. `lost(why)` is called
-    in a receiving thread when the owner has disconnected or is silent, and again after each reconnection. Clients that
-    `attach` may stop the run, and answer questions while the owner is lost. `pending` is called in a receiving thread:
-    whether the main thread polls no requests at present, so that it must be interrupted.
+    The `owner` is the client that started the session, None for a session that a terminal started. `lost(why)` is
+    called in a receiving thread when the owner has disconnected or is silent, and again after each reconnection.
+    Clients that `attach` may stop the run, and answer questions while the owner is lost. `pending`, called in a
+    receiving thread, returns whether the main thread is not polling for requests at present and must therefore be
+    interrupted.
     """
 
     def __init__(
@@ -146,7 +147,7 @@ class SessionServer:
             self.publish(OperatorNote(note.text, note.by))
 
     def close(self, last: FromSession, timeout: float) -> None:
-        """Send the queues and then `last`; gives up after `timeout` seconds."""
+        """Send the queued messages and then `last`; gives up after `timeout` seconds."""
         self.outbox.put(last, always=True)
         end = now() + timeout
         for sent in tuple(self._sending):
@@ -193,14 +194,14 @@ class SessionServer:
             with suppress(EOFError, OSError):
                 while True:
                     if not connection.poll(PATIENCE):
-                        # a frozen window answers no question
+                        # a silent client may be a frozen window, which answers no question
                         self._attending.discard(queue)
                         continue
                     message = receive(connection)
                     self._attending.add(queue)
                     if isinstance(message, Leave):
                         break
-                    # the run is the owner's while the owner is present; STOP is everybody's
+                    # only the owner controls the run while present, but every client may stop it
                     stops = isinstance(message, Ask) and message.end in ("abort", "halt")
                     if not self.connected or isinstance(message, Note) or stops:
                         self._heed(message)
@@ -216,7 +217,7 @@ class SessionServer:
         self._lost(why)
 
     def _find(self, *, present: bool) -> None:
-        """Give the control of the run to the attached clients, or back to the owner."""
+        """Transfer the control of the run to the attached clients, or back to the owner."""
         if present != self.connected:
             self.connected = present
             for queue in tuple(self._attached):
@@ -258,7 +259,8 @@ class RemoteOperator:
                     answer = self._host.answers.get(timeout=_LOOK)
                     if answer.number == self._number:
                         return answer.agreed
-                # the engine's thread waits while a person works at the bench
+                # the engine's thread, the only one that may read the inputs, waits here while a person works at the
+                # bench
                 self._host.inputs.look()
                 self._host.publish_notes()
             return False

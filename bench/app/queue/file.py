@@ -17,7 +17,7 @@ from sim.parameters import Parameters, quantity
 ITEM = "queue file"
 FORMAT, VERSION = "rocking-bench queue", 1
 REMEDY = "add the test there, close that program first, or choose another file"
-LEFT = "abandoned during its run: see the status in its folder"
+LEFT = "abandoned during its run: see the status in its results folder"
 
 
 class _Tests(Parameters):

@@ -152,9 +152,9 @@ class _Paper:
         peak = 1.2 * self._specimen.uplift_acceleration
         parts: list[Part] = [
             *_of_what(self._request.records),
-            f"Every record is scaled to a peak of {peak:.4g} m/s² (1.2 g/λ), at its own time scale, both "
-            f"unfiltered and limited to the band of a long-stroke shaker, {self._band}. Motions start from rest; "
-            "a block that topples has no gain. Statement 8 is checked on both.",
+            f"Every record is scaled to a peak of {peak:.4g} m/s² (1.2 g/λ), without a change of its time scale, both "
+            f"unfiltered and limited to the band of a long-stroke shaker, {self._band}. Motions start from rest; a "
+            "block that topples has no gain. Statement 8 is checked on both.",
         ]
         parts.append(motions_table([curve for curves in self._curves.values() for curve in curves]))
         for words, curves in self._curves.items():

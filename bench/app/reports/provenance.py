@@ -42,7 +42,10 @@ def provenance_section(campaign: Campaign) -> Section:
 def provenance_line() -> str:
     """The line below the title: date and program of the report, definition of its gains."""
     maker = program(software()[NAME], revision(), SHORT)
-    units = "α₂ is the ratio of the peak drift of the coupled frame to that of the bare one, α₁ that of u₁ (Eq. 10)."
+    units = (
+        "α₂ is the ratio of the peak drift of the coupled frame to that of the bare frame, α₁ the same ratio of the "
+        "peaks of u₁ (Eq. 10)."
+    )
     return f"Report created on {moment(datetime.now(UTC).isoformat())} by {maker}. {units}"
 
 
@@ -128,8 +131,8 @@ def facts_table(caption: str, facts: Mapping[str, str]) -> Table:
 
 
 def parameters_table(caption: str, kind: type[Parameters] | None, values: Mapping[str, Any]) -> Table:
-    """Parameters with description, name, value and unit. Parameters of another version that are not declared here
-    follow by name only.
+    """Parameters with description, name, value and unit. Parameters that this version does not declare follow, by name
+    only.
     """
     rows = list(_declared_rows(kind, values, "")) if kind is not None else []
     known = {row[1] for row in rows}

@@ -114,7 +114,10 @@ def limits_section(campaign: Campaign) -> Section:
     record, damaged = campaign.record, campaign.integrity.failing
     parts: list[Part] = []
     if damaged:
-        parts += ["Changed since it was written:", Listing(list(damaged.values())[:MOST_LISTED])]
+        parts += [
+            "Datasets that were damaged or changed since the file was written:",
+            Listing(list(damaged.values())[:MOST_LISTED]),
+        ]
     if record.status not in ("completed",):
         parts.append(Notice(f"The campaign was not completed: {record.status}. {typeset(record.summary)}".strip()))
     warnings = list(_warnings(campaign))
@@ -143,10 +146,12 @@ def damage_notice(campaign: Campaign) -> list[Notice]:
     """The first notice of a report, on datasets that do not match their checksum or have none."""
     found = campaign.integrity
     if found.failing:
-        what = counted(len(found.failing), "dataset")
+        what = counted(
+            len(found.failing), "dataset does not match its checksum", "datasets do not match their checksums"
+        )
         text = (
-            f"DAMAGED OR CHANGED since it was written: {what} of the file, listed in the section Limits and "
-            "warnings, do not match their checksums. Results in this report that depend on them are not reliable."
+            f"This file was DAMAGED OR CHANGED since it was written: {what} (see the section Limits and warnings). "
+            "Results in this report that depend on these data are not reliable."
         )
         return [Notice(text)]
     if found.unchecked:

@@ -41,7 +41,7 @@ def specimen_section(
         "Every prediction in this report was computed from these values."
     )
     if uncertainty is None:
-        text += " They are those of the paper's Tables 1 to 3 unless stated otherwise, and treated as exact."
+        text += " They are those of the paper's Tables 1 to 3 unless stated otherwise, and are treated as exact."
     measured = () if identified is None else identified.names
     parts: list[Part] = [text, _parameters(specimen, uncertainty, measured), _derived(specimen)]
     if identified is not None and identified.findings:

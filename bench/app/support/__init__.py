@@ -1,1 +1,1 @@
-"""Support of an installation: checks of the machine, and collection of fault reports."""
+"""Support of an installation: checks of the computer, and collection of fault reports."""

@@ -1,6 +1,6 @@
-"""Keeps the computer awake during a run in real time: sleep would end it, with the drive at its last value.
+"""Keeps the computer awake during a run in real time: sleep would interrupt the run with the drive at its last value.
 
-Suspension of USB devices cannot be inhibited by a program: `rockbench doctor` checks its settings.
+A program cannot inhibit the suspension of USB devices; `rockbench doctor` checks the settings for it.
 """
 
 import os
@@ -23,7 +23,7 @@ COMMANDS = {
     ),
     "darwin": ("caffeinate", "-i", "-w", str(os.getpid())),
 }
-"""Programs that keep the computer awake until their standard input ends, or this process does."""
+"""Programs that keep the computer awake until their standard input or this process ends."""
 
 
 @contextmanager
@@ -37,7 +37,7 @@ def awake(system: str = sys.platform) -> Generator[bool]:
     process = None
     if command is not None:
         with suppress(OSError):
-            # in a session of its own: Ctrl-C is to reach this program alone
+            # in a separate session, so that Ctrl-C does not reach the inhibiting program
             process = subprocess.Popen(
                 command,
                 stdin=subprocess.PIPE,
@@ -59,7 +59,7 @@ def awake(system: str = sys.platform) -> Generator[bool]:
 
 @contextmanager
 def _thread_required(set_state: Callable[[int], int]) -> Generator[bool]:
-    """Request a running system for this thread, and withdraw the request; `set_state` returns 0 when it fails."""
+    """Context manager in which this thread requires a running system; `set_state` returns 0 when it fails."""
     required = set_state(CONTINUOUS | SYSTEM_REQUIRED) != 0
     try:
         yield required

@@ -1,4 +1,4 @@
-"""Checks of the machine on which a bench is to run, each with a remedy."""
+"""Checks of the computer on which a bench is to run, each with a remedy."""
 
 import importlib.util
 import os
@@ -49,7 +49,7 @@ class Finding:
 
 
 def examine(folder: Path, port: str | None = None) -> Iterator[Finding]:
-    """Check the machine, for results in `folder`; `port` is the address host:port of a device server.
+    """Check this computer for runs with results in `folder`; `port` is the address host:port of a device server.
 
     A check that cannot be carried out is reported as unknown.
     """
@@ -158,19 +158,21 @@ def usb_suspend(devices: Path = Path("/sys/bus/usb/devices"), system: str = sys.
     suspended = [path.parent.parent for path in sorted(devices.glob("*/power/control")) if _read(path) == "auto"]
     ours = [device.name for device in suspended if _read(device / "idVendor") in _VENDORS]
     if not ours:
-        return Finding(item, Health.GOOD, "no device of NI and no serial adapter is suspended")
-    remedy = f"write on to power/control of each in {devices}, or add a udev rule that does so"
+        return Finding(item, Health.GOOD, "no NI device and no serial adapter is suspended")
+    remedy = f"write the word on to the file power/control of each device in {devices}, or add a udev rule that does so"
     return Finding(item, Health.BAD, f"may be suspended: {', '.join(ours)}", remedy)
 
 
 _SELECTIVE = "48e6b7a6-50f5-4782-a5d4-53bb8f07e226"
 """Identifier of the setting "USB selective suspend" (Microsoft's documentation of power settings)."""
 _VENDORS = {"3923": "NI", "0403": "FTDI", "10c4": "Silicon Labs", "067b": "Prolific", "1a86": "WCH"}
-"""Makers of USB devices of a bench, by identifier."""
+"""Vendors of the USB devices of a bench, by identifier."""
 
 
 def _usb_suspend_of_windows(told: str) -> Finding:
-    """Judge the answer of powercfg: the last number is the setting on batteries, the one before that on mains power."""
+    """Evaluate the output of powercfg: the last number is the setting on battery, the number before it the setting on
+    mains power.
+    """
     item = "USB suspend"
     found = [word for word in told.split() if word.startswith("0x")]
     if len(found) < 2:
