@@ -1,5 +1,5 @@
 """Physics of the bench: equations of specimen, table and sensors.
 
-Independent of instruments, files, screens and protocols. Importing this package compiles nothing;
-`sim.kernel` holds the compiled functions and is imported by the part that runs them.
+Independent of instruments, files, screens and protocols. Importing this package compiles nothing: the modules that run
+compiled functions import them from `sim.kernel` when needed.
 """

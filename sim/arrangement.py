@@ -1,4 +1,4 @@
-"""Specimen on the table, with clamps and manual restraints: system constants, and motion of the laser targets."""
+"""Specimen on the table, with clamps and manual restraints: system constants and motion of the laser targets."""
 
 from dataclasses import dataclass, replace
 from math import inf
@@ -21,10 +21,10 @@ Array = NDArray[np.float64]
 class Arrangement:
     """A specimen with its clamps and manual restraints.
 
-    table_locked : the table is clamped to the ground at mid stroke. block_clamped : the block is clamped to the table:
-    it moves with the table, and the spring is fixed to it. watched : height [m] at which laser 2 measures the block's
-    face; None if it measures storey 2. tilt : rotation [rad] at which the block is held by hand; 0 when it is free.
-    pull : displacement [m] at which storey 2 is held by hand; 0 when it is free.
+    `table_locked`: the table is clamped to the ground at mid stroke. `block_clamped`: the block is clamped to the table
+    and moves with it, and so does the end of the spring. `watched`: height [m] at which laser 2 measures the block's
+    face; None if it measures storey 2. `tilt`: rotation [rad] at which the block is held by hand; 0 if it is free.
+    `pull`: displacement [m] at which storey 2 is held by hand; 0 if it is free.
     """
 
     specimen: Specimen
@@ -40,7 +40,7 @@ class Arrangement:
         return self.tilt != 0.0 or self.pull != 0.0
 
     def let_go(self) -> "Arrangement":
-        """The same arrangement after the parts held by hand have been released."""
+        """Return the same arrangement after the parts held by hand have been released."""
         return replace(self, tilt=0.0, pull=0.0)
 
     def storeys(self) -> tuple[float, float]:
@@ -51,8 +51,9 @@ class Arrangement:
     def plant(self, shaker: Shaker, catch_angle: float) -> "Plant":
         """Constants of the moving system for `sim.kernel.table`.
 
-        A part clamped to the ground and a storey held by hand have an infinite mass: the forces on it are finite,
-        so its acceleration is exactly 0, and an impact on a locked table has exactly the restitution r of fixed ground.
+        A part clamped to the ground and a storey held by hand have infinite mass. The forces on them are finite, so
+        that their acceleration is exactly 0, and an impact on a locked table has exactly the restitution r of fixed
+        ground.
         """
         plant = plant_of(self.specimen, shaker, catch_angle)
         if self.block_clamped:
@@ -106,9 +107,9 @@ def plant_of(specimen: Specimen, shaker: Shaker, catch_angle: float) -> "Plant":
 def sights(states: Array, arrangement: Arrangement, on_ground: bool) -> Array:
     """Displacement [m] and velocity [m/s] of the target of laser 1, then of laser 2, shape (4, n).
 
-    `states` are rows x, v, u1, u2, v1, v2, theta, omega, shape (8 or more, n); lasers mounted on the ground also
-    measure the table's motion. Displacements are relative to mid range, the reading of each laser at rest; NaN where
-    there is no block, or the beam misses it.
+    The rows of `states`, shape (8 or more, n), are x, v, u1, u2, v1, v2, theta, omega. Lasers mounted on the ground
+    also measure the table's motion. Displacements are relative to mid range, which is the reading of each laser at
+    rest; NaN where there is no block or the beam misses it.
     """
     x, v, u1, u2, v1, v2, theta, omega = states[:8]
     height, specimen = arrangement.watched, arrangement.specimen

@@ -17,12 +17,12 @@ from sim.table_orbit import TableOrbit, TablePeriod, corner, harmonics_of
 Array = NDArray[np.float64]
 
 TICKS, SUBSTEPS = 400, 1
-"""Intervals of a constant drive per period, and Runge-Kutta steps in each: the greatest peak differs by at most 0.2 %
-from that with 600 intervals of two steps, less than between two sections of a motion that does not repeat.
+"""Intervals of constant drive per period, and Runge-Kutta steps in each. The greatest peak differs by at most 0.2 %
+from that with 600 intervals of two steps, less than between two parts of a motion that does not repeat.
 """
 
 LONGEST_PERIOD = 24
-"""Longest period in the search [cycles]."""
+"""Longest period of the motion that is searched for [cycles]."""
 
 KEPT = 10 * LONGEST_PERIOD
 """Number of final cycles that describe the long-term motion."""
@@ -36,8 +36,8 @@ corrected.
 """
 
 REPEATED, ALIKE = 0.01, 0.05
-"""Largest changes of a peak over one period of a motion that counts as periodic, relative to the largest peak and to
-the range of the peaks; the latter is needed because a slow spiral also returns close to earlier states.
+"""Largest changes of a peak over one period of a motion that counts as periodic: relative to the largest peak, and
+relative to the range of the peaks. The second is needed because a slow spiral also returns close to earlier states.
 """
 
 
@@ -59,10 +59,10 @@ class Attractor:
 
 
 def attractor(specimen: Specimen, shaker: Shaker, orbit: TableOrbit, cycles: int = 1500) -> Attractor:
-    """Long-term motion of `specimen` on the table of `shaker`, after `cycles` from the disturbed `orbit`.
+    """Long-term motion of `specimen` on the table of `shaker`, `cycles` cycles after a start on the disturbed `orbit`.
 
-    The drive begins as that of the orbit, which may be that of a similar specimen, and keeps the table's mean harmonics
-    at those of the orbit.
+    The drive is initially that of the orbit, which may be the orbit of a similar specimen, and keeps the table's mean
+    harmonics at those of the orbit.
     """
     from sim.kernel.plant import FALLEN
 
@@ -88,7 +88,9 @@ def attractor(specimen: Specimen, shaker: Shaker, orbit: TableOrbit, cycles: int
 
 
 def period_of(peaks: Array) -> int:
-    """Smallest number of cycles after which all peaks, shape (n, k), repeat, over at least two periods; 0 if none."""
+    """Smallest number of cycles after which all peaks, shape (n, k), repeat, over at least two periods; 0 if they do
+    not repeat.
+    """
     if not peaks.size:
         return 0
     allowed = np.minimum(REPEATED * peaks.max(axis=0), ALIKE * np.ptp(peaks, axis=0))

@@ -1,10 +1,10 @@
 """Displacement measured by a horizontal laser on the face of the rotating stand-alone block.
 
-The beam is at height z above the table and hits the face towards the frame. A is the base corner under
-that face, B the one 2b behind it. theta > 0 rotates the block about A, its top towards the frame; the face is a line
-through A and the lit point moves by z tan(theta). theta < 0 rotates it about B and lifts A: with n = (cos, -sin)(theta)
-normal to the face, the face is the line n p = 2b seen from B, which the beam meets 2b sec(theta) + z tan(theta) in
-front of B. For both signs, with displacements towards the frame positive:
+The beam is at height z above the table and hits the face towards the frame. A is the base corner below
+that face, and B is the other corner, 2b behind A. theta > 0 rotates the block about A, its top towards the frame; the
+face is a line through A, and the lit point moves by z tan(theta). theta < 0 rotates the block about B and lifts A: with
+the normal n = (cos, -sin)(theta), the points p of the face relative to B satisfy n p = 2b, and the beam meets the face
+2b sec(theta) + z tan(theta) in front of B. For both signs, with displacements towards the frame positive:
 
     D = z tan(theta) + 2b (sec(theta) - 1) [theta < 0],    dD/dtheta = sec^2(theta) (z + 2b min(sin(theta), 0))
 
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 def displacement(theta: ArrayLike, height: float, block: Block) -> Array:
     """Displacement [m] of the lit point along the beam, towards the frame, at rotations `theta` [rad], any shape.
 
-    `height` of the beam above the table [m]. NaN where the beam passes above or below the face.
+    `height` is the height of the beam above the table [m]. NaN where the beam passes above or below the face.
     """
     angle = np.asarray(theta, dtype=np.float64)
     sine, cosine = np.sin(angle), np.cos(angle)
@@ -34,7 +34,7 @@ def displacement(theta: ArrayLike, height: float, block: Block) -> Array:
 
 
 def heights(theta: ArrayLike, block: Block) -> tuple[Array, Array]:
-    """Lowest and highest point of the face above the table [m] at rotations `theta` [rad], any shape."""
+    """Heights of the lowest and highest point of the face above the table [m] at rotations `theta` [rad], any shape."""
     angle = np.asarray(theta, dtype=np.float64)
     low = np.maximum(-2.0 * block.b * np.sin(angle), 0.0)
     return low, low + 2.0 * block.h_b * np.cos(angle)
@@ -49,11 +49,11 @@ def displacement_rate(theta: ArrayLike, height: float, block: Block) -> Array:
 
 
 def rotation(displacement: ArrayLike, height: float, block: Block) -> Array:
-    """Rotation [rad] of the block whose lit point is displaced by `displacement` [m], any shape; the inverse of
-    `displacement`.
+    """Rotation [rad] of the block whose lit point is displaced by `displacement` [m], any shape; the inverse of the
+    function `displacement`.
 
-    About A, theta = atan(D / z). About B, with X = D + 2b, |theta| solves X cos + z sin = 2b: it is the difference of
-    two angles in the right triangle with legs X and z. NaN where no rotation gives that displacement.
+    About A, theta = atan(D / z). About B, |theta| is the solution of (D + 2b) cos|theta| + z sin|theta| = 2b, a
+    difference of two angles in the right triangle with legs D + 2b and z. NaN where no rotation gives the displacement.
     """
     seen = np.asarray(displacement, dtype=np.float64)
     width = 2.0 * block.b

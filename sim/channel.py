@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 TABLE_DISPLACEMENT, TABLE_ACCELERATION = "table_displacement", "table_acceleration"
 TABLE_FORCE, COIL_CURRENT = "table_force", "coil_current"
 STOREYS = ("laser_1", "laser_2")
-"""Names of the channels by what they measure, whatever the instrument: table and coil, first and second storey.
-"""
+"""Names of the channels by measured quantity, whatever the instrument: table and coil, first and second storey."""
 
 Counts = NDArray[np.int16 | np.int32]
 """Integer types of a converter's counts: 16 bits for most converters, 32 bits for 24-bit ones."""
@@ -27,9 +26,9 @@ class Channel:
 
     `quantity` is the measured quantity: "displacement", "acceleration" or "voltage". `valid` is the inclusive range of
     counts of valid measurements: outside it the converter is saturated or the sensor signals an error, and the sample
-    becomes NaN. `faults` gives the meaning of individual counts outside it. `delay` [s], with standard uncertainty
-    `delay_uncertainty` [s], has already been removed from its samples. `higher` are the small higher-order terms of a
-    converter whose own calibration is a polynomial.
+    becomes NaN. `faults` gives the meaning of individual counts outside it. The `delay` [s] of the channel, with
+    standard uncertainty `delay_uncertainty` [s], has already been removed from its samples. `higher` are the small
+    higher-order coefficients of a converter whose own calibration is a polynomial.
     """
 
     name: str
@@ -45,7 +44,7 @@ class Channel:
     delay_uncertainty: float = 0.0
 
     def to_unit(self, counts: Counts) -> NDArray[np.float64]:
-        """Counts as values in `unit`, same shape; NaN where the counts are not a measurement."""
+        """Convert counts to values in `unit`, same shape; NaN where the counts are not a measurement."""
         values = self._converted(counts.astype(np.float64))
         values[(counts < self.valid[0]) | (counts > self.valid[1])] = np.nan
         return values

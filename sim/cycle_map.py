@@ -1,8 +1,8 @@
 """Linear map from cycle to cycle near a steady rocking motion, with the fundamental of the drive as its input.
 
-Cycle n lasts from one section to the next. It begins with the deviation x_n of the state from the orbit, shape (8,). In
-its first part the control blends from c_(n-1) to c_n, each a complex share of the table's acceleration, written as a
-vector of real and imaginary part. With y_n, the Fourier coefficients of u1 and drift over the cycle,
+Cycle n lasts from one section to the next. At its beginning, the state deviates from the orbit by x_n, shape (8,). In
+its first part, the control blends from c_(n-1) to c_n. Each is a complex share of the table's acceleration, written as
+a vector of its real and imaginary parts. With y_n, the Fourier coefficients of u1 and drift over the cycle,
 
     x_(n+1) = M x_n + B1 c_(n-1) + B0 c_n
     y_n     = y* + C x_n + D1 c_(n-1) + D0 c_n.
@@ -23,22 +23,24 @@ OBSERVED = 3
 """Number of harmonics of u1 and of the drift in y."""
 
 STEP = 1e-4
-"""Step of the differences: for states relative to their scale, for control as a share."""
+"""Step of the finite differences: for states relative to their scales, for the control as a share."""
 
 RIGID = Shaker(moving_mass=1e8, friction=0.0, voltage_limit=1e12, current_limit=1e12)
-"""A table that the block does not move."""
+"""Shaker of a table that the block does not move."""
 
 TABLE = 2
-"""Number of states of the table, the first ones. A rigid table has none, since its free motion would hardly decay."""
+"""Number of states of the table, which come first. They are omitted for a rigid table, because its free motion would
+hardly decay.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class CycleMap:
-    """The map at `omega` [rad/s]; cycles begin at `phase` [rad] of the base's sine.
+    """Map from cycle to cycle at `omega` [rad/s]; cycles begin at `phase` [rad] of the base's sine.
 
-    States are relative to their scale on the orbit. Shapes: `transition` M (n, n), `inputs` B1, B0 (n, 2), `outputs` C
-    (12, n), `feedthrough` D1, D0 (12, 2), `orbit` y* (12,) [m]; n is 8, or 6 on a rigid table. `blend` is the part of a
-    cycle in which the control changes. The coefficients are ordered as by `coefficients`.
+    States are relative to their scales on the orbit. Shapes: `transition` M (n, n), `inputs` B1, B0 (n, 2), `outputs` C
+    (12, n), `feedthrough` D1, D0 (12, 2), `orbit` y* (12,) [m]; n is 8, or 6 on a rigid table. `blend` is the fraction
+    of a cycle in which the control changes. The order of the coefficients is that of `coefficients`.
     """
 
     omega: float
@@ -52,14 +54,14 @@ class CycleMap:
 
     @property
     def slowest(self) -> complex:
-        """Multiplier of greatest modulus; of a conjugate pair the one in the upper half plane."""
+        """Multiplier with the greatest modulus; of a conjugate pair, the one in the upper half plane."""
         multipliers = np.linalg.eigvals(self.transition)
         found = complex(multipliers[int(np.argmax(np.abs(multipliers)))])
         return complex(found.real, abs(found.imag))
 
     @property
     def sensitive(self) -> complex:
-        """Unit control of a single cycle that excites the slowest pair of multipliers most."""
+        """Control of unit magnitude, in a single cycle, that most excites the slowest pair of multipliers."""
         multipliers, vectors = np.linalg.eig(self.transition)
         at = int(np.argmax(np.abs(multipliers)))
         before, now = self.inputs
@@ -69,7 +71,7 @@ class CycleMap:
 
 
 def coefficients(u1: NDArray[np.complex128], drift: NDArray[np.complex128]) -> Array:
-    """The vector y, shape (12,), from complex harmonics, of shape (OBSERVED,) or longer, of u1 and drift [m].
+    """Return the vector y, shape (12,), for complex harmonics of u1 and drift [m], each of shape (OBSERVED,) or longer.
 
     A signal is the imaginary part of the sum of z_k exp(i k phi), with phi the phase of the base's sine.
     """
@@ -78,9 +80,9 @@ def coefficients(u1: NDArray[np.complex128], drift: NDArray[np.complex128]) -> A
 
 
 def cycle_map(fixed: Orbit, shaker: Shaker | None, harmonics: int, blend: float = 0.5) -> CycleMap:
-    """The map near the orbit `fixed` on the table of `shaker`, which is controlled up to `harmonics`.
+    """Compute the map near the orbit `fixed` on the table of `shaker`, controlled up to harmonic number `harmonics`.
 
-    `shaker` = None stands for a rigid table. The control changes along a smoothstep in the first part `blend` of a
+    Without a `shaker`, the table is rigid. The control changes along a smoothstep in the first fraction `blend` of a
     cycle. Raises NoOrbit as `sim.table_orbit.table_orbit` does.
     """
     table = RIGID if shaker is None else shaker
@@ -98,7 +100,7 @@ def cycle_map(fixed: Orbit, shaker: Shaker | None, harmonics: int, blend: float 
     sizes = period.scales(orbit.start)
 
     def response(state: Array, before: complex, now: complex) -> Array:
-        """State after the cycle, relative to its scale, and coefficients."""
+        """State after the cycle, relative to its scales, and coefficients y of the cycle."""
         change = ((before + (now - before) * done) * carrier).real
         after, samples = period.run(orbit.start + state * sizes, orbit.drive, change)
         u1, drift = samples[:, 2], samples[:, 3] - samples[:, 2]

@@ -1,7 +1,8 @@
 """Gain coefficients of an ensemble of specimens, for Monte Carlo or first-order uncertainties.
 
-Steady motions of the members lie near a known one, so Newton's method finds all of them together from its section and
-Jacobian; members farther away are reached by continuation one by one. Under a record each member is a separate run.
+The steady motions of the members are near a known one, so that Newton's method finds all of them together, starting at
+its section with its Jacobian. Members that are farther away are reached one by one, by continuation. Under a record,
+each member is a separate run.
 """
 
 from collections.abc import Sequence
@@ -24,7 +25,7 @@ RUN_TOLERANCE = 1e-8
 """Integration tolerance of the runs under a record, far below the statistical error of an ensemble."""
 
 _Member = tuple[Orbit, Specimen]
-"""A specimen, and the known orbit from which the search for the specimen's orbit starts."""
+"""A specimen, and the known orbit at which the search for the specimen's orbit starts."""
 
 CHUNK = 500
 """Members integrated together: enough to share the overhead of a step, few enough to finish within a second."""
@@ -38,9 +39,10 @@ def steady_gains(
 ) -> Floats:
     """alpha_1 and alpha_2 of m specimens on the branches of n orbits, shape (n, m, 2), computed on all processors.
 
-    `members[i]` are the specimens at `orbits[i]`, under its frequency and amplitude; `bare_amplitude` [m/s2] is that of
-    the test without block, if different. NaN where a member has no such motion: its block does not rest, or
-    continuation does not reach its orbit. `done` is called as parts of the work are completed.
+    `members[i]` are the specimens at `orbits[i]`, under its frequency and amplitude. `bare_amplitude` [m/s2] is the
+    amplitude of the test without block, if different. The gains are NaN where a member does not have the motion of the
+    branch: its block does not rest, or continuation does not reach its orbit. `done` is called as parts of the work are
+    completed.
     """
     every = [(orbit, specimen) for orbit, own in zip(orbits, members, strict=True) for specimen in own]
     parts = max(processors(), len(every) // CHUNK)
@@ -54,7 +56,7 @@ def steady_gains(
 
 
 def record_gains(members: Sequence[Specimen], record: SampledRecord) -> Floats:
-    """alpha_1 and alpha_2 of n specimens under `record`, from rest, shape (n, 2), computed on all processors.
+    """alpha_1 and alpha_2 of n specimens under `record`, started from rest, shape (n, 2), computed on all processors.
 
     NaN where the block overturns or the run fails.
     """

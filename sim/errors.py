@@ -30,7 +30,7 @@ class Interruption(Exception):
 
 @dataclass(frozen=True)
 class Cause:
-    """Cause of the end or refusal of a run: the `error_code` of an error, or a `CauseCode`; advice depends on it alone.
+    """Cause of the end or refusal of a run: the `error_code` of an error, or a `CauseCode`. Advice depends only on it.
 
     `subject` is the item concerned: the quantity of a limit, the names of safety inputs, the name of a value, the kind
     of a request ("stop", "abort" or "halt").
@@ -58,7 +58,7 @@ class RockbenchError(Exception):
 
 
 class InvalidInput(RockbenchError, ValueError):
-    """A value refused before anything started.
+    """Error: a value was refused before anything started.
 
     `item` names the key, flag or argument; `value` the input; `allowed` describes valid input.
     """

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from sim.errors import InvalidInput
 
 ROW = 10
-"""Numbers in a row of a packed excitation."""
+"""Number of values in a row of a packed excitation."""
 
 
 class Excitation(Protocol):
@@ -27,11 +27,11 @@ class Excitation(Protocol):
 
     @property
     def duration(self) -> float:
-        """Length [s]."""
+        """Duration [s]."""
         ...
 
     def packed(self) -> NDArray[np.float64]:
-        """The table of segments, shape (n, 10), as described in the module's docstring."""
+        """Table of segments, shape (n, 10), as described in the module's docstring."""
         ...
 
 
@@ -39,7 +39,7 @@ class Excitation(Protocol):
 class Sweep:
     """A sine whose amplitude [m/s2] follows a cubic smoothstep and whose frequency [rad/s] changes linearly.
 
-    `amplitude` and `omega` are (start, end); equal ends make a dwell.
+    `amplitude` and `omega` are (start, end); a dwell has equal ends.
     """
 
     duration: float
@@ -71,7 +71,7 @@ class Sweep:
         return self.omega[0] * t + 0.5 * self.chirp_rate * t * t
 
     def row(self, phase: float) -> list[float]:
-        """This sweep as a packed row, starting at `phase` [rad]."""
+        """Row of a packed excitation for this sweep, starting at `phase` [rad]."""
         rise, length = self.amplitude[1] - self.amplitude[0], self.duration
         polynomial = [self.amplitude[0], 0.0, 3.0 * rise / length**2, -2.0 * rise / length**3]
         return [length, *polynomial, phase, self.omega[0], self.chirp_rate, 0.0, 0.0]
@@ -103,7 +103,7 @@ class SineProgram:
 
 
 class SampledRecord:
-    """Accelerations [m/s2] at a constant step [s], interpolated linearly: every sample is a breakpoint."""
+    """Accelerations [m/s2] at a constant time step `dt` [s], interpolated linearly between the samples."""
 
     def __init__(self, acceleration: NDArray[np.float64], dt: float) -> None:
         if not dt > 0.0:

@@ -16,7 +16,7 @@ EXTRAS = {
 
 
 class MissingExtra(InvalidInput):
-    """An extra that the request needs is not installed; nothing was started.
+    """Error: an extra that the request needs is not installed; nothing was started.
 
     `item` is the feature that needs it, `value` the name of the extra, `allowed` the commands that install it.
     """
@@ -32,10 +32,10 @@ class MissingExtra(InvalidInput):
 
 
 def require(extra: str, purpose: str, *packages: str) -> None:
-    """Check that an extra is installed, before anything starts; imports nothing.
+    """Check that an extra is installed, before anything starts and without importing it.
 
-    `purpose` is the subject of the error message: the feature that needs it. Checks all packages of the extra, or only
-    those named. Raises MissingExtra.
+    `purpose` is the subject of the error message: the feature that needs the extra. Checks all packages of the extra,
+    or only those named. Raises MissingExtra.
     """
     for package in packages or EXTRAS[extra]:
         if not _installed(package):

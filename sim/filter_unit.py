@@ -1,4 +1,4 @@
-"""The low-pass cards between sensors and converter."""
+"""Low-pass filter cards between sensors and converter."""
 
 from functools import lru_cache
 from math import pi, sin, tan
@@ -13,18 +13,20 @@ Array = NDArray[np.float64]
 
 @lru_cache
 def butterworth(order: int, share: float) -> tuple[Array, Array]:
-    """Second-order sections b0, b1, b2, 1, a1, a2 of the low-pass with cutoff `share` of the sample rate, shape (m, 6),
-    poles near the unit circle last; and their state, shape (m, 2), once they have settled at 1.
+    """Design a Butterworth low-pass whose cutoff is the fraction `share` of the sample rate.
 
-    Bilinear transform of the analogue poles, in the order of operations of `scipy.signal.butter`, whose import alone
-    takes longer than a simulated minute.
+    Returns its second-order sections b0, b1, b2, 1, a1, a2, shape (m, 6), the poles nearest to the unit circle last,
+    and their states, shape (m, 2), after settling at a constant input of 1.
+
+    Bilinear transform of the analogue poles, in the order of operations of `scipy.signal.butter`, which is not used
+    because its import alone takes longer than the simulation of a minute.
     """
     warped = 4.0 * np.tan(np.pi * (share / 0.5) / 2.0)
     angles = 1j * np.pi * np.arange(1 - order, order, 2, dtype=np.float64) / (2 * order)
     analogue: NDArray[np.complex128] = warped * -np.exp(angles)
     poles: NDArray[np.complex128] = (4.0 + analogue) / (4.0 - analogue)
     half = order // 2
-    # both of a conjugate pair have the same rounding errors
+    # give both poles of a conjugate pair the same rounding errors
     pairs = 0.5 * (poles[:half] + poles[::-1][:half].conj())
     kept = [*pairs, *poles.real[half : order - half]]
     kept.sort(key=lambda pole: -abs(1.0 - abs(pole)))
@@ -34,7 +36,7 @@ def butterworth(order: int, share: float) -> tuple[Array, Array]:
 
 
 def _section(pole: complex) -> tuple[float, ...]:
-    """A pair of conjugate poles or a real one, with zeros at half the sample rate."""
+    """Section with a pair of conjugate poles or one real pole, and with zeros at half the sample rate."""
     if pole.imag == 0.0:
         return 1.0, 1.0, 0.0, 1.0, -pole.real, 0.0
     return 1.0, 2.0, 1.0, 1.0, -(pole + pole.conjugate()).real, (pole * pole.conjugate()).real
@@ -51,9 +53,9 @@ def _settled(sections: Array) -> Array:
 
 
 class FilterUnit(Parameters):
-    """The analogue low-pass before the converter: the same Butterworth card in every channel.
+    """Analogue low-pass before the converter: the same Butterworth card in every channel.
 
-    Simulated by the bilinear transform at the sample rate with the cutoff kept in place.
+    Simulated at the sample rate by the bilinear transform, prewarped so that the cutoff is exact.
     """
 
     order: int = quantity(4, "1", "order of the Butterworth low-pass", ge=1, le=10)
@@ -62,8 +64,8 @@ class FilterUnit(Parameters):
     def delay(self, sample_rate: float) -> float:
         """Delay of slow signals [s], as simulated at `sample_rate` [1/s]: 1 / (omega_c sin(pi / 2n)).
 
-        The group delay of a Butterworth low-pass at zero frequency, from its poles; omega_c as warped by the bilinear
-        transform.
+        This is the group delay at zero frequency of a Butterworth low-pass, from its poles, with omega_c as warped by
+        the bilinear transform.
         """
         bent = 2.0 * sample_rate * tan(pi * self.cutoff / sample_rate)
         return 1.0 / (bent * sin(pi / (2 * self.order)))
@@ -85,7 +87,7 @@ class FilterStream:
         self._state: Array | None = None
 
     def read(self, volts: Array) -> Array:
-        """Filtered voltages, shape (n_channels, n) as given."""
+        """Filter voltages, shape (n_channels, n). Returns an array of the same shape."""
         filtered = np.array(volts, dtype=np.float64, order="C")
         if self._state is None:
             self._state = self._settled[:, None, :] * filtered[None, :, :1]

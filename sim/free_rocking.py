@@ -1,7 +1,8 @@
 """Free rocking of the stand-alone block on fixed ground, in closed form, after release from a tilt.
 
 Between impacts theta'' = -p^2 sin(alpha - theta) for theta > 0, and mirrored for theta < 0. With phi = alpha - |theta|
-this is phi'' = p^2 sin(phi), a pendulum near its upper rest. From the turning point of a half swing, where phi = phi_m,
+this is phi'' = p^2 sin(phi), a pendulum near its upper equilibrium. From the turning point of a half swing, where
+phi = phi_m,
 
     phi(t) = 2 acos(k cd(p t | k^2)),    k = cos(phi_m / 2),
 
@@ -10,7 +11,7 @@ with Jacobi's elliptic function cd. The ground is reached after a quarter of the
     tan(psi) = sqrt(sin(alpha - theta_m / 2) sin(theta_m / 2)) / (cos(alpha / 2) sin(phi_m / 2)),
 
 which is K(k^2) - F(asin(cos(alpha / 2) / k) | k^2) without its cancellation. An impact multiplies the angular velocity
-by r, so the energy above the ground, cos(alpha - |theta_n|) - cos(alpha) at the n-th turning point, by r^2.
+by r, and hence the energy above the ground, cos(alpha - |theta_n|) - cos(alpha) at the n-th turning point, by r^2.
 Source: Housner (1963), with the exact equation of motion; Abramowitz and Stegun 16 and 17.
 """
 
@@ -27,7 +28,7 @@ from sim.specimen import Block
 Array = NDArray[np.float64]
 
 _SMALLEST = 1e-8
-"""Fraction of the energy at overturning below which the block counts as at rest: the tilt is then at most 1e-9 rad."""
+"""Energy, relative to that at overturning, below which the block counts as at rest: the tilt is at most 1e-9 rad."""
 
 _MOST = 2000
 """Greatest number of impacts computed."""
@@ -39,20 +40,23 @@ def critical_angle(block: Block) -> float:
 
 
 def frequency_parameter(block: Block, g: float) -> float:
-    """p = sqrt(M g R / J) [rad/s], R being the distance from a corner to the block's middle, `g` gravity [m/s2]."""
+    """p = sqrt(M g R / J) [rad/s], where R is the distance from a corner to the block's centre, and `g` is in m/s2."""
     return sqrt(block.mass * g * hypot(block.b, block.h_b) / block.inertia)
 
 
 def theoretical_restitution(block: Block) -> float:
-    """r of an inelastic impact that keeps the angular momentum about the new corner (Housner 1963): 1 - 2 M b^2 / J."""
+    """r = 1 - 2 M b^2 / J of an inelastic impact that conserves the angular momentum about the new corner.
+
+    Source: Housner (1963).
+    """
     return 1.0 - 2.0 * block.mass * block.b**2 / block.inertia
 
 
 def energy(angle: Array, alpha: float) -> Array:
     """Potential energy at `angle` [rad] relative to that at alpha, any shape.
 
-    (cos(alpha - |theta|) - cos(alpha)) / (1 - cos(alpha)), computed from products of sines: a difference of cosines
-    would cancel near the ground.
+    (cos(alpha - |theta|) - cos(alpha)) / (1 - cos(alpha)), computed from products of sines, because the difference of
+    cosines would suffer from cancellation near the ground.
     """
     half = 0.5 * np.abs(angle)
     return np.asarray(np.sin(alpha - half) * np.sin(half) / np.sin(0.5 * alpha) ** 2)
@@ -60,10 +64,11 @@ def energy(angle: Array, alpha: float) -> Array:
 
 @dataclass(frozen=True)
 class FreeRocking:
-    """The motion of a block of critical angle `alpha` [rad] and frequency parameter `p` [rad/s], 0 < |tilt| < alpha.
+    """Free motion of a block with critical angle `alpha` [rad] and frequency parameter `p` [rad/s], 0 < |tilt| < alpha.
 
-    It rests at `tilt` [rad] until `start` [s]. An impact multiplies the angular velocity by
-    `restitution` + `trend` (s - `trend_at`), s being its speed relative to that of a fall from alpha, 0 to 1.
+    The block rests at `tilt` [rad] until `start` [s]. An impact multiplies the angular velocity by
+    `restitution` + `trend` (s - `trend_at`), where s, 0 to 1, is the speed of the impact relative to that after a fall
+    from alpha.
     """
 
     alpha: float
@@ -90,14 +95,14 @@ class FreeRocking:
 
     @cached_property
     def amplitudes(self) -> Array:
-        """|theta_n| [rad] at the turning points, shape as `energies`."""
-        # cos(alpha - theta) = cos(alpha) + energy (1 - cos(alpha)) by half angles, for the same reason as in `energy`
+        """|theta_n| [rad] at the turning points, same shape as `energies`."""
+        # cos(alpha - theta) = cos(alpha) + energy (1 - cos(alpha)) in half angles, for the same reason as in `energy`
         phi = 2.0 * np.arcsin(sin(0.5 * self.alpha) * np.sqrt(1.0 - self.energies))
         return np.asarray(self.alpha - phi)
 
     @cached_property
     def quarters(self) -> Array:
-        """Time from the ground to each turning point [s], equal to the time back, shape as `energies`."""
+        """Time from the ground to each turning point [s], which equals the time back, same shape as `energies`."""
         from scipy import special
 
         phi, half = self.alpha - self.amplitudes, 0.5 * self.amplitudes
@@ -107,19 +112,19 @@ class FreeRocking:
 
     @cached_property
     def impacts(self) -> Array:
-        """Instants of the impacts [s], one after each turning point, shape as `energies`."""
+        """Instants of the impacts [s], one after each turning point, same shape as `energies`."""
         between = self.quarters.copy()
         between[1:] += self.quarters[1:]
         return self.start + np.cumsum(between)
 
     @cached_property
     def turns(self) -> Array:
-        """Instants of the turning points [s], starting with the release, shape as `energies`."""
+        """Instants of the turning points [s], starting with the release, same shape as `energies`."""
         return self.impacts - self.quarters
 
     @property
     def sides(self) -> Array:
-        """Sign of theta at the turning points, shape as `energies`."""
+        """Sign of theta at the turning points, same shape as `energies`."""
         return np.copysign(1.0, self.tilt) * (-1.0) ** np.arange(self.energies.size)
 
     def angle(self, times: Array) -> Array:

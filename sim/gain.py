@@ -1,8 +1,8 @@
 """Gain coefficients alpha_1 and alpha_2 predicted by the model for a steady sine and for a record.
 
-alpha is a peak of the coupled frame divided by the same peak of the bare one (Eq. 10). Under a sine two steady motions
-can coexist, so a prediction has up to two branches; the start of a test decides which one it reaches. Under a record
-the peaks are those of the motion that starts at rest, unless the block overturns.
+alpha is a peak of the coupled frame divided by the same peak of the bare one (Eq. 10). Under a sine, two steady motions
+can coexist, so that a prediction has up to two branches; the start of a test decides which one the motion reaches.
+Under a record, the peaks are those of the motion that starts at rest, unless the block overturns.
 """
 
 from collections.abc import Sequence
@@ -42,7 +42,8 @@ class Layer:
 class GainPrediction:
     """Gain coefficients at one frequency. A branch is None where its motion does not exist or was not found.
 
-    `omega` [rad/s]; `beta`: the spring's label; `bare`: peaks of the frame without block, exact.
+    `omega` is in rad/s, `beta` is the label of the spring, and `bare` contains the exact peaks of the frame without
+    block.
     """
 
     omega: float
@@ -54,7 +55,7 @@ class GainPrediction:
 
     @property
     def layers(self) -> dict[str, Layer]:
-        """The existing branches of steady motion, by name: "rocking", "resting"."""
+        """Branches of steady motion that exist, by name: "rocking", "resting"."""
         named = {"rocking": self.rocking, "resting": self.resting}
         return {name: layer for name, layer in named.items() if layer is not None}
 
@@ -63,8 +64,8 @@ class GainPrediction:
 class SeismicGain:
     """Gain coefficients of the spring labelled `beta` under a record; both None unless the run was completed.
 
-    `motion` has the overturning (`motion.overturned`, `motion.end_time`), if any, and the peaks;
-    `bare` has those of the frame without block.
+    `motion` contains the peaks and the overturning, if any (`motion.overturned`, `motion.end_time`); `bare` contains
+    the peaks of the frame without block.
     """
 
     beta: float
@@ -79,8 +80,9 @@ def predict_gain(
 ) -> GainPrediction:
     """Gain coefficients under `amplitude` [m/s2] sin(`omega` [rad/s] t).
 
-    `bare_amplitude` [m/s2] is that of the test without block, if different.
-    Raises InvalidInput for a bare specimen or meaningless numbers. Source: Eq. (10).
+    `bare_amplitude` [m/s2] is the amplitude of the test without block, if different.
+    Raises InvalidInput for a bare specimen, or an amplitude or frequency that is not positive and finite.
+    Source: Eq. (10).
     """
     resting = resting_state(specimen, omega, amplitude)
     try:
@@ -96,7 +98,7 @@ def gain_spectrum(
     amplitude: float,
     bare_amplitude: float | None = None,
 ) -> list[GainPrediction]:
-    """`predict_gain` at each of `omegas` [rad/s], but faster: each orbit is extrapolated from its neighbours."""
+    """Compute `predict_gain` at each of `omegas` [rad/s], but faster: orbits are extrapolated from their neighbours."""
     places = [float(omega) for omega in omegas]
     try:
         branch = rocking_branch(specimen, places, amplitude)
@@ -113,8 +115,8 @@ def seismic_curve(
 ) -> list[SeismicGain]:
     """Gain coefficients under `record`, from rest, at each stiffness ratio of `betas`, on all processors.
 
-    Raises InvalidInput for a negative stiffness ratio, or a record under which the bare frame does not move.
-    Source: Eq. (10); peaks over the record's duration, without the free motion after it.
+    The peaks are those during the record, without the free motion after it. Raises InvalidInput for a negative
+    stiffness ratio, or a record under which the bare frame does not move. Source: Eq. (10).
     """
     bare = simulate(specimen.bare(), record)
     if bare.status is not Status.COMPLETED or not min(bare.peaks.u1, bare.peaks.drift) > 0.0:

@@ -24,7 +24,7 @@ UNITS = {name: unit_of(Frame.model_fields[name]) for name in ("m1", "m2", "k1", 
 _HIGHEST = {"xi1": 1.0, "xi2": 1.0, "restitution_factor": 2.0}
 _MAY_VANISH = ("xi1", "xi2")
 _ROUNDING = 1e-9
-"""Lowest eigenvalue accepted for a correlation matrix, whose coefficients are rounded."""
+"""Magnitude of the most negative eigenvalue accepted for a correlation matrix, because its coefficients are rounded."""
 
 
 def spring_name(label: float) -> str:
@@ -33,7 +33,7 @@ def spring_name(label: float) -> str:
 
 
 def spring_label(name: str) -> float | None:
-    """Label of the spring whose stiffness is called `name`; None for another quantity."""
+    """Label of the spring whose stiffness is called `name`; None if `name` is another quantity."""
     if not name.startswith(SPRING):
         return None
     try:
@@ -46,12 +46,12 @@ def spring_label(name: str) -> float | None:
 
 
 def unit(name: str) -> str:
-    """The SI unit of a quantity that can be identified. Raises InvalidInput for another name."""
+    """SI unit of the quantity called `name`. Raises InvalidInput if it is not a quantity that can be identified."""
     if spring_label(name) is not None:
         return "N/m"
     if name not in UNITS:
         close = get_close_matches(name, UNITS, n=1)
-        known = f"the nearest is {close[0]}" if close else f'it may be {", ".join(UNITS)}, or "{SPRING}" and a label'
+        known = f"the nearest is {close[0]}" if close else f'give {", ".join(UNITS)}, or "{SPRING}" and a label'
         raise InvalidInput("name", name, f"no such quantity can be identified; {known}")
     return UNITS[name]
 
@@ -70,7 +70,7 @@ def _canonical(name: str) -> str:
 class Finding(Parameters):
     """One measured quantity of the specimen."""
 
-    name: str = quantity(..., "", "the quantity: m1, m2, k1, k2, xi1, xi2, restitution_factor, or k_c:LABEL")
+    name: str = quantity(..., "", "name of the quantity: m1, m2, k1, k2, xi1, xi2, restitution_factor, or k_c:LABEL")
     value: float = quantity(..., "", "best estimate, in the quantity's SI unit", ge=0)
     standard_uncertainty: float = quantity(..., "", "standard uncertainty (k = 1), in the quantity's SI unit", ge=0)
     source: str = quantity(..., "", "source of the value")
@@ -78,7 +78,7 @@ class Finding(Parameters):
 
     @property
     def unit(self) -> str:
-        """The SI unit of value and uncertainty."""
+        """SI unit of value and uncertainty."""
         return unit(self.name)
 
     @field_validator("name")
@@ -114,7 +114,7 @@ class Correlation(Parameters):
 
     @property
     def pair(self) -> frozenset[str]:
-        """The two names, unordered."""
+        """Both names, without order."""
         return frozenset((self.first, self.second))
 
 
@@ -134,7 +134,7 @@ class Identified(Parameters):
         for (label, _), (next_label, name) in pairwise(labels):
             if isclose(label, next_label):
                 raise InvalidInput(
-                    "findings", name, f"label too close to that of {spring_name(label)} to be distinguished"
+                    "findings", name, f"its label cannot be distinguished from that of {spring_name(label)}"
                 )
         pairs: set[frozenset[str]] = set()
         for one in self.correlations:
@@ -144,7 +144,7 @@ class Identified(Parameters):
             if one.first == one.second or one.pair in pairs:
                 pair = f"{one.first}, {one.second}"
                 raise InvalidInput(
-                    "correlations", pair, "it must name two different findings, and each pair may occur once"
+                    "correlations", pair, "a correlation must name two different findings, and each pair may occur once"
                 )
             pairs.add(one.pair)
         if self.correlations and float(np.linalg.eigvalsh(self.correlation(names)).min()) < -_ROUNDING:
@@ -155,7 +155,7 @@ class Identified(Parameters):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The names of the findings, in order."""
+        """Names of the findings, in order."""
         return tuple(finding.name for finding in self.findings)
 
     def finding(self, name: str) -> Finding | None:
@@ -163,18 +163,19 @@ class Identified(Parameters):
         return next((finding for finding in self.findings if finding.name == name), None)
 
     def covariance(self, names: Sequence[str]) -> NDArray[np.float64]:
-        """Covariance of the findings `names`, shape (n, n), SI. Raises InvalidInput for an unknown name."""
+        """Covariance matrix of the findings `names`, shape (n, n), SI. Raises InvalidInput for an unknown name."""
         found = [self.finding(name) for name in names]
         if None in found:
             missing = names[found.index(None)]
-            raise InvalidInput("name", missing, f"not identified; identified: {', '.join(self.names) or 'nothing'}")
+            known = ", ".join(self.names) or "nothing"
+            raise InvalidInput("name", missing, f"it has not been identified; identified quantities: {known}")
         sizes = np.array([finding.standard_uncertainty for finding in found if finding is not None])
         return self.correlation(names) * np.outer(sizes, sizes)
 
     def applied(self, specimen: Specimen) -> Specimen:
-        """The best estimate of `specimen`: identified values replace the declared ones.
+        """Best estimate of `specimen`, in which identified values replace the declared ones.
 
-        The springs' labels still refer to its declared k1. Raises InvalidInput for inconsistent values.
+        The labels of the springs still refer to the declared k1. Raises InvalidInput for inconsistent values.
         """
         values = {finding.name: finding.value for finding in self.findings}
         measured = tuple(
@@ -187,7 +188,7 @@ class Identified(Parameters):
         try:
             best = specimen.model_copy(
                 update={
-                    # a new object: a copy would keep the frame's cached natural frequencies
+                    # construct a new frame, because a copy would keep the cached natural frequencies
                     "frame": Frame(**(specimen.frame.model_dump() | frame)),
                     "block": Block(**(specimen.block.model_dump() | block)),
                     "springs": others + measured,
@@ -209,14 +210,14 @@ class Identified(Parameters):
         return matrix
 
     def extended(self, findings: Iterable[Finding], correlations: Iterable[Correlation] = ()) -> "Identified":
-        """These findings merged with newer ones, which replace any of the same name and their correlations."""
+        """Merge with newer findings, which replace those of the same names and their correlations."""
         findings, correlations = tuple(findings), tuple(correlations)
         kept, pairs = self.without(*(finding.name for finding in findings)), {one.pair for one in correlations}
         still = tuple(one for one in kept.correlations if one.pair not in pairs)
         return Identified(findings=kept.findings + findings, correlations=still + correlations)
 
     def without(self, *names: str) -> "Identified":
-        """The findings without `names` and without their correlations."""
+        """Remove the findings `names` and their correlations."""
         return Identified(
             findings=tuple(finding for finding in self.findings if finding.name not in names),
             correlations=tuple(one for one in self.correlations if not one.pair & set(names)),

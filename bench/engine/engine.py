@@ -55,7 +55,7 @@ class Engine:
         self._prepared = PreparedDrive(self._loop, guard, stream)
         self._specimen: Specimen | None = None
         self.returned: object = None
-        """Value returned by the plan; None if it was interrupted."""
+        """Value returned by the plan; None if the plan was interrupted."""
         requests.cut_by(rig.halt)
 
     @property
@@ -66,8 +66,8 @@ class Engine:
     def run(self, plan: Plan) -> Ending:
         """Run `plan` until it ends or is ended early.
 
-        Returns an ending for an error of rig, data file, plan or analysis. For any other error it cuts the output and
-        raises the error.
+        An error of the rig, data file, plan or analysis is returned as an ending. After any other error, the output is
+        cut and the error is raised.
         """
         ending_of = self._output.ending_of
         try:
@@ -81,7 +81,7 @@ class Engine:
             raise
 
     def _watched(self, plan: Plan) -> Ending:
-        """Run a plan; in real time, with a watch on stalls of the program."""
+        """Run a plan; in real time, also detect stalls of the program."""
         if isinstance(self._rig.clock, VirtualClock):
             return self._until_ended(plan)
         with Stalls() as self._output.stalls:
@@ -92,7 +92,7 @@ class Engine:
         output = self._output
         ending = output.ending_of(lambda: self._carry_out(plan)) or Ending("completed", "the plan was carried out")
         if output.driven:
-            # the rig still works after an error in data file, plan or analysis: stop smoothly
+            # the rig still works after an error in the data file, plan or analysis: stop smoothly
             ending = ending.then(
                 output.ending_of(lambda: self._loop.ramp_out(State.ABORTING, ending.reason, ending.cause))
             )
@@ -102,7 +102,7 @@ class Engine:
         outcome: Outcome | None = None
         try:
             while True:
-                # the plan may compute for a long time between steps without polling requests
+                # between steps, the plan may compute for a long time without polling for requests
                 with self._requests.breakable(self._requested_end):
                     if self._requests.interrupted:
                         raise self._requested_end()
@@ -161,7 +161,7 @@ class Engine:
 def configured_engine(
     rig: Rig, configuration: BenchConfiguration, stream: EventStream, requests: Requests, operator: Operator
 ) -> Engine:
-    """Engine of a configured bench; its guard has the configured limits and signal map."""
+    """Return the engine of a configured bench, with a guard that has the configured limits and signal map."""
     signals = SignalMap(rig.channels, configuration.laser_reference, configuration.calibrated)
     limits, ramps, shaker = configuration.limits, configuration.ramps, configuration.shaker_model
     guard = Guard(rig, limits, ramps, shaker, signals, configuration.channels)

@@ -30,7 +30,7 @@ class Ending:
         return cls("failed", str(error), error.cause)
 
     def then(self, later: "Ending | None") -> "Ending":
-        """This ending followed by a `later` one: the worse status, both reasons, the cause of the first."""
+        """Combine this ending with a `later` one: the worse status, both reasons, and the cause of this one."""
         if later is None:
             return self
         status = max(self.status, later.status, key=SEVERITY.index)
@@ -173,7 +173,7 @@ class EventStream:
         self._subscribers += (subscriber,)
 
     def now(self) -> float:
-        """Seconds of the bench's clock since the session began."""
+        """Bench time since the session began [s]."""
         return self._clock.now() - self._origin
 
     def publish(self, event: Event) -> None:

@@ -121,7 +121,7 @@ class Loop:
             self._end(State.ABORTING, Ending("aborted", reason, _cause(over)))
 
     def _cut(self, over: Violation) -> Never:
-        """Cut the enable line now, also during a ramp: the samples queued in the device are not waited for."""
+        """Cut the enable line now, even during a ramp, without waiting for the samples queued in the device."""
         self._over = over
         self._stream.publish(LimitExceeded(over.quantity, over.value, over.limit, over.unit, over.timing))
         raise Ended(self.output.cut(Ending("halted", f"{over}: the enable line was cut", _cause(over))))
@@ -201,7 +201,7 @@ class SineDrive:
         self._cycles = None
 
     def sweep(self, step: Sweep) -> Outcome:
-        """Drive the sweep's legs, from the present amplitude and frequency."""
+        """Drive the legs of the sweep, starting at the present amplitude and frequency."""
         output = self._loop.output
         output.source.require_silence("legs")
         oscillator = output.source.oscillator
@@ -242,10 +242,10 @@ class SineDrive:
         output.source.oscillator.trim(step.shares, step.blend, wait)
 
     def _sample_at(self, phase: float) -> int:
-        """Index of the first sample to be read at which the held sine has `phase` [rad]."""
+        """Index of the first sample not yet read at which the held sine has `phase` [rad]."""
         output = self._loop.output
         oscillator = output.source.oscillator
-        # the oscillator is at the last of the samples queued in the rig
+        # the oscillator's phase is that of the last sample queued in the rig
         queued = output.begins - 1 - output.read
         step = oscillator.omega / self._rate
         return output.read + ceil((phase - oscillator.phase + step * queued) % tau / step)
@@ -261,9 +261,9 @@ class PreparedDrive:
         self._loop, self._guard, self._stream = loop, guard, stream
 
     def play(self, step: Play) -> Outcome:
-        """Play the whole drive, or until the block falls.
+        """Play the drive to its end, or until the block falls.
 
-        Raises InvalidInput before the first sample for an unsuitable drive, or one that the guard would refuse.
+        Raises InvalidInput before the first sample if the drive is unsuitable or the guard would refuse it.
         """
         output = self._loop.output
         if output.state is not State.RUNNING:

@@ -72,7 +72,7 @@ class DriveSource:
         return self._prepared.size > 0
 
     def play(self, volts: Array) -> None:
-        """Play `volts`, shape (n,), which must already be checked, from the next sample on."""
+        """Play `volts`, shape (n,), starting with the next sample. The caller has checked them."""
         self._prepared = volts.copy()
 
     def require_playable(self, volts: Array) -> None:
@@ -144,7 +144,7 @@ class Alignments:
 
 
 RESERVE = 2**25
-"""Reserve [bytes] that is released when memory runs out, so that the output can still be ramped to zero."""
+"""Memory reserve [bytes], released when memory runs out so that the output can still be ramped to zero."""
 NO_MEMORY = "the computer has run out of memory: close other programs, then start again"
 
 _DRIVEN = (State.ARMED, State.RUNNING, State.STOPPING, State.ABORTING)
@@ -168,11 +168,12 @@ class Output:
         """Samples read since the rig was armed."""
         self._run = 0
         self.stalls: Stalls | None = None
-        """Detects when the program did not run; None in virtual time."""
+        """Detector of periods in which the program did not run; None in virtual time."""
         self.stalled = 0.0
         """Longest time during the last exchange in which the program did not run [s]."""
         self._exchanged = now()
-        # not written to: a limit counts its addresses, and writing 32 MB takes as long as a hundred loop iterations
+        # not written to: reserved addresses already count towards a memory limit, and writing 32 MB takes as long as a
+        # hundred loop iterations
         self._reserve: NDArray[np.uint8] | None = np.empty(RESERVE, dtype=np.uint8)
 
     @property
@@ -261,13 +262,13 @@ class Output:
         except RockbenchError as error:
             return Ending.failed(error)
         except MemoryError:
-            # frees memory for the ramp
+            # free memory for the ramp
             self._reserve = None
             return Ending("failed", NO_MEMORY, Cause(CauseCode.MEMORY))
         return None
 
     def rescue(self, error: BaseException, lasts: Sequence[Callable[[], object]]) -> None:
-        """Cut the output before `error` is raised, then call `lasts`; further errors are added to `error` as notes."""
+        """Cut the output before `error` is raised, then call each of `lasts`. Further errors become its notes."""
         ending = Ending("failed", f"{type(error).__name__} in the plan or a subscriber")
         for last in (lambda: self.cut(ending), *lasts):
             try:

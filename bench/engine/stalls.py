@@ -14,10 +14,10 @@ _KEPT = 16
 
 
 class Stalls:
-    """Context manager whose thread detects stalls: its short sleeps then end much too late.
+    """Context manager that runs a thread to detect stalls, during which its short sleeps end much too late.
 
     A slow call, a slow disk or a long computation in another thread does not delay this thread; a stopped or suspended
-    process, a computer without free processors and an exhausted memory do.
+    process, a computer without free processors, or exhausted memory does.
     """
 
     def __init__(self) -> None:

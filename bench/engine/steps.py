@@ -85,8 +85,8 @@ class SetHarmonics:
     """Blend to `shares`: complex shares of the set amplitude for the fundamental, second harmonic and so on, as in
     `bench.control.oscillator`. A `Sweep` resets them.
 
-    The change lasts `blend` cycles. It begins with `cycle` of the present count, or at once if that is None or has
-    begun.
+    The change lasts `blend` cycles. It begins at the start of cycle number `cycle` of the present count, or at once if
+    `cycle` is None or that cycle has begun.
     """
 
     shares: tuple[complex, ...]
@@ -122,7 +122,7 @@ class RampOut:
 
 @dataclass(frozen=True)
 class Publish:
-    """Publish an event; its time is set by the engine."""
+    """Publish an event. The engine sets its time."""
 
     event: Event
 

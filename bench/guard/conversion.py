@@ -31,8 +31,9 @@ class Conversion:
         self._scale, self._offset = (np.array([getattr(each, key) for each in channels]) for key in ("scale", "offset"))
 
     def of(self, counts: Counts) -> tuple[Array, Extremes | None]:
-        """Values for counts of shape (n, n_channels), n > 0, same shape; NaN where a count is not a measurement. Their
-        extremes are None if any sample is missing.
+        """Convert counts, shape (n, n_channels), n > 0, to values, same shape; NaN where a count is not a measurement.
+
+        Returns the values and their extremes, or None instead of the extremes if any sample is missing.
         """
         low, high = np.minimum.reduce(counts).tolist(), np.maximum.reduce(counts).tolist()
         if len(self._linear) < len(self._channels) or self._missing(low, high):
@@ -40,7 +41,7 @@ class Conversion:
         values = counts.astype(np.float64, order="F")
         values *= self._scale
         values += self._offset
-        # the same two operations as for the values, so that the extremes are bit-identical to those of the array
+        # convert with the same two operations as above, so that the extremes are bit-identical to those of the array
         for k, (scale, offset) in enumerate(self._linear):
             first, last = low[k] * scale + offset, high[k] * scale + offset
             low[k], high[k] = (first, last) if scale > 0.0 else (last, first)

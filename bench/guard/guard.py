@@ -29,9 +29,10 @@ class Exchange:
 
     `values` are the block's channel values in their units, shape (n, n_channels), `signals` the signals of the
     experiment, shape (n, n_signals; 0 without a signal map), and `drive` [V], shape (n,), the samples played meanwhile.
-    `violation` is the first limit exceeded, if any, and `runaway` the first of the table itself. `warnings` are the
-    limits whose warning level was reached for the first time since arming. `opened` names the open safety inputs; the
-    enable line is then cut. `magnitudes` returns the largest of the watched quantities, by their keys, for display.
+    `violation` is the first limit exceeded, if any, and `runaway` the first that concerns the table itself. `warnings`
+    are the limits whose warning level was reached for the first time since arming. `opened` names the open safety
+    inputs; if there are any, the enable line has been cut. `magnitudes` returns the largest magnitude of each watched
+    quantity in the block, by key, for display.
     """
 
     block: Block
@@ -48,8 +49,9 @@ class Exchange:
 class Guard:
     """Checks commands and measured samples between the engine and the rig.
 
-    A `shaker` model estimates force and current from the motion where no channel measures them. `signals` converts each
-    block into signals, once; the guard then checks the drift, and `further` channels that have a limit.
+    A `shaker` model estimates force and current from the motion where no channel measures them. With `signals`, each
+    block is converted to signals once, and the guard also checks the drift and those `further` channels that have a
+    limit.
     """
 
     def __init__(
@@ -75,7 +77,9 @@ class Guard:
         self._held: float | None = None
         self._sending = False
         self._owed = self._zeros = 0
-        """Samples that may be queued in the rig beyond the known ones, and samples read since these were all zero."""
+        """Samples that may be queued in the rig in addition to those in `_waiting`, and samples read since the ramp
+        ended with only zeros in `_waiting`.
+        """
         self._make_watches()
         self._ramp_samples: int | None = None
         self._ramp_done = 0
@@ -111,12 +115,12 @@ class Guard:
     def exchange(self, volts: NDArray[np.float64]) -> Exchange:
         """Send a block of commands [V] and read as many samples.
 
-        Commands from the first one beyond the limits on are not sent: the last valid value is ramped to zero along the
-        fast ramp.
+        If a command of the block is beyond the limits, none of the block is sent: the last command before it is ramped
+        to zero along the fast ramp.
         """
         if self._sending and self._held is None:
-            # the last exchange ended before its block was noted: the block's commands are lost, and the next ones would
-            # follow with a step
+            # the last exchange failed before its block was noted here: the commands of that block may not have been
+            # sent, and those of this block would then follow with a step
             self._held = self._command
             self._owed = volts.size
         self._sending = True
@@ -126,8 +130,8 @@ class Guard:
             self.abort()
         if self._held is not None:
             volts = np.full(volts.shape, self._held)
-        # everything is allocated before the rig is written to, and noted just after: when memory is exhausted at any of
-        # these lines, the next block, of the ramp, continues from what was really sent
+        # all memory is allocated before the rig is written to, and the state is updated just after: if memory runs out
+        # in any of these lines, the ramp in the next block continues from the value that was really sent
         command, sent = float(volts[-1]), self._ramped(volts)
         last, queue = float(sent[-1]), np.concatenate((self._waiting, sent))
         self._rig.write(sent)
@@ -169,7 +173,7 @@ class Guard:
         )
 
     def refusal(self, volts: NDArray[np.float64]) -> Violation | None:
-        """Limit that commands [V], shape (n,), would exceed if sent now, or None."""
+        """Limit that commands [V], shape (n,), would exceed if they were sent now, or None."""
         if self._acceptable(volts):
             return None
         if not np.isfinite(volts).all():
@@ -185,7 +189,7 @@ class Guard:
         return None
 
     def _acceptable(self, volts: NDArray[np.float64]) -> bool:
-        """Whether commands are within the limits; False if one is not finite, as a comparison with NaN is."""
+        """Whether commands are within the limits; False if one is NaN, because comparisons with NaN are False."""
         largest, first = self._limits.drive_voltage, abs(float(volts[0]) - self._command)
         if not (volts.max() <= largest and volts.min() >= -largest and first <= self._slew):
             return False
@@ -195,7 +199,7 @@ class Guard:
     def tare(self, values: NDArray[np.float64], *, drift: bool = True) -> None:
         """Take the mean of values at rest, shape (n, n_channels), as the zero of every signal.
 
-        The drift is checked from then on, unless it has no zero or `drift` is False: a laser may be aimed elsewhere.
+        From then on the drift is checked, unless it has no zero or `drift` is False because a laser is aimed elsewhere.
         """
         if self._signals is not None:
             self._signals.tare(values)
@@ -207,7 +211,7 @@ class Guard:
             self._begin(self._ramps.stop)
 
     def abort(self) -> None:
-        """Begin the fast ramp to zero, from the present value of a slower one."""
+        """Begin the fast ramp to zero; it replaces a slower ramp in progress, from that ramp's present value."""
         fast = max(round(self._ramps.abort * self._rig.sample_rate), 1)
         if self._ramp_samples is None or self._ramp_samples - self._ramp_done > fast:
             self._begin(self._ramps.abort)
@@ -262,7 +266,7 @@ class Guard:
         return volts
 
     def _slewed(self, volts: NDArray[np.float64]) -> NDArray[np.float64]:
-        """`volts` with limited slew: a command may use the entire limit, and the ramp adds to its slew."""
+        """`volts` with limited slew: the slew of a command may equal the limit, and the ramp adds to it."""
         if np.abs(np.diff(volts, prepend=self._sent)).max() <= self._slew:
             return volts
         slowed, last = np.empty_like(volts), self._sent
@@ -275,14 +279,14 @@ class Guard:
         if self._signals is None:
             return np.empty((len(values), 0))
         if self._first_block:
-            # the drive is zero: this zero is approximate until the storeys are at rest
+            # the drive is zero, so this block gives an approximate zero until the storeys are at rest
             self._signals.tare(values)
             self._first_block = False
         return self._signals.of(values)
 
 
 def _limits_of(signals: SignalMap, further: Sequence[FurtherChannel]) -> tuple[ChannelLimit, ...]:
-    """Limits of further channels. Raises InvalidInput for a channel that the rig lacks."""
+    """Limits of further channels. Raises InvalidInput for a channel that the rig does not have."""
     columns = {each.name: len(SIGNALS) + k for k, each in enumerate(signals.further)}
     found: list[ChannelLimit] = []
     for each in further:

@@ -93,8 +93,8 @@ class Limits(Parameters):
     cut: tuple[Literal["displacement", "force"], ...] = quantity(
         (),
         "",
-        "limits that cut the enable line in one call instead of ramping the drive through the queued samples: sooner by"
-        " acquisition.lead, but the amplifier then brakes the table harder than limits.acceleration",
+        "limits that cut the enable line at once instead of ramping the drive to zero after the queued samples: this"
+        " acts sooner by acquisition.lead, but the amplifier then brakes the table harder than limits.acceleration",
         example=["displacement"],
     )
     warning: Warnings = Warnings()
@@ -117,9 +117,7 @@ class Ramps(Parameters):
 
 
 def ramp_refusal(limits: Limits, ramps: Ramps) -> InvalidInput | None:
-    """Error message if the ramps, each half a cosine, exceed the slew limit when starting from the largest drive;
-    otherwise None.
-    """
+    """Error if the ramps, each half a cosine, exceed the slew limit when they start at the largest drive, else None."""
     shortest = min(ramps.stop, ramps.abort)
     steepest = 0.5 * pi * limits.drive_voltage / shortest
     if steepest <= limits.drive_slew:
@@ -133,8 +131,9 @@ def ramp_refusal(limits: Limits, ramps: Ramps) -> InvalidInput | None:
 class Violation:
     """Exceeded limit: `quantity` reached `value` beyond `limit`, in `unit`, at this sample index since arming.
 
-    `of_table`: the limit concerns motion or load of the table, not a sensor, a clock or the specimen. `timing`: the
-    limit concerns the arrival times of blocks, which the samples do not contain. `cuts`: it cuts the enable line.
+    `of_table`: the limit concerns the motion or load of the table, not a sensor, a clock or the specimen. `timing`: the
+    limit concerns the arrival times of blocks, which the samples do not contain. `cuts`: exceeding the limit cuts the
+    enable line.
     """
 
     quantity: str

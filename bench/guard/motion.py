@@ -94,9 +94,9 @@ class MotionWatch:
         """Whether the drift is tared and the lasers are aimed at their storeys."""
 
     def magnitudes(self) -> dict[str, float]:
-        """Largest magnitudes in the last block, by their keys in `WATCHED`; each laser and further channel by its name.
+        """Largest magnitudes in the last block, by key in `WATCHED`; for each laser and further channel, by name.
 
-        They are computed here, on request, since most blocks are not displayed.
+        They are computed on request, because most blocks are not displayed.
         """
         return {} if self._latest is None else self._quantities.displayed(*self._latest)
 
@@ -107,7 +107,7 @@ class MotionWatch:
         signals: NDArray[np.float64],
         extremes: Extremes | None = None,
     ) -> tuple[list[Violation], list[Violation]]:
-        """Limits that a block exceeds, and those whose warning level it reaches for the first time.
+        """Return the limits that a block exceeds, and those whose warning level it reaches for the first time.
 
         Values have shape (n, n_channels), signals (n, n_signals). If `extremes` are given, a block below all warning
         levels is accepted on their basis alone, unless the debounce count of an earlier condition is above zero.
@@ -120,7 +120,7 @@ class MotionWatch:
         if self.drift_watched:
             sizes["drift"] = np.abs(np.nan_to_num(signals[:, DRIFT]))
         for each in self._further:
-            # the converter is saturated
+            # a missing value means that the converter is saturated
             sizes[each.name] = np.nan_to_num(np.abs(signals[:, each.column]), nan=np.inf)
         peaks = {key: float(np.max(size, initial=0.0)) for key, size in sizes.items()}
         self._latest = values, peaks

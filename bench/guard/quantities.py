@@ -28,8 +28,8 @@ ROUNDING = 1e-9
 class WatchedQuantities:
     """Converts blocks of channel values into magnitudes of the limited quantities.
 
-    A missing value of a table channel counts as infinite: its converter is saturated. A missing value of a laser is
-    ignored here: `bench.guard.sensors` checks the loss of a sensor.
+    A missing value of a table channel counts as infinite, because its converter is saturated. A missing value of a
+    laser is ignored here; `bench.guard.sensors` checks for the loss of a sensor.
 
     A block is either converted by `of` or skipped: `bounds` returns upper bounds of its magnitudes, and `skip` stores
     the state required by later blocks.
@@ -45,14 +45,14 @@ class WatchedQuantities:
         self._span_time = self._span / sample_rate
         self._tail = self._long = np.zeros(0)
         self._forget = float(np.exp(-1.0 / (heating_time * sample_rate)))
-        # the compiled function is loaded here, not while the table moves
+        # load the compiled function here, not while the table moves
         self._heat = exponential_mean(np.zeros(1), self._forget)[1]
         self._skipped: list[Array] = []
         self._skipped_samples, self._skipped_current = 0, 0.0
         self._places = [(k, *_middle(channels[k])) for name, k in self._columns.items() if name in STOREYS]
 
     def of(self, values: Array) -> dict[str, Array]:
-        """Magnitude of each measured or estimated quantity, shape (n,), by its key in `WATCHED`."""
+        """Magnitude of each measured or estimated quantity, shape (n,), by key in `WATCHED`."""
         self._catch_up()
         found: dict[str, Array] = {}
         x, a = self._column(values, TABLE_DISPLACEMENT), self._column(values, TABLE_ACCELERATION)
@@ -69,8 +69,8 @@ class WatchedQuantities:
     def bounds(self, values: Array, extremes: Extremes) -> dict[str, float]:
         """Upper bound of each magnitude that `of` would return for a block without missing samples.
 
-        Every rounded operation is monotonic, so that the bounds equal the largest magnitudes bit for bit; only current
-        and heating may be below their bounds.
+        Every rounded operation is monotonic. The bounds are therefore bit-identical to the largest magnitudes, except
+        that current and heating may be below their bounds.
         """
         found: dict[str, float] = {}
         columns, shaker = self._columns, self._shaker
@@ -101,15 +101,15 @@ class WatchedQuantities:
         return found
 
     def displayed(self, values: Array, magnitudes: Mapping[str, float]) -> dict[str, float]:
-        """The `magnitudes` of a block for display: the current itself instead of its bound, the heating at its last
-        update, at most `MOST_SKIPPED` samples ago, and the place of each laser instead of the larger one.
+        """Magnitudes of a block for display, with the current itself instead of its bound, the heating at its last
+        update, at most `MOST_SKIPPED` samples ago, and the position of each laser instead of the larger of the two.
         """
         found = {key: value for key, value in magnitudes.items() if key != "laser_range"}
         if "current" in found and (current := self._load(values)[1]) is not None:
             found["current"] = largest(np.nan_to_num(current))
             found["heating"] = sqrt(max(float(self._heat[0]), 0.0) / self._forget) if self._forget > 0.0 else 0.0
         for k, middle, half in self._places:
-            # a laser without a valid sample has no place
+            # NaN for a laser without a valid sample
             found[self._names[k]] = float(np.fmax.reduce(np.abs(values[:, k] - middle))) / half
         return found
 
@@ -124,8 +124,8 @@ class WatchedQuantities:
                 self._catch_up()
 
     def _largest_heating(self, current: float) -> float:
-        """Upper bound of the heating up to the end of a block whose largest current is `current` [A]: a running mean
-        stays between its initial value and the largest square since.
+        """Upper bound of the heating up to the end of a block whose largest current is `current` [A]: the running mean
+        of the squares cannot exceed both its initial value and the largest square since.
         """
         before = float(self._heat[0]) / self._forget if self._forget > 0.0 else 0.0
         return sqrt(max(before, self._skipped_current**2, current**2) * (1.0 + ROUNDING))

@@ -13,7 +13,8 @@ from drivers.rig import Channel, Counts
 
 LATE, CLOCKS = "delay of a block of samples", "difference of the clocks"
 TIMING = (LATE, CLOCKS)
-"""Quantities whose limits concern the arrival of samples, which depends on computer and link rather than on the motion.
+"""Quantities whose limits concern the arrival of samples, which depends on the computer and its connection to the
+device, not on the motion.
 """
 _DRIVEN = 0.05
 """Drive change, relative to the largest command, above which the table counts as driven and all counts must change."""
@@ -42,10 +43,10 @@ class SensorWatch:
         drive: NDArray[np.float64],
         extremes: Extremes | None = None,
     ) -> list[Violation]:
-        """Sensor violations, from counts and values, shape (n, n_channels), and drive [V], shape (n,).
+        """Return sensor violations in counts and values, shape (n, n_channels), played with drive [V], shape (n,).
 
         If `extremes` are given and all channels change, a block without missing samples is accepted without examining
-        single samples.
+        individual samples.
         """
         self._keep(drive)
         if extremes is not None and not self._counting and all(map(lt, extremes.low, extremes.high)):
@@ -78,7 +79,7 @@ class SensorWatch:
             return []
         limit = self._limits.stuck
         return [
-            Violation(f"time of constant count of {self._channels[column].name}", limit, limit, "s", first + n - 1)
+            Violation(f"time with a constant count of {self._channels[column].name}", limit, limit, "s", first + n - 1)
             for column in np.flatnonzero(self._still >= self._needed)
         ]
 
@@ -90,9 +91,9 @@ class SensorWatch:
             self._driven_samples -= self._drives.popleft().size
 
     def _driven(self) -> bool:
-        """Whether the drive changed enough in both halves of the last `needed` samples.
+        """Whether the drive changed by more than `_DRIVEN` in both halves of the last `needed` samples.
 
-        Near its peaks a slow drive hardly changes within a single block.
+        Near its peaks, a slow drive hardly changes within a single block.
         """
         if self._driven_samples < self._needed:
             return False
@@ -105,7 +106,7 @@ class SensorWatch:
 _SETTLED = 20.0
 """Time before two clocks are compared [s], long compared with the delay of a block."""
 _STRETCH = 5.0
-"""Length [s] of the initial and of the present window whose earliest blocks are compared."""
+"""Length [s] of the two windows, at the start and at present, of which the earliest blocks are compared."""
 
 
 class TimeWatch:

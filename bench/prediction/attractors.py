@@ -25,20 +25,19 @@ SEED = 1
 """Seed of the drawn specimens, fixed so that predictions are reproducible."""
 
 RANGE = (0.025, 0.975)
-"""Quantiles of the greatest peaks of the drawn specimens that enclose 95 % of them."""
+"""Quantiles that enclose 95 % of the greatest peaks of the drawn specimens."""
 
 CYCLES, MEMBERS = 1500, 16
 
 
 @dataclass(frozen=True, eq=False)
 class LongTerm:
-    """Long-term motion with the spring `beta` at `omega` [rad/s], together with the rocking orbit, whose gain is
-    `orbit`.
+    """Long-term motion with the spring `beta` at `omega` [rad/s]. The rocking orbit there has the gain `orbit`.
 
     If the orbit on the table is `stable`, the motion is the orbit. `gains`, shape (n,), are the gains of the peaks of
-    the last cycles; it is empty if the block falls, after `fallen` cycles. `low` and `high` enclose the greatest peaks
-    of 95 % of the drawn specimens that do not fall, and `falls` is the fraction of those that do; NaN without drawn
-    specimens.
+    the last cycles; it is empty if the block falls, which happens after `fallen` cycles. `low` and `high` enclose the
+    greatest peaks of 95 % of the drawn specimens whose block does not fall, and `falls` is the fraction of specimens
+    whose block falls; all three are NaN without drawn specimens.
     """
 
     omega: float
@@ -53,7 +52,7 @@ class LongTerm:
 
     @property
     def repeats(self) -> int:
-        """Number of cycles after which the motion repeats, 0 if it does not."""
+        """Number of cycles after which the motion repeats; 0 if it does not repeat."""
         return 1 if self.stable else period_of(self.gains[:, None])
 
     def gain(self, of: Callable[[NDArray[np.float64]], np.float64]) -> float:
@@ -70,10 +69,10 @@ def long_term(
     cycles: int = CYCLES,
     members: int = MEMBERS,
 ) -> LongTerm:
-    """Long-term motion near the rocking orbit of `layer`, after `cycles`, with `members` specimens from `known`.
+    """Long-term motion near the rocking orbit of `layer` after `cycles` cycles, also of `members` draws from `known`.
 
-    The amplitude and the harmonics up to `harmonics` of the table's acceleration are those of the orbit. Raises NoOrbit
-    when there is no such orbit on the table.
+    The amplitude of the table's acceleration and its harmonics up to number `harmonics` are held at those of the orbit.
+    Raises NoOrbit if there is no such orbit on the table.
     """
     fixed = layer.orbit
     orbit, beta = table_orbit(fixed, shaker, harmonics), fixed.specimen.label or 0.0
@@ -99,9 +98,9 @@ def long_terms(
     request: AttractorRequest,
     progress: Progress = silent,
 ) -> list[LongTerm]:
-    """The long-term motion at every requested point at which there is a rocking orbit on the table."""
+    """Long-term motions at all requested points at which there is a rocking orbit on the table."""
     layers = [each.rocking for each in predict_spectra(specimen, request, progress) if each.rocking is not None]
-    done = counting(progress, "following the motions")
+    done = counting(progress, "simulating the long-term motions")
     found: list[LongTerm] = []
     for layer in layers:
         done(len(found), len(layers))

@@ -28,10 +28,10 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Bands:
-    """Bands of alpha_2 at n steady motions, arrays of shape (n,); NaN where no band can be stated.
+    """Bands of alpha_2 of n motions, arrays of shape (n,); NaN where no band can be stated.
 
     `uncertainty` is expanded (k = 2); `low` and `high` enclose 95 %; `share` is the fraction of the members that have
-    such a motion (1 to first order).
+    a finite gain (1 for a first-order band).
     """
 
     uncertainty: Floats
@@ -49,9 +49,9 @@ def bands(
 ) -> Bands:
     """Band around each `alpha_2`, shape (n,), of the motions `orbits`.
 
-    With `members` > 0, the band is from a Monte Carlo simulation with as many draws. Otherwise it is to first order:
-    the gain is computed one standard uncertainty to either side along each independent direction (GUM 5.1.4, note 2),
-    and the band is symmetric. Where a motion exists on one side only, that side is used.
+    With `members` > 0, the band is from a Monte Carlo simulation with that number of draws. Otherwise it is to first
+    order: the gain is computed one standard uncertainty to either side along each independent direction (GUM 5.1.4,
+    note 2), and the band is symmetric. Where the motion exists on only one side, that side is used.
     """
     best = np.asarray(alpha_2, dtype=np.float64)
     of: dict[Specimen, list[Specimen]] = {}
@@ -66,10 +66,11 @@ def bands(
 
 
 def record_bands(specimens: Sequence[Specimen], record: SampledRecord, known: SpecimenKnowledge, members: int) -> Bands:
-    """Band of alpha_2 of each of n `specimens` under `record`, from rest, by a Monte Carlo simulation with `members`
-    draws.
+    """Bands of alpha_2 of n `specimens` under `record`, started from rest, by Monte Carlo simulation with `members`
+    draws for each specimen.
 
-    A first-order band does not apply here, because toppling and the times of impacts do not change smoothly.
+    A first-order band does not apply here, because toppling and the times of impacts do not vary smoothly with the
+    parameters.
     """
     drawn = [_members(specimen, known, members) for specimen in specimens]
     gains = record_gains([one for own in drawn for one in own], record)[:, 1]
@@ -105,8 +106,8 @@ def _drawn(gains: Floats) -> Bands:
 def expanded_uncertainty(layer: Layer, known: SpecimenKnowledge) -> float | None:
     """Expanded uncertainty (k = 2) of the predicted alpha_2 of a steady motion, to first order.
 
-    From the sensitivities of the steady motion and the covariance of its inputs. The uncertainty of a spring is that of
-    its k_C, so that beta = k_C / k1 is anticorrelated with k1. None where the motion cannot be differentiated.
+    Computed from the sensitivities of the steady motion and the covariance of its inputs. The uncertainty of a spring
+    is that of its k_C, so that beta = k_C / k1 is anticorrelated with k1. None if the motion cannot be differentiated.
     """
     orbit = layer.orbit
     specimen = orbit.specimen

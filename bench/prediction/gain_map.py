@@ -17,15 +17,15 @@ from sim.specimen import Specimen
 from sim.steady import Orbit, resting_level
 
 IMPACTS: dict[Literal["rocking", "resting"], int] = {"rocking": 2, "resting": 0}
-"""Impacts per period of the drive, by layer."""
+"""Impacts per period of the drive, by branch."""
 
 
 def map_table(
     specimen: Specimen, request: MapRequest, known: SpecimenKnowledge | None = None, progress: Progress = silent
 ) -> Table:
-    """One row for each layer that exists at a point, sorted by stiffness, then frequency.
+    """Table with one row for each branch that exists at each point, sorted by stiffness, then frequency.
 
-    If `known`, the knowledge of the specimen, is given, additional columns contain the band of alpha_2. Raises
+    If the uncertainties of the specimen are given as `known`, additional columns contain the band of alpha_2. Raises
     SchedulerUnavailable if the requested scheduler does not respond.
     """
     betas, omegas = np.sort(request.beta), np.sort(request.omega)
@@ -53,13 +53,13 @@ def map_table(
         for part, name in zip(parts, IMPACTS, strict=True):
             part |= band_columns(_orbits(made, name), part["alpha_2"], known, request.members, done)
     whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    # stable sort: at each point the rocking layer remains first
+    # stable sort: at each point the rocking branch remains first
     order = np.lexsort((whole["omega_rad_s"], whole["beta"]))
     return table_of({name: values[order] for name, values in whole.items()})
 
 
 def grids(table: Mapping[str, NDArray[Any]], request: MapRequest, layer: str, name: str) -> NDArray[np.float64]:
-    """Column for one layer over the grid, shape (n_beta, n_omega), ascending in both; NaN where it has no row."""
+    """Column `name` of a branch over the grid, shape (n_beta, n_omega), both ascending; NaN where there is no row."""
     betas, omegas = np.sort(request.beta), np.sort(request.omega)
     grid = np.full((betas.size, omegas.size), np.nan)
     rows = table["layer"] == layer
@@ -70,10 +70,10 @@ def grids(table: Mapping[str, NDArray[Any]], request: MapRequest, layer: str, na
 
 
 def resting_margin(specimen: Specimen, request: MapRequest) -> NDArray[np.float64]:
-    """Margin of a resting block against uplift, shape (n_beta, n_omega), ascending in both.
+    """Margin of a resting block against uplift, shape (n_beta, n_omega), both ascending.
 
-    Ratio of the amplitude that would uplift the block to the amplitude of the test, minus one; the resting layer exists
-    where it is positive.
+    Ratio of the amplitude that would uplift the block to the amplitude of the test, minus one. The resting branch
+    exists where the margin is positive.
     """
     amplitude = amplitude_of(specimen, request)
     return np.array(
@@ -85,7 +85,7 @@ def resting_margin(specimen: Specimen, request: MapRequest) -> NDArray[np.float6
 
 
 def _orbits(made: GainMap, name: Literal["rocking", "resting"]) -> list[Orbit]:
-    """Motions of one layer, in the order of its columns."""
+    """Motions of one branch, in the row order of its columns."""
     layer = made.rocking if name == "rocking" else made.resting
     specimens = [made.specimen.coupled(float(beta)) for beta in made.betas]
     orbits: list[Orbit] = []

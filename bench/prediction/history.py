@@ -20,7 +20,7 @@ from sim.specimen import Specimen
 from sim.steady import Orbit
 
 FROM_REST = "from rest"
-"""Name of the motion from rest; other motions are named after the layer of the steady state."""
+"""Name of the motion from rest; a steady motion is named after its branch."""
 
 TIME = "time_s"
 
@@ -38,9 +38,9 @@ QUANTITIES: dict[str, tuple[str, str]] = {
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """Motion: `values` holds an array of shape (n,) for each of `QUANTITIES`.
+    """Motion over time: `values` contains an array of shape (n,) for each of `QUANTITIES`.
 
-    `status` is the ending at `end_time` [s]; `impacts` is the number of impacts until then.
+    `status` states how the motion ended at `end_time` [s]; `impacts` is the number of impacts until then.
     """
 
     omega: float
@@ -90,7 +90,7 @@ def history_table(made: Sequence[History]) -> Table:
 
 
 def runs_table(made: Sequence[History]) -> Table:
-    """One row per history: its ending, and the largest values of its samples."""
+    """Table with one row per history: how it ended, and the largest magnitudes of its samples."""
     columns = _points(made)
     columns["status"] = Column(np.array([history.status for history in made], np.str_), "", "ending of the motion")
     columns["end_time_s"] = Column(
@@ -113,7 +113,7 @@ def _points(made: Sequence[History]) -> dict[str, Column]:
         ),
         "beta": Column(np.array([history.beta for history in made], np.float64), "1", "stiffness ratio of the spring"),
         "motion": Column(
-            np.array([history.motion for history in made], np.str_), "", "from rest, or the layer of the steady state"
+            np.array([history.motion for history in made], np.str_), "", "from rest, or the branch of the steady motion"
         ),
     }
 
@@ -143,7 +143,7 @@ def _from_rest(coupled: Specimen, omega: float, amplitude: float, request: Histo
 
 
 def _steady(orbit: Orbit, request: HistoryRequest) -> History:
-    """Full periods, starting with the sine of the base."""
+    """History over full periods, starting where the sine of the base is zero and rising."""
     n, periods = request.samples_per_period, request.periods
     one = orbit.samples(n)[:, 1:]
     count = n * periods + 1

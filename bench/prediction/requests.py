@@ -53,8 +53,8 @@ class SineRequest(OrbitsRequest):
     tolerance: float | None = quantity(
         None,
         "1",
-        "relative tolerance per step of taylor (1e-10 if absent) or dop853; other solvers use a step of 1 "
-        "ms; steady motions by taylor are closed to 1e-11 or better, whatever the tolerance",
+        "relative tolerance per step of taylor (1e-10 if absent) or dop853; the other solvers use a step of 1 ms; "
+        "steady motions by taylor are periodic to 1e-11 or better, whatever the tolerance",
         ge=1e-15,
         le=1e-3,
     )
@@ -99,7 +99,7 @@ class MapRequest(GainRequest):
 
 
 class OnTableRequest(OrbitsRequest):
-    """Points at which steady motions on a table that the block pushes are computed."""
+    """Points at which steady motions are computed on a table that the block pushes."""
 
     table_mass: float | None = quantity(
         None,
@@ -122,19 +122,23 @@ class StabilityRequest(OnTableRequest):
 
 
 class AttractorRequest(OnTableRequest):
-    """Long-term motions on a table that the block pushes, where the rocking orbit is unstable."""
+    """Long-term motions where the rocking orbit is unstable, on a table that the block pushes."""
 
     omega: tuple[Frequency, ...] = _frequencies((12.5, 15.0))
     beta: tuple[Stiffness, ...] = _stiffnesses((0.64, 0.97))
     cycles: int = quantity(
         1500,
         "1",
-        "number of cycles simulated before the motion is described and its peaks are taken",
+        "number of cycles simulated before the motion is classified and its peaks are evaluated",
         ge=300,
         le=100_000,
     )
     members: int = quantity(
-        16, "1", "specimens drawn for the range of the greatest peak and the share of falls", ge=0, le=10_000
+        16,
+        "1",
+        "number of specimens drawn for the range of the greatest peak and the fraction of falls",
+        ge=0,
+        le=10_000,
     )
 
 
@@ -153,13 +157,13 @@ class RecordsRequest(Parameters):
     """Parameters of every prediction of a response to earthquake records."""
 
     peak_factor: float = quantity(
-        1.2, "1", "peak of each record, within the band, relative to the uplift acceleration g/lambda", gt=0, le=1000
+        1.2, "1", "peak of each filtered record, relative to the uplift acceleration g/lambda", gt=0, le=1000
     )
     table_band: str | None = quantity(
         None,
         "",
-        "table's band LOW:HIGH [Hz] to which records are filtered before scaling, or none; if absent, that "
-        "of the configured shaker",
+        "frequency band LOW:HIGH [Hz] of the table, to which records are filtered before scaling, or none; if absent, "
+        "that of the configured shaker",
     )
     trim: float = quantity(
         0.0005, "1", "fraction of the Arias intensity removed at either end of a record; 0: none", ge=0, lt=0.5
@@ -178,7 +182,7 @@ class SeismicRequest(RecordsRequest):
 
     beta: tuple[Stiffness, ...] = _stiffnesses(spaced("0.05", "1.2", 40))
     stroke_fit: Literal["none", "least-change", "high-pass"] = quantity(
-        "none", "", "method that fits the scaled motions to the configured bench's stroke"
+        "none", "", "method by which the scaled motions are fitted to the stroke of the configured bench"
     )
     members: int = quantity(
         0,
@@ -192,12 +196,12 @@ class SeismicRequest(RecordsRequest):
 
 
 class BandStudyRequest(RecordsRequest):
-    """Gain and overturning under earthquake records, against the lower end of the table's band."""
+    """Gain and overturning under earthquake records, against the lower end of the table's frequency band."""
 
     corner: tuple[Corner, ...] = quantity(
         spaced("0.1", "3", 16),
         "Hz",
-        "lower ends of the table's band: values, or start:stop:count; the upper end is constant",
+        "lower ends of the table's frequency band: values, or start:stop:count; the upper end is constant",
         min_length=2,
     )
     beta: tuple[Stiffness, ...] = _stiffnesses((0.25, 0.64, 0.97))

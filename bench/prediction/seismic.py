@@ -59,7 +59,7 @@ def seismic_curves(
     known: SpecimenKnowledge | None = None,
     progress: Progress = silent,
 ) -> list[SeismicCurve]:
-    """One curve for each record, with the requested bands if the uncertainty of the specimen is `known`.
+    """Compute one curve for each record, with the requested bands if the uncertainty of the specimen is `known`.
 
     Raises InvalidInput for a record that cannot be prepared.
     """
@@ -87,7 +87,9 @@ def band_study(
     configuration: BenchConfiguration,
     progress: Progress = silent,
 ) -> list[SeismicCurve]:
-    """One curve for each record and lower end of the band, ascending; each motion is scaled to the peak separately.
+    """Compute one curve for each record and, in ascending order, each lower end of the band.
+
+    Each motion is scaled to the requested peak separately.
 
     Raises InvalidInput for a band that is not ascending, or a record that cannot be prepared.
     """
@@ -130,27 +132,27 @@ def _curve(
 
 
 DIGITS = 9
-"""Significant digits of peaks and gains: the error of a step is 1e-10 and is amplified by impacts."""
+"""Significant digits of peaks and gains: the relative error of a step is 1e-10, which impacts amplify."""
 
 Columns = Mapping[str, tuple[type, str, str]]
 
 RECORD: Columns = {
     "record": (np.str_, "", "name of the record"),
-    "synthetic": (np.bool_, "1", "whether it is synthetic, not measured"),
+    "synthetic": (np.bool_, "1", "whether the record is synthetic, not measured"),
 }
 
 BAND: Columns = {
-    "band_low_hz": (np.float64, "Hz", "lower end of the table's band; absent without filter"),
-    "band_high_hz": (np.float64, "Hz", "upper end of the table's band; absent without filter"),
+    "band_low_hz": (np.float64, "Hz", "lower end of the table's frequency band; absent without filter"),
+    "band_high_hz": (np.float64, "Hz", "upper end of the table's frequency band; absent without filter"),
 }
 
 GAINS: Columns = {
     **RECORD,
     **BAND,
     "beta": (np.float64, "1", "stiffness ratio k_C/k1 of the coupling spring"),
-    "alpha_1": (np.float64, "1", "gain of the peak of u1, coupled over bare; absent unless completed"),
-    "alpha_2": (np.float64, "1", "gain of the peak drift u2 - u1, coupled over bare; absent unless completed"),
-    "status": (np.str_, "", "ending of the run"),
+    "alpha_1": (np.float64, "1", "gain of the peak of u1, coupled over bare; absent if the run ended early"),
+    "alpha_2": (np.float64, "1", "gain of the peak drift u2 - u1, coupled over bare; absent if the run ended early"),
+    "status": (np.str_, "", "how the run ended"),
     "toppled": (np.bool_, "1", "whether the block overturned"),
     "toppled_time_s": (
         np.float64,
@@ -158,9 +160,9 @@ GAINS: Columns = {
         "time of overturning since the start of the motion; absent if it did not overturn",
     ),
     "impacts": (np.int64, "1", "impacts of the block"),
-    "u1_max_m": (np.float64, "m", "greatest |u1|; absent unless completed"),
-    "drift_max_m": (np.float64, "m", "greatest |u2 - u1|; absent unless completed"),
-    "theta_max_rad": (np.float64, "rad", "greatest |theta|; absent unless completed"),
+    "u1_max_m": (np.float64, "m", "greatest |u1|; absent if the run ended early"),
+    "drift_max_m": (np.float64, "m", "greatest |u2 - u1|; absent if the run ended early"),
+    "theta_max_rad": (np.float64, "rad", "greatest |theta|; absent if the run ended early"),
     "bare_u1_max_m": (np.float64, "m", "greatest |u1| of the bare frame"),
     "bare_drift_max_m": (np.float64, "m", "greatest |u2 - u1| of the bare frame"),
 }
@@ -172,7 +174,7 @@ GAIN_BANDS: Columns = {
         "lower bound of the 95 % interval of alpha_2 over the drawn specimens that did not topple",
     ),
     "alpha_2_high": (np.float64, "1", "upper bound of the 95 % interval of alpha_2"),
-    "members_share": (np.float64, "1", "share of the drawn specimens that did not topple"),
+    "members_share": (np.float64, "1", "fraction of the drawn specimens that did not topple"),
 }
 
 MOTIONS: Columns = {
@@ -192,7 +194,7 @@ MOTIONS: Columns = {
 
 
 def gains_table(curves: Sequence[SeismicCurve]) -> Table:
-    """One row for each record, band and stiffness."""
+    """Table with one row for each record, band and stiffness."""
     table = _table(GAINS, [_gain(curve, gain) for curve in curves for gain in curve.gains])
     found = [curve.bands for curve in curves if curve.bands is not None]
     if len(found) < len(curves):
@@ -202,7 +204,7 @@ def gains_table(curves: Sequence[SeismicCurve]) -> Table:
 
 
 def motions_table(curves: Sequence[SeismicCurve]) -> Table:
-    """One row for each table motion, with its record and processing."""
+    """Table with one row for each table motion, with its record and processing."""
     return _table(MOTIONS, [_motion(curve) for curve in curves])
 
 

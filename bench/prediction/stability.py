@@ -17,7 +17,7 @@ from sim.sweep import in_threads
 from sim.table_orbit import table_orbit
 
 GROUNDS = {"fixed ground": "modulus", "table": "table_modulus"}
-"""Column of the moduli for each ground."""
+"""Name of the column of moduli for each ground."""
 
 BOUNDARY = 1e-4
 """Largest error of the frequency of a boundary [rad/s]."""
@@ -31,8 +31,8 @@ REAL = 0.02
 def multipliers_table(
     specimen: Specimen, shaker: Shaker, request: StabilityRequest, progress: Progress = silent
 ) -> Table:
-    """One row per rocking orbit, by stiffness and ascending frequency: its gain, and its slowest multiplier on fixed
-    ground and on the table, NaN where no orbit was found on the table.
+    """Table with one row per rocking orbit, by stiffness and ascending frequency: its gain, and its slowest-decaying
+    multiplier on fixed ground and on the table; NaN where no orbit was found on the table.
     """
     found = predict_spectra(specimen, request, progress)
     layers = [(each.beta, each.omega, each.rocking) for each in found if each.rocking is not None]
@@ -62,7 +62,7 @@ def multipliers_table(
 def boundaries_table(
     specimen: Specimen, shaker: Shaker, request: StabilityRequest, table: Table, progress: Progress = silent
 ) -> Table:
-    """One row per change of stability between neighbouring rows of `table`, located by bisection."""
+    """Table with one row per change of stability between adjacent rows of `table`, located by bisection."""
     amplitude = amplitude_of(specimen, request)
     columns = {name: column.values for name, column in table.items()}
     changes = [
@@ -97,7 +97,9 @@ def boundaries_table(
             np.array([beta for *_, beta in changes], dtype=np.float64), "1", "stiffness ratio of the coupling spring"
         ),
         "ground": Column(np.array([ground for ground, *_ in changes], dtype=np.str_), "", "fixed ground, or table"),
-        "omega_rad_s": Column(np.array([omega for omega, _ in found]), "rad/s", "frequency at which the orbit changes"),
+        "omega_rad_s": Column(
+            np.array([omega for omega, _ in found]), "rad/s", "frequency at which the stability of the orbit changes"
+        ),
         "argument_rad": Column(
             np.array([float(np.angle(each)) for _, each in found]),
             "rad",
@@ -112,7 +114,7 @@ def boundaries_table(
 
 
 def _slowest(orbit: Orbit, ground: str, shaker: Shaker, harmonics: int) -> complex:
-    """The slowest multiplier on a ground of GROUNDS; UNKNOWN where no orbit is found on the table."""
+    """Slowest-decaying multiplier on one of GROUNDS; UNKNOWN if no orbit is found on the table."""
     if ground == "fixed ground":
         return orbit.slowest
     try:

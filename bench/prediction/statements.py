@@ -19,7 +19,7 @@ from sim.specimen import Specimen
 
 
 class Verdict(StrEnum):
-    """Verdict of a claim. EXPECTED: a known and documented deviation of the model from the paper."""
+    """Verdict on a claim. EXPECTED: a known and documented deviation of the model from the paper."""
 
     HOLDS = "holds"
     FAILS = "does not hold"
@@ -28,7 +28,7 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True)
 class Check:
-    """Check of one claim: requirement, result, and the underlying numbers `values` (SI units, by name)."""
+    """Check of one claim: the claim, the finding, and the numbers that underlie it, `values` (SI units, by name)."""
 
     claim: str
     found: str
@@ -121,7 +121,7 @@ def lead_of_u1(layer: Layer) -> float:
 
 
 def _section(specimen: Specimen, beta: float, omegas: Floats, amplitude: float) -> Floats:
-    """alpha_2 of the rocking motion at `omegas`, same shape; NaN where none was found."""
+    """Return alpha_2 of the rocking motion at `omegas`, same shape; NaN where no rocking motion was found."""
     spectrum = gain_spectrum(specimen.coupled(beta), omegas, amplitude)
     return np.array([np.nan if each.rocking is None else each.rocking.alpha_2 for each in spectrum])
 
@@ -130,7 +130,7 @@ def _rocking(specimen: Specimen, omega: float, amplitude: float) -> Layer:
     layer = predict_gain(specimen.coupled(POINTS_BETA), omega, amplitude).rocking
     if layer is None:
         raise RockbenchError(
-            f"no rocking motion at {omega:g} rad/s and beta {POINTS_BETA:g}: cannot check the statements"
+            f"no rocking motion at {omega:g} rad/s and beta {POINTS_BETA:g}: the statements cannot be checked"
         )
     return layer
 
@@ -182,7 +182,11 @@ def _points(specimen: Specimen, amplitude: float, points: Mapping[str, Layer]) -
 
 
 def _phases(points: Mapping[str, Layer]) -> Statement:
-    """u1 > 0 is towards the block, theta > 0 rotates it towards the frame: equal signs are opposite motions."""
+    """Check the phase between u1 and theta.
+
+    u1 > 0 is a displacement towards the block, and theta > 0 a rotation of the block towards the frame: equal signs
+    are opposite motions.
+    """
     apart = {name: abs(lead_of_u1(layer)) for name, layer in points.items()}
     ratio = {name: layer.orbit.peaks.theta / layer.orbit.peaks.u1 for name, layer in points.items()}
     at_a = Check(
@@ -192,8 +196,8 @@ def _phases(points: Mapping[str, Layer]) -> Statement:
         {"A": apart["A"]},
     )
     at_c = Check(
-        f"at C, u₁ and ϑ move within {ALMOST:g}° of phase",
-        f"{180.0 - apart['C']:.1f}° from phase, {apart['C']:.1f}° from counter-phase",
+        f"at C, u₁ and ϑ move within {ALMOST:g}° of being in phase",
+        f"{180.0 - apart['C']:.1f}° from being in phase, {apart['C']:.1f}° from counter-phase",
         180.0 - apart["C"] <= ALMOST,
         {"C": apart["C"]},
         expected=False,
@@ -251,11 +255,12 @@ ABOUT = 0.1
 
 
 def seismic_statement(curves: Sequence[SeismicCurve]) -> Statement:
-    """Statement 8 for records with gains against stiffness: alpha_2 < 1, about 0.5 at best, approaching 1 as
-    beta grows (sections 5.1 and 5.2).
+    """Statement 8, on the gains under earthquake records against stiffness: alpha_2 < 1, about 0.5 at best, approaching
+    1 as beta grows (sections 5.1 and 5.2).
 
-    It is not expected to hold: with the table's values and unscaled time the experiments of the paper are not
-    reproduced; the content below 1 to 2 Hz is decisive. A block that topples has no gain, and alpha_2 < 1 fails.
+    The statement is not expected to hold: with the values in the paper's table and unscaled time, the model does not
+    reproduce the experiments of the paper; the content of the records below 1 to 2 Hz is decisive. A block that topples
+    has no gain, and counts as a failure of alpha_2 < 1.
     """
     gains = [gain for curve in curves for gain in curve.gains]
     known = np.array([gain.alpha_2 for gain in gains if gain.alpha_2 is not None])
@@ -290,6 +295,6 @@ def seismic_statement(curves: Sequence[SeismicCurve]) -> Statement:
 
 
 def _ends(curve: SeismicCurve) -> tuple[float, float]:
-    """Distance of alpha_2 from 1 at the smallest and the largest stiffness with a gain; NaN if there are none."""
+    """Distance of alpha_2 from 1 at the smallest and the largest stiffness that has a gain; NaN if none has."""
     known = [gain.alpha_2 for gain in curve.gains if gain.alpha_2 is not None]
     return (abs(known[0] - 1.0), abs(known[-1] - 1.0)) if known else (float("nan"), float("nan"))

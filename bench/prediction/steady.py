@@ -30,7 +30,7 @@ RUN_DURATION = 120.0
 
 @dataclass(frozen=True)
 class Timed:
-    """Result of a simulation; gains and peaks are NaN if it ended early. `impacts_per_period` is a mean."""
+    """Result of a simulation; gains and peaks are NaN if the simulation ended early. `impacts_per_period` is a mean."""
 
     alpha_1: float
     alpha_2: float
@@ -60,7 +60,7 @@ def timed_gains(
     scheduler: str | None = None,
     done: Done | None = None,
 ) -> list[Timed | None]:
-    """One simulation per prediction by the requested solver, on all processors; None without a rocking orbit.
+    """Run one simulation per prediction by the requested solver, on all processors; None without a rocking orbit.
 
     Raises InvalidInput for a tolerance outside the solver's range.
     """
@@ -92,7 +92,7 @@ def _timed(specimen: Specimen, solver: str, tolerance: float | None, prediction:
 
 
 def modes_table(specimen: Specimen, betas: Sequence[float]) -> Table:
-    """One row per mode: first those of the bare frame (beta NaN), then those of the coupled system at each stiffness.
+    """Table with one row per mode: the bare frame first (beta NaN), then the coupled system at each stiffness.
 
     Source: Eq. (12) to (14). A divergent mode has a growth rate instead of a frequency.
     """
@@ -105,13 +105,17 @@ def modes_table(specimen: Specimen, betas: Sequence[float]) -> Table:
         "system": Column(np.where(np.isnan(beta), "bare", "coupled"), "", "bare frame, or coupled with the block"),
         "beta": Column(beta, "1", "stiffness ratio of the coupling spring; absent for the bare frame"),
         "mode": Column(mode.astype(np.int64), "1", "number of the mode, in ascending order of the eigenvalue"),
-        "divergent": Column(divergent, "1", "whether the mode grows instead of oscillating: negative stiffness"),
+        "divergent": Column(
+            divergent, "1", "whether the mode grows instead of oscillating, because its stiffness is negative"
+        ),
         "omega_rad_s": Column(np.where(divergent, np.nan, omega), "rad/s", "circular frequency; absent if divergent"),
         "frequency_hz": Column(
             np.where(divergent, np.nan, omega / (2.0 * np.pi)), "Hz", "frequency; absent if divergent"
         ),
         "growth_rate_per_s": Column(np.where(divergent, -omega, np.nan), "1/s", "growth rate if divergent"),
-        "signed_root_rad_s": Column(omega, "rad/s", "sign(lambda) sqrt|lambda|, lambda an eigenvalue of M^-1 K"),
+        "signed_root_rad_s": Column(
+            omega, "rad/s", "sign(lambda) sqrt|lambda|, where lambda is the eigenvalue of M^-1 K"
+        ),
         "shape_u1": Column(
             u1, "1", "displacement of the first storey in the mode; normalised to unity unless it vanishes"
         ),
@@ -129,12 +133,14 @@ def _mode_rows(beta: float, modes: Modes) -> Iterator[tuple[float, float, float,
 DIGITS = 11
 """Significant digits of peaks and gains.
 
-Compared with orbits of order 26 closed to 5e-14, peaks at 228 points of a map have a median error of 1e-12, at
-most 3e-11.
+In a comparison with orbits of order 26 that are periodic to 5e-14, the peaks at 228 points of a map have a median error
+of 1e-12 and a largest error of 3e-11.
 """
 
 MULTIPLIER_DIGITS = 9
-"""Rounding of Floquet multipliers: their Jacobian is computed by finite differences, accurate to 1e-10 to 1e-9."""
+"""Significant digits of Floquet multipliers: their Jacobian is computed by finite differences, with an error of 1e-10
+to 1e-9.
+"""
 
 COLUMNS: dict[str, tuple[str, str, int | None]] = {
     "omega_rad_s": ("rad/s", "circular frequency of the base motion", None),
@@ -163,8 +169,8 @@ EXTRA: dict[str, tuple[str, str, int | None]] = {
     "alpha_2_uncertainty": ("1", "expanded uncertainty of alpha_2 (k = 2) due to the specimen", 6),
     "alpha_2_low": ("1", "lower bound of the 95 % band of alpha_2", 6),
     "alpha_2_high": ("1", "upper bound of the 95 % band of alpha_2", 6),
-    "members_share": ("1", "fraction of the drawn specimens that have this motion; 1 to first order", 6),
-    "status": ("", "exact, or the ending of the simulation by another solver", None),
+    "members_share": ("1", "fraction of the drawn specimens that have this motion; 1 for a first-order band", 6),
+    "status": ("", "exact, or how the simulation by another solver ended", None),
     "outcome": ("", "outcome of the sine switched on at rest: rocking, resting, other, toppled or failed", None),
     "outcome_time_s": ("s", "time at which the block overturned or the outcome was decided", None),
 }
@@ -178,7 +184,7 @@ def amplitude_of(specimen: Specimen, request: OrbitsRequest) -> float:
 
 
 def predict_points(specimen: Specimen, request: SineRequest, progress: Progress = silent) -> list[GainPrediction]:
-    """One prediction for each frequency at each stiffness, each computed independently."""
+    """Compute one prediction for each frequency at each stiffness, independently of the others."""
     amplitude = amplitude_of(specimen, request)
     points = [(beta, omega) for beta in request.beta for omega in request.omega]
     found: list[GainPrediction] = []
@@ -189,7 +195,7 @@ def predict_points(specimen: Specimen, request: SineRequest, progress: Progress 
 
 
 def predict_spectra(specimen: Specimen, request: OrbitsRequest, progress: Progress = silent) -> list[GainPrediction]:
-    """The same predictions, continued along ascending frequency from neighbouring points: five times faster."""
+    """Compute the predictions of `predict_points` five times faster, by continuation along ascending frequency."""
     amplitude, omegas = amplitude_of(specimen, request), sorted(request.omega)
     found: list[GainPrediction] = []
     for i, beta in enumerate(request.beta):
@@ -205,11 +211,11 @@ def steady_table(
     members: int = 0,
     progress: Progress = silent,
 ) -> Table:
-    """One row for each layer of each prediction, rounded to the significant digits.
+    """Table with one row for each branch of each prediction, rounded to the significant digits.
 
-    `timed` has one entry for each prediction: gains of the rocking layer by another solver, which replace the exact
-    ones; an additional column gives the ending of its simulation. `known`: knowledge of the specimen; additional
-    columns then give the band of alpha_2, see `bench.prediction.bands.bands`.
+    `timed` has one entry for each prediction: the gains of the rocking branch by another solver, which replace the
+    exact ones; an additional column then states how the simulation ended. With `known`, the uncertainties of the
+    specimen, additional columns contain the band of alpha_2, see `bench.prediction.bands.bands`.
     """
     rows: list[Row] = []
     for k, prediction in enumerate(predictions):
@@ -264,15 +270,19 @@ def table_of(values: Mapping[str, NDArray[Any]]) -> Table:
 
 
 EXACT_POWER = 22
-"""Largest power of ten that a double represents exactly: dividing by it rounds once, like reading a decimal number."""
+"""Largest power of ten that a double represents exactly. A division by it rounds once, as does the conversion of a
+decimal number.
+"""
 
 NEAR_TIE = 1e-3
-"""Distance of the discarded digits from one half below which the decimal conversion does the rounding."""
+"""Distance of the discarded digits from one half, in units of the last digit, below which a value is rounded by
+conversion to text.
+"""
 
 
 def rounded(values: NDArray[np.float64], digits: int) -> NDArray[np.float64]:
-    """`values`, shape (n,), rounded to the given number of significant digits: the doubles nearest to the decimal
-    numbers, as by a conversion to text and back.
+    """Round `values`, shape (n,), to the given number of significant digits. The result is the double nearest to the
+    decimal number, as after a conversion to text and back.
     """
     magnitude = np.abs(values)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):

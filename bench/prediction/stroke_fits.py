@@ -21,9 +21,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class StrokeFits:
-    """`unfitted` is the motion before the fit; `fitted` has the fit by method, `refused` the reason by method.
+    """Result of fitting a record to the stroke of a bench.
 
-    `own` are the periods [s] of the bare frame's modes.
+    `unfitted` is the motion before the fit. `fitted` contains the fitted motion of each method that succeeded, and
+    `refused` the error of each that did not. `own` are the periods [s] of the bare frame's modes.
     """
 
     record: Accelerogram
@@ -35,7 +36,7 @@ class StrokeFits:
 
     @property
     def chosen(self) -> PreparedMotion:
-        """Fit by the first requested method that succeeded: least change before high-pass."""
+        """Motion fitted by the first requested method that succeeded; least change precedes high-pass."""
         return next(iter(self.fitted.values()))
 
 
@@ -65,13 +66,13 @@ def stroke_fits(record: Accelerogram, request: StrokeFitRequest, configuration: 
 
 
 def change_at(fit: StrokeFit, periods: Array) -> Array:
-    """Relative change of the response spectrum at `periods` [s], same shape; they must be among the spectrum's
-    periods.
+    """Relative change of the response spectrum at `periods` [s], same shape, all of which are periods of the
+    spectrum.
     """
     return fit.change[np.searchsorted(fit.periods, periods)]
 
 
 def change_over(fit: StrokeFit) -> tuple[float, float]:
-    """Root mean square and largest magnitude of the change at periods from 0.1 to 2 s."""
+    """Root mean square and largest magnitude of the relative change at periods from 0.1 to 2 s."""
     change = change_at(fit, PERIODS)
     return float(np.sqrt(np.mean(change**2))), float(np.abs(change).max())

@@ -81,7 +81,7 @@ def response_of(configuration: BenchConfiguration) -> TableResponse | None:
     """Response of this bench's table; None for a real table without a stored model.
 
     Raises InvalidInput if the stored model cannot be read or was identified at another sample rate. Its age is not
-    checked, since an old model still gives the approximate drive for a motion.
+    checked, because even an old model gives the approximate drive for a motion.
     """
     if configuration.table_model is not None:
         model = TableModel.read(Path(configuration.table_model))
@@ -116,8 +116,8 @@ def _amplitude(program: SineProgram, times: Array) -> Array:
 
 
 def _parts(program: SineProgram, times: Array) -> Iterator[tuple[Sweep, slice, Array]]:
-    """Each sweep with its slice of the ascending `times` [s], and those times relative to its start; the last sweep
-    includes all later times.
+    """Yield each sweep with its slice of the ascending `times` [s], and those times relative to the sweep's start. The
+    last sweep includes all later times.
     """
     begins = [0.0, *accumulate(sweep.duration for sweep in program.sweeps)][: len(program.sweeps)]
     places = [*np.searchsorted(times, begins).tolist(), times.size]
@@ -135,10 +135,10 @@ def load(
     response: TableResponse | None,
     heating_time: float,
 ) -> dict[str, float]:
-    """Largest value of each quantity of table and shaker from `begin` [s] on; unknown quantities are absent.
+    """Largest value of each quantity of table and shaker, by key, from `begin` [s] on; unknown quantities are absent.
 
-    The heating, with time constant `heating_time` [s], begins at zero, as in the guard after arming, and is also
-    evaluated at the end of the last sine, which is held for `held` [s].
+    The heating, with time constant `heating_time` [s], is zero at the start of the programme, as in the guard after
+    arming. It is also evaluated at the end of the last sine, which is held for `held` [s].
     """
     times = np.arange(0.0, program.duration, STEP)
     amplitude, omega, _ = envelope(program, times)
@@ -173,7 +173,7 @@ TOLERANCE = 1e-7
 @dataclass(frozen=True)
 class Travel:
     """Largest magnitudes of the displacement at either laser and of the drift [m], and the time [s] at which the block
-    `toppled`, where that matters.
+    `toppled`, where it is evaluated.
     """
 
     storey_1: float
@@ -185,8 +185,8 @@ class Travel:
 def travel_demands(
     travels: Sequence[Travel], halves: tuple[float, float], off_middle: float
 ) -> dict[str, NDArray[np.float64]]:
-    """`laser_demands` of each specimen, shape (n,), with the storeys at rest away from mid range by the fraction
-    `off_middle`.
+    """Laser and drift demands of each specimen, shape (n,), as in `laser_demands`. At rest, the storeys are away from
+    mid range by the fraction `off_middle` of half the range.
     """
     moved = np.array([(each.storey_1, each.storey_2, each.drift) for each in travels]).T
     found = laser_demands(moved[0], moved[1], moved[2], halves)
@@ -200,11 +200,11 @@ def stage_travels(
     reference: Literal["ground", "table"],
     catch_angle: float,
 ) -> list[Travel]:
-    """Travels of each specimen under its program, from rest; evaluated from `begin` [s] until the end, or until the
-    block falls.
+    """Travels of each specimen under its programme, started from rest, evaluated from `begin` [s] until the end of the
+    programme or the fall of the block.
 
-    The programs differ only in their amplitudes. `reference` is the mounting of the lasers; from `catch_angle` [rad] on
-    the block counts as fallen.
+    The programmes differ only in their amplitudes. `reference` is the mounting of the lasers. From `catch_angle` [rad]
+    on, the block counts as fallen.
     """
     highest = max(max(sweep.omega) for sweep in programs[0].sweeps)
     times = np.arange(begin, programs[0].duration, tau / highest / PER_CYCLE)
@@ -227,14 +227,14 @@ def stage_travels(
 
 
 LIKELY = 0.95
-"""Fraction of the drawn specimens that a likely demand covers."""
+"""Fraction of the drawn specimens whose demands do not exceed the likely demand."""
 
 UNKNOWN_SHAKER = {
     "force": "the moving mass is unknown: set hardware.moving_mass and hardware.force_constant",
     "current": "the force constant is unknown: set hardware.moving_mass and hardware.force_constant",
     "heating": "the force constant is unknown: set hardware.moving_mass and hardware.force_constant",
 }
-"""Reasons why quantities of the shaker may not be predicted."""
+"""Reasons given when quantities of the shaker are not predicted."""
 
 
 UNPROBED = {
@@ -246,7 +246,7 @@ UNPROBED = {
 
 
 def demands_of(known: Mapping[str, float], where: str, configuration: BenchConfiguration) -> tuple[Demand, ...]:
-    """Demand on every limited quantity in the decisive part `where` of a run, on a table that the run itself probes."""
+    """Demands on all limited quantities in the decisive part `where` of a run that itself probes its table."""
     return tuple(
         Demand(quantity, known[quantity], None, where)
         if quantity in known
@@ -257,7 +257,7 @@ def demands_of(known: Mapping[str, float], where: str, configuration: BenchConfi
 
 @dataclass(frozen=True, eq=False)
 class StageDemands:
-    """Demands of one part, each of shape (1 + draws,): for the nominal specimen, then for the drawn ones.
+    """Demands of one part of a run, each of shape (1 + draws,): for the nominal specimen, then for the drawn ones.
 
     `chance` is the estimated probability that the block does not topple, where known.
     """
@@ -268,7 +268,7 @@ class StageDemands:
 
 
 def demand(quantity: str, asked: Sequence[StageDemands], unknown: Mapping[str, str]) -> Demand:
-    """Largest demand on `quantity` over the parts, or the reason in `unknown` if none is predicted."""
+    """Largest demand on `quantity` over the parts of a run, or the reason in `unknown` if none is predicted."""
     known = [each for each in asked if quantity in each.values]
     if not known:
         return Demand(quantity, None, None, unknown[quantity])

@@ -18,8 +18,9 @@ from sim.errors import InvalidInput
 class Demand:
     """Largest predicted value of one limited quantity, a key of `bounds`, in its SI unit.
 
-    `value` is for the nominal specimen; 95 % of the specimens within the uncertainty stay below `likely`. `where` is
-    the part of the run in which it occurs. If not predicted, both values are None and `where` is the reason.
+    `value` is for the nominal specimen. Given the uncertainty of the specimen, 95 % of the specimens stay below
+    `likely`. `where` is the part of the run in which the value occurs. If it is not predicted, both values are None and
+    `where` is the reason.
     """
 
     quantity: str
@@ -30,7 +31,7 @@ class Demand:
 
 @dataclass(frozen=True)
 class Stage:
-    """Part of a run: table motions from rest, and the estimated probability of success, if known."""
+    """Part of a run: the legs of the table motion from rest, and the estimated probability of success, if known."""
 
     name: str
     legs: tuple[Leg, ...]
@@ -58,7 +59,9 @@ _AWAY = f"{_LESS}, or choose frequencies farther from the specimen's resonances"
 
 @dataclass(frozen=True)
 class Bound:
-    """`limit` of one quantity in its SI `unit`, the key or part that sets it, and the remedy if it is exceeded."""
+    """`limit` of one quantity in its SI `unit`, the `owner` (key or part) that sets it, and the `remedy` if it is
+    exceeded.
+    """
 
     quantity: str
     name: str
@@ -74,7 +77,7 @@ class Bound:
 
 
 def bounds(configuration: BenchConfiguration) -> dict[str, Bound]:
-    """Bound of every quantity, by its key: the lowest where several apply."""
+    """Bound of each quantity, by key; the lowest where several apply."""
     limits = configuration.limits
 
     def guarded(quantity: str) -> tuple[float, str]:
@@ -133,7 +136,7 @@ class Margin:
 
     @property
     def likely(self) -> float | None:
-        """Margin kept by 95 % of the specimens within the uncertainty; None if not predicted."""
+        """Margin that 95 % of the specimens keep, given the uncertainty; None if the demand is not predicted."""
         return None if self.demand.likely is None else 1.0 - self.demand.likely / self.bound.limit
 
     @property
@@ -144,13 +147,13 @@ class Margin:
 
 
 def margins(demands: Iterable[Demand], bounds: Mapping[str, Bound]) -> tuple[Margin, ...]:
-    """Margin of each demand, tightest first, those not predicted last."""
+    """Margin of each demand, in ascending order; demands that are not predicted are last."""
     found = [Margin(bounds[demand.quantity], demand) for demand in demands]
     return tuple(sorted(found, key=lambda each: inf if each.margin is None else each.margin))
 
 
 def refusal(found: Sequence[Margin]) -> InvalidInput | None:
-    """Error naming the exceeded limit with the smallest margin, or None. `found` is in ascending order of margin."""
+    """Error naming the exceeded limit with the smallest margin, or None. `found` is sorted by ascending margin."""
     binding = found[0] if found else None
     if binding is None or binding.margin is None or binding.margin >= 0.0:
         return None
@@ -160,9 +163,9 @@ def refusal(found: Sequence[Margin]) -> InvalidInput | None:
 
 
 def warnings(found: Sequence[Margin]) -> tuple[str, ...]:
-    """Warnings about limits that the nominal specimen does not exceed but others within the uncertainty may."""
+    """Warnings about limits that the nominal specimen does not exceed but a specimen within the uncertainty may."""
     return tuple(
-        f"at the 95 % bound of the specimen's uncertainty {bound.owner} = {bound.limit:g} would be exceeded: "
+        f"at the 95 % bound of the specimen's uncertainty, {bound.owner} = {bound.limit:g} would be exceeded: "
         + _needs(each, each.demand.likely, each.likely)
         for each in found
         if each.likely is not None and each.likely < 0.0 <= (each.margin or 0.0)
@@ -176,7 +179,7 @@ def _needs(each: Margin, value: float | None, margin: float | None) -> str:
 
 
 def margins_table(margins: Sequence[Margin]) -> Table:
-    """One row for each limited quantity, tightest first."""
+    """Table with one row for each limited quantity, in ascending order of margin."""
 
     def numbers(values: list[float | None], unit: str, description: str) -> Column:
         return Column(np.array([nan if value is None else value for value in values]), unit, description)
@@ -184,11 +187,11 @@ def margins_table(margins: Sequence[Margin]) -> Table:
     def texts(values: list[str], description: str) -> Column:
         return Column(np.array(values, dtype=np.str_), "", description)
 
-    assumed, likely = "for the nominal specimen", "that 95 % of the specimens within the uncertainty stay below"
+    assumed, likely = "for the nominal specimen", "that 95 % of the specimens stay below, given the uncertainty"
     return {
         "quantity": texts([each.bound.name for each in margins], "limited quantity"),
         "margin": numbers([each.margin for each in margins], "1", f"1 - demand / limit, {assumed}; NaN: not predicted"),
-        "margin_95": numbers([each.likely for each in margins], "1", f"1 - demand / limit, for the demand {likely}"),
+        "margin_95": numbers([each.likely for each in margins], "1", f"1 - demand / limit, for a demand {likely}"),
         "demand": numbers([each.demand.value for each in margins], "SI", f"largest predicted value {assumed}"),
         "demand_95": numbers([each.demand.likely for each in margins], "SI", f"largest predicted value {likely}"),
         "limit": numbers([each.bound.limit for each in margins], "SI", "largest allowed value"),
@@ -196,13 +199,13 @@ def margins_table(margins: Sequence[Margin]) -> Table:
         "owner": texts([each.bound.owner for each in margins], "source of the limit"),
         "where": texts(
             [each.demand.where for each in margins],
-            "part of the run in which the demand occurs, or reason why it is not predicted",
+            "part of the run in which the demand occurs, or the reason why it is not predicted",
         ),
     }
 
 
 def drive_table(stages: Sequence[Stage]) -> Table:
-    """One row for each leg of the planned drive; a stage starts at zero drive."""
+    """Table with one row for each leg of the planned drive; every stage starts at zero drive."""
     rows = [(stage, leg) for stage in stages for leg in stage.legs]
     chances = [nan if stage.chance is None else stage.chance for stage, _ in rows]
     return {

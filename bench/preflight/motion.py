@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 def table_demands(
     displacement: Motion, velocity: Motion, acceleration: Motion, shaker: ShakerModel | None
 ) -> dict[str, Motion]:
-    """Demands on the table, and force and current if the shaker is known; accepts samples, spectra or peaks."""
+    """Demands on the table, including force and current if the shaker is known. Accepts samples, spectra or peaks."""
     found = {"displacement": displacement, "velocity": velocity, "acceleration": acceleration}
     if shaker is not None:
         found |= {"force": shaker.force(acceleration), "current": shaker.current(acceleration, displacement)}
@@ -25,7 +25,7 @@ def table_demands(
 
 
 def laser_demands(storey_1: Motion, storey_2: Motion, drift: Motion, halves: tuple[float, float]) -> dict[str, Motion]:
-    """Measured displacements of the storeys over half the range of their lasers, and the drift [m]."""
+    """Measured displacements of the storeys, relative to half the ranges of their lasers, and the drift [m]."""
     return {STOREYS[0]: storey_1 / halves[0], STOREYS[1]: storey_2 / halves[1], "drift": drift}
 
 
@@ -38,19 +38,21 @@ RESTING = "resting"
 """Key for the ratio of the uplift moment to the moment of the block's weight."""
 
 _SILENCE = 30.0
-"""Time at rest [s] appended to the record in the transform, so that ringing does not wrap around to the beginning."""
+"""Time at rest [s] appended to the record before the Fourier transform, so that the free vibration does not wrap around
+to the beginning.
+"""
 
 
 def resting_demands(
     acceleration: Array, sample_rate: float, specimen: Specimen, configuration: BenchConfiguration
 ) -> dict[str, float]:
-    """Largest magnitude of each limited quantity, in its unit, and of `RESTING`, from rest to rest, in closed form.
+    """Largest magnitude of each limited quantity, in its unit, and of `RESTING`, while the block rests.
 
-    The system is linear while the block rests: the spring is then grounded, and the moment about a corner,
-    h_b M a - k_C h1 u1, shows the margin to uplift (Eq. 9 and A.3 of the paper).
+    Computed from the frequency response: the system is linear while the block rests, because the spring is then
+    grounded. The moment about a corner, h_b M a - k_C h1 u1, gives the margin to uplift (Eq. 9 and A.3 of the paper).
 
     `acceleration` [m/s2] of the table, shape (n,), begins at rest. Force and current are absent for an unknown shaker,
-    `RESTING` without a block.
+    `RESTING` is absent without a block.
     """
     from scipy.fft import next_fast_len
 
@@ -71,13 +73,13 @@ def resting_demands(
     made = {name: np.fft.irfft(spectrum, size)[: acceleration.size] for name, spectrum in series.items()}
     found = peaks(made)
     if "current" in made:
-        # rms over the record: conservative, as the guard averages over a longer time
+        # rms over the record: conservative, because the guard averages over a longer time
         found["heating"] = float(np.sqrt(np.mean(made["current"] ** 2)))
     return found
 
 
 def _storeys(specimen: Specimen, omega: Array) -> NDArray[np.complex128]:
-    """u1 and u2 [m] per table acceleration [m/s2] at `omega` [rad/s], shape (2, n); with a block, while it rests."""
+    """u1 and u2 [m] per table acceleration [m/s2] at `omega` [rad/s], shape (2, n); for a block, while it rests."""
     mass, damping, stiffness = frame_matrices(specimen.frame)
     stiffness[0, 0] += specimen.k_c
     w = omega[:, None, None]

@@ -29,7 +29,7 @@ from sim.parameters import Parameters
 
 
 class NotComparable(RockbenchError):
-    """The recorded samples are insufficient for the requested analysis."""
+    """Error: the recorded samples are insufficient for the requested analysis."""
 
     error_code = "not_comparable"
 
@@ -42,8 +42,8 @@ def follow(
 ) -> tuple[Replayed, tuple[Parameters, ...]]:
     """Replay the recorded plan with a follower. Returns the replay and the follower's points.
 
-    Raises NotComparable if this software does not reproduce the recorded points with the recorded settings, since the
-    effects of settings and software could not be separated.
+    Raises NotComparable if this software does not reproduce the recorded points with the recorded settings, because the
+    effects of the settings could then not be separated from those of the software.
     """
     configuration = prepared.configuration
     follower = make()
@@ -62,11 +62,11 @@ def carry_out(
     """Carry out a plan with `changed` settings on the recorded samples. Returns the replay and its points.
 
     `configuration` is the recorded one. Raises NotComparable if the plan with these settings would have driven the
-    table differently, since the recorded motion is not the response to that drive.
+    table differently, because the recorded motion is not the response to that drive.
     """
     replayed = replay(record, changed.plan(), configuration, clock=VirtualClock(), subscribers=subscribers)
     if (why := replayed.parted(DRIVE)) is not None:
-        raise NotComparable(f"these settings would change the drive of the table ({why}): measure again")
+        raise NotComparable(f"these settings would change the drive of the table ({why}): repeat the measurement")
     return replayed, replayed.points
 
 
@@ -84,7 +84,7 @@ def _watched(plan: Plan, follower: Follower) -> Generator[Step, Outcome, object]
 class Analysis:
     """Re-analysed `points` of type `point_type`, and the inputs of their computation.
 
-    `settings` are the changed settings by name; `used` and `configuration` hold all settings in force.
+    `settings` are the changed settings by name; `used` and `configuration` contain all settings in force.
     """
 
     points: Sequence[Parameters]
@@ -95,10 +95,10 @@ class Analysis:
 
 
 def write_analysis(original: Path, record: DataFile, analysis: Analysis, out: Path | None = None) -> Path:
-    """Write a new file, `<name>.analysis-<n>.h5` in the original's folder with the first free n, unless `out` is given.
-    Returns its path.
+    """Write the results to a new file and return its path.
 
-    Raises InvalidInput if `out` exists or cannot be created, DataFileError when the disk fails.
+    Without `out`, the file is `<name>.analysis-<n>.h5` in the original's folder, with the first free n. Raises
+    InvalidInput if `out` exists or cannot be created, DataFileError when the disk fails.
     """
     digest = file_hash(original)
     for path in [out] if out is not None else _names(original):
@@ -107,7 +107,9 @@ def write_analysis(original: Path, record: DataFile, analysis: Analysis, out: Pa
         except FileExistsError:
             if out is None:
                 continue
-            raise InvalidInput("--out", str(path), "the file exists and is never overwritten; name another") from None
+            raise InvalidInput(
+                "--out", str(path), "the file exists and is never overwritten: give another name"
+            ) from None
         except OSError as error:
             raise InvalidInput("--out", str(path), f"the file cannot be created ({reason(error)})") from error
         try:
@@ -137,7 +139,7 @@ def _fill(file: hdf5.File, original: Path, digest: str, record: DataFile, analys
     process = hdf5.create_group(entry, "process", "NXprocess")
     hdf5.write_text(process, "program", "rocking-bench")
     hdf5.write_text(process, "version", software_version())
-    hdf5.write_text(process, "date", now(), description="wall clock, ISO 8601")
+    hdf5.write_text(process, "date", now(), description="time of the analysis by the wall clock, ISO 8601")
     texts = {
         "settings": (json.dumps(dict(analysis.settings), default=str), "changed settings, by name (JSON)"),
         "used": (analysis.used.model_dump_json(), "every setting of the analysis that was in force (JSON)"),

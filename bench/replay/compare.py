@@ -17,23 +17,23 @@ from bench.events import Acquired, Event, PointFinished, SensorsAligned, TwinEst
 from bench.replay.recording import RecordedCourse
 
 ROUNDING = 1e-9
-"""Relative difference of results that is attributed to rounding on another processor or with another library."""
+"""Largest relative difference of results that is attributed to rounding on another processor or by another library."""
 
 DRIVE_ROUNDING = 1e-6
-"""Difference of the drive [V] that is attributed to rounding: far below the step of a 16-bit converter."""
+"""Largest difference of the drive [V] that is attributed to rounding: far below the step of a 16-bit converter."""
 
 ROWS_AT_ONCE = 2**16
 
 OF_INTERVALS = ("uncertainty", "dominating", "agrees", "alpha_1_low", "alpha_1_high", "alpha_2_low", "alpha_2_high")
-"""Parts of the names of columns that depend on the evaluation of uncertainties."""
+"""Words in the names of the columns that depend on the evaluation of uncertainties."""
 
 DRIVE, JOURNAL, POINTS, ENDING = "drive samples", "journal entries", "points", "ending"
-"""Parts that are compared in addition to the other tables."""
+"""Parts of a recording that are compared in addition to its other tables."""
 
 
 @dataclass(frozen=True)
 class Difference:
-    """Difference from the recording in `part`; `rounding` is true if it concerns only the last bits of a number."""
+    """Difference from the recording in `part`; `rounding` is True if only the last bits of numbers differ."""
 
     text: str
     part: str
@@ -98,8 +98,8 @@ class Comparison:
                 continue
             common = max(len(stored), len(rows))
             if broken_off is not None and kind in (TwinEstimate, SensorsAligned):
-                # a killed program may lose its last samples but not the twin's estimates from them; the end of its run
-                # was never published
+                # a killed program may lose its last samples but not the twin's estimates from them, and it has not
+                # published the end of its run
                 common = min(len(stored), len(rows))
             elif broken_off is not None and kind in ENTRY_TABLES:
                 common = entries[kind.__name__]
@@ -108,9 +108,9 @@ class Comparison:
         return found
 
     def _compare_journal(self, found: Found, broken_off: str | None) -> list[tuple[str, str, int]]:
-        """Compare kind, order and text of the entries, or kind and preceding number of blocks if the wording differs.
+        """Compare the entries in order: kind and text, or kind and number of preceding blocks if the wording differs.
 
-        Returns the entries of the replay that can be compared.
+        Returns the entries of the replay that were compared.
         """
         begin, same_wording = self._course.begin, self._course.same_wording
         stored = [(entry.kind, entry.text, entry.blocks) for entry in self._course.journal]
@@ -187,8 +187,8 @@ def _compare_rows(
     same_wording: bool,
     same_intervals: bool,
 ) -> None:
-    """Compare the rows of a table field by field, except bench times, and what an older evaluation of uncertainties or
-    wording differs in.
+    """Compare the rows of a table field by field, except bench times and, for an older file, fields that depend on the
+    wording or on the evaluation of uncertainties.
     """
     found.compared[what] = len(came)
     if len(stored) != len(came):
@@ -207,7 +207,7 @@ def _compare_rows(
             else:
                 largest = max(largest, apart)
     if largest > 0.0:
-        said = f"{what} differ by at most {largest:.1e} of a value"
+        said = f"{what} differ by at most {largest:.1e} of the value"
         found.differences.append(Difference(said, what, rounding=True))
 
 
@@ -223,7 +223,7 @@ def _are_sentences(was: Any, now: Any) -> bool:
 
 
 def _apart(was: Any, now: Any) -> float:
-    """Relative difference of two values; infinite if they are unequal and not numbers."""
+    """Relative difference of two values; infinite for unequal values that are not numbers."""
     was, now = (None if each is None or each != each else each for each in (was, now))
     if isinstance(now, str):
         return 0.0 if was == _clipped(now) or (was is None and not now) else np.inf

@@ -30,7 +30,7 @@ from drivers.rig import Alignment, Channel, Counts
 from sim.errors import CauseCode, InvalidInput
 
 _AHEAD = 10.0
-"""Duration read in one access [s]: an access takes as long for one sample as for thousands."""
+"""Duration read in one access [s]: reading thousands of samples takes no longer than reading one."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class RunRecording:
         return [(stretch.first, stretch.length) for stretch in self._stretches]
 
     def counts(self, first: int, n: int) -> Counts:
-        """Counts of `n` samples from `first` on, shape (n, n_channels). Raises InvalidInput for absent samples."""
+        """Counts of `n` samples from `first` on, shape (n, n_channels). Raises InvalidInput if a sample is missing."""
         begin = first - self._held_first
         if not 0 <= begin <= begin + n <= len(self._held):
             self._fetch(first, n)
@@ -120,7 +120,7 @@ class DataFileRecording:
 
     @property
     def runs(self) -> tuple[RunRecording, ...]:
-        """Runs in order, as they were at the first access."""
+        """Runs in order, as the file contained them at the first access."""
         return self._runs
 
     @cached_property
@@ -134,7 +134,7 @@ class DataFileRecording:
 
 
 def _stretches(blocks: dict[str, NDArray[Any]], ends: NDArray[np.int64], chosen: NDArray[np.intp]) -> list[_Stretch]:
-    """Gap-free sections of one run: consecutive blocks are joined."""
+    """Gap-free sections of one run, in which consecutive blocks are joined."""
     row, first, end = blocks["row"][chosen], blocks["first"][chosen], ends[chosen]
     length = end - row
     follows = first[1:] == first[:-1] + length[:-1]
@@ -144,10 +144,10 @@ def _stretches(blocks: dict[str, NDArray[Any]], ends: NDArray[np.int64], chosen:
 
 
 def former_keys(record: DataFile) -> str:
-    """A notice of the keys in the recorded configuration that have their names of an earlier version; empty if none."""
+    """Notice that lists keys of the recorded configuration under their names of an earlier version; empty if none."""
     stored = json.loads(record.metadata.get("configuration", "{}"))
     found = [f"{dotted(old)} (now {new})" for old, new in former_names(BenchConfiguration, stored)]
-    return f"the file has former names of keys: {', '.join(found)}" if found else ""
+    return f"the file uses former names of keys: {', '.join(found)}" if found else ""
 
 
 def _configuration(record: DataFile) -> BenchConfiguration:
@@ -170,14 +170,14 @@ def _configuration(record: DataFile) -> BenchConfiguration:
 
 
 _REQUESTS = (CauseCode.REQUEST, CauseCode.CLIENT_LOST)
-"""Causes that recorded samples and computation cannot reproduce."""
+"""Causes of requests, which a replay cannot reproduce from recorded samples."""
 
 Row = dict[str, Any]
 
 
 @dataclass(frozen=True)
 class Entry:
-    """Journal entry: `columns` is the row of its event, `blocks` the number of blocks before it."""
+    """Journal entry: `columns` is the table row of its event, `blocks` the number of blocks before it."""
 
     kind: str
     text: str
@@ -197,10 +197,10 @@ class _Request:
 
 
 class RecordedCourse:
-    """`drivers.replay.Course` of an open file; `journal` has its entries.
+    """`drivers.replay.Course` of an open file, with the entries of its journal in `journal`.
 
-    The replay delivers blocks in time. A run that the guard ended for late blocks is ended by an abort request with the
-    same reason; `in_place` lists the reasons of such requests.
+    In a replay, no block is late. If the guard ended the recorded run because of late blocks, an abort request with the
+    same reason ends the replay; `in_place` lists the reasons of such requests.
     """
 
     def __init__(self, record: DataFile) -> None:
@@ -215,15 +215,15 @@ class RecordedCourse:
         self._alignments = record.alignments
         self._block_times = blocks["time"]
         self.same_wording = record.wording == WORDING
-        """Whether sentences can be compared."""
+        """Whether the sentences in the file can be compared with those of this version."""
         self.same_intervals = record.intervals == INTERVALS
-        """Whether uncertainties can be compared."""
+        """Whether the uncertainties in the file can be compared with those of this version."""
         self._rows = {kind.__name__: as_rows(columns) for kind in ENTRY_TABLES if (columns := record.columns_of(kind))}
         entries = self._entries()
         members = record.columns_of(TwinEstimate).get("members", ())
         self.twin_in_time = len({*members}) <= 1 and not any(each.columns.get("realtime") for each in entries)
-        """Whether the live twin kept up. A replay waits for the twin, so if the live twin did not keep up, its
-        estimates differ.
+        """Whether the live twin kept up with the samples. If it did not, the estimates of the replay differ, because a
+        replay waits for its twin.
         """
         self.in_place: tuple[str, ...] = ()
         self.journal = self._without_timing(entries)
@@ -250,7 +250,7 @@ class RecordedCourse:
 
     @property
     def begin(self) -> int:
-        """Number of journal entries before the engine's first."""
+        """Number of journal entries before the first one by the engine."""
         kinds = (entry.kind != Warned.__name__ for entry in self.journal)
         return next((index for index, other in enumerate(kinds) if other), len(self.journal))
 
@@ -265,11 +265,11 @@ class RecordedCourse:
         return names if samples >= since else ()
 
     def journalled(self, event: Event) -> bool:
-        """Whether the file's journal includes events of this kind: older files have fewer kinds."""
+        """Whether the file's journal includes events of this kind; journals of older files have fewer kinds."""
         return event.journalled and not isinstance(event, self._unknown)
 
     def alignments(self, run: int) -> tuple[Alignment, ...]:
-        """Alignments of the sensors with free clocks in `run`."""
+        """Alignments of the free-running sensors in `run`."""
         return self._alignments.get(int(self._numbers[run]), ())
 
     @property
@@ -278,7 +278,7 @@ class RecordedCourse:
         for index, entry in enumerate(self.journal):
             columns = entry.columns
             if columns.get("code") in _REQUESTS:
-                # failures during the ramp-down are appended to the reason of the request
+                # errors during the ramp-down are appended to the reason of the request
                 reason = columns["reason"].partition("; then ")[0]
                 yield _Request(entry.blocks, index, columns["subject"], reason, CauseCode(columns["code"]))
 
@@ -286,7 +286,7 @@ class RecordedCourse:
         waiting = {kind: deque(rows) for kind, rows in self._rows.items()}
         entries: list[Entry] = []
         for each in self._record.events:
-            # on a virtual clock a block and its consequences have equal times; preceding entries are earlier
+            # on a virtual clock, a block and the entries that it causes have equal times; preceding entries are earlier
             blocks = int(np.searchsorted(self._block_times, each.time, side="right"))
             rows = waiting.get(each.kind)
             columns = columns_from(each.kind, each.text) if rows is None else rows.popleft() if rows else {}
@@ -294,7 +294,7 @@ class RecordedCourse:
         return entries
 
     def _without_timing(self, entries: list[Entry]) -> list[Entry]:
-        """Remove entries that depend on the computer's speed, and turn the resulting endings into requests."""
+        """Remove entries that depend on the computer's speed, and turn endings that follow from them into requests."""
         kept: list[Entry] = []
         replaced: str | None = None
         for before, entry in zip([None, *entries], entries, strict=False):

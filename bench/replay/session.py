@@ -27,13 +27,13 @@ from sim import waiting
 from sim.parameters import Parameters
 
 LONGEST_WAIT = 1.0
-"""Longest pause replayed in real time [s]; pauses for operator actions are shortened to it."""
+"""Longest pause in a replay in real time [s]; longer ones, for operator actions, are shortened to it."""
 
 
 class PacedClock:
-    """Recorded time at `speed` times real time; never late, however slow the computer.
+    """Clock that shows the recorded time, at `speed` times real time. No block is late, however slow the computer.
 
-    With a real-time clock, the guard could find blocks late that were recorded in time.
+    With a real-time clock, blocks that were recorded in time could be late for the guard.
     """
 
     def __init__(self, speed: float) -> None:
@@ -46,12 +46,12 @@ class PacedClock:
         return self._now
 
     def wait_until(self, instant: float) -> None:
-        """Wait until bench time `instant` is due, and advance to it."""
+        """Wait until bench time `instant` is due, and set the clock to it."""
         ahead = instant - self._now
         if ahead <= 0.0:
             return
         self._now = instant
-        # delays by slow computations are not made up for
+        # do not make up for delays caused by slow computations
         self._due = max(self._due + min(ahead, LONGEST_WAIT) / self._speed, now())
         while (remaining := self._due - now()) > 0.0:
             waiting.sleep(remaining)
@@ -78,7 +78,7 @@ class RequestReplay:
 
 
 class RecordedOperator:
-    """Operator who answers as recorded; a request without a recorded answer is declined."""
+    """Operator that answers as recorded and declines a request without a recorded answer."""
 
     def __init__(self, course: RecordedCourse) -> None:
         self._answers: deque[str | None] = deque()
@@ -104,10 +104,11 @@ UNFINISHED = "running"
 class Replayed:
     """Result of a replay.
 
-    `ended` states where and why the recording broke off before the end of the plan: at an error of the rig or a killed
-    program, which recorded data cannot reproduce. `in_place` are violations that the samples do not contain and that
-    abort requests replace. `played` of `rows` samples were requested. `same_wording` is false for a file written with
-    other message texts, which were not compared. `returned` is the result of the plan; None if it broke off.
+    `ended` states where and why the recording broke off before the end of the plan: an error of the rig, or the end of
+    a killed program, neither of which recorded data can reproduce. `in_place` lists violations that the samples do not
+    contain and that abort requests replace. `played` of `rows` samples were requested. `same_wording` is False for a
+    file written with other message texts, which are not compared; `same_intervals` is False for a file with another
+    evaluation of uncertainties, likewise. `returned` is the result of the plan, or None if the recording broke off.
     """
 
     status: str
@@ -124,7 +125,7 @@ class Replayed:
     returned: object = None
 
     def parted(self, part: str) -> str | None:
-        """First difference in `part` that rounding does not explain, or None."""
+        """First difference in `part` that is larger than rounding, or None."""
         return next((each.text for each in self.found.differences if each.part == part and not each.rounding), None)
 
     @property
@@ -139,7 +140,7 @@ class Replayed:
 
 
 def stored_configuration(record: DataFile) -> BenchConfiguration:
-    """Recorded configuration of the bench. Raises InvalidInput if there is none or its format is unknown."""
+    """Recorded configuration of the bench. Raises InvalidInput if there is none or it cannot be read."""
     return DataFileRecording(record).configuration
 
 
@@ -151,14 +152,14 @@ def replay(
     clock: Clock,
     subscribers: Sequence[Subscriber],
 ) -> Replayed:
-    """Carry out `plan` on the samples of an open file, with the recorded `configuration`, and compare.
+    """Carry out `plan` on the samples of an open file, with the recorded `configuration`, and compare the results.
 
     `clock` begins at 0. Raises InvalidInput if the file cannot be replayed.
     """
     recording, course = DataFileRecording(record), RecordedCourse(record)
     comparison, requests = Comparison(record, course), Requests()
     with ReplayRig(recording, clock=clock, course=course) as rig:
-        # requests come last, when all subscribers have received the earlier events
+        # last, so that requests follow when all other subscribers have received the earlier events
         stream = EventStream(clock, [comparison, *subscribers, RequestReplay(course, requests)])
         engine = configured_engine(rig, configuration, stream, requests, RecordedOperator(course))
         for warning in course.first_warnings:
@@ -174,7 +175,7 @@ def replay(
         said = f"the run was {was}; the replay was {ending.status} ({ending.reason})"
         found.differences.append(Difference(said, ENDING))
     played, rows = comparison.drive_played, record.rows
-    # an incomplete block is not replayed
+    # an incomplete last block is not replayed
     if rows - played >= (configuration.block_samples if broke_off else 1):
         found.differences.append(Difference(f"{played} of {rows} recorded samples were requested", DRIVE))
     return Replayed(
@@ -194,16 +195,16 @@ def replay(
 
 
 def _broke_off(record: DataFile, over: str | None) -> str | None:
-    """Where and why the recording ends before its plan; None if the plan ended."""
+    """Text that states where and why the recording ends before its plan; None if the plan ended."""
     if record.status == UNFINISHED:
-        return f"{over or 'it ends'}: the program that wrote it was killed, or still writes"
+        return f"{over or 'it ends'}: the program that wrote it was killed, or is still writing"
     if over is None or record.status not in ("failed", "halted", "interrupted"):
         return None
     return f"{over}: the run {record.status} there, {record.summary}"
 
 
 def _changed(metadata: dict[str, str]) -> tuple[str, ...]:
-    """Changes, since the file was written, in the software on which results depend, by version or git hash."""
+    """Changes in the software on which results depend, by version or git hash, since the file was written."""
     now = software()
     known = {name: metadata.get(name, "unknown") for name in now}
     versions = (f"{name} was {known[name]} and is {now[name]}" for name in now if known[name] != now[name])
@@ -211,7 +212,7 @@ def _changed(metadata: dict[str, str]) -> tuple[str, ...]:
 
 
 def _changed_files(was: str, now: str) -> tuple[str, ...]:
-    """Comparison of the git hashes; empty if equal, without uncommitted changes ("+") and known."""
+    """Notice about the git hashes; empty if both are known, equal and without uncommitted changes ("+")."""
     if was != now:
         return (f"git was {was} and is {now}",)
     if now == "unknown" or now.endswith("+"):

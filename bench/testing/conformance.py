@@ -34,7 +34,7 @@ def samples(rig: Rig, seconds: float) -> int:
 
 
 def started(rig: AnyRig, ahead: int = 0) -> AnyRig:
-    """Arm the rig, and write zeros for its lead and `ahead` further samples."""
+    """Arm the rig, and write zeros for its lead and for `ahead` further samples."""
     rig.arm()
     rig.write(np.zeros(rig.lead + ahead))
     return rig
@@ -52,7 +52,7 @@ def play(rig: Rig, volts: NDArray[np.float64], block: int = 100) -> list[Block]:
 
 @contextmanager
 def refusal(error: type[RigError] = RigError) -> Generator[None]:
-    """Context manager in which `error` must be raised."""
+    """Context manager that fails unless `error` is raised in its block."""
     try:
         yield
     except error:
@@ -61,7 +61,7 @@ def refusal(error: type[RigError] = RigError) -> Generator[None]:
 
 
 def fresh(rig: Rig) -> None:
-    """Leave the rig as it is after opening or stopping."""
+    """Leave the rig in its state after opening or stopping."""
     assert rig.sample_rate > 0.0
 
 
@@ -122,14 +122,14 @@ def refuses_to_play_and_to_read(rig: Rig) -> None:
 
 
 class RigConformance:
-    """Conformance tests: derive from this class and provide a `make_rig` fixture, see the module's docstring."""
+    """Conformance tests. Derive from this class and provide a `make_rig` fixture, see the module's docstring."""
 
     drive = 0.4
     """Largest voltage that the tests output [V]."""
     reacts = "table_acceleration"
     """Name of the channel that responds fastest to the drive."""
     reaction_time = 0.1
-    """Time within which this channel must respond to a step of the drive [s]."""
+    """Time within which the channel `reacts` must respond to a step of the drive [s]."""
 
     def test_a_rig_describes_itself(self, make_rig: RigFactory) -> None:
         rig = make_rig()
@@ -168,7 +168,7 @@ class RigConformance:
         assert isinstance(rig.alignments, tuple)
         for alignment in rig.alignments:
             assert alignment.sensor in [channel.name for channel in rig.channels]
-            # two quartz clocks, each accurate to 50 ppm, compared over a fraction of a second
+            # two quartz clocks, each accurate to 50 ppm, are compared over only a fraction of a second
             assert abs(alignment.rate - 1.0) <= 1e-3
             assert alignment.residual >= 0.0
             assert alignment.values > 0
@@ -206,7 +206,7 @@ class RigConformance:
     def test_close_is_allowed_in_every_state_any_number_of_times_and_leaves_nothing_behind(
         self, make_rig: RigFactory
     ) -> None:
-        # once the first rig has been opened, the resources that libraries never release are already counted
+        # opening and closing a first rig loads libraries, some of whose resources are never released: count these here
         make_rig().close()
         before = held()
         for state in (armed, playing, halted, starved):
@@ -253,7 +253,7 @@ class RigConformance:
         rig = started(make_rig())
         rig.write(np.array([rig.drive_range, -rig.drive_range]))
         rig.write(np.zeros(0))
-        # none of it is played: the lead of zeros is played first
+        # none of these values is played, because the lead of zeros is played first
         assert len(rig.read(1)) == 1
         rig.stop()
 

@@ -24,8 +24,8 @@ COUNTS_PER_UNIT = 1000.0
 class LoopbackRig(ComputedRig):
     """Rig in virtual time whose channels return `response[name](volts)`, in their units.
 
-    NaN becomes -32768 counts, which means no measurement. `played` are the drive samples of all runs, `done` the
-    operator actions, `safety` the safety inputs; `halted` is True once the output has been cut.
+    NaN becomes -32768 counts, which means no measurement. `played` contains the drive samples of all runs, `done` the
+    operator actions, `safety` the states of the safety inputs; `halted` is True once the output has been cut.
     """
 
     def __init__(
@@ -68,9 +68,9 @@ class LoopbackRig(ComputedRig):
 
 
 class LoopbackBench:
-    """Guard and engine on a rig, by default a loop-back rig, without an operator. Stores every event and outcome.
+    """Guard and engine on a rig, by default a loop-back rig, without a human operator. Stores every event and outcome.
 
-    Guard and engine use `checked`, the rig behind the checks of `drivers.border`, as in a session.
+    Guard and engine use `checked`, which is the rig with the checks of `drivers.border`, as in a session.
     """
 
     def __init__(

@@ -11,7 +11,7 @@ _PATIENCE = 10.0
 def held() -> dict[str, int]:
     """Number of threads and, on Linux, of open files (including ports and sockets) and child processes.
 
-    Excludes threads of an emulated laboratory in this process, which starts before a rig and outlives it.
+    Excludes threads of an emulated laboratory in this process, because it starts before a rig and outlives it.
     """
     counts = {"threads": sum(not thread.name.startswith("emulated") for thread in threading.enumerate())}
     own = Path("/proc/self")
@@ -22,7 +22,7 @@ def held() -> dict[str, int]:
 
 
 def held_at_last(allowed: dict[str, int]) -> dict[str, int]:
-    """Resources held as soon as they are within `allowed`, or at a time-out."""
+    """Wait until the resources held are within `allowed`, or for a time-out, and return them."""
     deadline = time.monotonic() + _PATIENCE
     now = held()
     while any(count > allowed[kind] for kind, count in now.items()) and time.monotonic() < deadline:
@@ -32,7 +32,7 @@ def held_at_last(allowed: dict[str, int]) -> dict[str, int]:
 
 
 def _text(path: Path) -> str:
-    """Contents of a thread's file; empty if the thread has just ended."""
+    """Contents of a thread's file in /proc; empty if the thread has just ended."""
     try:
         return path.read_text()
     except (FileNotFoundError, ProcessLookupError):

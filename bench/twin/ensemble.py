@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Members:
-    """Specimens, nominal first, and `scales`: ratios of true to measured table motion, shape (n,)."""
+    """Specimens, the nominal one first, and `scales`, the ratios of true to measured table motion, shape (n,)."""
 
     specimens: Sequence[Specimen]
     scales: Array
@@ -34,7 +34,7 @@ class Members:
 
 
 def draw_members(specimen: Specimen, configuration: BenchConfiguration) -> Members:
-    """Draw specimens within the uncertainty of `specimen` and accelerometer, reproducibly; `specimen` is the first."""
+    """Draw members reproducibly from the uncertainties of `specimen`, which is the first, and of the accelerometer."""
     twin, random = configuration.twin, np.random.default_rng(configuration.twin.seed)
     others = configuration.known.draws(specimen, twin.members, random)
     scales = 1.0 + configuration.analysis.table_scale * random.standard_normal(twin.members)
@@ -50,7 +50,7 @@ class Ensemble:
             Stream(specimen, dt, peaks_from=None, overturning_angle=FALLEN_TILT) for specimen in those.specimens
         ]
         for stream in self._streams:
-            # the table was at rest before
+            # the table is at rest before the first sample
             stream.feed([0.0])
 
     def __len__(self) -> int:
@@ -61,9 +61,9 @@ class Ensemble:
         del self._streams[n:]
 
     def feed(self, acceleration: Array) -> Array:
-        """Compute u1, u2 [m] and theta [rad], shape (3, n_specimens, n), for accelerations [m/s2], shape (n,).
+        """Compute u1, u2 [m] and theta [rad], shape (3, n_specimens, n), for table accelerations [m/s2], shape (n,).
 
-        NaN after the block has fallen. Raises InvalidInput for accelerations that are not finite.
+        Values after the fall of a block are NaN. Raises InvalidInput for accelerations that are not finite.
         """
         motions = np.full((3, len(self._streams), acceleration.size), np.nan)
         for k, (stream, scale) in enumerate(zip(self._streams, self._scales, strict=False)):
@@ -73,7 +73,7 @@ class Ensemble:
 
 
 _CYCLES = 5.0
-"""Number of cycles of a sine over which peak and amplitude are taken."""
+"""Number of cycles of a sine over which peak and amplitude are evaluated."""
 
 
 @dataclass(frozen=True)
@@ -94,12 +94,13 @@ class Gains:
         self._bare_peaks = np.zeros(len(those.specimens))
         self._bare: Ensemble | None = None
         self._bare_per_unit: tuple[float, Array] | None = None
-        # accelerations and peak drifts still required: all of them until the kind of test is known
+        # accelerations and peak drifts that are still required; all are kept until the kind of test is known
         self._held: deque[tuple[Array, Array]] = deque()
 
     def push(self, acceleration: Array, drift: Array, measured: Measured | None) -> Array:
-        """alpha_2 of the k remaining members, shape (k,), after further accelerations [m/s2], shape (n,), and drifts
-        [m], shape (k, n). NaN after the block has fallen, and before a gain is `measured`.
+        """Add accelerations [m/s2], shape (n,), and drifts [m], shape (k, n), of the k remaining members.
+
+        Returns alpha_2 of the members, shape (k,); NaN after the block has fallen, and until a gain is `measured`.
         """
         k = len(drift)
         if not self._coupled:

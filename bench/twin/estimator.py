@@ -18,7 +18,7 @@ from bench.twin.ensemble import Ensemble, Gains, Measured, Members
 from sim.errors import RockbenchError
 
 _PIPELINE = 3
-"""Number of measurements from exposure to output of an optoNCDT 1420; the output begins up to one measurement later
+"""Delay from exposure to output of an optoNCDT 1420, in measurement periods; the output begins up to one period later
 (manual, p. 52).
 """
 _HELD = 0.5
@@ -36,7 +36,7 @@ def laser_lag(configuration: BenchConfiguration) -> tuple[float, float]:
     if configuration.backend == "simulated":
         laser = configuration.simulation.bench.laser_1
         lag = (laser.latency + _HELD) / laser.rate
-        # the simulated accelerometer averages over the preceding tick
+        # the simulated accelerometer averages over the preceding sample interval
         return lag - 0.5 / configuration.sample_rate, lag
     lasers = configuration.hardware.lasers
     placed = configuration.backend != "hardware" or lasers.connection == "serial"
@@ -47,7 +47,7 @@ def laser_lag(configuration: BenchConfiguration) -> tuple[float, float]:
 Array = NDArray[np.float64]
 
 _CUTOFF = 0.35
-"""Middle of the transition band, as a fraction of the model's rate. The filter cards limit the motion to frequencies
+"""Middle of the transition band, as a fraction of the model's rate. The filter cards limit the signals to frequencies
 far below it.
 """
 _HALF_WIDTH = 6
@@ -59,8 +59,8 @@ _KAISER = 5.65
 class Resampler:
     """Linear-phase low-pass filter for signals in blocks; the output does not depend on the division into blocks.
 
-    Delays every signal by `latency` [s] and signal i by a further `delays[i]` [s] (0 or more), interpolating between
-    samples. Outputs a sample every `dt` [s]. The input before the first block is zero.
+    Delays every signal by `latency` [s], and signal i by a further `delays[i]` [s] (0 or more) with interpolation
+    between samples. Outputs a sample every `dt` [s]. The input before the first block is zero.
     """
 
     def __init__(self, sample_rate: float, delays: Sequence[float]) -> None:
@@ -70,7 +70,7 @@ class Resampler:
         self.latency = half / sample_rate
         late = np.array(delays) * sample_rate
         length = 2 * half + 1 + ceil(float(late.max()))
-        # weight of the newest sample last, in the order of the window
+        # the weight of the newest sample is last, as in the window of samples
         places = (np.arange(length)[::-1] - half - late[:, None]) / self.every
         window = np.i0(_KAISER * np.sqrt(np.maximum(1.0 - (places / _HALF_WIDTH) ** 2, 0.0)))
         taps = np.sinc(2.0 * _CUTOFF * places) * np.where(np.abs(places) <= _HALF_WIDTH, window, 0.0)
@@ -79,8 +79,10 @@ class Resampler:
         self._skip = 0
 
     def push(self, block: Array) -> tuple[Array, int]:
-        """Resample a block, shape (n, n_signals). Returns samples, shape (m, n_signals), NaN where an input within the
-        filter's length is missing, and the number of input samples of the block after the last output sample.
+        """Resample a block, shape (n, n_signals).
+
+        Returns samples, shape (m, n_signals), NaN where an input within the filter's length is missing, and the number
+        of input samples of the block that are newer than the last output sample.
         """
         line = np.concatenate((self._kept, block))
         chosen = sliding_window_view(line, self._taps.shape[1], axis=0)[self._skip :: self.every]
@@ -94,9 +96,10 @@ SPAN = 1.0
 
 
 class Residual:
-    """Root mean squares over the last `SPAN`, relative to the largest measured drift so far.
+    """Root mean squares over the last `SPAN`, relative to the largest rms of the measured drift so far.
 
-    `least` [m] is the lower bound of this drift: differences below the sensors' resolution are not significant.
+    `least` [m] is a lower bound of this reference, because differences below the errors of the sensors are not
+    significant.
     """
 
     def __init__(self, dt: float, least: float) -> None:
@@ -105,10 +108,10 @@ class Residual:
         self._largest = 0.0
 
     def push(self, measured: Array, model: Array, low: Array, high: Array) -> tuple[float, float]:
-        """Relative rms of measured minus modelled drift, and of the excess outside the band, after further samples [m],
-        shape (n,).
+        """Add drifts [m], shape (n,): measured, modelled, and the bounds of the model's band.
 
-        NaN until the window is full, and while more than half of its values are missing.
+        Returns the relative rms of measured minus modelled drift, and of the measured drift's excess over the band; NaN
+        until the window is full, and while half of its values or more are missing.
         """
         parts = np.stack((measured, measured - model, np.maximum(np.maximum(measured - high, low - measured), 0.0)))
         known = np.isfinite(parts).all(axis=0)
@@ -127,7 +130,7 @@ class Residual:
 
 
 class Limit:
-    """Limit that trips once, when a value has exceeded it for `persistence` [s]."""
+    """Limit that trips once, as soon as a value has exceeded it for `persistence` [s]."""
 
     def __init__(self, limit: float | None, persistence: float) -> None:
         self.limit = limit
@@ -172,11 +175,11 @@ class NoEstimate(RockbenchError):
 
 
 class Estimator:
-    """Computes estimates from consecutive blocks, the first of them at rest."""
+    """Computes estimates from consecutive blocks; the bench is at rest during the first block."""
 
     def __init__(self, run: int, setting: Setting, members: Members) -> None:
         self._run, self._setting = run, setting
-        # delays the acceleration by the lag of the lasers
+        # delay the acceleration by the lag of the lasers
         lasers = max(0.0, *(-lag for lag in setting.lag))
         self._resampler = Resampler(setting.sample_rate, (*(lasers + lag for lag in setting.lag), lasers, lasers))
         dt = self._resampler.dt
@@ -199,11 +202,10 @@ class Estimator:
         self._ensemble.keep(1 + self.members // 2)
 
     def take(self, time: float, end: int, signals: Array, measured: Measured | None) -> TwinEstimate | None:
-        """Estimate at the end of a block read at `time`; None if the block is too short for a sample of the model.
+        """Return the estimate at the end of a block, or None if the block is too short for a sample of the model.
 
-        `signals`, shape (n, n_signals), are those of the block that ends before sample `end` of the run.
-
-        Raises NoEstimate if the table's acceleration is missing.
+        `time` is the time at which the block was read, and `end` the index in the run of the sample after it. `signals`
+        are those of the block, shape (n, n_signals). Raises NoEstimate if the table's acceleration is missing.
         """
         setting = self._setting
         samples, newer = self._resampler.push(signals[:, [ACCELERATION, DISPLACEMENT, LASER_1, LASER_2]])
@@ -229,8 +231,8 @@ class Estimator:
         theta: Array,
         measured: Measured | None,
     ) -> TwinEstimate:
-        """Estimate from u1, u2 and drift, measured (`seen`, shape (3, n)) and modelled (shape (3, k, n)), and theta,
-        shape (k, n).
+        """Estimate from u1, u2 and drift, measured (`seen`, shape (3, n)) and modelled (`u`, shape (3, k, n)), and from
+        the modelled `theta`, shape (k, n).
         """
         low, high = _band(u.swapaxes(0, 1), self._uncertainties[:, None])
         residual, excess = self._residual.push(seen[2], u[2, 0], low[2], high[2])
@@ -269,8 +271,8 @@ class Estimator:
 
 
 def _band(values: Array, uncertainty: float | Array) -> tuple[Array, Array]:
-    """Smallest and largest value along the first axis for the members whose block is standing, widened by the sensors'
-    `uncertainty`; NaN where fewer than half of the members stand.
+    """Smallest and largest of `values` along the first axis over the members whose block is standing, widened by the
+    `uncertainty` of the sensors; NaN where fewer than half of the blocks are standing.
     """
     few = 2 * np.count_nonzero(np.isfinite(values), axis=0) < len(values)
     low, high = np.fmin.reduce(values, axis=0) - uncertainty, np.fmax.reduce(values, axis=0) + uncertainty

@@ -17,8 +17,8 @@ def live_twin(
     *,
     patient: bool,
 ) -> Generator[None]:
-    """Context manager in which a `Twin` is subscribed to `stream` and publishes on it, if the configuration enables
-    it.
+    """Context manager in which a `Twin` receives the events of `stream` and publishes its estimates there, if the
+    configuration enables it.
     """
     if not configuration.twin.enabled:
         yield

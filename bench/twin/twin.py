@@ -41,7 +41,7 @@ _BEGINS = {
     OperatorTask.TILT_BLOCK: "the block is released from a tilt",
     OperatorTask.PULL_FRAME: "the frame is released from a deflection",
 }
-"""Operator actions after which the model does not apply, with the reason."""
+"""Reason why the model does not apply, by the operator action after which it does not."""
 
 _MOUNTED = (OperatorTask.HOLD_BLOCK, OperatorTask.TILT_BLOCK, OperatorTask.PULL_FRAME)
 _ENDS = {
@@ -51,7 +51,7 @@ _ENDS = {
     OperatorTask.MOUNT_SPRING: _MOUNTED,
     OperatorTask.REMOVE_BLOCK: _MOUNTED,
 }
-"""Operator actions that revoke an earlier action and its reason."""
+"""Operator actions that undo earlier ones, and the actions that each undoes."""
 
 
 class Applicability:
@@ -62,7 +62,7 @@ class Applicability:
         self._against: set[OperatorTask] = set()
 
     def follow(self, event: SpecimenMounted) -> None:
-        """Update the state for an operator action."""
+        """Take account of an operator action."""
         self._mounted = event.specimen
         self._against.difference_update(_ENDS.get(event.work, ()))
         if event.work in _BEGINS:
@@ -70,7 +70,7 @@ class Applicability:
 
     @property
     def specimen(self) -> Specimen | None:
-        """Mounted specimen to which the model applies; None if it is unknown or the model does not apply (see
+        """Mounted specimen if the model applies to it. None if it is unknown, or if the model does not apply (see
         `why_not`).
         """
         return None if self._against else self._mounted
@@ -84,9 +84,9 @@ class Applicability:
 Array = NDArray[np.float64]
 
 _LATE = 0.15
-"""Backlog at which the model drops members [s]; at least two blocks."""
+"""Backlog at which the model drops members [s], but at least two blocks."""
 _BEHIND = 1.0
-"""Backlog above which the twin is switched off [s]."""
+"""Backlog at which the twin is switched off [s], but at least five blocks."""
 _NOT_IN_TIME = "the twin did not keep up and is off until the rig is armed again"
 
 
@@ -101,10 +101,10 @@ class _Run:
 
 
 class Twin:
-    """Follows every test from arming to rest if the model applies to the mounted specimen.
+    """Computes estimates during every test, from arming to rest, if the model applies to the mounted specimen.
 
     `publish` is called in the engine's thread. A `patient` twin waits for its model, so that its estimates are
-    reproducible, as needed in virtual time. A residual beyond its limit requests a stop.
+    reproducible, as needed in virtual time. When a residual exceeds its limit, the twin requests a stop.
     """
 
     def __init__(
@@ -116,7 +116,7 @@ class Twin:
         *,
         patient: bool,
     ) -> None:
-        import_module("sim.kernel.rocking")  # load it now: loading would delay an armed bench
+        import_module("sim.kernel.rocking")  # load it now, because loading it later would delay an armed bench
 
         self._configuration = configuration
         self._publish, self._requests, self._patient = publish, requests, patient
@@ -158,7 +158,7 @@ class Twin:
                 pass
 
     def _draw(self) -> None:
-        """Draw the members for the mounted specimen while nothing moves."""
+        """Draw the members for the mounted specimen while the bench is at rest."""
         specimen = self._applicability.specimen
         if specimen is not None and (self._members is None or self._members[0] != specimen):
             self._members = specimen, self._worker.submit(draw_members, specimen, self._configuration)
@@ -215,10 +215,10 @@ class Twin:
 
     def _judge(self, run: _Run, estimate: TwinEstimate, now: float) -> None:
         excess, seconds = estimate.excess, estimate.seconds
-        what = f"drift outside the twin's band: rms over 1 s {excess:.3g} of the drift"
+        what = f"drift outside the twin's band: rms over 1 s of the excess is {excess:.3g} of the drift"
         if run.warn.exceeded(excess, seconds) and self._warned_of != self._applicability.specimen:
             self._warned_of = self._applicability.specimen
-            self._publish(Warned(f"{what}, limit {run.warn.limit:g}: is another specimen mounted?", time=now))
+            self._publish(Warned(f"{what}, limit {run.warn.limit:g}: check which specimen is mounted", time=now))
         if run.stop.exceeded(excess, seconds):
             self._requests.stop(f"{what}, limit {run.stop.limit:g}", CauseCode.RESIDUAL)
 

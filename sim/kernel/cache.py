@@ -1,9 +1,9 @@
 """Folder of the kernel's compiled code, named after a hash of its sources and writable only by this user.
 
-numba checks only the source file of the function itself, so that a caller in another file would keep an outdated
-callee; if that file's folder is not writable, numba uses a folder in the user's home. Here the hash is in the name of
-every folder. The cached files are pickles, which execute code on loading: a folder to which others can write is not
-used.
+By itself, numba checks only the source file of the compiled function, so that a caller in another file would keep an
+outdated callee, and uses a folder in the user's home if the folder of the source file is not writable. Here the hash is
+in the name of every folder. The cached files are pickles, which execute code when loaded; therefore a folder to which
+others can write is not used.
 """
 
 import hashlib
@@ -22,7 +22,7 @@ if sys.platform != "win32":
     import pwd
 
 KEPT = 6
-"""Number of unused folders of other kernel versions that are kept, so that returning to one needs no compilation."""
+"""Number of unused folders of other kernel versions that are kept, so that a return to one needs no compilation."""
 
 PREFIX = "rockbench-"
 IN_USE = "in-use"
@@ -38,9 +38,10 @@ KERNEL = Path(__file__).parent
 class KernelCache:
     """Finds the folder for the compiled kernel once, and stops using it if it fails.
 
-    given : folder that the user set for numba's caches; when empty, the installation's or the user's cache folder.
-    versions : further dependencies of the compiled code.  sources : folder of the compiled functions, the kernel's own
-    or another one.
+    given : folder that the user set for numba's caches; if empty, the installation's or the user's cache folder is
+    used.
+    versions : further dependencies of the compiled code.
+    sources : folder of the source files of the compiled functions, the kernel's own or another one.
     """
 
     def __init__(self, given: str, versions: Sequence[object], sources: Path = KERNEL) -> None:
@@ -49,9 +50,9 @@ class KernelCache:
         self._folder: Path | None = None
         self._handle: int | None = None
         self.name = ""
-        """Name of the folder, with the hash; empty without sources."""
+        """Name of the folder, which contains the hash; empty without source files."""
         if not self._stamp:
-            # for example in an archive: numba's locator needs files, and changes are not detectable without sources
+            # for example in an archive: numba's locator needs files, and without source files no change can be detected
             self.give_up(f"{self._sources} is not a folder of source files")
             return
         content = [(name, (self._sources / name).read_bytes()) for name, *_ in self._stamp]
@@ -64,11 +65,11 @@ class KernelCache:
             except OSError as error:
                 reasons.append(f"{error.filename or base} {error.strerror or error}")
                 if isinstance(error, NotPrivate) and (base / name).exists():
-                    _say(f"the compiled kernel in {base / name} is not loaded: {reasons[-1]}; remove it")
+                    _say(f"the compiled kernel in {base / name} is not loaded: {reasons[-1]}; remove this folder")
         self.give_up("; ".join(reasons) or "there is no home folder")
 
     def folder(self) -> Path | None:
-        """The folder to load from and save to; None for compilation in memory."""
+        """Folder for loading and saving compiled code; None for compilation in memory."""
         if self._folder is not None and _stamp(self._sources) != self._stamp:
             self.give_up(f"the sources in {self._sources} changed while they were loaded")
         return self._folder
@@ -83,14 +84,14 @@ class KernelCache:
         )
 
     def release(self) -> None:
-        """Allow the folder to be removed once it is old."""
+        """Close the file that prevents the removal of the folder once it is old."""
         if self._handle is not None:
             os.close(self._handle)
             self._handle = None
 
 
 class NotPrivate(OSError):
-    """Other users can write to the folder."""
+    """Error: other users can write to the folder."""
 
 
 def _say(what: str) -> None:
@@ -100,7 +101,7 @@ def _say(what: str) -> None:
 
 
 def _stamp(folder: Path) -> list[tuple[str, int, int]]:
-    # checked before each function: an update during loading would mix two versions
+    # compared before each function is loaded: an update during loading would mix two versions
     with suppress(OSError), os.scandir(folder) as entries:
         sources = [entry for entry in entries if entry.name.endswith(".py")]
         return sorted((entry.name, entry.stat().st_mtime_ns, entry.stat().st_size) for entry in sources)
@@ -123,9 +124,9 @@ def _places(sources: Path) -> list[Path]:
 
 
 def _claim(base: Path, name: str) -> tuple[Path, int]:
-    """Create or reuse the folder `name` in `base`; returns it with the open file that prevents its removal.
+    """Create or reuse the folder `name` in `base`. Returns it with the open file that prevents its removal.
 
-    Raises OSError with the obstacle.
+    Raises OSError with the reason if this fails.
     """
     existing = base
     while not existing.exists() and existing != existing.parent:
@@ -150,12 +151,12 @@ def _claim(base: Path, name: str) -> tuple[Path, int]:
                 _remove_old(base, folder)
             return folder, handle
         os.close(handle)
-    raise OSError(None, "is removed repeatedly", str(folder))
+    raise OSError(None, "is repeatedly removed by another process", str(folder))
 
 
 def _hold(handle: int, path: Path) -> bool:
-    """Mark the open file as in use; False when `path` is no longer this file."""
-    with suppress(OSError):  # on a file system without locks nothing is removed either
+    """Mark the open file as in use. Returns False if `path` is no longer this file."""
+    with suppress(OSError):  # a file system without locks: no folder is removed there either
         if sys.platform != "win32":
             fcntl.flock(handle, fcntl.LOCK_SH)
     with suppress(OSError):
@@ -165,7 +166,7 @@ def _hold(handle: int, path: Path) -> bool:
 
 
 def _remove_old(base: Path, own: Path) -> None:
-    """Remove all folders in `base` but the KEPT last used ones and those in use."""
+    """Remove all folders in `base` except those in use and the last KEPT that were used."""
     with suppress(OSError):
         others = [(_last_use(path), path) for path in base.glob(f"{PREFIX}*") if path != own]
         for _, path in sorted(others, reverse=True)[KEPT:]:
@@ -188,13 +189,13 @@ def _remove_unused(folder: Path) -> None:
         finally:
             os.close(handle)
         if sys.platform == "win32":
-            # an open file cannot be removed, nor its folder renamed
+            # Windows can neither remove an open file nor rename its folder
             (folder / IN_USE).unlink()
             shutil.rmtree(folder)
 
 
 def _require_private(path: Path, *, parents: bool) -> None:
-    """Raise OSError when a user other than root could put files there. Windows' user folders are private already."""
+    """Raise OSError if a user other than root could put files there. User folders of Windows are already private."""
     if sys.platform == "win32":
         return
     info = path.lstat()

@@ -1,14 +1,14 @@
 """Decorators that compile the kernel with uniform settings.
 
 Signatures are explicit: a function is compiled once, when its module is imported, and kept in numba's cache.
-`nogil` lets a thread pool run many simulations; division by zero gives inf, as in numpy, and is caught by the
-integrator's check of its state. There is no fastmath: it would make results depend on the processor and break
-the test for non-finite numbers; products are fused with sums where the source says `fma` (`sim.kernel.lanes`).
-The wrapper for calls from C is omitted, since it is unused and slow to compile.
+`nogil` lets a thread pool run many simulations. Division by zero gives inf, as in numpy, which the integrator detects
+when it checks its state. fastmath is not used, because it would make results depend on the processor and break the test
+for non-finite numbers; products are fused with sums only where the source contains `fma` (`sim.kernel.lanes`).
+The wrapper for calls from C is omitted, because it is unused and slow to compile.
 """
 # pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
 # pyright: reportPrivateImportUsage=false, reportAttributeAccessIssue=false
-# numba publishes no types; `cast` below gives the decorated function its own type back.
+# numba has no type annotations; `cast` below restores the type of the decorated function.
 
 import threading
 from collections.abc import Callable
@@ -24,7 +24,7 @@ from sim.kernel.cache import KERNEL, KernelCache
 F = TypeVar("F", bound=Callable[..., Any])
 
 OPTIONS = ("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "BOUNDSCHECK", "DEBUGINFO_DEFAULT", "DISABLE_INTEL_SVML")
-"""numba's settings that change the compiled code but, unlike the processor, are not part of its index key."""
+"""numba's settings that change the compiled code but, unlike the processor, are not part of its cache key."""
 
 _SETTINGS = [(option, str(getattr(numba.config, option, None))) for option in OPTIONS]
 _VERSIONS = [numba.__version__, llvmlite.__version__, np.__version__, *_SETTINGS, __debug__]
@@ -55,7 +55,8 @@ def compiled(signature: str) -> Callable[[F], F]:
             cache = _cache_of(function)
             folder = cache.folder()
             if folder is not None:
-                # numba reads this once for each function; set only for the kernel's, so other code keeps its caches
+                # numba reads this for each function; it is set only for the kernel's, so that other code keeps its
+                # cache
                 before, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(folder)
                 try:
                     made = _njit(signature, function, cache=True)
@@ -65,8 +66,8 @@ def compiled(signature: str) -> Callable[[F], F]:
                 except numba.core.errors.NumbaError:
                     raise
                 except Exception as error:
-                    # after a power cut or on a full disk, reading and writing pickles may raise any exception
-                    cache.give_up(f"{folder} cannot be used ({type(error).__name__}: {error}); remove it")
+                    # after a power failure or on a full disk, reading and writing pickles may raise any exception
+                    cache.give_up(f"{folder} cannot be used ({type(error).__name__}: {error}); remove this folder")
                 finally:
                     numba.config.CACHE_DIR = before
             return _njit(signature, function, cache=False)
@@ -75,7 +76,7 @@ def compiled(signature: str) -> Callable[[F], F]:
 
 
 def is_compiled(module: str) -> bool:
-    """Whether the cache has compiled code of the kernel's `module`, such as "rocking"."""
+    """Whether the cache contains compiled code of the kernel's `module`, such as "rocking"."""
     folder = _cache.folder()
     return folder is not None and any(folder.rglob(f"{module}.*.nbi"))
 
@@ -86,19 +87,19 @@ def cache_folder() -> Path | None:
 
 
 def processor() -> str:
-    """Name of the processor as the compiler knows it: the last digits of the kernel depend on it."""
+    """Compiler's name for the processor, on which the last digits of the kernel's results depend."""
     return str(llvmlite.binding.get_host_cpu_name())
 
 
 def _is_within(made: Callable[..., Any], folder: Path) -> bool:
-    # where the folder is unusable, as on a full disk, numba silently uses others; without compilation
+    # if the folder is unusable, as on a full disk, numba silently uses another one; without compilation
     # (NUMBA_DISABLE_JIT) there is no cache
     stats = getattr(made, "stats", None)
     return stats is None or Path(stats.cache_path).is_relative_to(folder)
 
 
 def _cache_of(function: Callable[..., Any]) -> KernelCache:
-    """Cache for a function's folder; for a folder outside the kernel its name includes the kernel's hash."""
+    """Cache for the folder of a function. Outside the kernel, the hash of the folder includes that of the kernel."""
     folder = Path(function.__code__.co_filename).parent
     if folder not in _caches:
         _caches[folder] = KernelCache(_GIVEN, [*_VERSIONS, _cache.name], folder)

@@ -1,7 +1,7 @@
 """Equations of motion, Eq. (8) and (A.1), and mechanical energy.
 
-Both corners share one form. With sg = +1 and B2 = 0 about corner A (theta > 0), sg = -1 and B2 = 2b about corner B
-(theta < 0), s = sin(theta), c = cos(theta):
+The equations have the same form for both corners. With sg = +1 and B2 = 0 about corner A (theta > 0), sg = -1 and
+B2 = 2b about corner B (theta < 0), s = sin(theta), c = cos(theta):
 
     dx = d + B2 (1 - c) - h1 s - u1        horizontal length of the spring, Eq. (4)
     dy = -h1 (1 - c) - B2 s                vertical length of the spring
@@ -11,8 +11,8 @@ Both corners share one form. With sg = +1 and B2 = 0 about corner A (theta > 0),
     J theta'' = M g (h_b s - sg b c) + M a_g (h_b c + sg b s) - k_C q G
     G = ((B2 + d) B2 + h1^2) s - h1 d c + u1 (h1 c - B2 s)
 
-The printed forms suffer from cancellation at small theta and u1: here 1 - c = 2 sin^2(theta/2), and with e = dx - d,
-L - d = (2 d e + e^2 + dy^2) / (L + d).
+As printed in the paper, they suffer from cancellation at small theta and u1. Here 1 - c = 2 sin^2(theta/2), and with
+e = dx - d, L - d = (2 d e + e^2 + dy^2) / (L + d).
 """
 
 from math import cos, sin, sqrt
@@ -28,7 +28,7 @@ from sim.kernel.packing import RESTITUTION as RESTITUTION
 
 @compiled("void(float64[::1], float64, float64[::1], float64, float64[::1])")
 def rates(p: NDArray[np.float64], sg: float, x: NDArray[np.float64], a_g: float, out: NDArray[np.float64]) -> None:
-    """Time derivative of x = [u1, u2, v1, v2, theta, omega], written to `out`, shape (6,).
+    """Write the time derivative of x = [u1, u2, v1, v2, theta, omega] to `out`, shape (6,).
 
     p : packed parameters, shape (16,).  sg : +1 about A, -1 about B, 0 at rest.  a_g : base acceleration [m/s2].
     Source: Eq. (8) and (A.1); at rest theta'' = 0 and the spring acts as k_C u1.

@@ -8,10 +8,10 @@ from sim.kernel.compiled import compiled
 
 @compiled("void(float64[:,::1], float64[:,:,::1], float64[:,::1])")
 def cascade(sections: NDArray[np.float64], state: NDArray[np.float64], volts: NDArray[np.float64]) -> None:
-    """Filter `volts`, shape (channels, n), in place; updates the `state`, shape (sections, channels, 2).
+    """Filter `volts`, shape (channels, n), in place, and update the `state`, shape (sections, channels, 2).
 
-    `sections`, shape (sections, 6): b0, b1, b2, 1, a1, a2 of each (transposed direct form II), in scipy's order of
-    operations.
+    The rows of `sections`, shape (sections, 6), are b0, b1, b2, 1, a1, a2 (transposed direct form II, in scipy's order
+    of operations).
     """
     for channel in range(volts.shape[0]):
         for i in range(volts.shape[1]):
@@ -26,7 +26,7 @@ def cascade(sections: NDArray[np.float64], state: NDArray[np.float64], volts: ND
 
 @compiled("void(float64[::1], float64, float64[::1])")
 def exponential_mean(values: NDArray[np.float64], forget: float, state: NDArray[np.float64]) -> None:
-    """Replace `values`, shape (n,), by their running mean; updates the `state`, shape (1,): `forget` times the mean."""
+    """Replace `values`, shape (n,), by their running mean. Updates the `state`, shape (1,): `forget` times the mean."""
     for i in range(values.size):
         values[i] = (1.0 - forget) * values[i] + state[0]
         state[0] = forget * values[i]

@@ -1,17 +1,18 @@
 """Numbers of several members in one SIMD register, for code shared by single members and vectors of members.
 
-A function written with `get`, `put` and the arithmetic here compiles twice: to scalar code for arrays of one member,
-and to vector code for arrays with an additional last axis of LANES members. Every lane has the same bits as the scalar
-code: operations follow the standard, and are fused only where the source uses `fma`.
+A function written with `get`, `put` and the arithmetic of this module is compiled twice: to scalar code for arrays of
+one member, and to vector code for arrays with an additional last axis of LANES members. The results of every lane are
+bit-identical to those of the scalar code, because operations follow IEEE 754 and are fused only where the source uses
+`fma`.
 
-numba does not vectorise loops over branching members; here the vector is a type.
+numba does not vectorise loops over members that branch; therefore the vector is a type here.
 """
 # pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
 # pyright: reportUnknownArgumentType=false, reportUnknownParameterType=false, reportMissingParameterType=false
 # pyright: reportUnknownLambdaType=false
-# numba and llvmlite publish no types.
+# numba and llvmlite have no type annotations.
 # ruff: noqa: ARG001, ARG002, ARG005
-# numba fixes the arguments of its hooks.
+# numba prescribes the arguments of its hooks.
 
 import math
 import operator
@@ -28,9 +29,9 @@ from numba.extending import models, register_model
 from numpy.typing import NDArray
 
 LANES = 4
-"""Members in a vector: the doubles of an AVX2 register. Other processors use two registers or half of one."""
+"""Members in a vector: as many as an AVX2 register has doubles. Other processors use two registers or half of one."""
 
-# `Any`: numba's and llvmlite's own objects
+# `Any`, because these are objects of numba and llvmlite
 FLOAT: Any = types.float64
 _DOUBLE: Any = ir.DoubleType()
 _VECTOR: Any = ir.VectorType(_DOUBLE, LANES)
@@ -45,7 +46,7 @@ class _LanesType(types.Type):
 
 
 VALUES: Any = _LanesType()
-"""The type of a vector of LANES numbers in compiled code."""
+"""Type of a vector of LANES numbers in compiled code."""
 
 
 @register_model(_LanesType)
@@ -55,27 +56,27 @@ class _LanesModel(models.PrimitiveModel):
 
 
 def get(a: NDArray[np.float64], i: int) -> float:
-    """a[i], unchecked; of shape (n,) a float, of shape (n, LANES) a vector."""
+    """a[i] without bounds check: a float for shape (n,), a vector for shape (n, LANES)."""
     return float(a[i])
 
 
 def put(a: NDArray[np.float64], i: int, value: float) -> None:
-    """a[i] = value, unchecked."""
+    """Set a[i] = value without bounds check."""
     a[i] = value
 
 
 def get2(a: NDArray[np.float64], row: int, i: int) -> float:
-    """a[row, i], unchecked; of shape (m, n) a float, of shape (m, n, LANES) a vector."""
+    """a[row, i] without bounds check: a float for shape (m, n), a vector for shape (m, n, LANES)."""
     return float(a[row, i])
 
 
 def put2(a: NDArray[np.float64], row: int, i: int, value: float) -> None:
-    """a[row, i] = value, unchecked."""
+    """Set a[row, i] = value without bounds check."""
     a[row, i] = value
 
 
 def zero(like: NDArray[np.float64]) -> float:
-    """0, of the type returned by `get`: a float for shape (n,), a vector for shape (n, LANES)."""
+    """Zero of the type returned by `get`: a float for shape (n,), a vector for shape (n, LANES)."""
     return 0.0 * float(like[0])
 
 
@@ -114,7 +115,7 @@ def _number(kind: Any) -> bool:
 
 
 def _widened(context: Any, builder: Any, kind: Any, value: Any) -> Any:
-    """A float in every lane."""
+    """Vector with a float in every lane."""
     if kind == VALUES:
         return value
     first = builder.insert_element(ir.Constant(_VECTOR, ir.Undefined), value, ir.Constant(ir.IntType(32), 0))
@@ -125,7 +126,9 @@ def _widened(context: Any, builder: Any, kind: Any, value: Any) -> Any:
 def _arithmetic(
     function: Callable[..., Any], count: int, build: Callable[[Any, bool, list[Any]], Any], own: bool
 ) -> None:
-    """Type and lower `function` of `count` numbers: a vector if any is one, else a float unless numba provides it."""
+    """Define type and code of `function` of `count` numbers: a vector if any of them is one, else a float unless numba
+    provides the function (`own` is False).
+    """
 
     class Template(AbstractTemplate):
         def generic(self, args: Any, kws: Any) -> Any:
@@ -179,7 +182,7 @@ _arithmetic(fma, 3, _intrinsic("fma"), own=True)
 
 
 def _array(function: Callable[..., Any], axes: int, build: Callable[..., Any], result: Callable[[Any], Any]) -> None:
-    """Type and lower access to an array with `axes` axes, or with an additional axis of vectors."""
+    """Define type and code of the access to an array with `axes` axes, or with an additional axis of vectors."""
 
     class Template(AbstractTemplate):
         def generic(self, args: Any, kws: Any) -> Any:

@@ -1,6 +1,6 @@
-"""Free-running laser: measures between the ticks; each tick samples its latest output.
+"""Free-running laser: it measures between the ticks, and each tick samples its latest output.
 
-Measurement k is taken at tick (k + phase) / per_tick, a real number, and output `latency` measurements later.
+Measurement k is taken at tick (k + phase) / per_tick, a real number, and is output `latency` measurements later.
 """
 
 import math
@@ -11,13 +11,16 @@ from numpy.typing import NDArray
 from sim.kernel.compiled import compiled
 
 RANGE, GAIN, LINEARITY, WAVES, WAVE_PHASE, STEPS, LOAD, ERROR_CURRENT = range(8)
-"""Indices of the constants: measuring range [m], sensitivity over nominal [1], linearity error [1], its periods
-in the range [1] and their phase [rad], steps of the output [1], load [ohm], error current [A]."""
+"""Indices of the constants: measuring range [m], sensitivity relative to nominal [1], linearity error [1], number of
+its periods in the range [1] and their phase [rad], steps of the output [1], load [ohm], error current [A].
+"""
 
 
 @compiled("float64(float64, float64[::1])")
 def output(displacement: float, constants: NDArray[np.float64]) -> float:
-    """Voltage [V] across the load at a displacement [m] from mid range: 4 to 20 mA, 1 % reserve, else error current."""
+    """Voltage [V] across the load at a displacement [m] from mid range: 4 to 20 mA with a reserve of 1 % at either end,
+    and the error current beyond it.
+    """
     place = displacement / constants[RANGE]
     share = 0.5 + constants[GAIN] * place
     share += constants[LINEARITY] * math.sin(2.0 * math.pi * constants[WAVES] * place + constants[WAVE_PHASE])
@@ -44,14 +47,14 @@ def measure(
     taken: NDArray[np.float64],
     volts: NDArray[np.float64],
 ) -> int:
-    """Write the output at each tick into `volts`, shape (n,); returns the number of the next measurement.
+    """Write the output at each tick to `volts`, shape (n,). Returns the number of the next measurement.
 
-    tick, following : the first tick's number and the next measurement's number.
-    per_tick, phase, tick_length : measurements per tick [1], offset of the first one [1], length of a tick [s].
-    noise : shape (m,), error of each new measurement [m], m = measurements up to the last tick.
-    x, v : shape (n,), position and velocity of the target at the ticks [m], [m/s]; interpolated by cubic Hermite
-    curves. last : shape (2,), x and v at the previous tick, updated. taken : shape (latency + 1,), the latest
-    measurements [m], by number modulo its length, updated; those sampled by a tick are converted to an output.
+    tick, following : numbers of the first tick and of the next measurement.
+    per_tick, phase, tick_length : measurements per tick [1], offset of the first one [1], duration of a tick [s].
+    noise : shape (m,), error [m] of each of the m new measurements up to the last tick.
+    x, v : shape (n,), position [m] and velocity [m/s] of the target at the ticks, interpolated by cubic Hermite curves.
+    last : shape (2,), x and v at the previous tick, updated.
+    taken : shape (latency + 1,), the latest measurements [m], indexed by their number modulo its length, updated.
     """
     depth, used = taken.size, 0
     for i in range(x.size):

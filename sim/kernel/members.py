@@ -1,8 +1,8 @@
-"""Many motions at once, LANES of them in parallel, each bit-identical to that of `sim.kernel.rocking` alone.
+"""Many motions at once, LANES of them in parallel, each bit-identical to the single motion of `sim.kernel.rocking`.
 
-Every member has its own time, step, contact mode and position in its excitation; the arithmetic of a step is shared.
-Events, and rest under a record, are computed for one member alone. A lane whose member has ended takes
-the next one.
+Every member has its own time, step, contact mode and position in its excitation; the arithmetic of a step is done for
+all lanes at once. Events, and rest under a record, are computed for each member separately. When a member has ended,
+its lane takes the next one.
 """
 
 import numpy as np
@@ -62,11 +62,12 @@ def advance_members(
     impact_limit: int,
     reports: NDArray[np.float64],
 ) -> None:
-    """Integrate m members through their excitations; `states`, shape (m, 6), become their end states.
+    """Integrate m members through their excitations. `states`, shape (m, 6), become their end states.
 
-    specimens : packed parameters, shape (k, 16); member j has those of row `specimen_of[j]`.
-    segments : packed excitations, shape (n, 10); member j has the rows from spans[j, 0] up to spans[j, 1].
-    peaks_from : shape (m,) [s].  reports : shape (m, REPORT), written.  The rest is as in `sim.kernel.rocking.run`.
+    specimens : packed parameters, shape (k, 16); member j uses row `specimen_of[j]`.
+    segments : packed excitations, shape (n, 10); member j uses the rows from spans[j, 0] up to spans[j, 1], exclusive.
+    peaks_from : shape (m,) [s].  reports : shape (m, REPORT), written.
+    The other arguments are those of `sim.kernel.rocking.run`.
     """
     n, count = order, states.shape[0]
     # arrays of all lanes
@@ -74,8 +75,8 @@ def advance_members(
     a, c, w = np.zeros((n + 1, LANES)), np.zeros((6, n + 1, LANES)), np.zeros((WORK_ROWS, n + 1, LANES))
     following, bounds = np.zeros((6, LANES)), np.zeros((3, LANES))
     side, clock, length, rests = np.ones((1, LANES)), np.zeros((1, LANES)), np.zeros((1, LANES)), np.zeros((1, LANES))
-    # per lane: its member, segment, known roots, time since the segment's start, start of the segment with its rounding
-    # error, length of the last segment at rest (negative: tabulated)
+    # per lane: its member, its segment, number of known roots, time since the segment's start, start of the segment and
+    # its rounding error, length of the last segment at rest (negative if tabulated), table
     member, segment, known = np.full(LANES, -1), np.zeros(LANES, np.int64), np.zeros(LANES, np.int64)
     tau, begin, met, table = np.zeros(LANES), np.zeros((LANES, 2)), np.zeros(LANES), np.zeros((LANES, TABLE_ROWS, 6))
     # arrays of one lane, for events and rest
@@ -119,7 +120,8 @@ def advance_members(
                     continue
                 sine = this[1] != 0.0 or this[2] != 0.0 or this[3] != 0.0 or this[4] != 0.0
                 if side[0, lane] == 0.0 and tau[lane] == 0.0 and not sine:
-                    # a table pays off from the second segment of equal length on; negative: tabulated
+                    # a table is worth its cost from the second segment of equal length on; a negative length means that
+                    # the table has been computed
                     if met[lane] == this[0]:
                         met[lane] = -this[0]
                         propagator(specimens[specimen_of[j]], this[0], n, tolerance, table[lane])
@@ -147,7 +149,7 @@ def advance_members(
                             continue
                         this = segments[i]
                         if found == LOOK_INSIDE:
-                            # the exact step is known: the polynomial is needed only for the peaks within it
+                            # the exact step is known, so that the polynomial is needed only for the peaks within it
                             forcing_coefficients(this, 0.0, a1, n)
                             for k in range(6):
                                 c1[k, 0] = states[j, k]
@@ -280,7 +282,7 @@ def advance_members(
                 tau[lane] = row[0, lane] if event == NO_EVENT and h == remaining else tau[lane] + h
                 now = begin[lane, 0] + tau[lane]
                 if event == NO_EVENT and sg * state[4] < 0.0:
-                    event = IMPACT  # due to rounding, the end of the step is just past the root
+                    event = IMPACT  # the end of the step is just past the root, because of rounding
                 known[lane] = 0
                 if event == IMPACT:
                     reports[j, IMPACTS] += 1.0
@@ -295,7 +297,7 @@ def advance_members(
                 elif event == OVERTURNING:
                     status = OVERTURNED_A if sg > 0.0 else OVERTURNED_B
                 elif event == UPLIFT:
-                    # theta starts from zero angle and zero velocity: two known roots
+                    # angle and velocity are zero at the start of the motion: two known roots
                     known[lane] = 2
                     side[0, lane] = direction
                     state[4] = state[5] = 0.0

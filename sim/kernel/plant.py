@@ -1,18 +1,18 @@
-"""Table and specimen as one mechanical system: rates of its state in every contact mode.
+"""Table and specimen as one mechanical system: time derivative of its state in every contact mode.
 
-State y = [x, v, u1, u2, v1, v2, theta, omega] with x, v of the table and u, v relative to it, and a contact mode.
-The specimen acts back on the table: horizontal momentum of everything that moves gives
+The state consists of y = [x, v, u1, u2, v1, v2, theta, omega], with x, v of the table and u, v relative to it, and of a
+contact mode. The specimen acts back on the table: the horizontal momentum of all moving parts gives
 
     m_t a + m1 (a + u1'') + m2 (a + u2'') + M x_C'' = F,    x_C'' = a - G theta'' + omega^2 (h_b s - sg b c)
 
 with s, c = sin, cos(theta), sg = +1 about corner A and -1 about B, and the lever G = h_b c + sg b s. The storeys'
-equations give m_i (a + u_i'') without a, and J theta'' = T + M G a is linear in it, so a follows in closed form.
-Storeys, spring and block: Eqs. (8) and (A.1) of the paper, with dx, dy the spring's components and B2 = 0 about A,
-2b about B; 1 - cos and the spring's elongation are computed without cancellation.
+equations give m_i (a + u_i'') without a, and J theta'' = T + M G a is linear in a, so that a follows in closed form.
+Storeys, spring and block follow Eqs. (8) and (A.1) of the paper, where dx and dy are the components of the spring, and
+B2 = 0 about A, 2b about B; 1 - cos and the elongation of the spring are computed without cancellation.
 """
 # pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
 # pyright: reportUnknownArgumentType=false
-# numba publishes no types.
+# numba has no type annotations.
 
 import math
 from typing import Any, NamedTuple
@@ -26,10 +26,10 @@ from sim.kernel.compiled import compiled
 Array = NDArray[np.float64]
 
 REST, ROCK_A, ROCK_B, FALLEN = 0, 1, 2, 3
-"""Contact modes: at rest, rocking about A (theta > 0), about B (theta < 0), held by the catch."""
+"""Contact modes: at rest, rocking about A (theta > 0), rocking about B (theta < 0), held by the catch."""
 
 STATES = 8
-"""Numbers in the state."""
+"""Number of values in the state."""
 
 
 class Plant(NamedTuple):
@@ -67,7 +67,7 @@ class Plant(NamedTuple):
     lag: float
 
 
-# `Any`: a string cannot name the tuple of constants, so the signatures here are numba's own objects
+# `Any`: a string cannot name the type of the constants, so that the signatures here are objects of numba
 FLOAT: Any = types.float64
 INT: Any = types.int64
 VOID: Any = types.void
@@ -80,15 +80,15 @@ GRID: Any = FLOAT[:, ::1]
 def table_force(x: float, v: float, request: float, p: Plant) -> float:
     """Force [N] of coil, suspension, friction and end stops on the table.
 
-    `request` is the amplifier's command: coil volts, or amperes if `holds_current`. In both cases the coil
-    voltage R i + Bl v and the current are kept within the amplifier's limits.
+    `request` is the coil voltage [V] commanded by the amplifier, or the current [A] if `holds_current`. In both cases,
+    the coil voltage R i + Bl v and the current are kept within the amplifier's limits.
     """
     current = request if p.holds_current > 0.0 else (request - p.bl * v) / p.resistance
     back_emf = p.bl * v
     current = max(current, (-p.voltage_limit - back_emf) / p.resistance)
     current = min(current, (p.voltage_limit - back_emf) / p.resistance)
     current = min(max(current, -p.current_limit), p.current_limit)
-    # tanh from one exponential: twice as fast as the library function, and exact to rounding of the friction force
+    # tanh from one exponential: twice as fast as the library function, and accurate to the rounding of the friction
     friction = p.friction * (1.0 - 2.0 / (math.exp(2.0 * v / p.friction_velocity) + 1.0))
     force = p.bl * current - p.k_s * x - p.c_s * v - friction
     over = abs(x) - p.half_stroke
@@ -138,7 +138,7 @@ def rates(mode: int, y: Array, request: float, noise: float, p: Plant, dy: Array
 
 @compiled(FLOAT(ROW, ROW, PLANT))
 def overturning_moment(y: Array, dy: Array, p: Plant) -> float:
-    """h_b M a - k_c h1 u1 [N m] of the standing block: it lifts when the magnitude exceeds b g M (Eqs. 9, A.3)."""
+    """h_b M a - k_c h1 u1 [N m] of the resting block, which lifts when the magnitude exceeds b g M (Eqs. 9, A.3)."""
     return p.h_b * p.mass * dy[1] - p.k_c * p.h1 * y[2]
 
 
@@ -146,9 +146,9 @@ def overturning_moment(y: Array, dy: Array, p: Plant) -> float:
 def restitution_on_table(p: Plant) -> float:
     """Ratio of the angular velocities after and before an impact on a table that can move.
 
-    Housner's balance of angular momentum about the new corner with the table's share of the horizontal momentum:
-    (J - mu) omega+ = (r J - mu) omega-, mu = (M h_b)^2 / (m_t + M). r is that of a block on fixed ground, the limit for
-    a heavy table. A light table takes up momentum at the impact, which is returned by the drive that holds it.
+    Housner's balance of angular momentum about the new corner, including the table's share of the horizontal momentum:
+    (J - mu) omega+ = (r J - mu) omega-, mu = (M h_b)^2 / (m_t + M). r is the ratio on fixed ground, which is the limit
+    for a heavy table. A light table takes up momentum at the impact, which the drive that controls it returns.
     """
     give = (p.mass * p.h_b) ** 2 / (p.moving_mass + p.mass)
     return (p.restitution * p.inertia - give) / (p.inertia - give)
@@ -156,9 +156,10 @@ def restitution_on_table(p: Plant) -> float:
 
 @compiled(VOID(ROW, FLOAT, PLANT))
 def turn(y: Array, omega: float, p: Plant) -> None:
-    """Set the block's angular velocity to `omega` instantly: the table takes the horizontal impulse.
+    """Change the block's angular velocity to `omega` instantaneously; the table takes the horizontal impulse.
 
-    m_t v + M (v - G omega) is conserved; the columns transmit no impulse, so the storeys keep their absolute velocity.
+    m_t v + M (v - G omega) is conserved. The columns transmit no impulse, so that the storeys keep their absolute
+    velocities.
     """
     lever = p.h_b * math.cos(y[6]) + math.copysign(p.b, y[6]) * math.sin(y[6])
     jump = p.mass * lever * (omega - y[7]) / (p.moving_mass + p.mass)

@@ -1,11 +1,12 @@
-"""Exact integration step of the frame under a resting block, with proof that no event lies within it.
+"""Exact integration step of the frame while the block rests, with proof that no event lies within the step.
 
 At rest everything is linear. With y = [u1, u2, v1, v2, a_g, a_g'] and a linear base acceleration,
 y' = A y, so a step of length h is y(h) = exp(A h) y(0): [Phi | Gamma0 | Gamma1] are the first four rows (Van Loan,
 1978; Nigam and Jennings, 1969). The matrix is computed once per length.
 
-A quantity f y stays within h^2 / 8 max |f y''| of the chord between its ends, and |f y''| <= |f A^2| exp(|A| h) |y(0)|
-elementwise. Thus six products bound the moment, a peak or a velocity over the whole step.
+A quantity f y stays within h^2 / 8 max |f y''| of the chord between its end values, and
+|f y''| <= |f A^2| exp(|A| h) |y(0)| elementwise. Thus six products bound the moment, a peak or a velocity over the
+whole step.
 """
 
 import numpy as np
@@ -15,19 +16,20 @@ from sim.kernel.compiled import compiled
 from sim.kernel.packing import C1, C2, COUPLED, GRAVITY, H1, H_B, K1, K2, K_C, M1, M2, MASS, B
 
 TABLE_ROWS = 9
-"""Rows of a propagator: u1, u2, v1, v2, then the bounds of moment, u1, drift and of their velocities."""
+"""Rows of a propagator: u1, u2, v1, v2, then the bounds of the moment, u1, the drift, and the velocities of both."""
 
 MUST_STEP, GLIDED, LOOK_INSIDE, ANOTHER_KIND = range(4)
-"""Results of `glide`: the block may lift; all taken; no uplift, but a peak may lie inside; a segment that is a sine or
-has another length."""
+"""Results of `glide`: the block may lift in the segment; all segments are taken; the block does not lift, but a peak
+may lie inside the segment; the segment is a sine or has another length.
+"""
 
 
 @compiled("void(float64[::1], float64, int64, float64, float64[:,::1])")
 def propagator(p: NDArray[np.float64], h: float, n: int, tolerance: float, table: NDArray[np.float64]) -> None:
     """Write the exact step of length `h` [s] and its bounds to `table`, shape (TABLE_ROWS, 6).
 
-    Its first number, cos-like and positive, is 0 where the table cannot be used: where a Taylor polynomial of order
-    `n`, needed to look inside the step, does not reach `tolerance`.
+    The first element, which is otherwise positive, is 0 if the table cannot be used, because a Taylor polynomial of
+    order `n`, needed to look inside the step, does not reach `tolerance`.
     """
     # plain loops: array expressions would add seconds of compilation
     system = np.zeros((2, 6, 6))
@@ -102,14 +104,14 @@ def glide(
 ) -> tuple[int, int]:
     """Apply the exact step of `table` to segment `i` and the following ones, until one needs closer inspection.
 
-    Returns the segment where that ended and the result: `x`, shape (6,), is the state at its start and `following` the
-    exact state at its end, which is not yet taken. The number of segments and GLIDED mean that all were taken.
-    until : time [s] of the next sample; the segment that contains it is not taken.
-    peaks : of |u1| and |u2 - u1| from `peaks_from` [s] on; raised where the ends of a segment suffice, because the
-    motion between them is proved monotone.
-    samples, filled : the state after each segment taken goes to the rows of `samples`, shape (m, 6), from `filled` on,
-    as long as there are any; unlike those of `until`, which the caller handles.
-    clock : shape (2,), start of the segment [s] and its rounding error; updated, as x and `peaks` are.
+    Returns the index of that segment, which is not taken, and the reason. `x`, shape (6,), is then the state at its
+    start, and `following` the exact state at its end. The number of segments and GLIDED mean that all were taken.
+    until : time [s] of the next sample; the segment that contains it is not taken, because the caller takes the sample.
+    peaks : peaks of |u1| and |u2 - u1| from `peaks_from` [s] on, raised if the ends of a segment suffice because the
+    motion between them is proved to be monotone.
+    samples, filled : the state after each segment taken is written to `samples`, shape (m, 6), from row `filled` to the
+    last row.
+    clock : shape (2,), start of the segment [s] and its rounding error, updated like `x` and `peaks`.
     """
     h, coupled, holding = segments[i, 0], p[COUPLED] != 0.0, p[B] * p[GRAVITY] * p[MASS]
     forth, back = p[H_B] * p[MASS], p[K_C] * p[H1]

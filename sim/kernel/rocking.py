@@ -1,12 +1,12 @@
 """Hybrid motion: rest, rocking about A, rocking about B, and the events between them.
 
 A step never crosses an event or the end of a segment of the excitation. Events are roots of the step's own Taylor
-polynomials, so their accuracy is that of the step. In a phase that starts at theta = 0 that known root is divided out:
-the return to zero is found however short the phase, and chatter cannot pass through the ground.
+polynomials, so that they are as accurate as the step. In a phase that starts at theta = 0, that known root is divided
+out: the return to zero is found however short the phase, and a chattering block cannot pass through the ground.
 
 While the block rests under a record, whole segments are taken by the exact step of `sim.kernel.resting`; a Taylor
-polynomial is computed only where the block may lift or a requested value may lie inside. Requested peaks and samples do
-not affect the motion: they are evaluated on unchanged steps.
+polynomial is computed only where the block may lift or a requested value may lie inside the segment. Requests for peaks
+and samples do not affect the motion: they are evaluated on unchanged steps.
 """
 
 import numpy as np
@@ -37,14 +37,16 @@ from sim.kernel.taylor import WORK_ROWS, forcing_coefficients, resting_coefficie
 from sim.kernel.watching import IMPACT, NO_EVENT, OVERTURNING, UPLIFT, first_event, raise_peaks, state_at
 
 STARTED, SIDE, KNOWN, BEGIN, LOST, LENGTH = range(6)
-"""Indices in the first row of `advance`'s memory: begun, corner, known roots theta = 0, time at the end of the segments
-so far [s] and its rounding error, length of the last segment at rest (negative: tabulated)."""
+"""Indices in the first row of `advance`'s memory: whether it has begun, corner, number of known roots theta = 0, time
+at the end of the segments so far [s] and its rounding error, length of the last segment at rest (negative if
+tabulated).
+"""
 
 MEMORY_ROWS = 1 + TABLE_ROWS
-"""Rows of `advance`'s memory: its scalars, then the propagator of the resting frame."""
+"""Rows of `advance`'s memory: one row of scalars, then the propagator of the frame while the block rests."""
 
 AT_ONCE = 1e-12
-"""Times closer than this [s] are the same instant."""
+"""Times [s] that are closer than this count as the same instant."""
 
 
 @compiled("float64(float64, float64, float64[::1], int64, int64, int64, int64)")
@@ -78,13 +80,13 @@ def advance(
     memory: NDArray[np.float64],
     report: NDArray[np.float64],
 ) -> None:
-    """Integrate through the next segments; several calls are bit-identical to one.
+    """Integrate through the next segments. Several calls give results that are bit-identical to those of one call.
 
-    memory, report : shapes (MEMORY_ROWS, 6) and (REPORT,); zeros before the first call, except for the LENGTH of the
-    first segment, then managed by this function.
-    divisions : when positive, samples are due at that many equal parts of every segment, each part's end, and
-    `sample_times` is ignored. `samples`, shape (m, 6), receives at most m of them; the report counts those of this
-    call. The rest is as in `run`.
+    memory, report : shapes (MEMORY_ROWS, 6) and (REPORT,); before the first call, zeros except for the LENGTH of the
+    first segment; managed by this function from then on.
+    divisions : if positive, every segment is divided into this number of equal parts, a sample is due at the end of
+    each part, and `sample_times` is ignored. `samples`, shape (m, 6), receives at most m samples; the report counts
+    those of this call. The other arguments are those of `run`.
     """
     n = order
     c = np.zeros((6, n + 1))
@@ -108,14 +110,15 @@ def advance(
         row = segments[i]
         found = MUST_STEP
         if sg == 0.0 and row[1] == 0.0 and row[2] == 0.0 and row[3] == 0.0 and row[4] == 0.0:
-            # a table pays off from the second segment of equal length on; negative: tabulated
+            # a table is worth its cost from the second segment of equal length on; a negative length means that the
+            # table has been computed
             if kept[LENGTH] == row[0]:
                 kept[LENGTH] = -row[0]
                 propagator(p, row[0], n, tolerance, table)
             elif kept[LENGTH] != -row[0]:
                 kept[LENGTH] = row[0]
             if kept[LENGTH] == -row[0] and table[0, 0] > 0.0 and row[0] <= longest_step:
-                # `glide` writes samples at the ends of segments; others stop it
+                # `glide` writes samples at the ends of segments, and stops before a segment with other samples
                 until, first = np.inf, room
                 if divisions == 1:
                     first = filled
@@ -235,20 +238,20 @@ def run(
     impact_limit: int,
     report: NDArray[np.float64],
 ) -> None:
-    """Integrate x = [u1, u2, v1, v2, theta, omega], shape (6,), through the excitation; x becomes the end state.
+    """Integrate x = [u1, u2, v1, v2, theta, omega], shape (6,), through the excitation. x becomes the end state.
 
     p : packed parameters, shape (16,).  segments : packed excitation, shape (n, 10).
-    sample_times : ascending [s], shape (m,); the states there go to `samples`, shape (m, 6).
-    order, tolerance : of the Taylor steps; the last two coefficients stay below `tolerance` of the velocities.
-    longest_step : [s]; with an infinite tolerance every step has this length or ends at an event or a segment.
+    sample_times : times [s], ascending, shape (m,); the states at these times are written to `samples`, shape (m, 6).
+    order, tolerance : of the Taylor steps; the last two terms stay below the fraction `tolerance` of the velocities.
+    longest_step : [s]; with an infinite tolerance, every step has this length or ends at an event or a segment.
     theta_limit : |theta| [rad] that counts as overturning.  rest_angle : [rad], see below.  peaks_from : [s].
-    impact_limit : the run ends right after this many impacts.
+    impact_limit : number of impacts right after which the run ends.
     report : shape (8,), written: status, end time, impacts, steps, samples, peaks of |u1|, |u2 - u1|, |theta|.
 
-    At rest the moment on the block is m = h_b M a_g - k_C h1 u1; it lifts when |m| > b g M, to A when m > 0 (Eq. 9,
-    A.3). At an impact omega -> r omega and the corner changes. The block comes to rest when the next bounce, omega^2 /
-    (2 a) with a = (b g M - |m|) / J, stays below `rest_angle`: the error of the angle is then at most rest_angle, and
-    that of the energy at most b g M rest_angle.
+    At rest, the moment on the block is m = h_b M a_g - k_C h1 u1. The block lifts when |m| > b g M, and rocks about A
+    when m > 0 (Eq. 9, A.3). At an impact, omega -> r omega and the corner changes. The block comes to rest when the
+    angle of the next bounce, omega^2 / (2 a) with a = (b g M - |m|) / J, stays below `rest_angle`; the error of the
+    angle is then at most rest_angle, and that of the energy at most b g M rest_angle.
     """
     memory = np.zeros((MEMORY_ROWS, 6))
     memory[0, LENGTH] = segments[0, 0]

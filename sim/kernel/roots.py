@@ -1,7 +1,7 @@
 """First root and greatest magnitude of a polynomial on an interval, by certified subdivision.
 
-An interval is discarded only when a bound on the derivatives proves that it has no root or extremum, and searched only
-when a bound proves that it has exactly one: a grazing dip cannot be missed between samples.
+An interval is discarded only if a bound on the derivatives proves that it contains no root or extremum, and is searched
+only if a bound proves that it contains exactly one. A short dip below zero therefore cannot be missed between samples.
 """
 
 import numpy as np
@@ -15,8 +15,9 @@ raised each time it is reached, which limits the work for polynomials with incon
 """
 
 ROUNDING, NOTHING = 2e-15, 1e-300
-"""Rounding error of a polynomial relative to the sum of its terms' magnitudes, and a value far below any motion:
-relative bounds fail for denormal numbers."""
+"""Rounding error of a polynomial relative to the sum of the magnitudes of its terms, and a value far below any motion,
+which is needed because relative bounds fail for denormal numbers.
+"""
 
 
 @compiled("Tuple((float64, float64, float64))(float64[::1], int64, float64)")
@@ -32,7 +33,7 @@ def evaluate(p: NDArray[np.float64], n: int, t: float) -> tuple[float, float, fl
 
 @compiled("float64(float64[::1], int64, float64)")
 def first_root(p: NDArray[np.float64], n: int, h: float) -> float:
-    """Smallest t in [0, h] at which sum p_k t^k, k = 0..n, stops being positive; -1 when there is none."""
+    """Smallest t in [0, h] at which sum p_k t^k, k = 0..n, is no longer positive; -1 if there is none."""
     if p[0] <= 0.0:
         return 0.0
     steepest = sharpest = 0.0
@@ -65,18 +66,18 @@ def first_root(p: NDArray[np.float64], n: int, h: float) -> float:
             left = t
         else:
             right = t
-        # Halley's step, which triples the digits; else bisection
+        # Halley's step, which triples the number of correct digits; otherwise bisection
         trial = left
         if slope < 0.0:
             trial = t - value * slope / (slope * slope - value * half_bend)
-            # relative to the root, not the step: errors of short phases accumulate over hundreds of bounces
+            # relative to the root, not to the step, because errors of short phases accumulate over hundreds of bounces
             if abs(trial - t) <= 4e-16 * t:
                 break
         inside = left < trial < right
         if not inside:
             trial = 0.5 * (left + right)
         moved, t = abs(trial - t), trial
-        # the next step of Newton would move by the bend times the square of this one, Halley's by far less
+        # the next step of Newton's method would be this step squared, times a bend; Halley's would be far smaller
         if moved <= 4e-16 * t:
             break
         if inside and moved <= 1e-6 * t and abs(half_bend) * moved * moved <= 1e-13 * t * -slope:
@@ -86,17 +87,17 @@ def first_root(p: NDArray[np.float64], n: int, h: float) -> float:
 
 @compiled("float64(float64[::1], int64, float64, float64, float64)")
 def greatest_magnitude(p: NDArray[np.float64], n: int, start: float, h: float, best: float) -> float:
-    """The greater of `best` and the greatest |sum p_k t^k|, k = 0..n, for t in [start, h]."""
-    # the ends first: over a step that is long for its motion the polynomial grows like a high power of t and is small
-    # before
+    """Greater of `best` and the greatest |sum p_k t^k|, k = 0..n, for t in [start, h]."""
+    # the ends first: over a step that is long for its motion, the polynomial is small until it grows like a high power
+    # of t
     best = max(best, abs(evaluate(p, n, start)[0]), abs(evaluate(p, n, h)[0]))
     most = sharpest = jerkiest = bounded = 0.0
     left, width, floor = start, h - start, SMALLEST_PART * h
     while left < h:
         right = min(left + width, h)
         if right != bounded:
-            # bounds on [0, right], of the value and the second and third derivatives: those on the whole of [0, h]
-            # would divide the beginning of such a step into thousands of parts
+            # bounds of the value and of the second and third derivatives on [0, right]: with bounds on the whole of
+            # [0, h], the beginning of such a step would be divided into thousands of parts
             bounded = right
             most = sharpest = jerkiest = 0.0
             for k in range(n, -1, -1):
@@ -109,7 +110,7 @@ def greatest_magnitude(p: NDArray[np.float64], n: int, start: float, h: float, b
         t = left + half
         value, slope, half_bend = evaluate(p, n, t)
         best = max(best, abs(value))
-        # skip an excess over `best` by rounding alone, here or in the sum, and negligible values
+        # ignore negligible values, and an excess over `best` that is only due to rounding, here or in the sum
         above = best * (1.0 + 1e-14) + ROUNDING * most + NOTHING
         if abs(value) + half * (abs(slope) + 0.5 * sharpest * half) > above:
             if abs(slope) <= sharpest * half and 2.0 * abs(half_bend) <= jerkiest * half:
@@ -117,7 +118,7 @@ def greatest_magnitude(p: NDArray[np.float64], n: int, start: float, h: float, b
                     width *= 0.5
                     continue
                 floor *= FLOOR_GROWTH
-            # at most one extremum here: evaluate both ends, and the zero of the slope between them if there is one
+            # at most one extremum here: evaluate both ends and, if there is one, the zero of the slope between them
             low, high = left, right
             low_value, low_slope, _ = evaluate(p, n, low)
             high_value, high_slope, _ = evaluate(p, n, high)

@@ -1,4 +1,4 @@
-"""Length, validity and impact of a step; endings and report of a run."""
+"""Length of a step, check of a state, and impact; endings and report of a run."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,19 +7,21 @@ from sim.kernel.compiled import compiled
 from sim.kernel.packing import GRAVITY, H1, H_B, INERTIA, K_C, MASS, RESTITUTION, B
 
 COMPLETED, OVERTURNED_A, OVERTURNED_B, IMPACT_LIMIT, FAILED = range(5)
-"""Endings of a run. IMPACT_LIMIT: right after the last impact requested."""
+"""Endings of a run. IMPACT_LIMIT: the run ended right after the last requested impact."""
 
 STATUS, END, IMPACTS, STEPS, SAMPLES, PEAKS = range(6)
-"""Indices in the report of `run`: status, end time [s], counts, rows of samples filled; from PEAKS on the peaks."""
+"""Indices in the report of `run`: status, end time [s], numbers of impacts and steps, filled rows of samples, and the
+first of the peaks.
+"""
 
 REPORT = 8
 """Length of the report of `run`."""
 
 SHORTEST_STEP = 1e-9
-"""Step [s] below which the tolerance counts as unattainable: the run fails."""
+"""Step [s] below which the tolerance counts as unattainable, so that the run fails."""
 
 LARGEST_STATE = 1e6
-"""Bound of every component of a physical state; a run that exceeds it, or yields NaN, fails."""
+"""Bound of every component of a physical state. A run fails if its state exceeds it or becomes NaN."""
 
 
 @compiled("float64(float64[::1], float64, float64, float64, float64, float64, int64, float64, float64)")
@@ -36,13 +38,13 @@ def step_length(
 ) -> float:
     """Length [s] of a step from the last two coefficients, at most `allowed`; NaN if a coefficient is not finite.
 
-    last, before : coefficients n and n - 1 of the velocities added up as (|v1| + |v2|) / R + |omega|.
+    last, before : coefficients n and n - 1 of the velocities, combined as (|v1| + |v2|) / R + |omega|.
     Source: Jorba and Zou (2005).
     """
     if not (last < np.inf and before < np.inf):
         return np.nan
     reach = np.hypot(p[B], p[H_B])
-    # velocities below a thousandth of the block's p alpha need no relative accuracy
+    # velocities below a thousandth of p alpha of the block need no relative accuracy
     floor = 1e-3 * p[B] / p[H_B] * np.sqrt(p[MASS] * p[GRAVITY] * reach / p[INERTIA])
     scale = tolerance * max(max(abs(v1), abs(v2)) / reach, abs(omega), floor)
     limit = np.inf
@@ -55,7 +57,7 @@ def step_length(
 
 @compiled("boolean(float64[::1])")
 def is_physical(x: NDArray[np.float64]) -> bool:
-    """Whether every component of a state is a number below LARGEST_STATE."""
+    """Whether the magnitude of every component of a state is a number below LARGEST_STATE."""
     physical = True
     for k in range(6):
         physical = physical and abs(x[k]) < LARGEST_STATE
@@ -64,7 +66,7 @@ def is_physical(x: NDArray[np.float64]) -> bool:
 
 @compiled("void(float64[::1], float64[::1], float64, float64)")
 def strike(p: NDArray[np.float64], x: NDArray[np.float64], acceleration: float, rest_angle: float) -> None:
-    """Set the state `x`, shape (6,), to that after an impact under a base acceleration [m/s2]: rocking, or at rest."""
+    """Set `x`, shape (6,), to the state after an impact, rocking or at rest, under a base acceleration [m/s2]."""
     holding = p[B] * p[GRAVITY] * p[MASS]
     moment = p[H_B] * p[MASS] * acceleration - p[K_C] * p[H1] * x[0]
     x[4] = 0.0

@@ -1,7 +1,8 @@
-"""Motion of the bench's moving parts, tick by tick, under a drive held between ticks.
+"""Motion of the bench's moving parts, tick by tick, under a drive that is held between ticks.
 
-Integration: classical Runge-Kutta of order 4; uplift, impact and catch end a step at their instant, located on the step
-itself, which preserves the order across them. The end stops are stiff springs, not events.
+Integration is by the classical Runge-Kutta method of order 4. Uplift, impact and catch end a step at their instant,
+which is located with steps of the same method, so that the order is preserved. The end stops are stiff springs, not
+events.
 """
 # pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
 # pyright: reportUnknownArgumentType=false
@@ -37,9 +38,10 @@ COLUMNS = 9
 
 _NONE, _IMPACT, _CATCH, _UPLIFT = 0, 1, 2, 3
 _REST_ANGLE = 1.0e-7
-"""Bounces that stay below this angle [rad] end at rest: the error at the block's top is at most 4e-6 m."""
+"""A bounce that stays below this angle [rad] is replaced by rest; the error at the block's top is at most 4e-6 m."""
 _BOUNCES = 100
-"""Events within one step after which the block is set to rest; with the rest angle real motions have far fewer.
+"""Number of events within one step after which the block is set to rest. Because of the rest angle, real motions have
+far fewer.
 """
 _INSTANT = 1.0e-14
 """Accuracy to which the instant of an event is found [s]."""
@@ -47,9 +49,10 @@ _INSTANT = 1.0e-14
 
 @compiled(VOID(INT, ROW, FLOAT, FLOAT, FLOAT, FLOAT, PLANT, GRID))
 def advance(mode: int, y: Array, h: float, held: float, request: float, noise: float, p: Plant, work: Array) -> None:
-    """One Runge-Kutta step of length `h` from `y` into work[4]; work[0] already holds the rates at `y`.
+    """Take one Runge-Kutta step of length `h` from `y`, and write the state to work[4]. work[0] contains the rates at
+    `y`.
 
-    The amplifier's first-order lag from `held` towards `request` is exact.
+    The first-order lag of the amplifier, from `held` towards `request`, is exact.
     """
     decay = math.exp(-0.5 * h / p.lag) if p.lag > 0.0 else 0.0
     middle = request + (held - request) * decay
@@ -83,10 +86,10 @@ def margin(event: int, mode: int, y: Array, request: float, noise: float, p: Pla
 def locate(
     event: int, mode: int, y: Array, h: float, held: float, request: float, noise: float, p: Plant, work: Array
 ) -> float:
-    """Instant of the first `event` within (0, h], the state then in work[4]; -1 if the step ends before it.
+    """Instant of the first `event` within (0, h], with the state at that instant in work[4]; -1 if there is none.
 
-    Illinois iteration on Runge-Kutta steps of varying length. A motion that starts on the ground already has a root at
-    0, which is divided out to find the return, however short the bounce.
+    Illinois iteration on Runge-Kutta steps of varying length. A motion that starts on the ground has a root at 0, which
+    is divided out, so that the return is found however short the bounce.
     """
     power, low_value = 0, 1.0
     if event == _IMPACT and y[6] == 0.0:
@@ -140,7 +143,7 @@ def impact(mode: int, y: Array, request: float, noise: float, p: Plant, work: Ar
 
 @compiled(INT(INT, ROW, FLOAT, FLOAT, PLANT, GRID))
 def passed(mode: int, y: Array, request: float, noise: float, p: Plant, work: Array) -> int:
-    """Event that a step ending in `y` has passed."""
+    """Event that has been passed by a step that ends in the state `y`."""
     if mode == REST:
         return _UPLIFT if p.mass > 0.0 and margin(_UPLIFT, mode, y, request, noise, p, work) < 0.0 else _NONE
     if mode == FALLEN:
@@ -154,7 +157,7 @@ def passed(mode: int, y: Array, request: float, noise: float, p: Plant, work: Ar
 def substep(
     mode: int, y: Array, h: float, held: float, request: float, noise: float, p: Plant, work: Array
 ) -> tuple[int, float]:
-    """Advance `y` by `h` through every event; returns the mode and the amplifier's output."""
+    """Advance `y` by `h`, including all events. Returns the mode and the amplifier's output."""
     left = h
     for bounce in range(_BOUNCES + 1):
         last = bounce == _BOUNCES
@@ -207,12 +210,12 @@ def stream(
     carried: Array,
     samples: Array,
 ) -> int:
-    """Sample the plant, then hold the next request for one tick [s]; again for every request.
+    """For every request, sample the plant, then hold the request for one tick [s]. Returns the mode.
 
-    requests, noise : shape (n,), commands to the amplifier [V or A] and force noise [N], held for a tick each.
-    y : state, shape (8,), updated; carried : shape (2,), [amplifier output, last mean acceleration], updated.
-    samples : shape (n, 9), row i is the state at tick i before request i acts, and the mean acceleration over the
-    previous tick. Returns the mode. Rows do not depend on how the requests are divided among calls.
+    requests, noise : shape (n,), commands to the amplifier [V or A] and force noise [N], each held for one tick.
+    y : state, shape (8,), updated.  carried : shape (2,), [amplifier output, last mean acceleration], updated.
+    samples : shape (n, 9); row i is the state at tick i, before request i acts, and the mean acceleration over the
+    previous tick. The rows do not depend on how the requests are divided among calls.
     """
     work = np.empty((6, STATES))
     h = tick / substeps
@@ -222,7 +225,7 @@ def stream(
         held, velocity = carried[0] if p.lag > 0.0 else requests[i], y[1]
         for _ in range(substeps):
             mode, held = substep(mode, y, h, held, requests[i], noise[i], p, work)
-        # mean over the tick: an instantaneous value would miss the impulse of an impact, and always sample the same
-        # phase of the sawtooth of a held drive (1.5 % low with the default shaker)
+        # the mean over the tick: an instantaneous value would miss the impulse of an impact, and would always be taken
+        # at the same phase of the sawtooth under a held drive (1.5 % too low with the default shaker)
         carried[0], carried[1] = held, (y[1] - velocity) / tick
     return mode

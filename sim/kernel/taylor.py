@@ -3,8 +3,8 @@
 Coefficient k of x(t0 + t) = sum x_k t^k follows from the lower ones through the equations of motion: products are
 convolutions, sines and roots have recurrences (Jorba and Zou, 2005). Rows of `c` are u1, u2, v1, v2, theta, omega.
 
-Every function serves one member or, with an additional last axis of `sim.kernel.lanes.LANES` in its arrays, as many
-members at once; the docstrings give the shapes for one.
+Every function applies to one member or, if its arrays have an additional last axis of length `sim.kernel.lanes.LANES`,
+to that number of members at once. The docstrings give the shapes for one member.
 """
 
 import numpy as np
@@ -20,10 +20,10 @@ WORK_ROWS = 8
 
 @generic
 def forcing_coefficients(row: NDArray[np.float64], t: float, a: NDArray[np.float64], n: int) -> None:
-    """Coefficients 0..n of the base acceleration at time `t` of a packed segment `row`, written to `a`.
+    """Write coefficients 0..n of the base acceleration, at time `t` of a packed segment `row`, to `a`.
 
     With S = sin(phi), C = cos(phi) and phi' = omega + kappa t: (k+1) S_{k+1} = omega C_k + kappa C_{k-1}, and
-    likewise for C; the amplitude is a cubic, so the product has four terms.
+    likewise for C. The amplitude is a cubic, so that its product with the sine has four terms.
     """
     nothing = zero(row)
     for k in range(n + 1):
@@ -53,9 +53,9 @@ def forcing_coefficients(row: NDArray[np.float64], t: float, a: NDArray[np.float
 
 @generic
 def resting_coefficients(p: NDArray[np.float64], a: NDArray[np.float64], c: NDArray[np.float64], n: int) -> None:
-    """Coefficients 1..n of the linear frame while the block rests; column 0 of `c` is the state.
+    """Write coefficients 1..n of the linear frame, while the block rests, to `c`, whose column 0 is the state.
 
-    The spring acts as k_C u1 (k_C = 0 for the bare frame); theta and omega are zero.
+    The spring force is k_C u1 (k_C = 0 for the bare frame); theta and omega are zero.
     """
     k2, c2, nothing = get(p, K2), get(p, C2), zero(p)
     inverse_1, inverse_2 = 1.0 / get(p, M1), 1.0 / get(p, M2)
@@ -85,10 +85,10 @@ def rocking_coefficients(
     w: NDArray[np.float64],
     n: int,
 ) -> None:
-    """Coefficients 1..n of the rocking motion about one corner; column 0 of `c` is the state.
+    """Write coefficients 1..n of the rocking motion about one corner to `c`, whose column 0 is the state.
 
     Source: Eq. (8) (sg = +1) and (A.1) (sg = -1) in the form of `sim.kernel.equations`. `w` is scratch space of
-    WORK_ROWS rows. Seven and a half convolutions with a spring, three without.
+    WORK_ROWS rows. There are seven and a half convolutions with a spring, and three without.
 
     With X = dx + u1, L^2 = X^2 + dy^2 - u1 (2 X - u1), and X^2 + dy^2 = const - 2 R cos - 2 h1 d sin has no products.
     L L = L^2, L e = dx and L g = G give e = dx / L and g = G / L, so that q dx = dx - d e and q G = G - d g; only
@@ -131,7 +131,7 @@ def rocking_coefficients(
         if k > 0:
             s = cs = pushed = square = arm = lengths = e = g = nothing
             if elastic:
-                # one loop: each sum alone would wait for its previous product
+                # one loop for all sums: in a loop of its own, each addition would wait for the previous one
                 for j in range(1, k):
                     omega, u, length = get2(c, 5, j), get2(c, 0, j), get2(w, 4, j)
                     s = fma(omega, get2(w, 1, k - 1 - j), s)

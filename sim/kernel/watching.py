@@ -1,7 +1,7 @@
 """Evaluation of a step's polynomials: samples, peaks and the first event.
 
-`c` holds the Taylor coefficients of u1, u2, v1, v2, theta, omega, shape (6, n + 1), `a` those of the base
-acceleration; a step lasts from 0 to `h`. `e` is scratch space, shape (n + 1,).
+`c`, shape (6, n + 1), contains the Taylor coefficients of u1, u2, v1, v2, theta, omega, and `a` those of the base
+acceleration. A step lasts from 0 to `h`. `e` is scratch space, shape (n + 1,).
 """
 
 import numpy as np
@@ -16,13 +16,13 @@ NO_EVENT, IMPACT, OVERTURNING, UPLIFT = range(4)
 """Endings of a step."""
 
 UPLIFT_MARGIN = 1e-12
-"""Relative excess of |m| over b g M that counts as uplift: rounding alone never lifts a block."""
+"""Relative excess of |m| over b g M that counts as uplift, so that rounding alone never lifts a block."""
 
 
 @generic
 def state_at(c: NDArray[np.float64], n: int, t: float, out: NDArray[np.float64]) -> None:
-    """Write the six polynomials at time `t` of the step to `out`, shape (6,), or those of many members."""
-    # six interleaved sums: each alone would wait for its previous product
+    """Write the values of the six polynomials at time `t` of the step to `out`, shape (6,); also for many members."""
+    # six interleaved sums: if computed separately, each addition would wait for the previous one
     u1, u2, v1, v2 = get2(c, 0, n), get2(c, 1, n), get2(c, 2, n), get2(c, 3, n)
     theta, omega = get2(c, 4, n), get2(c, 5, n)
     for k in range(n - 1, -1, -1):
@@ -39,7 +39,7 @@ def state_at(c: NDArray[np.float64], n: int, t: float, out: NDArray[np.float64])
 
 @generic
 def bends(c: NDArray[np.float64], n: int, h: float, out: NDArray[np.float64]) -> None:
-    """Bounds of |u1''|, |u2'' - u1''| and |theta''| over a step of length `h`, written to `out`, shape (3,)."""
+    """Write bounds of |u1''|, |u2'' - u1''| and |theta''| over a step of length `h` to `out`, shape (3,)."""
     bend_1 = bend_2 = bend_3 = zero(out)
     for k in range(n, 1, -1):
         factor = float(k * (k - 1))
@@ -53,7 +53,7 @@ def bends(c: NDArray[np.float64], n: int, h: float, out: NDArray[np.float64]) ->
 
 @generic
 def tail(c: NDArray[np.float64], n: int, h: float, out: NDArray[np.float64]) -> None:
-    """Sum of |theta_k| h^(k - 5) for k = 5..n, written to `out`, shape (1,)."""
+    """Write the sum of |theta_k| h^(k - 5) for k = 5..n to `out`, shape (1,)."""
     total = magnitude(get2(c, 4, n))
     for k in range(n - 1, 4, -1):
         total = fma(total, h, magnitude(get2(c, 4, k)))
@@ -71,7 +71,8 @@ def raise_peaks(
     e: NDArray[np.float64],
     peaks: NDArray[np.float64],
 ) -> None:
-    """Raise `peaks` = [|u1|, |u2 - u1|, |theta|], shape (3,), to the greatest values in [start, h].
+    """Raise `peaks` = [|u1|, |u2 - u1|, |theta|], shape (3,), to the greatest values in [start, h] if these are
+    greater.
 
     following : the state at `h`, shape (6,).
     """
@@ -87,8 +88,8 @@ def raise_peaks(
             bend, begin, end, slope, last = bend_3, c[4, 0], following[4], c[5, 0], following[5]
         most = max(abs(begin), abs(end))
         if start == 0.0 and most > peaks[which] and slope * last > 0.0 and abs(slope) + abs(last) > bend * h:
-            peaks[which] = most  # the slope has no zero: the largest value is at one of the ends
-        # most steps raise no peak: the distance from the chord is at most h^2 / 8 of the largest second derivative
+            peaks[which] = most  # the slope has no zero, so that the largest value is at one of the ends
+        # most steps raise no peak: the distance from the chord is at most h^2 / 8 times the largest second derivative
         elif most + 0.125 * h * h * bend > peaks[which]:
             for k in range(n + 1):
                 e[k] = c[0, k] if which == 0 else (c[1, k] - c[0, k] if which == 1 else c[4, k])
@@ -118,9 +119,10 @@ def is_clear(
     known: int,
     theta_limit: float,
 ) -> bool:
-    """Whether a bound proves that a step of a rocking block holds no event: from the first coefficients of theta and
-    the `tail` of the others. The first three left after division by the known roots are a parabola with an exact
-    minimum.
+    """Whether a bound proves that a step of a rocking block contains no event.
+
+    The bound follows from the first coefficients of theta and, as `rest`, the `tail` of the others. After division by
+    the known roots, the first three coefficients are a parabola, whose minimum is exact.
     """
     if known == 0:
         first, line, bend, rest = theta_0, theta_1, theta_2, fma(fma(rest, h, abs(theta_4)), h, abs(theta_3))
@@ -150,16 +152,17 @@ def first_event(
     theta_limit: float,
     e: NDArray[np.float64],
 ) -> tuple[float, int, float]:
-    """Time, kind and direction (+1 to A, -1 to B; of an uplift) of the first event in [0, h]; NO_EVENT at h.
+    """Time and kind of the first event in [0, h], and the direction of an uplift (+1 to A, -1 to B); h and NO_EVENT if
+    there is none.
 
     known : number of roots theta = 0 of a rocking phase at the start of the step, which are divided out.
-    Source: uplift Eq. (9) and (A.3).
+    Source of the uplift: Eq. (9) and (A.3).
     """
     event, direction = NO_EVENT, 0.0
     if sg == 0.0 and p[COUPLED] == 0.0:
         return h, event, direction
     if sg != 0.0:
-        # most steps contain no event: test one bound for both before searching
+        # most steps contain no event: test one bound for impact and overturning before searching
         tail(c, n, h, e)
         rest = e[0]
         if n > 4 and is_clear(sg, c[4, 0], c[4, 1], c[4, 2], c[4, 3], c[4, 4], rest, h, known, theta_limit):

@@ -246,7 +246,7 @@ def test_a_damaged_file_in_the_cache_is_not_the_end(installation: Installation, 
         path.write_bytes(path.read_bytes()[:kept])
     out, err = installation.run()
     assert out == "3.0"
-    assert "remove it" in err
+    assert "remove this folder" in err
 
 
 class _Attack:

@@ -73,7 +73,7 @@ def test_a_file_is_never_overwritten(kept: Path) -> None:
         ),
         (
             lambda text: text.replace('"k1"', '"k_c:0.2500000001"'),
-            "k_c:0.2500000001' .* label too close to that of k_c:0.25",
+            "k_c:0.2500000001' .* label cannot be distinguished from that of k_c:0.25",
         ),
         (lambda text: text.replace('"value": 210.0', '"value": 0.0'), r"findings\[0\].value .* k1 must be above 0"),
         (lambda text: text.replace('"findings": [', '"findings": [3, '), r"findings\[0\]"),

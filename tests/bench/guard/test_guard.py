@@ -316,7 +316,7 @@ def test_a_stuck_sensor_ends_a_run_in_which_the_table_is_driven() -> None:
     guard.arm()
     seen = [guard.exchange(_sine(1.0, N * k)).violation for k in range(9)]
     found = [violation for violation in seen if violation is not None]
-    assert found[0].quantity == "time of constant count of laser_2"
+    assert found[0].quantity == "time with a constant count of laser_2"
     assert guard.ramping
 
 

@@ -137,7 +137,7 @@ def test_a_specimen_that_is_another_warns_once_and_where_a_limit_says_so_ends_th
     assert bench.run(*twice).status == "completed"
     (warning,) = bench.warnings
     assert warning.startswith("drift outside the twin's band: rms over 1 s")
-    assert warning.endswith("limit 0.15: is another specimen mounted?")
+    assert warning.endswith("limit 0.15: check which specimen is mounted")
 
     bench = Beside(configuration(truth, residual_warn=None, residual_stop=0.2, persistence=1.0))
     ending = bench.run(shaken(6.0, 1.0, 16.3, REMOVE))
