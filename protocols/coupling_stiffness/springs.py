@@ -1,8 +1,11 @@
-"""Springs from two frames: with the block clamped, spring and first storey act in parallel. k_C = k1(held) - k1(bare)
+"""Stiffness of springs from two frames.
 
-Both are identified with the same masses, timebase and lasers. Masses and timebase contribute through the difference of
-their sensitivities; the linearity errors of the lasers are assumed independent, an upper bound. If the bare frame was
-identified previously, its stated correlation with the masses is used, and the timebase is assumed independent.
+With the block clamped, spring and first storey act in parallel: k_C = k1(held) - k1(bare).
+
+Both frames are identified with the same masses, timebase and lasers. The uncertainties of masses and timebase
+contribute through the difference of the two sensitivities; the linearity errors of the lasers are assumed independent,
+which gives an upper bound. If the bare frame was identified previously, its stated correlation with the masses is used,
+and the timebase is assumed independent.
 """
 
 from collections.abc import Sequence
@@ -37,7 +40,8 @@ SOURCE = "shift of the frame's modes with the block held"
 @dataclass(frozen=True, eq=False)
 class Reference:
     """Bare frame: `values` of the quantities `names`, shape (n,), k1 and k2 first. `apart`, shape (n, n), is their
-    covariance without the contributions of masses and timebase, to which the sensitivities are `shift`, shape (n, 3).
+    covariance without the contributions of masses and timebase; `shift`, shape (n, 3), holds their sensitivities to
+    these.
     """
 
     names: tuple[str, ...]
@@ -48,9 +52,10 @@ class Reference:
 
 @dataclass(frozen=True, eq=False)
 class SpringResult:
-    """Spring with its `label`, `k_c` [N/m] with its standard uncertainty by contribution, `beta` = k_C/k1. `across`,
-    shape (n,), are the covariances of k_c with the quantities of the reference; `shift`, shape (3,), is the sensitivity
-    of k_c to masses and timebase. `k2_apart` is the difference of k2 from the reference in standard uncertainties.
+    """Spring with its `label`, its stiffness `k_c` [N/m], whose standard uncertainties by contribution are `parts`, and
+    `beta` = k_C/k1. `across`, shape (n,), holds the covariances of k_c with the quantities of the reference; `shift`,
+    shape (3,), the sensitivities of k_c to masses and timebase. `k2_apart` is the difference of k2 from the reference,
+    in standard uncertainties.
     """
 
     label: float
@@ -106,12 +111,12 @@ def frame_change(bare: FrameResult, known: Identified | None) -> str | None:
     apart = (now.values[:2] - before.values[:2]) / np.sqrt(variance)
     if np.all(np.abs(apart) <= SIGNIFICANT):
         return None
-    return f"k1 is off by {apart[0]:+.1f} and k2 by {apart[1]:+.1f} standard uncertainties of the difference"
+    return f"k1 has changed by {apart[0]:+.1f} and k2 by {apart[1]:+.1f} standard uncertainties of the difference"
 
 
 def replaces(bare: FrameResult, known: Identified) -> bool:
-    """Whether the frame of this run replaces the identified one, because the frame has changed or the new uncertainty
-    is smaller.
+    """Whether this run's frame replaces the previously identified one, because the frame has changed or the new
+    uncertainty is smaller.
 
     Uncertainties are compared by the determinant of the covariance of k1, k2, xi1 and xi2.
     """
@@ -124,7 +129,7 @@ def replaces(bare: FrameResult, known: Identified) -> bool:
 
 
 def spring_result(label: float, held: FrameResult, reference: Reference) -> SpringResult:
-    """Stiffness of a spring as the difference of two frames."""
+    """Stiffness of a spring as the difference between two frames."""
     k1, shared = float(reference.values[0]), held.shared
     shift = held.shared_shift[K1] - reference.shift[0]
     parts = {
@@ -184,8 +189,9 @@ def spring_point(spring: SpringResult, nominal: float, number: int) -> SpringPoi
 def spring_findings(
     bare: FrameResult | None, springs: Sequence[SpringResult], known: Identified
 ) -> tuple[list[Finding], list[Correlation]]:
-    """Findings, with all correlations: the stiffness of each spring, and the bare frame if this run identified it best.
-    `known` are the previously identified quantities; those kept are correlated with the springs as well.
+    """Findings with all correlations: the stiffness of each spring, and the bare frame unless the previously identified
+    one remains valid. `known` are the previously identified quantities; those that are kept are correlated with the
+    springs as well.
     """
     framed = bare is not None and replaces(bare, known)
     findings, correlations = frame_findings(bare, known) if bare is not None and framed else ([], [])
@@ -205,7 +211,7 @@ def spring_findings(
             weighed = spring.held.weighed @ spring.shift[:2]
             covariances |= {mass: value for mass, value in zip(MASSES, weighed, strict=True) if mass in made}
         for other in springs[:place]:
-            # both share masses, timebase, and the bare frame as reference
+            # both springs share the masses, the timebase, and the bare frame as reference
             common = spring.shift @ spring.held.shared @ other.shift + spring.reference.apart[0, 0]
             covariances[spring_name(other.label)] = float(common)
         correlations += correlations_with(name, size, covariances, sizes)
@@ -213,8 +219,8 @@ def spring_findings(
 
 
 def _with_known(spring: SpringResult, known: Identified, other: str, *, measured: bool) -> float:
-    """Covariance of k_c with an identified quantity, through the masses and, unless k1 was measured in this run,
-    through k1.
+    """Covariance of k_c with a previously identified quantity, through the masses and, unless k1 was measured in this
+    run, through k1.
     """
     masses = known_masses(known) is not None
     if measured:

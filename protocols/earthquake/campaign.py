@@ -1,4 +1,4 @@
-"""Seismic campaign (section 5 of the paper): predicted curves, results, and the paper's statement."""
+"""Seismic campaign (section 5 of the paper): predicted curves, results, and verdicts on the paper's statement."""
 
 import textwrap
 from collections.abc import Mapping, Sequence
@@ -28,7 +28,7 @@ from sim.parameters import Parameters
 from sim.specimen import Specimen
 
 Curves = Mapping[str, Sequence[SeismicGain]]
-"""Gains over ascending stiffness ratios, for each record."""
+"""Gains of each record, by ascending stiffness ratio."""
 
 
 class EarthquakeCampaign(Prepared[EarthquakeParameters]):
@@ -55,7 +55,7 @@ class EarthquakeCampaign(Prepared[EarthquakeParameters]):
 
     @cached_property
     def left_out(self) -> LeftOut:
-        """Combinations that are not played; taken from the data file, if there is one."""
+        """Combinations that are not played, taken from the data file if there is one."""
         if self._stored is not None:
             return self._stored.left_out
         return beyond_limits(self.combinations, self.configuration)
@@ -117,7 +117,7 @@ BETA_MARGIN = 0.15
 
 
 def curves(parameters: EarthquakeParameters, shakings: Sequence[Shaking], specimen: Specimen) -> Curves:
-    """Gains for every record under its target motion, at and between the given stiffnesses."""
+    """Gains for every record under its target motion, at the given stiffness ratios and on a grid around them."""
     first, last = max(min(parameters.beta) - BETA_MARGIN, BETA_STEP), max(parameters.beta) + BETA_MARGIN
     grid = np.linspace(first, last, round((last - first) / BETA_STEP) + 1)
     betas = sorted({*(round(float(beta), 6) for beta in grid), *parameters.beta})
@@ -125,7 +125,7 @@ def curves(parameters: EarthquakeParameters, shakings: Sequence[Shaking], specim
 
 
 def gain_curves(curves: Curves) -> Table:
-    """alpha_1 and alpha_2 against beta for every record: one row per stiffness, NaN where the block topples."""
+    """alpha_1 and alpha_2 against beta, one row per record and beta; NaN where the block topples."""
     rows = [(name, gain) for name, curve in curves.items() for gain in curve]
 
     def numbers(values: list[float | None], unit: str, description: str) -> Column:
@@ -145,7 +145,7 @@ def gain_curves(curves: Curves) -> Table:
 
 
 def target_gains(curves: Curves, betas: Sequence[float]) -> dict[tuple[str, float], float | None]:
-    """alpha_2 under the target motion for every record and spring; None where the block topples."""
+    """alpha_2 under the target motion, by record and beta; None where the block topples."""
     return {(name, gain.beta): gain.alpha_2 for name, curve in curves.items() for gain in curve if gain.beta in betas}
 
 
@@ -168,8 +168,8 @@ _COLUMNS = (
 
 
 def earthquake_table(points: Sequence[PointLike]) -> str:
-    """Table with a row for each point, followed by the number of agreeing points and the remarks; absent values are
-    "-".
+    """Text table with a row for each point, followed by the number of points that agree and the remarks; absent values
+    are "-".
     """
     rows = plain(points)
     return "\n".join([text_table(_COLUMNS, map(_cells, rows)), *_remarks(rows)])
@@ -219,11 +219,11 @@ _SOURCES = {
     "predicted for the achieved motion": ("alpha_2_predicted", None),
     "predicted for the requested motion": ("alpha_2_target", None),
 }
-"""Sources of gains, each with the fields of the gain and of its uncertainty."""
+"""Fields of the gain and of its uncertainty, by the source of the gain."""
 
 
 def check_statement(points: Sequence[PointLike], band: tuple[float, float]) -> dict[str, Any]:
-    """Verdicts "holds", "does not hold" or "undecided" on each part of the statement, with numbers, per record and
+    """Verdicts on each part of the statement ("holds", "does not hold" or "undecided"), with the gains, per record and
     overall.
     """
     rows = plain(points)
@@ -236,9 +236,9 @@ def check_statement(points: Sequence[PointLike], band: tuple[float, float]) -> d
 
 
 def statement_text(checked: Mapping[str, Any]) -> str:
-    """Verdicts as lines for the terminal."""
+    """The verdicts as lines of text for the terminal."""
     low, high = checked["band_hz"]
-    lines = [f"Statement of the paper: {checked['statement']}. Records within {low:g} to {high:g} Hz."]
+    lines = [f"Statement of the paper: {checked['statement']}. Records are limited to {low:g} to {high:g} Hz."]
     for name in _SOURCES:
         found = checked[name]
         best = f"best {_gain_text(found['best'])}: around 0.5 {found['around_half']}"
@@ -286,7 +286,7 @@ def _below_one(gain: float, uncertainty: float) -> str:
 
 
 def _towards_one(known: Sequence[tuple[float, float]]) -> str:
-    """Verdict on whether the gain with the stiffest spring is closer to one than that with the softest."""
+    """Verdict on whether the gain is closer to one with the stiffest spring than with the softest."""
     (first, doubt), (last, other) = known[0], known[-1]
     nearer = abs(first - 1.0) - abs(last - 1.0)
     return "undecided" if abs(nearer) <= (doubt**2 + other**2) ** 0.5 else _verdict(nearer > 0.0)

@@ -35,7 +35,7 @@ from sim.sweep import in_threads
 Array = NDArray[np.float64]
 
 STEP = 0.005
-"""Sample interval of a simulated motion [s]: the error of a peak between samples is at most 0.2 %."""
+"""Sample interval of a simulated motion [s]; peaks between samples are underestimated by at most 0.2 %."""
 
 TOLERANCE = 1e-7
 
@@ -65,9 +65,9 @@ def travel(specimen: Specimen, shaking: Shaking, factor: float, grounded: bool) 
 def load(
     shaking: Shaking, payload: float, configuration: BenchConfiguration, response: TableResponse | None
 ) -> dict[str, float]:
-    """Peaks of the table's and the shaker's quantities with a `payload` [kg]; unknown ones are absent.
+    """Peak demands on table and shaker with a `payload` [kg]; unknown demands are absent.
 
-    Raises InvalidInput if an identified table does not cover the record's band.
+    Raises InvalidInput if the table model does not cover the record's band.
     """
     target = shaking.target
     velocity, displacement = integrated(target.acceleration, target.sample_rate)
@@ -96,13 +96,13 @@ def _drive(shaking: Shaking, payload: float, response: TableResponse) -> Array:
 
 
 DRAWS, SEED = 32, 8
-"""Number of specimens drawn in addition to the nominal one, and their seed."""
+"""Number of specimens drawn in addition to the nominal one, and random seed."""
 
 OFF = 0.03
 """Relative error of the table's motion, and allowance for noise and friction in all quantities."""
 
 IMPACTS = 0.15
-"""Allowance for quantities that are increased by the impacts of a rocking block, which the drive does not cancel."""
+"""Allowance for quantities increased by the impacts of a rocking block, which the drive does not compensate."""
 
 OFF_MIDDLE = 0.015
 """Largest offset of a storey at rest from the middle of the laser's range, relative to half the range."""
@@ -131,7 +131,7 @@ def combinations(
     shakings: Sequence[Shaking],
     progress: Progress = silent,
 ) -> list[Combination]:
-    """Simulated demands of every record with the bare frame and every spring, and the probability that the block does
+    """Simulated demands of every record with the bare frame and with every spring, and probability that the block does
     not topple.
     """
     load_model(progress)
@@ -145,9 +145,9 @@ def combinations(
 
 
 def beyond_limits(found: Sequence[Combination], configuration: BenchConfiguration) -> LeftOut:
-    """Combinations that the nominal specimen cannot play within the limits, with the reason. A record that the bare
-    frame cannot play is omitted for all springs, as is the bare frame of a record without springs. Empty if no
-    combination would remain: the campaign is then refused by its limits.
+    """Combinations that exceed the limits even with the nominal specimen, with the reason. If a record exceeds them
+    with the bare frame, it is omitted with all springs; if it exceeds them with all springs, it is omitted with the
+    bare frame. Empty if no combination would remain, so that the limits refuse the campaign.
     """
     bound = bounds(configuration)
     left = LeftOut()
@@ -199,7 +199,7 @@ def _identification(table: TableSource) -> list[StageDemands]:
     """Demands of the identification at the start of the campaign; none with a stored model."""
     if table.plan is None:
         return []
-    # the specimen's uncertainty is neglected, since the motion is linear and its level has a margin
+    # the specimen's uncertainty is neglected, since the response is linear and the level includes a margin
     values = {quantity: np.full(1 + DRAWS, value) for quantity, value in table.plan.asked.items()}
     return [StageDemands("the identification of the table", values, None)]
 
@@ -223,7 +223,7 @@ def _asked(shaking: Shaking, specimen: Specimen, configuration: BenchConfigurati
 def _travels(
     shaking: Shaking, specimen: Specimen, factors: Array, configuration: BenchConfiguration
 ) -> Sequence[Travel]:
-    """Motions of the nominal and the drawn specimens, computed on all processors."""
+    """Motions of the nominal and of the drawn specimens, computed on all processors."""
     drawn = [specimen, *configuration.known.draws(specimen, DRAWS, np.random.default_rng(SEED))]
     grounded = configuration.laser_reference == "ground"
 

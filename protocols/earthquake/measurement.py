@@ -20,15 +20,15 @@ from sim.specimen import Specimen
 Array = NDArray[np.float64]
 
 QUIET = 0.5
-"""Fraction of the rest before a record that is used to determine the noise; in the remainder the filters ring."""
+"""Fraction of the rest before a record that is used to determine the noise; the filters ring in the remainder."""
 
 
 @dataclass(frozen=True)
 class PeakSeen:
-    """A peak, and the sensor signals at its time, positive in the direction of the peak.
+    """A peak, and the sensor signals at its time; `lasers` and `table` are positive in the direction of the peak.
 
-    `lasers` [m] are the readings of the lasers, `speeds` [m/s] their rates of change, `swings` [m] their ranges within
-    the fit window; `table` [m] is the table's displacement.
+    `lasers` [m] are the readings of the lasers, `speeds` [m/s] the rates of change of their signals, `swings` [m] the
+    signals' ranges within the fit window; `table` [m] is the table's displacement.
     """
 
     peak: TransientPeak
@@ -40,7 +40,7 @@ class PeakSeen:
 
 @dataclass(frozen=True, eq=False)
 class Observed:
-    """Measurement under one record; `drift` and `u1` [m] are the peaks, `history` the drift [m] at every sample."""
+    """Measurement under one record: peaks of `drift` and `u1` [m], and `history`, the drift [m] at every sample."""
 
     base: BaseMotion
     drift: PeakSeen
@@ -66,7 +66,7 @@ def _sensor_peak(signals: Array, still: Array, column: int, sample_rate: float) 
     peak = transient_peak(values, quiet[np.isfinite(quiet)], sample_rate)
     place, half = round(peak.time * sample_rate), max(round(peak.window * sample_rate), 2)
     window = signals[max(place - half, 0) : place + half + 1]
-    # values and rates are fitted over the window, which makes them insensitive to single samples
+    # values and rates are fitted over the window, to be insensitive to single samples
     time = (np.arange(len(window)) - min(place, half)) / sample_rate
     lines = [_line(time, window[:, each]) for each in (LASER_1, LASER_2, DISPLACEMENT)]
     (first, v1), (second, v2), (table, _) = lines
@@ -113,7 +113,7 @@ def tracking(shaking: Shaking, signals: Array) -> Tracking:
 
 
 def difference(shaking: Shaking, signals: Array, others: Array) -> float:
-    """Rms difference between the motions of two tests relative to the record's rms, within its band."""
+    """Rms difference between the table motions of two tests, relative to the record's rms, within its band."""
     wanted = _windowed(shaking, shaking.target.acceleration)
     return _rms(_table_motion(shaking, signals) - _table_motion(shaking, others)) / _rms(wanted)
 
@@ -135,8 +135,8 @@ def overturning_time(signals: NDArray[np.float64], sample_rate: float, specimen:
 
     A fallen block displaces the storey permanently. The moving mean of u1 over a period of the frame's first mode last
     crosses the threshold of `FallWatch` at about the time at which the block finally passes its critical angle. In ten
-    simulated falls, the difference was 0.12 s on average, ranging from 0.14 s earlier to 0.4 s later; the strap stopped
-    the block 0.3 to 0.6 s afterwards. None if no sample of u1 is valid.
+    simulated falls, the result was 0.12 s late on average, between 0.14 s early and 0.4 s late; the strap stopped the
+    block 0.3 to 0.6 s after this time. None if no sample of u1 is valid.
     """
     span = min(round(2.0 * np.pi / specimen.frame.natural_frequencies[0] * sample_rate), len(signals))
     u1 = signals[:, U1]
@@ -145,7 +145,7 @@ def overturning_time(signals: NDArray[np.float64], sample_rate: float, specimen:
         return None
     values = np.interp(np.arange(u1.size), np.flatnonzero(known), u1[known])
     mean = np.convolve(values, np.full(span, 1.0 / span), mode="same")
-    # no mean at the end, where samples are missing since the block has fallen
+    # at the end the last valid mean is kept, since half the window is beyond the last sample
     mean[-(span // 2) :] = mean[-(span // 2) - 1]
     below = np.flatnonzero(np.abs(mean) <= FallWatch(specimen, sample_rate).threshold)
     return float((below[-1] + 1 if below.size else 0) / sample_rate)
@@ -157,7 +157,7 @@ TOLERANCE = 1e-8
 """Relative tolerance of simulated responses."""
 
 STEP = 0.01
-"""Step of a predicted history [s]."""
+"""Time step of a predicted history [s]."""
 
 AUDIBLE = 20.0
 """Minimum running peak of the bare drift, in standard uncertainties of that peak, at which a ratio is published."""
@@ -171,7 +171,7 @@ class History:
 
     @staticmethod
     def of(specimen: Specimen, base: BaseMotion) -> "History":
-        """History of the nominal specimen under a motion of the table."""
+        """History of the specimen under a motion of the table."""
         times = np.arange(0.0, base.record.duration, STEP)
         motion = simulate(
             specimen,
@@ -190,7 +190,7 @@ class History:
 
 
 class GainMonitor:
-    """Computes a `RunningGain` from every block of signals while one record is played.
+    """Computes a `RunningGain` from each block of signals while a record is played.
 
     `bare` is the measured drift of the bare frame at the same samples, `noise` [m] the uncertainty of its peak, and
     `expected` are the predicted histories of the bare and the coupled frame, absent in the test of the bare frame.
@@ -230,7 +230,7 @@ def _running_gain(bare: History, coupled: History) -> Array:
     size = bare.drift.size
     below = running_peak(bare.drift)
     gain = np.full(size, nan)
-    # no gain after the block topples, however large the peak was before
+    # no gain after the block topples, although the peak before remains
     np.divide(running_peak(coupled.padded(size)), below, out=gain, where=below > 0.0)
     return np.where(np.isnan(coupled.padded(size)), nan, gain)
 
@@ -249,7 +249,7 @@ class DriftHistory:
 @dataclass(eq=False)
 class Histories:
     """Histories for the figures of a campaign: accelerations of the table [m/s2], and drifts by record and stiffness
-    (None for the bare frame).
+    ratio (None for the bare frame).
     """
 
     asked: dict[str, Array] = field(default_factory=dict[str, Array])

@@ -1,9 +1,9 @@
 """Steps of the seismic campaign (section 5 of the paper).
 
 1. With the bare frame, the table is identified unless it is known. Then, for every record, the drive is iterated until
-the table follows it, and is played again for the measurement. 2. Each spring is mounted, and every record is played
-with the drive from the bare frame. If the block topples, the record is ended and the block is set upright. The springs
-are the outer loop, since changing them is manual work.
+the table follows the record, and is played once more for the measurement. 2. Each spring is mounted in turn, and every
+record is played with the drive found with the bare frame. If the block topples, the record is ended and the block is
+set upright. The springs form the outer loop, since they are changed by hand.
 """
 
 from collections import Counter
@@ -50,12 +50,12 @@ SEED = 5
 
 
 BETWEEN = 45.0
-"""Typical time between records until the storeys are at rest [s]."""
+"""Typical time between records in which the storeys come to rest [s]."""
 
 
 class Pace:
-    """Progress of a campaign, weighted by the durations of the `identification` [s] and of the records on the bench,
-    excluding the combinations in `left_out`.
+    """Progress of a campaign, weighted by the durations of the `identification` [s] and of the records, excluding the
+    combinations in `left_out`.
     """
 
     def __init__(
@@ -79,7 +79,7 @@ class Pace:
         self._played = Counter[str]()
 
     def identified(self, share: float = 1.0) -> None:
-        """Set the completed fraction of the table's identification."""
+        """Set the completed fraction `share` of the table's identification."""
         self._identified = share * self._identification
 
     def played(self, record: str) -> None:
@@ -87,7 +87,7 @@ class Pace:
         self._played[record] += 1
 
     def learned(self, record: str) -> None:
-        """Finish the bare-frame part of a record, and remove unused passes from the expected time."""
+        """Finish the bare-frame part of a record; unused passes count as completed."""
         self._played[record] = self._bare[record]
 
     def progress(self, activity: str) -> Progress:
@@ -97,7 +97,7 @@ class Pace:
 
 
 class EarthquakePlan:
-    """Steps of a campaign, and the tests of the bare frame required by later steps."""
+    """Steps of a campaign, and the bare-frame tests that later steps require."""
 
     def __init__(
         self,
@@ -142,7 +142,7 @@ class EarthquakePlan:
         try:
             learned = yield from replicate(shaking.target, model, limits, self._learning(), shaking.name, passed)
         except InvalidInput as beyond:
-            # the other records are played nevertheless
+            # the campaign continues with the other records
             yield Publish(Warned(f"{shaking.name} is not played: {beyond}"))
             return f"the table cannot reproduce it: {beyond}"
         if learned.fell:
@@ -226,7 +226,9 @@ class EarthquakePlan:
     def _play(
         self, shaking: Shaking, drive: NDArray[np.float64], monitor: GainMonitor
     ) -> Generator[Step, Outcome, Played | Fallen]:
-        """Play a drive and its decay, and ramp out; a fall during the ramp counts as a fall under the record."""
+        """Play a drive and the decay after it, and ramp out; a fall during the ramp is treated as a fall under the
+        record.
+        """
         yield Arm(self._parameters.rest)
         outcome = yield Play(shaking.volts(drive, self._parameters.decay), monitor)
         ended = yield RampOut(fast=isinstance(outcome, Fallen))
@@ -234,12 +236,10 @@ class EarthquakePlan:
             return Fallen(outcome.signals) if isinstance(ended, Fallen) else outcome
         if isinstance(outcome, Fallen):
             return outcome
-        raise RigError("a drive was played without a result")
+        raise RigError("playing a drive returned no result")
 
     def _running_gain(self, shaking: Shaking, specimen: Specimen, bare: BareTest) -> GainMonitor:
-        """Callback that monitors the running gain; its prediction is for the motion of this drive with the bare
-        frame.
-        """
+        """Monitor of the running gain; the prediction is for the motion that this drive caused with the bare frame."""
         base = bare.observed.base
         expected = (History.of(specimen.bare(), base), History.of(specimen, base))
         noise = bare.observed.drift.peak.uncertainty
@@ -248,7 +248,7 @@ class EarthquakePlan:
         )
 
     def _remarked(self, shaking: Shaking, point: EarthquakePoint) -> EarthquakePoint:
-        """The point, with the shortcomings of its drive added to the remarks."""
+        """The point, with the drive's missed tolerances added to the remarks."""
         said = filter(None, (point.reason, self._shortfalls.get(shaking.name)))
         return point.model_copy(update={"reason": "; ".join(said)})
 
@@ -259,7 +259,7 @@ class EarthquakePlan:
 def table_model(
     source: TableSource, configuration: BenchConfiguration, pace: Pace
 ) -> Generator[Step, Outcome, TableModel]:
-    """The stored table model, or one identified now, for which the bare frame is mounted."""
+    """The stored table model, or one identified now; in both cases the bare frame is mounted."""
     if source.model is not None or source.plan is None:
         assert source.model is not None
         bare = configuration.known_specimen.bare()
@@ -267,7 +267,7 @@ def table_model(
         return source.model
 
     def carry_out(step: Step) -> Generator[Step, Outcome, Outcome]:
-        # the campaign's progress includes that of the identification
+        # the campaign's progress replaces that of the identification
         if isinstance(step, Publish) and isinstance(step.event, Progress):
             return Done()
         return (yield replace(step, watch=_counted(step.watch, pace)) if isinstance(step, Play) else step)
@@ -278,7 +278,7 @@ def table_model(
 
 
 def _counted(watch: Watch | None, pace: Pace) -> Watch | None:
-    """Callbacks of an identification, with its progress converted to that of the campaign."""
+    """Callback of an identification whose progress is converted to the campaign's."""
     if watch is None:
         return None
 

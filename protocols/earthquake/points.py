@@ -1,4 +1,4 @@
-"""Points for a record: measured, overturned, or not played."""
+"""Points of a record: measured, overturned, or not played."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from sim.specimen import Specimen
 Array = NDArray[np.float64]
 
 CHANCE_NOTE = 0.05
-"""Predicted probability of toppling above which a remark is added if the block stays upright."""
+"""Predicted probability of toppling above which a remark is added if the block has not toppled."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +135,7 @@ def overturned_point(
 def unplayed_point(
     shaking: Shaking, beta: float, target_gain: float | None, bare: BareTest | None, reason: str
 ) -> EarthquakePoint:
-    """Point for a record without a test or result at this stiffness."""
+    """Point of a record that was not played, or has no result, at this stiffness ratio."""
     known = shared_fields(shaking, beta, target_gain, bare)
     return EarthquakePoint.model_validate({**known, "status": PointStatus.NOT_PLAYED, "reason": reason})
 
@@ -144,7 +144,7 @@ def _remarks(found: Compared, observed: Observed) -> Iterator[str]:
     """Remarks on the point."""
     if found.alpha_2_predicted is None:
         yield (
-            "the nominal specimen topples under the achieved motion; the interval is that of the draws that do "
+            "the nominal specimen topples under the achieved motion; the interval is computed from the draws that do "
             "not topple"
         )
     elif found.chance > CHANCE_NOTE:
@@ -162,7 +162,7 @@ def _remarks(found: Compared, observed: Observed) -> Iterator[str]:
 
 
 def rejection(learned: Replicated, parameters: EarthquakeParameters) -> str | None:
-    """Reason why the best drive is not used; None if it is."""
+    """Reason why the best drive is not used; None if it is used."""
     if learned.acceleration is None:
         return f"no pass was evaluated: {learned.reason}"
     if learned.repeatable <= parameters.usable:
@@ -174,7 +174,7 @@ def rejection(learned: Replicated, parameters: EarthquakeParameters) -> str | No
 
 
 def shortfall(learned: Replicated, parameters: EarthquakeParameters, lowest: float) -> str:
-    """Tolerances that a used drive misses, as text; empty if it meets both.
+    """Tolerances that the drive misses, as text; empty if it meets both.
 
     `lowest` [Hz] is the lower end of the record's band.
     """

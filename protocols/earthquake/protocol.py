@@ -17,7 +17,7 @@ class EarthquakeParameters(Parameters):
     records: tuple[str, ...] = quantity(
         (),
         "",
-        "records, before the flags: FILE, FILE@KEY=VALUE,... or synthetic:NAME[:SEED] (see `rockbench "
+        "records, given before the options: FILE, FILE@KEY=VALUE,... or synthetic:NAME[:SEED] (see `rockbench "
         "records`); if absent, the seven synthetic ones",
     )
     beta: tuple[Stiffness, ...] = quantity(
@@ -48,7 +48,7 @@ class EarthquakeParameters(Parameters):
     longest: float = quantity(
         100.0,
         "s",
-        "longest duration that is played; of a longer record, the part of this duration with the most Arias intensity",
+        "longest duration that is played; of a longer record, the part with the largest Arias intensity",
         ge=5,
         le=3600,
     )
@@ -171,7 +171,7 @@ class EarthquakePoint(Parameters):
     bare_tracking_error: float | None = quantity(None, "1", "rms error of the table with the bare frame")
     passes: int = quantity(0, "1", "number of passes of the replication with the bare frame")
     replication: str = quantity("", "", "outcome of the replication")
-    reason: str = quantity("", "", "remarks, or the reason why there is no gain")
+    reason: str = quantity("", "", "remarks, or the reason why the gain is absent")
 
 
 PROTOCOL = Protocol(

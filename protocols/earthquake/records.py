@@ -24,12 +24,12 @@ from sim.errors import InvalidInput
 from sim.excitation import SampledRecord
 
 RECORDS, SAMPLES, MODEL, LINES = "records", "record_samples", "table_model", "table_model_lines"
-"""Tables of the data file: one row per record, concatenated samples of all records, one row for the table model, and
-its lines.
+"""Tables of the data file: records, one row each; concatenated samples of all records; table model, one row; lines of
+the table model.
 """
 
 OMITTED = "left_out"
-"""Table of the data file with a row per combination that the plan left out; absent without one."""
+"""Table of the data file with a row for each combination that is not played; absent if all are played."""
 
 LeftOut = dict[tuple[str, float | None], str]
 """Reasons why combinations are not played, by record and stiffness ratio (None for the bare frame)."""
@@ -56,7 +56,7 @@ class FileSources:
 
     @property
     def tables(self) -> dict[str, Table]:
-        """Tables of the data file, exact to the last bit."""
+        """Tables for the data file, from which the sources are restored exactly."""
         found = {RECORDS: _records(self.records), SAMPLES: _samples(self.records)}
         if self.table is not None:
             found |= _model(self.table)
@@ -194,7 +194,7 @@ class Shaking:
         }
 
     def volts(self, drive: NDArray[np.float64], decay: float) -> NDArray[np.float64]:
-        """`drive` [V] followed by `decay` [s] of zeros."""
+        """The samples of `drive` [V], followed by `decay` [s] of zeros."""
         return np.concatenate((drive, np.zeros(round(decay * self.target.sample_rate))))
 
 
@@ -207,15 +207,17 @@ def band_used(parameters: EarthquakeParameters, configuration: BenchConfiguratio
             "--table-band", parameters.table_band, "records must be filtered to a band: specify LOW:HIGH"
         )
     if band[0] < low or band[1] > high:
-        raise InvalidInput("--table-band", parameters.table_band, f"the band of the table is {low:g} to {high:g} Hz")
+        raise InvalidInput(
+            "--table-band", parameters.table_band, f"it must lie within the table's band, {low:g} to {high:g} Hz"
+        )
     return band
 
 
 def shakings(
     parameters: EarthquakeParameters, configuration: BenchConfiguration, sources: FileSources | None = None
 ) -> tuple[Shaking, ...]:
-    """Read and prepare every record, in the given order; `sources` are the sources stored in a data file. Raises
-    InvalidInput.
+    """Read and prepare every record, in the given order, or take them from `sources`, those stored in a data file.
+    Raises InvalidInput.
     """
     named = parameters.records or tuple(f"synthetic:{name}" for name in NAMES)
     records = sources.records if sources else read_records([RecordReference.parse(text) for text in named])
@@ -241,7 +243,7 @@ def _shaking(record: Accelerogram, parameters: EarthquakeParameters, configurati
 
 
 def _strongest(record: SampledRecord, longest: float) -> tuple[SampledRecord, float]:
-    """Part of `longest` seconds with the largest Arias intensity, faded in and out, and its start [s]."""
+    """Part of at most `longest` seconds with the largest Arias intensity, faded in and out, and its start [s]."""
     count = round(longest / record.dt) + 1
     if record.acceleration.size <= count:
         return record, 0.0

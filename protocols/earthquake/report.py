@@ -112,7 +112,7 @@ def _first_storey(points: Sequence[Mapping[str, Any]]) -> Table:
                 with_uncertainty(measured, row["alpha_1_uncertainty"]),
                 plain(predicted),
                 percent(measured / predicted - 1.0) if measured is not None and predicted else ABSENT,
-                # older files lack these fields and have the gain without a verdict
+                # older files lack these fields and contain the gain without a verdict
                 _interval(row.get("alpha_1_low"), row.get("alpha_1_high")),
                 yes_or_no(row.get("alpha_1_agrees")),
             ]
@@ -163,7 +163,7 @@ def _conditions(points: Sequence[Mapping[str, Any]]) -> Table:
 
 
 def _statement(campaign: Campaign, points: Sequence[Mapping[str, Any]]) -> list[Part]:
-    """The paper's statement for the band of the campaign, with the verdicts of model and measurement."""
+    """The paper's statement for the band of the campaign, with the verdicts by model and measurement."""
     if campaign.configuration is None:
         return []
     parameters = validated(EarthquakeParameters, campaign.parameters)
@@ -192,7 +192,7 @@ QUIET = 1.5
 
 @dataclass(frozen=True)
 class Played:
-    """Played record: file rows from the start of the drive to its last gain; `run` is the first row of its run."""
+    """Played record: file rows from the start of its drive to its last gain; `run` is the first row of its run."""
 
     name: str
     beta: float | None
@@ -218,9 +218,9 @@ def played_records(record: DataFile) -> list[Played]:
         begin = int(rows[bisect_left(runs, runs[block])])
         samples = round(seconds * record.sample_rate)
         one = Played(str(name), None if beta is None else float(beta), begin, stop - samples, stop)
-        # all gains of one played record have the same start
+        # all gains of a played record are relative to the same start
         if found and (found[-1].run, found[-1].name, found[-1].beta) == (one.run, one.name, one.beta):
-            # the first gain is at the end of a block, which determines the start; the last one lies within a block
+            # the first gain is at the end of a block, from which the start follows; the last one may lie within a block
             start = found.pop().start
             one = replace(one, start=start, stop=start + samples)
         found.append(one)
@@ -245,9 +245,7 @@ def histories_parts(campaign: Campaign) -> list[Part]:
     """Figures of the table's motions and of the drifts, from the raw channels."""
     record, configuration = campaign.record, campaign.configuration
     if configuration is None:
-        return [
-            Notice("Histories are not drawn: this version of the software cannot read the configuration of the file.")
-        ]
+        return [Notice("Histories are not drawn: this version of the software cannot read the file's configuration.")]
     try:
         signals = SignalMap(record.channels, configuration.laser_reference, configuration.calibrated)
     except InvalidInput as refused:
@@ -293,7 +291,7 @@ def histories_parts(campaign: Campaign) -> list[Part]:
 
 
 def _shakings(campaign: Campaign) -> tuple[Shaking, ...]:
-    """Records of the campaign from the data file; for an older file without them, they are read again.
+    """Records of the campaign from the data file; an older file does not contain them, so they are read again.
 
     Raises InvalidInput for missing records.
     """

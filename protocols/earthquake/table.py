@@ -16,10 +16,10 @@ from protocols.earthquake.records import FileSources, band_used
 from sim.errors import InvalidInput
 
 PERIOD, LONGEST = 8.0, 120.0
-"""Period of the identification, and its maximum for a low first octave [s]."""
+"""Period of the identification [s], and its maximum, which a low first octave may need."""
 
 OCTAVE_LINES = 4
-"""Minimum number of lines in the lowest octave of the identification, which has the fewest."""
+"""Minimum number of lines in the lowest octave of the identification, which has the fewest lines."""
 
 
 def stored_table(
@@ -49,7 +49,7 @@ def stored_table(
 
 @dataclass(frozen=True, eq=False)
 class TableSource:
-    """Source of the table model: a stored `model`, or else an identification with `parameters` and its `plan`."""
+    """Source of the table model: a stored `model`, or an identification with `parameters` according to `plan`."""
 
     model: TableModel | None
     parameters: IdentifyParameters
@@ -59,8 +59,8 @@ class TableSource:
     def of(
         parameters: EarthquakeParameters, configuration: BenchConfiguration, sources: FileSources | None
     ) -> "TableSource":
-        """The source for a campaign. Raises InvalidInput for an unsuitable model, or a band that cannot be
-        identified.
+        """The source for a campaign. Raises InvalidInput for an unsuitable model, or for a band in which the table
+        cannot be identified.
         """
         model = stored_table(parameters, configuration, sources)
         if model is not None:
@@ -70,7 +70,7 @@ class TableSource:
 
     @property
     def duration(self) -> float:
-        """Expected duration of the identification [s]; zero with a stored model."""
+        """Expected duration of the identification [s]; zero for a stored model."""
         return 0.0 if self.plan is None else expected_duration(self.parameters, self.plan)
 
 

@@ -1,11 +1,12 @@
 """Comparison of measured and predicted gain by Monte Carlo simulation under the achieved motions of the table.
 
-Both tests share sensors and specimen, so each draw has one specimen, one scale of the table's sensors and one pair of
-lasers for both; noise is drawn separately. If the model holds, a draw of the measurement, coupled over bare, times a
-draw of the prediction over the predicted gain is distributed as the measured gain (GUM Supplement 1).
+The bare and the coupled test share sensors and specimen, so each draw has one specimen, one scale of the table's
+sensors and one pair of lasers for both; noise is drawn separately. If the model holds, the product of two draws, the
+measurement's ratio of coupled to bare and the predicted gain relative to its nominal value, is distributed as the
+measured gain (GUM Supplement 1).
 
-A second set of draws with an exactly known specimen determines the uncertainty of the bench alone. Contributions drawn
-one by one only show which is the largest: where the response is chaotic, each alone changes the gain as much as all
+A second set of draws, with an exactly known specimen, gives the uncertainty due to the bench alone. Contributions drawn
+one by one only show which one is the largest: where the response is chaotic, each one changes the gain as much as all
 together.
 """
 
@@ -57,8 +58,8 @@ _KEPT = {
 class Predicted:
     """Predicted gains under a pair of motions; NaN where the block topples with the nominal specimen.
 
-    `alpha_1` and `alpha_2`, shape (n,), are those of the draws, NaN where they toppled; `times` [s] are the times of
-    overturning.
+    `alpha_1` and `alpha_2`, shape (n,), are the gains of the draws, NaN where the block topples; `times` [s] are the
+    times of overturning.
     """
 
     nominal: tuple[float, float]
@@ -68,18 +69,18 @@ class Predicted:
 
     @property
     def chance(self) -> float:
-        """Probability of toppling."""
+        """Predicted probability of toppling."""
         return float(np.mean(np.isnan(self.alpha_2)))
 
 
 @dataclass(frozen=True)
 class Compared:
-    """Measured and predicted gains; `low` and `high` are the bounds of the 95 % interval of a measured alpha_2,
-    `alpha_1_low` and `alpha_1_high` those of alpha_1.
+    """Measured and predicted gains; `low` and `high` bound the 95 % interval of a measured alpha_2, `alpha_1_low` and
+    `alpha_1_high` that of a measured alpha_1.
 
     `bench` is the 95 % quantile of |measured - predicted| alpha_2 for an exactly known specimen; None if that specimen
     topples. `budget` holds the standard uncertainties of alpha_2 by contribution, each drawn alone, largest first;
-    `chaotic` is set if they do not add up.
+    `chaotic` is set if their variances do not add up. `chance` is the predicted probability of toppling.
     """
 
     alpha_1: float
@@ -119,7 +120,7 @@ def predict_draws(
     table_scale: float = 0.0,
     noisy: bool = True,
 ) -> Predicted:
-    """Gains of `n` draws of the specimen and of the motions, within their uncertainties."""
+    """Gains of `n` draws of the specimen and of the table motions within their uncertainties."""
     import_module("sim.kernel.rocking")  # compiled once, before the threads start
     root = seed if isinstance(seed, SeedSequence) else SeedSequence(seed)
     specimens, scale, *seeds = root.spawn(2 + n)
@@ -139,7 +140,7 @@ def predict_draws(
 
 
 def gains(specimen: Specimen, bare: SampledRecord, coupled: SampledRecord) -> tuple[float, float, float]:
-    """alpha_1, alpha_2, and the time of overturning [s]; each NaN if there is none."""
+    """alpha_1, alpha_2, and the time of overturning [s]; NaN for those that do not exist."""
     moved = simulate(specimen, coupled, tolerance=TOLERANCE, overturning_angle=CATCH_ANGLE)
     if moved.status is not Status.COMPLETED:
         return nan, nan, moved.end_time
@@ -150,7 +151,7 @@ def gains(specimen: Specimen, bare: SampledRecord, coupled: SampledRecord) -> tu
 def compare(
     bare: Observed, coupled: Observed, specimen: Specimen, configuration: BenchConfiguration, n: int, seed: int
 ) -> Compared:
-    """Compare the gain from two tests, bare and coupled, with the model's."""
+    """Compare the gain measured in two tests, bare and coupled, with the predicted gain."""
     sensors = configuration.sensors
     drifts, firsts = (bare.drift, coupled.drift), (bare.u1, coupled.u1)
     of_drift, of_u1, of_all, of_bench, of_parts = SeedSequence(seed).spawn(5)
@@ -214,17 +215,17 @@ def _parts(
 
 
 def _ratio(errors: Array) -> Array:
-    """Ratio of coupled to bare, from the relative errors of both, shape (2, n)."""
+    """Relative error of the ratio of coupled to bare, as a factor, from the relative errors of both, shape (2, n)."""
     return (1.0 + errors[1]) / (1.0 + errors[0])
 
 
 def _stood(gains: Array) -> Array:
-    """Draws that did not topple."""
+    """Gains of the draws in which the block does not topple."""
     return gains[np.isfinite(gains)]
 
 
 def _interval(stood: Array) -> tuple[float | None, float | None]:
-    """Central 95 % interval of the draws."""
+    """Central 95 % interval of the draws; None without draws."""
     if not stood.size:
         return None, None
     low, high = np.quantile(stood, INTERVAL)
@@ -242,13 +243,13 @@ def _known(value: float) -> float | None:
 Array = NDArray[np.float64]
 
 NOISE = "noise of the peaks"
-"""Contribution that is independent in the two tests."""
+"""Name of the contribution that is independent in the two tests."""
 
 
 def drift_errors(
     peaks: tuple[PeakSeen, PeakSeen], sensors: SensorUncertainty, n: int, seed: int | SeedSequence
 ) -> dict[str, Array]:
-    """Drawn relative errors of the drift peaks, bare and coupled, by contribution; shapes (2, n)."""
+    """Drawn relative errors of the drift peaks, bare and coupled, by contribution, shape (2, n) each."""
     random = np.random.default_rng(seed)
     noise = np.array([_noise(peak, random, n) for peak in peaks])
     drifts = np.array([[peak.peak.value] for peak in peaks])
@@ -259,8 +260,8 @@ def drift_errors(
 def u1_errors(
     peaks: tuple[PeakSeen, PeakSeen], sensors: SensorUncertainty, grounded: bool, n: int, seed: int | SeedSequence
 ) -> Array:
-    """Drawn relative errors of the peaks of u1, shape (2, n); a laser on the ground also needs the displacement
-    sensor.
+    """Drawn relative errors of the peaks of u1, shape (2, n); with lasers on the ground they include the error of the
+    displacement sensor.
     """
     random = np.random.default_rng(seed)
     seen = [_sighting(peak) for peak in peaks]
@@ -281,7 +282,7 @@ def _noise(seen: PeakSeen, random: np.random.Generator, n: int) -> Array:
 
 
 def _sighting(seen: PeakSeen) -> PeakReadings:
-    """Readings at a peak, relative to the readings at rest."""
+    """Readings of the lasers at a peak, relative to those at rest."""
     sign = float(seen.peak.sign)
     return PeakReadings(
         drift=seen.peak.value,

@@ -33,7 +33,7 @@ def rocking_point(
     push: float | None = None,
     remarks: str = "",
 ) -> RockingPoint:
-    """Point for `part`, a tilt or all tilts, with the block of `specimen`."""
+    """Point of `part`, the name of a tilt or of all tilts, for the block of `specimen`."""
     block, theory = specimen.block, theoretical_restitution(specimen.block)
     r, birge = found.restitution, found.motion.birge
     return RockingPoint(
@@ -71,12 +71,12 @@ def rocking_point(
 
 
 def inconsistencies(combined: RockingPoint) -> list[str]:
-    """Inconsistencies of the combined result, one sentence each, with checks at the bench."""
+    """Inconsistencies of the combined result, one message each, with what to check at the bench."""
     found: list[str] = []
     if abs(combined.trend) > combined.trend_uncertainty:
         found.append(
-            f"r changes with impact velocity by {combined.trend:+.2g} +- {combined.trend_uncertainty:.2g} over the"
-            " whole range: the stated value is a mean over these tilts"
+            f"r changes with the impact velocity by {combined.trend:+.2g} +- {combined.trend_uncertainty:.2g} over the"
+            " whole range: the stated value is the mean over these tilts"
         )
     motion, motion_uncertainty = combined.r_motion or combined.r_exp, combined.r_motion_uncertainty or 0.0
     apart = motion - combined.r_amplitudes
@@ -88,7 +88,7 @@ def inconsistencies(combined: RockingPoint) -> list[str]:
         found.append(
             f"the scatter of the tilts is {combined.birge:.1f} times that expected from their uncertainties, and "
             "is included: the impacts differ. r_exp is taken from the amplitudes, which are less sensitive to "
-            "the differences"
+            "these differences"
         )
     if combined.birge is None:
         found.append("a single tilt does not show the scatter of r between tilts: release the block several times")
@@ -118,17 +118,17 @@ def inconsistencies(combined: RockingPoint) -> list[str]:
 def fit_events(tilt: Tilt, alone: Findings, uncertain: Array, number: int) -> Iterator[FitFinished]:
     """Two fit events for tilt `number`: the exact motion against time, and the impacts in order.
 
-    `alone` are the findings from this tilt alone; `uncertain`, shape (8,), the standard uncertainties of the fit.
+    `alone` are the findings from this tilt alone, `uncertain`, shape (8,), the standard uncertainties of the fit.
     """
     yield _motion(tilt, uncertain, number)
     yield _impacts(tilt, alone, number)
 
 
 def identified_specimen(found: Findings, tilts: int, block: Block, known: Identified | None) -> Identified:
-    """Identified specimen with the restitution factor of `block`: measured over theoretical restitution.
+    """Identified specimen with the restitution factor of `block`, the ratio of measured to theoretical restitution.
 
-    The theoretical value follows from the block's sides, so the source of the factor states both the sides and the
-    restitution.
+    The theoretical value depends on the block's sides, so the source of the finding states both the sides and the
+    measured restitution.
     """
     theory, r = theoretical_restitution(block), found.restitution
     by = "amplitudes of the swings" if found.by_amplitudes else "exact motion"
@@ -163,7 +163,7 @@ def _motion(tilt: Tilt, uncertain: Array, number: int) -> FitFinished:
 def _impacts(tilt: Tilt, alone: Findings, number: int) -> FitFinished:
     relation, points = tilt.relation, tilt.points
     count = relation.each.size
-    # the first impact follows the release, not a turning point
+    # the first impact is preceded by the release, not by a turning point
     columns = {
         "time": Series(points.impacts[1 : count + 1], "s", "time of the impact"),
         "restitution": Series(relation.each, "1", "r of this impact, from the largest angles before and after"),
@@ -177,7 +177,9 @@ def _impacts(tilt: Tilt, alone: Findings, number: int) -> FitFinished:
         ),
         "angle_before": Series(relation.angles[:-1], "rad", "largest angle before the impact"),
         "angle_after": Series(relation.angles[1:], "rad", "largest angle after the impact"),
-        "time_uncertainty": Series(points.impact_uncertainty[1 : count + 1], "s", "standard uncertainty from noise"),
+        "time_uncertainty": Series(
+            points.impact_uncertainty[1 : count + 1], "s", "standard uncertainty of the angle from noise"
+        ),
     }
     text = f"impacts of tilt {number}: r = {relation.restitution:.5f} +- {alone.relation.uncertainty:.1g} (k = 1)"
     found = {"restitution": FittedParameter(relation.restitution, alone.relation.uncertainty, "1")}

@@ -22,13 +22,15 @@ from sim.free_rocking import FreeRocking, critical_angle, frequency_parameter
 from sim.parameters import Parameters
 
 LOWEST_CUTOFF = 1.25 / AFTER
-"""Cutoff [Hz] of a fourth-order Butterworth low-pass at which 5 % of the kink at an impact, about 2 um, remains after
-`AFTER`.
+"""Cutoff [Hz] of a fourth-order Butterworth low-pass at which 5 % of the kink that an impact causes, about 2 um,
+remains `AFTER` the impact.
 """
 
-_MEETS = "the beam must hit the face of the tilted block: between {:.4f} and {:.4f} m at these tilts"
+_MEETS = (
+    "the laser beam misses the face of the tilted block: choose a height between {:.4f} and {:.4f} m for these tilts"
+)
 
-_NOT_WATCHED = "laser 2 points at the block: the drift is neither measured nor monitored"
+_NOT_WATCHED = "laser 2 measures the block, so the drift is neither measured nor monitored"
 
 _LASER_ON_BLOCK = "Laser 2 still points at the block: aim it at storey 2 again."
 
@@ -36,7 +38,7 @@ _TABLE_LOCKED = "THE TABLE IS STILL LOCKED: remove the clamps before the table i
 
 
 class FreeRockingTest(Prepared[FreeRockingParameters]):
-    """Identification of the block's restitution. Raises InvalidInput for tilts beyond the laser's capabilities."""
+    """Identification of the block's restitution. Raises InvalidInput for tilts that the laser cannot measure."""
 
     def __init__(
         self, parameters: FreeRockingParameters, configuration: BenchConfiguration, stored: Sources | None = None
@@ -48,7 +50,7 @@ class FreeRockingTest(Prepared[FreeRockingParameters]):
 
     @cached_property
     def forecast(self) -> Forecast:
-        """Demands (used range of the laser, no drive) and duration."""
+        """Duration and demands: the range of laser 2 is used, and there is no drive."""
         self.progress("predicting the demands of the run")
         largest = max(abs(tilt.displacement) for tilt in self.tilts)
         where = f"{1e3 * largest:.0f} mm of displacement of the block's face"
@@ -63,7 +65,7 @@ class FreeRockingTest(Prepared[FreeRockingParameters]):
         return Forecast(
             demands=tuple(demands),
             duration=sum(tilt.duration for tilt in self.tilts),
-            notes=("The drive stays at zero. The table is locked by hand, and unlocked at the end.",),
+            notes=("The drive remains zero. The operator locks the table at the start and unlocks it at the end.",),
         )
 
     @cached_property
@@ -113,7 +115,7 @@ class FreeRockingTest(Prepared[FreeRockingParameters]):
         )
 
     def _check(self) -> None:
-        """Raise InvalidInput if the laser cannot follow the block."""
+        """Raise InvalidInput if the laser cannot measure the block's motion."""
         p, configuration = self.parameters, self.configuration
         low, high = beam_heights(self.tilts, configuration.specimen)
         for tilt in self.tilts:

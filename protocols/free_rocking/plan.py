@@ -1,6 +1,6 @@
-"""Steps of free rocking. The drive is zero throughout.
+"""Steps of a free-rocking run. The drive is zero throughout.
 
-1. The table is locked, since a moving table absorbs part of the impact. Laser 2 is aimed at the block.
+1. The table is locked, since a moving table absorbs part of an impact. Laser 2 is aimed at the block.
 2. For each tilt, the operator holds the block and releases it during the recording; a recording without free rocking
    is repeated.
 3. The tilts are combined. The laser is aimed at storey 2 again, and the table is unlocked.
@@ -43,24 +43,24 @@ Array = NDArray[np.float64]
 STILL = 2e-3
 """Allowed scatter of the signals at rest [m], for a block held by hand."""
 
-LOCK = "Clamp the table to the ground: no impact must move it. It is not driven: leave the amplifier off."
+LOCK = "Clamp the table to the ground, so that no impact moves it. It is not driven: leave the amplifier off."
 UNLOCK = "Remove the clamps from the table."
 BACK = "Aim laser 2 at storey 2 again."
 
 REST = 1.0
-"""Time at the start, while the operator holds the block, in which the signals are zeroed [s]."""
+"""Time at the start in which the operator holds the block and the signals are zeroed [s]."""
 
 _OVERHEAD = 20.0
 """Time for a tilt in addition to its recording [s], in which the operator tilts the block and starts the recording."""
 
 _LEAST_LOSS = 0.8
-"""Smallest velocity loss per impact, relative to the theoretical loss, for which the recording is long enough."""
+"""Smallest velocity loss per impact, relative to the theoretical loss, for which the recording suffices."""
 
 
 @dataclass(frozen=True)
 class PlannedTilt:
-    """A tilt by `angle` [rad], positive towards the frame, recorded for `recording` [s]. `displacement` [m] is that of
-    the laser spot on the face, NaN if the beam misses the face.
+    """A tilt by `angle` [rad], positive towards the frame, recorded for `recording` [s]. `displacement` [m] is the
+    displacement of the face at the laser beam, NaN if the beam misses the face.
     """
 
     angle: float
@@ -74,12 +74,12 @@ class PlannedTilt:
 
     @property
     def duration(self) -> float:
-        """Expected time for the complete tilt, with one recording [s]."""
+        """Expected time for the complete tilt, if one recording suffices [s]."""
         return self.recording + REST + _OVERHEAD
 
 
 def planned_tilts(parameters: FreeRockingParameters, specimen: Specimen) -> tuple[PlannedTilt, ...]:
-    """The tilts in order, smallest first; those towards the frame come before those away from it."""
+    """The tilts in order, smallest first; of equal tilts, the one towards the frame precedes the one away from it."""
     signs = {"both": (1.0, -1.0), "towards": (1.0,), "away": (-1.0,)}[parameters.sides]
     alpha = critical_angle(specimen.block)
     return tuple(
@@ -94,9 +94,7 @@ def beam_heights(tilts: Sequence[PlannedTilt], specimen: Specimen) -> tuple[floa
 
 
 def _planned(parameters: FreeRockingParameters, specimen: Specimen, angle: float) -> PlannedTilt:
-    """Plan a tilt; the recording is long enough for a block to come to rest even if it is released as late as
-    allowed.
-    """
+    """Plan a tilt whose recording ends after the block has come to rest, even if it is released as late as allowed."""
     block = specimen.block
     r = 1.0 - _LEAST_LOSS * (1.0 - theoretical_restitution(block))
     motion = FreeRocking(critical_angle(block), frequency_parameter(block, specimen.g), r, angle)
@@ -108,7 +106,7 @@ def _planned(parameters: FreeRockingParameters, specimen: Specimen, angle: float
 
 
 class RockingRun:
-    """Steps of a run, its findings so far, and the state of table and laser."""
+    """Steps of a run, its findings so far, and the states of table and laser."""
 
     def __init__(
         self, parameters: FreeRockingParameters, configuration: BenchConfiguration, tilts: Sequence[PlannedTilt]
@@ -133,7 +131,7 @@ class RockingRun:
             for number, tilt in enumerate(self._planned, 1):
                 yield from self._tilt(number, tilt)
             if not self.tilts:
-                raise Unmeasurable("no tilt was usable: see the warnings")
+                raise Unmeasurable("no tilt was usable: see the warnings of this run for the reasons")
             yield from self._combine()
         except RockbenchError as error:
             failed = error
@@ -153,7 +151,7 @@ class RockingRun:
         )
 
     def _tilt(self, number: int, tilt: PlannedTilt) -> Generator[Step, Outcome, None]:
-        """Record a tilt until a recording is usable or no attempts are left."""
+        """Record a tilt until a recording is usable or no attempt is left."""
         request = self._request(number, tilt)
         for attempt in range(self._parameters.attempts):
             yield Publish(StepStarted(f"tilt {number}: {degrees(tilt.angle):+.1f} degrees, block held and released"))
@@ -188,7 +186,7 @@ class RockingRun:
         return outcome
 
     def _progress(self, number: int) -> Callable[[Array], Event]:
-        """Callback that updates the progress with each block of a recording."""
+        """Callback that computes the progress from each block of a recording."""
         total, samples = sum(tilt.duration for tilt in self._planned), 0
         begin = sum(tilt.duration for tilt in self._planned[: number - 1]) + self._planned[number - 1].before
 
@@ -222,7 +220,8 @@ class RockingRun:
             yield Publish(event)
         remarks = ""
         if abs(tilt.push) > PUSH:
-            remarks = f"not released from rest: equivalent to a tilt larger by {100.0 * tilt.push:+.0f} %"
+            change = f"{100.0 * tilt.push:+.0f} %"
+            remarks = f"the block was not released from rest, which is equivalent to a change of the tilt by {change}"
             yield Publish(Warned(f"tilt {number}: {remarks}; the impacts are still used"))
         held, residual, name = tilt.swings.held, tilt.fit.rms, f"tilt {number}"
         point = rocking_point(name, alone, self._specimen, p, residual, tilt=held, push=tilt.push, remarks=remarks)
@@ -247,7 +246,7 @@ class RockingRun:
 
     @property
     def _laser(self) -> LaserErrors:
-        """Laser errors from the data sheet, since a calibration applies only to displacements of the storeys from
+        """Laser errors from the data sheet, since a calibration is valid only for displacements of the storeys from
         rest.
         """
         return LaserErrors(self._configuration.sensors.accuracy, self._configuration.laser_ranges[1])

@@ -198,8 +198,8 @@ def test_the_tilts_go_to_both_sides_smallest_first() -> None:
     [
         ({"tilts": (0.95,)}, bench(), "tilts"),
         ({"tilts": (0.5, 0.5)}, bench(), "once"),
-        ({"height": 0.399}, bench(), "must hit the face .* between 0.0.* and 0.39.* m at these tilts"),
-        ({"height": 1e-4}, bench(), "must hit the face .* between 0.0"),
+        ({"height": 0.399}, bench(), "misses the face .* between 0.0.* and 0.39.* m for these tilts"),
+        ({"height": 1e-4}, bench(), "misses the face .* between 0.0"),
         ({"tilts": (0.8,)}, bench(limits=Limits(laser_range=0.2)), "aim lower"),
         ({}, bench(filter_unit=FilterUnit(cutoff=30.0)), "filter_unit.cutoff"),
     ],
