@@ -34,27 +34,27 @@ class FreeRockingParameters(Parameters):
     side_uncertainty: float = quantity(
         1e-4, "m", "standard uncertainty of the measured width and height of the block", ge=0
     )
-    least_swing: float = quantity(0.12, "1", "smallest swing that is used, relative to the tilt", ge=0.03, le=0.5)
+    least_swing: float = quantity(0.12, "1", "smallest swing that is evaluated, relative to the tilt", ge=0.03, le=0.5)
     release_within: float = quantity(
         8.0, "s", "time from the beginning of a recording within which the block must be released", ge=5, le=60
     )
-    attempts: int = quantity(2, "1", "number of recordings of a tilt before it is omitted", ge=1, le=10)
+    attempts: int = quantity(2, "1", "number of attempts to record a tilt before it is omitted", ge=1, le=10)
 
 
 class RockingPoint(Parameters):
     """Restitution and shape of the block, from its motion and from its sides."""
 
-    part: str = quantity(..., "", "the tilt, or all tilts")
+    part: str = quantity(..., "", "name of the tilt, or of all tilts")
     tilt_rad: float | None = quantity(None, "rad", "tilt before the release, positive towards the frame")
     impacts: int = quantity(..., "1", "number of impacts used")
     r_exp: float = quantity(..., "1", "restitution, from the better of the two estimators")
     r_exp_uncertainty: float = quantity(..., "1", f"{_EXPANDED} of r_exp")
     estimator: str = quantity(
-        "", "", "estimator of r_exp: the exact motion, or the amplitudes if the impacts differ too much"
+        "", "", "estimator that gives r_exp: the exact motion, or the amplitudes if the impacts differ too much"
     )
     r_th: float = quantity(..., "1", "theoretical restitution of the block as measured, 1 - 2 M b^2 / J")
     r_th_uncertainty: float = quantity(..., "1", f"{_EXPANDED} of r_th, due to the block's sides")
-    ratio: float = quantity(..., "1", "r_exp / r_th, the restitution factor of the block as configured")
+    ratio: float = quantity(..., "1", "r_exp / r_th, the restitution factor of the configured block")
     ratio_uncertainty: float = quantity(..., "1", f"{_EXPANDED} of the ratio, excluding that of r_th")
     r_motion: float | None = quantity(None, "1", "restitution from the fit of the exact nonlinear motion")
     r_motion_uncertainty: float | None = quantity(None, "1", f"{_EXPANDED} of r_motion")
@@ -74,7 +74,7 @@ class RockingPoint(Parameters):
     push: float | None = quantity(
         None,
         "1",
-        "effect of a push at the release, expressed as the relative change of tilt that would have the same effect",
+        "push at the release, expressed as the relative change of the tilt that would have the same effect",
     )
     birge: float | None = quantity(
         None, "1", "scatter of r_motion over the tilts, relative to that expected from the uncertainties"

@@ -42,13 +42,13 @@ _FIT = "impacts of "
 """Prefix for the names of fits of single impacts."""
 
 _MOTION = (("r_motion", "r_exp"), ("r_motion_uncertainty", "r_exp_uncertainty"))
-"""Fields of the result in older files, where it is always from the fit, by their present names."""
+"""Present field names, and those of older files, whose result is always from the fit."""
 
 
 @dataclass(frozen=True, eq=False)
 class Impacts:
-    """Impacts after one tilt [rad]: `speed` relative to that of a fall from the critical angle, r and its expanded
-    uncertainty from noise, each with shape (n,).
+    """Impacts after one tilt [rad]: `speed` relative to the speed in a fall from the critical angle, r, and its
+    expanded uncertainty from noise, shape (n,) each.
     """
 
     tilt: float
@@ -58,8 +58,8 @@ class Impacts:
 
 
 def rocking_table(points: Sequence[RockingPoint]) -> str:
-    """Table with a row for each tilt and one for all tilts, followed by the block's parameters as found from its
-    motion.
+    """Text table with a row for each tilt and one for all tilts, followed by the block's parameters as identified from
+    its motion.
     """
     if not points:
         return "No tilt was usable."
@@ -69,7 +69,7 @@ def rocking_table(points: Sequence[RockingPoint]) -> str:
 
 
 def rocking_figure(points: Sequence[RockingPoint], tilts: Sequence[Tilt], found: Findings | None) -> "Figure":
-    """Figure of four panels, empty without a result; shows the motion of the largest tilt."""
+    """Figure of four panels, with the motion of the largest tilt; empty without a result."""
     figure = new_figure(8.0, 11.0)
     motion, left, single, parts = figure.subplots(4, 1, height_ratios=(3, 1.5, 3, 1.6))
     for panel in (motion, left, single, parts):
@@ -117,7 +117,7 @@ def _combined(point: RockingPoint) -> list[str]:
 
 
 def _pair(value: float, uncertainty: float) -> tuple[str, str]:
-    """A value and its uncertainty, rounded to two digits of the uncertainty."""
+    """A value and its uncertainty, both rounded to two significant digits of the uncertainty."""
     places = min(max(1 - int(log10(uncertainty) // 1), 0), 8) if uncertainty > 0.0 else 8
     return f"{value:.{places}f}", f"{uncertainty:.{places}f}"
 
@@ -127,7 +127,7 @@ def _motion(motion: "Axes", left: "Axes", tilt: Tilt) -> None:
     end = float(fit.times[-1]) + 1.0
     shown = slice(None, int(end * seen.sample_rate), max(round(seen.sample_rate / 500.0), 1))
     motion.plot(seen.times[shown], 1e3 * (seen.displacement[shown] - zero), color=BLACK, lw=0.9, label="measured")
-    # NaN interrupts the line between the parts of the fit
+    # NaN separates the parts of the fit in the plotted line
     broken = np.insert(1e3 * (fit.fitted - zero), np.flatnonzero(np.diff(fit.swing)) + 1, np.nan)
     times = np.insert(fit.times, np.flatnonzero(np.diff(fit.swing)) + 1, np.nan)
     motion.plot(times, broken, "--", color=VERMILLION, lw=1.2, label="exact motion, fitted")
@@ -183,7 +183,7 @@ def _draw_impacts(panel: "Axes", tilts: Sequence[Impacts], mean: float, theory: 
 
 
 def rocking_sections(campaign: Campaign) -> list[Section]:
-    """Report section on result, tilts and single impacts, as available in the file."""
+    """Report section on the result, the tilts and the single impacts, as far as the file contains them."""
     if not campaign.points:
         return []
     tilts = [row for row in campaign.points if row["part"] != ALL]
@@ -209,11 +209,11 @@ def _result_text(row: Mapping[str, Any]) -> str:
     ratio = with_uncertainty(row["ratio"], row["ratio_uncertainty"])
     theory = with_uncertainty(row["r_th"], row["r_th_uncertainty"])
     by = (
-        "The restitution is taken from the amplitudes, because the impacts differ so much that the exact "
-        "nonlinear motion, fitted from the release onward, gives the worse estimate."
+        "The restitution is taken from the amplitudes, because the impacts differ so much that the fit of the exact "
+        "nonlinear motion from the release onward is less accurate."
         if row.get("estimator") == "amplitudes"
-        else "The restitution is taken from the exact nonlinear motion, fitted from the release onward; the "
-        "amplitudes alone serve as a check."
+        else "The restitution is taken from the fit of the exact nonlinear motion from the release onward; the "
+        "amplitudes are used as a check."
     )
     return (
         f"r_exp / r_th = {ratio}, from {row['impacts']} impacts of the stand-alone block on a table clamped to the"
@@ -233,7 +233,9 @@ def _shape_table(row: Mapping[str, Any]) -> Table:
         ]
         for name, unit, meaning in names
     ]
-    rows.append(["r", "change over all speeds", with_uncertainty(row["trend"], row["trend_uncertainty"]), "0", "1"])
+    rows.append(
+        ["r", "change of r over all speeds", with_uncertainty(row["trend"], row["trend_uncertainty"]), "0", "1"]
+    )
     columns = [
         Column("symbol", words=True),
         Column("meaning", words=True),
@@ -268,7 +270,7 @@ def _tilts_table(rows: list[dict[str, Any]]) -> Table:
 
 
 def _budget(rows: list[dict[str, Any]]) -> list[Part]:
-    """Bar chart of the uncertainty budget of r; older files lack it."""
+    """Bar chart of the uncertainty budget of r, which older files lack."""
     known = [row for row in rows if row.get("uncertainty_parts")]
     if not known:
         return []

@@ -1,11 +1,10 @@
 """Identification of stiffness and damping of the bare frame from free vibration, written to a specimen file for other
 runs.
 
-1. The block is removed.
-2. With release by hand, the table is locked, and storey 2 is displaced and released for each decay. With a pulse, the
-   table is probed from a drive too small to cause damage up to the required drift.
-3. Each decay is recorded, fitted, and published; an unusable decay is repeated once.
-4. The result combines all decays.
+1. The block is removed. 2. For releases by hand, the table is locked, and storey 2 is displaced and released for each
+decay. For pulses, the table is probed with increasing drive, from one too small to cause damage up to the required
+drift. 3. Each decay is recorded, fitted and published; an unusable decay is repeated once. 4. The result combines all
+decays.
 """
 
 from collections.abc import Generator, Sequence
@@ -58,7 +57,7 @@ RELEASE = 6.0
 """Time within which the frame must be released by hand [s]."""
 
 
-LOCK = "Clamp the table to the ground: it must not move, and it is not driven."
+LOCK = "Clamp the table to the ground, so that it cannot move. It is not driven."
 
 STILL_LOCKED = "THE TABLE IS STILL LOCKED: remove the clamp before the table is driven."
 
@@ -82,7 +81,7 @@ class FreeVibration(Prepared[FreeVibrationParameters]):
             self._duration = pulsed_duration(parameters, self._pulse.pulse)
         self._frame: FrameResult | None = None
         self._locked = False
-        """True while the table is clamped."""
+        """Whether the table is clamped."""
 
     @cached_property
     def forecast(self) -> Forecast:
@@ -139,7 +138,7 @@ class FreeVibration(Prepared[FreeVibrationParameters]):
         )
 
     def _locked_decays(self, specimen: Specimen, setting: Setting, pace: Pace) -> Generator[Step, Outcome, list[Decay]]:
-        """Decays with the table clamped; requests removal of the clamp even if the decays are unusable."""
+        """Decays with the table clamped; the clamp is removed even if the decays are unusable."""
         self._locked = True
         yield OperatorAction(OperatorTask.LOCK_TABLE, specimen, LOCK)
         decays: list[Decay] = []
@@ -156,8 +155,10 @@ class FreeVibration(Prepared[FreeVibrationParameters]):
 
 
 def _check_pull(parameters: FreeVibrationParameters, configuration: BenchConfiguration) -> None:
-    """Raise InvalidInput for a displacement beyond the lasers' range or the drift limit, or too small to measure."""
-    # after the release, the storeys swing to the other side
+    """Raise InvalidInput for a displacement that exceeds the lasers' range or the drift limit, or cannot be
+    measured.
+    """
+    # after the release, the storeys also swing to the other side
     room = min(
         SHARE * 0.5 * configuration.limits.drift,
         *(0.5 * SHARE * min(configuration.limits.laser_range, 1.0) * half for half in configuration.laser_half_ranges),
@@ -168,7 +169,7 @@ def _check_pull(parameters: FreeVibrationParameters, configuration: BenchConfigu
 
 
 def _hand_forecast(configuration: BenchConfiguration, pull: float, duration: float) -> Forecast:
-    """Demands of releases by hand: there is no drive, and the storeys swing to either side by up to the initial
+    """Demands of releases by hand. There is no drive, and the storeys swing to either side by at most the initial
     displacement of storey 2.
     """
     swing = 2.0 * pull

@@ -31,12 +31,12 @@ class FreeVibrationParameters(DecayParameters):
 
 PROTOCOL = Protocol(
     name="free-vibration",
-    summary="Free decay of the bare frame: stiffness and damping with their covariance, given the weighed masses.",
+    summary="Free decay of the bare frame: stiffness and damping with their covariance, for weighed masses.",
     details=(
-        "A short pulse of the table, or a release by hand on a locked table, excites the bare frame. The "
-        "exact response to the measured motion of the table is fitted to both lasers for each of several "
-        "decays. Other runs load the result, specimen.json, instead of the assumed values. Without options, "
-        "a run has five decays after pulses and takes about ten minutes."
+        "A short pulse of the table, or a release by hand on a locked table, excites the bare frame. For each of "
+        "several decays, the exact response to the measured motion of the table is fitted to the signals of both "
+        "lasers. Other runs load the result, specimen.json, instead of the assumed values. Without options, a run has "
+        "five decays after pulses and takes about ten minutes."
     ),
     example="--config bench.toml --operator Weber",
     parameters=FreeVibrationParameters,

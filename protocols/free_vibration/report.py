@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 
 
 _SIGNS = {"k1": ("k₁", "k1_n_m"), "k2": ("k₂", "k2_n_m"), "xi1": ("ξ₁", "xi1"), "xi2": ("ξ₂", "xi2")}
-"""Symbols and fields of the quantities of the frame."""
+"""Symbols and fields of the frame's quantities."""
 
 
 @dataclass(frozen=True)
 class Course:
-    """Damping ratio of a mode against the amplitude [m] of its drift, with expanded uncertainties, in one decay."""
+    """Damping ratio of a mode in one decay against the amplitude of its drift [m], with expanded uncertainties."""
 
     amplitude: Sequence[float]
     damping: Sequence[float]
@@ -32,7 +32,7 @@ class Course:
 
 
 def vibration_sections(campaign: Campaign) -> list[Section]:
-    """Stiffness and damping of the frame, decay by decay; fields missing in older files are omitted."""
+    """Report section on stiffness and damping of the frame, by decay; fields that older files lack are omitted."""
     points = campaign.points
     if not points:
         return []
@@ -79,7 +79,7 @@ def _frame(points: list[dict[str, Any]]) -> Table:
 
 
 def _frame_budget(points: Rows) -> list[Part]:
-    """Table and bars of the uncertainty budget of the frame, all decays together."""
+    """Table and bar chart of the frame's uncertainty budget, for all decays together."""
     together = [row for row in points if row["decay"] == 0 and row.get("k1_parts")]
     if not together:
         return []
@@ -113,7 +113,7 @@ def _damping(points: list[dict[str, Any]]) -> Table:
 
 
 def _damping_course(points: Rows) -> list[Part]:
-    """Damping ratios of both modes against amplitude, in windows of every decay."""
+    """Damping ratios of both modes against amplitude, from several windows of every decay."""
     told = [row for row in points if row.get("damping1_course")]
     together = [row for row in points if row["decay"] == 0]
     if not told or not together:

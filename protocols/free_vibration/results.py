@@ -1,5 +1,5 @@
 # pyright: reportUnknownMemberType=false
-"""Results as a text table and a figure: decay, residual, spectrum, budget, and damping against amplitude."""
+"""Results as a text table, and as a figure: decay, residual, spectrum, uncertainties, damping against amplitude."""
 
 from collections.abc import Sequence
 from math import tau
@@ -45,7 +45,7 @@ QUANTITIES = ("$k_1$", "$k_2$", r"$\xi_1$", r"$\xi_2$")
 
 
 def decays_table(points: Sequence[DecayPoint], result: FrameResult | None) -> str:
-    """Table with a row for each decay and one for all decays, with expanded uncertainties (k = 2), followed by the
+    """Text table with a row for each decay and one for all decays, with expanded uncertainties (k = 2), followed by the
     correlations.
     """
     if not points:
@@ -95,7 +95,7 @@ def _notes(point: DecayPoint, result: FrameResult) -> list[str]:
         if point.damping_is_linear
         else "The damping depends on the amplitude: see the figure; the stated value is its mean over the decays."
     )
-    # largest contributions in single decays and in their combination
+    # the largest contributions in the single decays and in their combination
     largest = {
         name: max(result.parts, key=lambda part: float(result.parts[part][index]))
         for index, name in enumerate(("k1", "k2", "xi1", "xi2"))

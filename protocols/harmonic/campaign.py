@@ -35,17 +35,17 @@ from sim.specimen import Specimen
 from sim.steady import NoOrbit, rocking_orbit
 
 STEP = 0.05
-"""Frequency step of a spectrum [rad/s]."""
+"""Frequency step of a predicted spectrum [rad/s]."""
 
 MARGIN = 1.0
-"""Extension of a spectrum beyond the measured frequencies [rad/s]."""
+"""Extension of a predicted spectrum beyond the measured frequencies [rad/s]."""
 
 
 class HarmonicCampaign(Prepared[HarmonicParameters]):
     """Harmonic campaign.
 
-    Raises InvalidInput if closed-form or steady motions exceed table, lasers or limits of the bench. These immediate
-    checks name the parameter; the forecast simulates the complete run, including starts.
+    Raises InvalidInput if the steady motions, which are quick to compute, exceed the table, the lasers or the limits of
+    the bench. These checks name the parameter to change; the forecast simulates the complete run, including starts.
     """
 
     def __init__(
@@ -60,9 +60,9 @@ class HarmonicCampaign(Prepared[HarmonicParameters]):
 
     @cached_property
     def starts(self) -> Mapping[tuple[float, float], tuple[Start, ...]]:
-        """Starts to try at each stiffness ratio and frequency [rad/s], best first.
+        """Starts to try at each stiffness ratio and frequency [rad/s], the most promising first.
 
-        Forecast and plan share them, so that no start has to be planned while the bench is armed.
+        Forecast and plan share the starts, so that none has to be planned while the bench is armed.
         """
         p, amplitude = self.parameters, self._amplitude
         found: dict[tuple[float, float], tuple[Start, ...]] = {}
@@ -111,7 +111,8 @@ class HarmonicCampaign(Prepared[HarmonicParameters]):
     def _steady_motion(self, beta: float | None, omega: float) -> Travel | None:
         """Peaks of the storeys, as the lasers measure them, and of the drift in the steady state at `omega` [rad/s].
 
-        They are for the bare frame if `beta` is None, else for the rocking motion; None if no orbit was found.
+        The motion is that of the bare frame if `beta` is None, otherwise the rocking motion; None if no orbit was
+        found.
         """
         if (beta, omega) not in self._motions:
             grounded = self.configuration.laser_reference == "ground"
@@ -121,7 +122,7 @@ class HarmonicCampaign(Prepared[HarmonicParameters]):
         return self._motions[beta, omega]
 
     def _check_table(self) -> None:
-        """Check table motions against limits and stroke, including the overshoot of a start (x = a / Omega^2 etc.)."""
+        """Check the table's motion (x = a / Omega^2), including the overshoot of a start, against limits and stroke."""
         parameters, configuration = self.parameters, self.configuration
         limits, stroke = configuration.limits, configuration.half_stroke
         peak = max(OVERSHOOTS) * self._amplitude
@@ -156,7 +157,7 @@ class HarmonicCampaign(Prepared[HarmonicParameters]):
                     if peak > half:
                         what = "the bare frame" if beta is None else f"beta = {beta:g}"
                         moves = f"storey {number} of {what} moves by {1e3 * peak:.0f} mm at this frequency"
-                        needs = f"{moves}, but its laser measures up to {1e3 * half:.0f} mm"
+                        needs = f"{moves}, but its laser measures only up to {1e3 * half:.0f} mm"
                         raise InvalidInput("omega", omega, needs)
 
 
@@ -176,9 +177,9 @@ def _rocking_peaks(specimen: Specimen, omega: float, amplitude: float, grounded:
 
 
 def gain_spectra(parameters: HarmonicParameters, specimen: Specimen, known: SpecimenKnowledge) -> Table:
-    """alpha_2 against Omega for every spring at the given amplitude, one row for each existing branch.
+    """alpha_2 against Omega for every spring at the configured amplitude, one row for each existing branch.
 
-    Its band (k = 2, first order) follows from the uncertainty of the specimen.
+    The uncertainty band of alpha_2 (k = 2, first order) follows from the uncertainty of the specimen.
     """
     amplitude = parameters.amplitude_factor * specimen.uplift_acceleration
     low, high = max(min(parameters.omega) - MARGIN, STEP), max(parameters.omega) + MARGIN
@@ -200,7 +201,7 @@ def gain_spectra(parameters: HarmonicParameters, specimen: Specimen, known: Spec
         "alpha_1": Column(np.array([layer.alpha_1 for layer in layers]), "1", "gain of the peak of u1"),
         "alpha_2": Column(alpha_2, "1", "gain of the peak drift"),
         "alpha_2_uncertainty": Column(
-            band.uncertainty, "1", "expanded uncertainty of alpha_2 (k = 2) from that of the specimen"
+            band.uncertainty, "1", "expanded uncertainty of alpha_2 (k = 2) due to the specimen"
         ),
         "alpha_2_low": Column(band.low, "1", "lower bound of the band of alpha_2"),
         "alpha_2_high": Column(band.high, "1", "upper bound of the band of alpha_2"),
@@ -230,8 +231,8 @@ _COLUMNS = (
 
 
 def points_table(points: Sequence[PointLike]) -> str:
-    """A table of harmonic points, at most 118 columns wide, followed by remarks on single points. Absent values are
-    "-"; "NO <" in the last column marks a disagreement with the prediction.
+    """Text table of harmonic points, at most 118 characters wide, followed by remarks. Absent values are "-"; "NO <" in
+    the last column marks a disagreement with the prediction.
     """
     rows = plain(points)
     return "\n".join([text_table(_COLUMNS, map(_cells, rows)), *_remarks(rows)])
@@ -247,7 +248,7 @@ def _cells(row: dict[str, Any]) -> list[str]:
         return ABSENT if value is None else yes if value else no
 
     measured, predicted = row.get("alpha_2"), row.get("alpha_2_predicted")
-    # an unsteady motion is not on the predicted orbit
+    # an unsteady motion does not follow the predicted orbit
     compared = row.get("status") in ("steady", "resting", "held")
     return [
         number("beta", ".3f"),
@@ -275,7 +276,7 @@ def _remarks(rows: list[dict[str, Any]]) -> list[str]:
     orbits = [row["orbit_agrees"] for row in rows if row.get("orbit_agrees") is not None and row.get("agrees") is None]
     if orbits:
         verdict = counted(len(orbits) - sum(orbits), "disagrees", "disagree")
-        lines.append(f"{len(orbits)} more compared by the orbit about which the motion revolves, {verdict}.")
+        lines.append(f"{len(orbits)} more compared by the orbit about which their motion revolves, {verdict}.")
     known = [row for row in rows if row.get("dominating") and row.get("alpha_2")]
     if known:
         shares = [100.0 * row["alpha_2_uncertainty"] / row["alpha_2"] for row in known]

@@ -42,11 +42,12 @@ PROBES = (PROBE, 10.0 * PROBE)
 @dataclass(frozen=True)
 class Trial:
     """A simulated stage: the segments `before` it, which are not evaluated, the stage itself, and its last sine, which
-    is held.
+    is continued.
 
-    The sine is simulated for `hold` [s] and may last `longest` [s]. `beta` is the stiffness ratio with which the block
-    rocks, None if it rests. `steady` is the frequency [rad/s] whose steady state is also evaluated. `control` is the
-    largest control of a motion that is held on its orbit after the stage, relative to the amplitude.
+    The last sine is simulated for `hold` [s] and may last `longest` [s] on the bench. `beta` is the stiffness ratio
+    with which the block rocks, None if it rests. `steady` is the frequency [rad/s] whose steady state is also
+    evaluated. `control` is the largest control of a motion that is held on its orbit after the stage, relative to the
+    amplitude.
     """
 
     stage: Stage
@@ -76,7 +77,7 @@ def trials(
     response: TableResponse | None,
     starts: Mapping[tuple[float, float], Sequence[Start]],
 ) -> Iterator[Trial]:
-    """Every stage that the plan may reach, with each of the planned `starts` (by stiffness and frequency).
+    """Every stage that the plan may reach, with each of the planned `starts`, by stiffness ratio and frequency.
 
     Without a `response` of the table, the calibration of the bare frame is assumed to reach its level exactly.
     """
@@ -102,14 +103,16 @@ def trials(
 
 
 def _slow(parameters: HarmonicParameters, specimen: Specimen, omega: float) -> bool:
-    """Whether a hold is expected: disturbances of the rocking orbit at `omega` [rad/s] hardly decay, or grow."""
+    """Whether a hold is expected, because disturbances of the rocking orbit at `omega` [rad/s] hardly decay, or
+    grow.
+    """
     layer = predict_gain(specimen, omega, parameters.amplitude_factor * specimen.uplift_acceleration).rocking
     return layer is not None and layer.multiplier > SLOW
 
 
 def _bare_calibration(parameters: HarmonicParameters, specimen: Specimen, response: TableResponse | None) -> Trial:
     """Calibration of the bare frame: each drive follows from the response at the previous frequency, the first one from
-    that of the probe.
+    the response to the probe.
 
     Friction considerably reduces the response to a small probe, so the resulting drive moves the table more than
     intended.
@@ -141,12 +144,12 @@ def _bare_tests(parameters: HarmonicParameters, specimen: Specimen) -> Iterator[
         stage = Stage(f"the bare frame at omega = {omega:g} rad/s", (leg,))
         longest = _longest_dwell(parameters)
         yield Trial(stage, specimen.bare(), before, hold=BARE_HOLD, longest=longest, steady=omega)
-        # the next stage starts from this motion, which is as steady after the hold as the damping allows
+        # the next stage starts from this motion, which is as steady after `hold` seconds as the damping allows
         before = (Leg(parameters.ramp_time, amplitude, omega), replace(leg, duration=BARE_HOLD))
 
 
 def _calibration_legs(levels: Sequence[tuple[float, float]]) -> tuple[Leg, ...]:
-    """Segments of the calibration through all (frequency [rad/s], level [m/s2]), ending at zero level."""
+    """Segments of a calibration through all pairs of frequency [rad/s] and level [m/s2], ending at zero level."""
     legs = [leg for omega, level in levels for leg in _measured(omega, level)]
     return (*legs, Leg(CHANGE_TIME, 0.0, levels[-1][0]))
 
@@ -162,17 +165,17 @@ def _longest_dwell(parameters: HarmonicParameters) -> float:
 Array = NDArray[np.float64]
 
 DRAWS = 16
-"""Number of specimens drawn in addition to the nominal one; their 95 % quantile is close to the maximum."""
+"""Number of specimens drawn in addition to the nominal one; the 95 % quantile of the draws is close to their
+maximum.
+"""
 
 RIPPLE = 0.03
-"""Allowance in the demands on table and drive for noise, and for friction that a calibration at half the level does not
-detect.
+"""Allowance, in the demands on table and drive, for noise and for the effects of friction that a calibration at half
+the level does not detect.
 """
 
 IMPACTS = 0.15
-"""Allowance, with a rocking block, for quantities that its impacts increase until the table's harmonics are
-cancelled.
-"""
+"""Allowance for quantities that the impacts of a rocking block increase until the table's harmonics are cancelled."""
 
 OFF_MIDDLE = 0.015
 """Largest offset of a storey at rest from the middle of the laser's range, relative to half the range."""
@@ -194,11 +197,11 @@ def forecast(
     steady: Callable[[float | None, float], Travel | None],
     progress: Progress = silent,
 ) -> Forecast:
-    """Stages of the campaign with their demands.
+    """Stages of the campaign, with their demands.
 
-    `steady` returns the steady motion at a stiffness and frequency [rad/s]. Each drawn specimen, and the error of its
-    drive, is used throughout the campaign. Raises InvalidInput for a table model that cannot be read or does not cover
-    the frequencies.
+    `steady` returns the steady motion at a stiffness ratio and frequency [rad/s]. A drawn specimen and the error of its
+    drive are used for all stages. Raises InvalidInput for a table model that cannot be read or does not cover the
+    frequencies.
     """
     response = response_of(configuration)
     found = list(trials(parameters, configuration, response, starts))
@@ -226,7 +229,7 @@ def forecast(
 def _travels(
     found: Sequence[Trial], factors: Array, configuration: BenchConfiguration, done: Done
 ) -> list[list[Travel]]:
-    """Motions of the nominal and the drawn specimens in each trial, computed on all processors."""
+    """Motions of the nominal and of the drawn specimens in each trial, computed on all processors."""
     drawn: dict[Specimen, list[Specimen]] = {}
     for trial in found:
         if trial.specimen not in drawn:
@@ -272,7 +275,7 @@ def _asked(
         for quantity, value in loads.items()
     }
     values = {quantity: (1.0 + trial.control) * value for quantity, value in values.items()}
-    # a simulation of limited length may not reach the steady state
+    # a simulation of limited duration may not reach the steady state
     steady = steady or Travel(0.0, 0.0, 0.0)
     halves = configuration.laser_half_ranges
     storeys = [

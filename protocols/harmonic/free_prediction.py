@@ -1,4 +1,4 @@
-"""Comparison of a free motion with the long-term motion of the model, where the orbit on the table is unstable."""
+"""Comparison of a free motion with the model's long-term motion, where the orbit on the table is unstable."""
 
 from math import isfinite
 from typing import Any
@@ -18,10 +18,10 @@ MEMBERS = 8
 def with_free_prediction(
     point: HarmonicPoint, specimen: Specimen, amplitude: float, configuration: BenchConfiguration, harmonics: int
 ) -> HarmonicPoint:
-    """The point of an unsteady free motion with the predicted one at `amplitude` [m/s2]; others are unchanged.
+    """The point of an unsteady free motion, with the prediction of this motion at `amplitude` [m/s2] added.
 
-    Without a model of the table, or where disturbances of the orbit decay on it, nothing is added: the free motion then
-    tends to the orbit.
+    Nothing is added to other points, without a model of the table, or where disturbances of the orbit decay, so that
+    the free motion tends to the orbit.
     """
     greatest, multiplier = point.alpha_2_greatest, point.table_multiplier
     if greatest is None or multiplier is None or multiplier <= 1.0:
@@ -47,7 +47,9 @@ def with_free_prediction(
 def _predicted(
     specimen: Specimen, omega: float, amplitude: float, configuration: BenchConfiguration, harmonics: int
 ) -> dict[str, Any] | None:
-    """Numbers of the long-term motion, from the cache if possible; None without a rocking orbit on the table."""
+    """Characteristics of the long-term motion, from the cache if possible; None without a rocking orbit on the
+    table.
+    """
     shaker, known = configuration.simulated_shaker, configuration.known_on_table
     if shaker is None:
         return None
@@ -64,7 +66,7 @@ def _predicted(
 
 
 def _numbers(motion: LongTerm) -> dict[str, Any]:
-    """The numbers of a motion that is not the orbit, as JSON content; absent ones are None."""
+    """Characteristics of a long-term motion as JSON content; absent ones are None."""
 
     def known(value: float) -> float | None:
         return value if isfinite(value) else None
@@ -85,4 +87,4 @@ def _remark(found: dict[str, Any], agrees: bool | None) -> str:
     text = f"the model's free motion {repeats}, with peaks up to alpha_2 = {found['greatest']:.3f}"
     if found["low"] is not None:
         text += f", between {found['low']:.3f} and {found['high']:.3f} for 95 % of the specimens"
-    return text if agrees is not False else f"{text}: the measured peak differs"
+    return text if agrees is not False else f"{text}; the measured peak is outside this range"

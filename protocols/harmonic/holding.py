@@ -33,7 +33,7 @@ from sim.shaker import Shaker
 from sim.steady import NoOrbit, Orbit
 
 PATIENCE = 200
-"""Number of cycles within which a motion must be captured; as many again are allowed for the correction of the table
+"""Number of cycles within which a motion must be captured; the same number is allowed for the correction of the table
 and the measurement.
 """
 
@@ -44,17 +44,18 @@ UPDATES = 8
 """Largest number of corrections of the table while a motion is held."""
 
 RELEASED, GROWN = 120, 0.3
-"""Largest number of cycles observed after the release, and the relative deviation of a peak that ends them."""
+"""Largest number of cycles observed after the release, and relative deviation of a peak that ends the observation."""
 
 KICK, FADING = 0.003, 12
-"""Control of a single cycle after the measurement, as a share, without which the deviation would grow from the noise
-for a hundred cycles; and number of cycles after it in which other multipliers fade.
+"""Control in a single cycle after the measurement, as a share of the amplitude, without which the deviation would take
+a hundred cycles to grow from the noise; and number of cycles after it in which the effects of the other multipliers
+fade.
 """
 
 
 def prepared(orbit: Orbit | None, shaker: Shaker | None, harmonics: int) -> StabiliserDesign | None:
-    """Design of the stabiliser, which takes too long while the table is driven. None if there is no orbit on the table,
-    or if no control stabilises it.
+    """Design of the stabiliser, whose computation takes too long while the table is driven. None if there is no orbit
+    on the table, or if no control stabilises it.
     """
     if orbit is None:
         return None
@@ -65,10 +66,10 @@ def prepared(orbit: Orbit | None, shaker: Shaker | None, harmonics: int) -> Stab
 
 
 def too_late(configuration: BenchConfiguration, omega: float) -> str | None:
-    """Reason why a motion at `omega` [rad/s] cannot be held, None if it can: corrections would begin later than `DELAY`
-    cycles after the measured one.
+    """Reason why a motion at `omega` [rad/s] cannot be held, because corrections would begin later than `DELAY` cycles
+    after the measured cycle; None if it can be held.
 
-    A cycle's last sample is read up to a block late, and a command takes effect a lead later.
+    The last sample of a cycle is read up to a block late, and a command takes effect after the lead.
     """
     latency = (configuration.block_samples + configuration.lead_samples) / configuration.sample_rate
     cycle = tau / omega
@@ -92,8 +93,8 @@ def hold(
 ) -> Generator[Step, Outcome, Held | Fallen]:
     """Capture the orbit of `design` from the present motion, hold it, and measure it.
 
-    `largest` [m] is the greatest peak drift allowed. While the motion is being captured the amplitude control is
-    frozen; then it corrects the shares to which the control is added.
+    `largest` [m] is the largest peak drift allowed. The amplitude control is inactive while the motion is captured;
+    then it corrects the shares to which the control of the hold is added.
     """
     run = _Hold(sine, table, design, largest, parameters, accuracy)
     phase: float | None = design.cycle_map.phase
@@ -125,8 +126,8 @@ def hold(
 def _released(
     sine: Sine, beta: float, drift: float, largest: float, cycles: int
 ) -> Generator[Step, Outcome, Rate | Fallen | None]:
-    """Rate at which the deviation changes without control, while it is small; `drift` [m] is the peak on the orbit, and
-    the first one above `largest` [m] ends the observation.
+    """Rate at which a small deviation changes without control. `drift` [m] is the peak on the orbit; the first peak
+    above `largest` [m] ends the observation.
     """
     yield Publish(StepStarted(f"beta = {beta:g} at {sine.omega:g} rad/s: released, observing the deviation"))
     found = list[Cycle]()
@@ -150,7 +151,7 @@ def _rate(cycles: list[Cycle]) -> Rate | None:
 
 
 class _Hold:
-    """State of a hold between its cycles."""
+    """State of a hold between two cycles."""
 
     def __init__(
         self,
@@ -179,13 +180,13 @@ class _Hold:
 
     @property
     def command(self) -> tuple[complex, ...]:
-        """Shares of the drive with the latest control."""
+        """Shares of the drive, including the latest control."""
         first, *others = self.shares
         return (first + self._controls[-1] / self._table.answer, *others)
 
     def push(self, cycle: Cycle | None) -> str | None:
-        """Determine the next control from a cycle, None if it was lost. Returns the reason to release the hold, if
-        any.
+        """Determine the next control from a cycle, which is None if it was lost; returns the reason to release the
+        hold, if any.
         """
         y = None if cycle is None else observed(cycle, self._table.turn)
         self._controls.append(self._stabiliser.next(y))
@@ -202,7 +203,7 @@ class _Hold:
         return reason
 
     def _settle(self, cycle: Cycle, control: float) -> str | None:
-        """Correct the table until its motion is a sine, then collect cycles."""
+        """Correct the table until its motion is a sine, then collect cycles; returns the reason to release, if any."""
         if self.monitor.cycles > 2 * PATIENCE:
             return f"the held motion was not steady within {2 * PATIENCE} cycles"
         self._since += 1

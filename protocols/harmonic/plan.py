@@ -1,9 +1,10 @@
 """Steps of the harmonic campaign (section 4.3 of the paper).
 
-1. The bare frame: calibrate the drive, then at each frequency hold the amplitude, wait for the steady state, measure.
-2. For each spring: mount it, calibrate the drive again at a level that leaves the block at rest, and at each frequency
-   try the planned starts until one is steady. If a start topples the block, it is ended, the block is set upright, and
-   the next one is tried; if no start reaches the point, its last motion is reported.
+1. Bare frame: calibrate the drive; then, at each frequency, hold the amplitude, wait for the steady state, and measure.
+2. Each spring: mount it, and calibrate the drive again at a level that leaves the block at rest; then, at each
+frequency, try the planned starts until the motion becomes steady. If a start topples the block, the test is ended, the
+block is set upright, and the next start is tried. If no start leads to a steady motion, the first motion without a fall
+is reported.
 """
 
 from collections.abc import Generator, Mapping, Sequence
@@ -43,14 +44,14 @@ NO_BLOCK = "storey 1 has a permanent offset although the block was removed: chec
 FALLEN_REQUEST = "The block has fallen: set it upright again."
 
 OVERHEAD = 30.0
-"""Duration of a test in addition to its cycles: rest, start, ramps [s]."""
+"""Duration of a test in addition to its cycles [s]: rest, start, ramps."""
 
 CYCLES = 220
 """Typical number of cycles of a test, including settling."""
 
 
 class Pace:
-    """Progress, computed from the expected duration of the remaining tests on the bench."""
+    """Progress, computed from the expected durations of the finished and the remaining tests on the bench."""
 
     def __init__(self, omegas: tuple[float, ...], tests_per_omega: int) -> None:
         self._total = tests_per_omega * sum(self._expected(omega) for omega in omegas)
@@ -89,7 +90,7 @@ class HarmonicPlan:
         self._draws = shared_draws()
 
     def steps(self) -> Generator[Step, Outcome, Sequence[HarmonicPoint]]:
-        """Execute the complete campaign; returns its points."""
+        """Steps of the complete campaign; returns its points."""
         calibration = yield from self._bare_frame()
         for beta in self._parameters.beta:
             plans = {omega: self._starts[beta, omega] for omega in self._parameters.omega}
@@ -139,7 +140,7 @@ class HarmonicPlan:
         measured = yield from calibrate_drive(wanted, level, calibration)
         yield from self._end_test(specimen, fast=isinstance(measured, Fallen))
         if isinstance(measured, DriveCalibration):
-            # far above the frame's modes, the block only adds mass: use the response of the bare frame
+            # far above the frame's modes the block merely adds mass, so the response of the bare frame is used
             calibration = measured.beyond(calibration)
         for omega in self._parameters.omega:
             point = yield from self._point(specimen, omega, calibration, plans[omega])
@@ -151,13 +152,15 @@ class HarmonicPlan:
     def _point(
         self, specimen: Specimen, omega: float, calibration: DriveCalibration, starts: Sequence[Start]
     ) -> Generator[Step, Outcome, HarmonicPoint]:
-        """Try the planned starts. Returns the first steady rocking motion, else the first motion without a fall."""
+        """Try the planned starts; returns the first steady rocking motion, otherwise the first motion without a
+        fall.
+        """
         found: HarmonicPoint | None = None
         falls = 0
         orbit = self._orbit(specimen, omega)
         slow = orbit is not None and orbit.multiplier > SLOW
         late = too_late(self._configuration, omega)
-        # the first start already states why its motion cannot be held
+        # if the motion cannot be held, the first start already states the reason
         held_by = self._prepared(orbit) if slow or late is not None else None
         for tried, start in enumerate(starts, 1):
             where = f"beta = {specimen.label:g} at {omega:g} rad/s, start {tried} of {len(starts)}: {start.name}"
@@ -191,14 +194,14 @@ class HarmonicPlan:
                 return point
             found = found or point
             if held_by is None and not settled.steadiness.steady:
-                # the next start is held if its motion does not become steady either
+                # the motion after the next start is held if it does not become steady either
                 held_by = self._prepared(orbit)
         if found is not None:
             return found.model_copy(update={"starts_tried": len(starts)})
         return self._overturned(specimen, omega, falls, starts[0].chance)
 
     def _end_test(self, specimen: Specimen, *, fast: bool) -> Generator[Step, Outcome, None]:
-        """Ramp out, fast if the block has fallen; then request that a fallen block be set upright."""
+        """Ramp out, fast if the block has fallen, and then request that a fallen block be set upright."""
         outcome = yield RampOut(fast=fast)
         if fast or isinstance(outcome, Fallen):
             yield OperatorAction(OperatorTask.STAND_BLOCK_UP, specimen, FALLEN_REQUEST)
@@ -238,7 +241,7 @@ class HarmonicPlan:
     ) -> Generator[Step, Outcome, Held | Fallen]:
         """Hold the present motion on its orbit, and measure it."""
         if settled.table is None:
-            return Held(None, "the table's sine is not known")
+            return Held(None, "the sine of the table has not been measured")
         sine = Sine(omega, self._amplitude, calibration)
         free = settled.peak.drift if settled.motion is None else settled.motion.greatest
         limits = self._configuration.limits
@@ -260,7 +263,7 @@ class HarmonicPlan:
     def _settle(
         self, omega: float, specimen: Specimen | None, calibration: DriveCalibration
     ) -> Generator[Step, Outcome, Settled | Fallen]:
-        """Settle and measure; publishes the running alpha_2 with the predicted one."""
+        """Settle and measure; publishes the running alpha_2 and its prediction."""
         sine = Sine(omega, self._amplitude, calibration)
         report = self._report(omega, specimen)
         frame = linear_frame(self._configuration) if specimen is None else None
@@ -296,14 +299,14 @@ class HarmonicPlan:
 
 
 def _to_be_held(settled: Settled, design: StabiliserDesign) -> bool:
-    """Whether a motion is held: it is not steady, or its orbit is unstable on the table."""
+    """Whether to hold a motion, because it is not steady or its orbit is unstable on the table."""
     return not settled.steadiness.steady or abs(design.cycle_map.slowest) > 1.0
 
 
 def spring_calibration(
     parameters: HarmonicParameters, specimen: Specimen, starts: Sequence[Start]
 ) -> tuple[list[float], float]:
-    """Frequencies [rad/s] and level [m/s2] of the drive calibration with a spring: the block provably stays at rest."""
+    """Frequencies [rad/s] and level [m/s2] of the drive calibration with a spring, which leaves the block at rest."""
     amplitude = parameters.amplitude_factor * specimen.uplift_acceleration
     omegas = sorted({leg.omega for start in starts for leg in start.legs})
     grid = np.linspace(omegas[0], omegas[-1], max(round((omegas[-1] - omegas[0]) / 1.5) + 1, 2))

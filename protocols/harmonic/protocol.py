@@ -48,13 +48,13 @@ class HarmonicParameters(Parameters):
     calibration_level: float = quantity(
         0.5,
         "1",
-        "level of the drive calibration relative to the test; below 1, so that the block stays at rest",
+        "level of the drive calibration relative to that of the test; below 1, so that the block stays at rest",
         gt=0,
         lt=1,
     )
     ramp_time: float = quantity(8.0, "s", "duration of the ramp that starts the bare frame", gt=0, le=120)
     settle_tolerance: float = quantity(
-        0.002, "1", "relative change that may remain in a channel that counts as steady", gt=0, le=0.1
+        0.002, "1", "largest remaining relative change of a channel that is considered steady", gt=0, le=0.1
     )
     settle_limit: float = quantity(240.0, "s", "longest wait for the steady state", gt=0, le=3600)
     measured_cycles: int = quantity(24, "1", "number of cycles measured at a steady point", ge=4, le=1000)
@@ -63,7 +63,7 @@ class HarmonicParameters(Parameters):
         True, "", "whether a motion that is unstable or does not become steady is held on its orbit and measured again"
     )
     hold_authority: float = quantity(
-        0.1, "1", "largest control of a held motion, relative to the amplitude of the table", gt=0, le=0.2
+        0.1, "1", "largest control of a held motion, relative to the table's amplitude", gt=0, le=0.2
     )
 
 
@@ -81,7 +81,7 @@ class HarmonicPoint(Parameters):
     """Measured and predicted gain at one frequency and stiffness.
 
     Values that were not measured or do not exist are None, never zero. Uncertainties are expanded (k = 2). The
-    prediction is for the point's branch, at the achieved amplitudes.
+    prediction is for the branch of the point and the achieved amplitudes.
     """
 
     omega_rad_s: float = quantity(..., "rad/s", "circular frequency of the base motion")
@@ -110,15 +110,19 @@ class HarmonicPoint(Parameters):
         "table; absent if the model's block falls",
     )
     alpha_2_greatest_low: float | None = quantity(
-        None, "1", "lower end of the range of that gain for 95 % of the specimens within the uncertainty"
+        None,
+        "1",
+        "lower end of the range of alpha_2_greatest_predicted for 95 % of the specimens within the uncertainty",
     )
-    alpha_2_greatest_high: float | None = quantity(None, "1", "upper end of that range")
+    alpha_2_greatest_high: float | None = quantity(None, "1", "upper end of the range of alpha_2_greatest_predicted")
     repeats_predicted: int | None = quantity(
         None, "1", "predicted number of cycles after which the free motion repeats; absent: it does not repeat"
     )
-    falls_predicted: float | None = quantity(None, "1", "share of those specimens whose block falls in a free motion")
+    falls_predicted: float | None = quantity(
+        None, "1", "share of the specimens within the uncertainty whose block falls in a free motion"
+    )
     free_agrees: bool | None = quantity(
-        None, "1", "whether alpha_2_greatest lies in the range, extended by its own uncertainty"
+        None, "1", "whether alpha_2_greatest lies in the predicted range, extended by its uncertainty"
     )
     alpha_2_orbit: float | None = quantity(
         None, "1", "gain of the mean cycle of a motion that revolves about a periodic one: the gain of the orbit"
@@ -137,12 +141,14 @@ class HarmonicPoint(Parameters):
         "1, the motion becomes periodic",
     )
     multiplier_uncertainty: float | None = quantity(None, "1", "expanded uncertainty of the multiplier (k = 2)")
-    multiplier_angle_rad: float | None = quantity(None, "rad", "its measured argument: angle of the spiral in a cycle")
+    multiplier_angle_rad: float | None = quantity(
+        None, "rad", "measured argument of the multiplier: angle of the spiral in a cycle"
+    )
     dominating: str = quantity("", "", "largest contribution to the uncertainty of alpha_2")
     uncertainty_parts: str = quantity("", "", "standard uncertainty of alpha_2 by contribution, largest first, as JSON")
     alpha_2_predicted: float | None = quantity(None, "1", "predicted gain at the achieved amplitude")
     alpha_2_predicted_uncertainty: float | None = quantity(
-        None, "1", "expanded uncertainty of the predicted gain (k = 2), due to that of the specimen"
+        None, "1", "expanded uncertainty of the predicted gain (k = 2), due to the specimen"
     )
     predicted_stable: bool | None = quantity(None, "1", "whether the predicted orbit is stable on fixed ground")
     table_multiplier: float | None = quantity(
@@ -152,7 +158,9 @@ class HarmonicPoint(Parameters):
         "the orbit is unstable on fixed ground",
     )
     agrees: bool | None = quantity(
-        None, "1", "whether the difference is within the combined uncertainty of both (root sum of squares)"
+        None,
+        "1",
+        "whether alpha_2 and its prediction differ by no more than their combined uncertainty (root sum of squares)",
     )
     drift_peak_m: float | None = quantity(None, "m", "peak drift of the coupled frame")
     bare_drift_peak_m: float | None = quantity(None, "m", "peak drift of the bare frame")
@@ -174,7 +182,7 @@ class HarmonicPoint(Parameters):
     start_chance: float | None = quantity(
         None,
         "1",
-        "estimated probability of success of the measured start, or of the best start if the block fell in all of them",
+        "estimated probability of success of the measured start, or of the best start if the block fell in all starts",
     )
     cycles_measured: int = quantity(0, "1", "number of cycles evaluated for the peaks")
     settle_time_s: float | None = quantity(None, "s", "time from the start of the dwell to the steady state")
@@ -182,7 +190,7 @@ class HarmonicPoint(Parameters):
 
 
 class HarmonicSettings(Parameters):
-    """Settings of a re-analysis; the defaults are those of the campaign."""
+    """Settings of a re-analysis; the defaults are the settings of the campaign."""
 
     measured_cycles: int | None = quantity(
         None,
@@ -191,7 +199,7 @@ class HarmonicSettings(Parameters):
         ge=4,
         le=10000,
     )
-    # bench.analysis.cycles.HARMONICS, not imported, to keep the listing of flags fast
+    # equals bench.analysis.cycles.HARMONICS, which is not imported, so that options are listed quickly
     harmonics: int = quantity(10, "1", "number of harmonics fitted to each cycle", ge=1, le=60)
     peak: Literal["judged", "mean", "largest"] = quantity(
         "judged",
@@ -201,7 +209,7 @@ class HarmonicSettings(Parameters):
     settle_tolerance: float | None = quantity(
         None,
         "1",
-        "relative change that may remain in a channel that counts as steady; if absent, as measured",
+        "largest remaining relative change of a channel that is considered steady; if absent, as measured",
         gt=0,
         le=0.1,
     )

@@ -1,4 +1,4 @@
-"""Re-analysis of a recorded harmonic campaign with different cycles, harmonics, peaks, accuracies or specimen."""
+"""Re-analysis of a recorded harmonic campaign with other cycles, harmonics, peaks, accuracies or specimen."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -35,8 +35,9 @@ from sim.gain import predict_gain
 
 @dataclass
 class _Series:
-    """Consecutive dwells at one frequency. `recent` are the cycles since the last change of the drive; of a `hold`, in
-    which the drive changes in every cycle, all until it is `released`. `held` is the hold of the same motion.
+    """Consecutive dwells at one frequency. `recent` are the cycles since the last change of the drive. A `hold` changes
+    the drive in every cycle, so its `recent` are all cycles until it is `released`. `held` is the hold of the same
+    motion.
     """
 
     sine: Sine
@@ -83,7 +84,7 @@ class HarmonicFollower:
         return self._points
 
     def before(self, step: Step) -> None:
-        """Start a new series with its first dwell."""
+        """Start a series at its first dwell, and end it at the next sweep."""
         match step:
             case Arm() | Sweep():
                 self._end_series(self._series)
@@ -172,16 +173,18 @@ class HarmonicFollower:
         return found.model_copy(update={"start_chance": point.start_chance})
 
     def _unlike(self, series: _Series, point: HarmonicPoint) -> float:
-        """Difference between the table amplitudes of a dwell and the point [m/s2], to find the dwell of the point."""
+        """Difference between the table amplitudes of a dwell and a point [m/s2], by which the dwell of a point is
+        found.
+        """
         if point.status is PointStatus.HELD:
-            # the amplitude is that of the hold
+            # the amplitude of a held point was measured during the hold
             series = series.held or series
         cycles = series.recent if series.hold else series.measured
         used = cycles[-self._parameters.measured_cycles :]
         return abs(mean_amplitude(used, ACCELERATION) - (point.amplitude_m_s2 or 0.0))
 
     def _held(self, series: _Series, point: HarmonicPoint) -> Held:
-        """The hold of a point: its last cycles, with control and capture as recorded."""
+        """The hold of a point, evaluated from its last cycles, with control and capture as recorded."""
         if point.status is not PointStatus.HELD:
             return Held(None, "as recorded", cycles=len(series.recent))
         omega, used = series.sine.omega, series.recent[-self._cycles :]
@@ -227,7 +230,7 @@ class HarmonicFollower:
 
 
 def _rate(point: HarmonicPoint) -> Rate | None:
-    """The recorded multiplier of a point."""
+    """The recorded multiplier of a point; None if it has none."""
     modulus, uncertainty, angle = point.multiplier, point.multiplier_uncertainty, point.multiplier_angle_rad
     if modulus is None or uncertainty is None or angle is None:
         return None

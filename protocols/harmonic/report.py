@@ -31,7 +31,7 @@ LAYERS = "rocking", "resting"
 
 
 def harmonic_sections(campaign: Campaign) -> list[Section]:
-    """Results, gain spectra, gain map and time histories; empty for a file without points."""
+    """Sections on results, gain spectra, gain map, holds and time histories; none for a file without points."""
     if not campaign.harmonic_points:
         return []
     measured = [
@@ -56,8 +56,8 @@ def _results_section(campaign: Campaign) -> Section:
         f"motion that can be compared, and {counted(sum(compared), 'of those agrees', 'of those agree')} with the "
         "prediction. Both gains are for the achieved amplitudes of the table and for the branch of the point. They "
         "agree when they differ by no more than their combined uncertainty (root sum of squares). The uncertainty of a "
-        "measured gain is expanded (k = 2) and includes sensors and scatter; that of a predicted one (k = 2, "
-        "to first order) follows from the uncertainty of the specimen.",
+        "measured gain is expanded (k = 2) and includes sensors and scatter; that of a predicted gain (k = 2, to first "
+        "order) follows from the uncertainty of the specimen.",
         _gains(campaign, points),
         _conditions(points),
         *_budget_parts(points),
@@ -86,7 +86,7 @@ def _spectra_section(campaign: Campaign) -> Section | None:
 
 
 def _holds_section(campaign: Campaign) -> Section | None:
-    """Deviation and control of every held point; None without one."""
+    """Deviation and control of every held point; None without held points."""
     held = [row for row in campaign.harmonic_points if row["status"] == "held"]
     cycles = campaign.record.columns_of(HoldCycle)
     if not held or not cycles.get("cycle"):
@@ -96,7 +96,7 @@ def _holds_section(campaign: Campaign) -> Section | None:
             hold_figure(cycles, row["omega_rad_s"], row["beta"]),
             f"Hold at β = {row['beta']:g}, Ω = {row['omega_rad_s']:g} rad/s: peak drift and control of each cycle, "
             "from the free motion to the release.",
-            "Peak drift and control against the number of the cycle, both logarithmic.",
+            "Peak drift and control, both logarithmic, against the number of the cycle.",
         )
         for row in held
     ]
@@ -114,7 +114,7 @@ def _histories_section(campaign: Campaign) -> Section | None:
 def _histories(campaign: Campaign, points: Sequence[Mapping[str, Any]]) -> list[Part]:
     configuration = campaign.configuration
     if configuration is None:
-        return [Notice("Not drawn: this version of the software cannot read the configuration in this file.")]
+        return [Notice("Not drawn: this version of the software cannot read the file's configuration.")]
     try:
         dwells = Dwells(
             campaign, SignalMap(campaign.record.channels, configuration.laser_reference, configuration.calibrated)
@@ -131,9 +131,8 @@ def _histories(campaign: Campaign, points: Sequence[Mapping[str, Any]]) -> list[
             drawn.append(motion)
     parts: list[Part] = [
         "The curves are the last measured cycles from the raw channels, relative to the values at rest, in "
-        "phase with the measured table acceleration, including the delays of the sensors. u₁ is relative to "
-        "the table. ϑ is not measured but predicted, as are the thin dotted curves, for the achieved "
-        "amplitude."
+        "phase with the measured table acceleration, including the delays of the sensors. u₁ is relative to the "
+        "table. ϑ is not measured; it and the thin dotted curves are predicted for the achieved amplitude."
     ]
     for beta in sorted({motion.beta for motion in drawn}):
         of_spring = [motion for motion in drawn if motion.beta == beta]
@@ -233,14 +232,14 @@ def _conditions(points: Sequence[Mapping[str, Any]]) -> Table:
             ]
         )
     caption = (
-        "Conditions of the points. The scales of the lasers cancel in α₂, and with them most of the "
-        "uncertainty of the peaks; the scale of the accelerometer is common to both tests"
+        "Conditions of the points. The scale errors of the lasers, and with them most of the uncertainty of the peaks, "
+        "cancel in α₂; the scale error of the accelerometer is common to both tests"
     )
     return Table(caption, columns, rows)
 
 
 def _budget_parts(points: Sequence[Mapping[str, Any]]) -> list[Part]:
-    """Table and figure of the uncertainty budgets; None for older files, which lack them."""
+    """Table and figure of the uncertainty budgets, which older files lack."""
     known = [(row, found) for row in points if row["alpha_2"] and (found := _budget(row))]
     if not known:
         return []

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 PERIODS, SAMPLES = 3, 120
-"""Number of drawn periods of the drive, and of points per curve and period."""
+"""Number of periods of the drive that are drawn, and number of points per curve and period."""
 
 QUIET = 1.5
 """Time at the start of a run in which the signals are zeroed [s]; the table is at rest for 2 s."""
@@ -62,8 +62,8 @@ class Predicted:
 class MeasuredMotion:
     """Measured cycles of a point; `time` [s], shape (n,), starts at an upward zero crossing of the table acceleration.
 
-    `drift`, `bare_drift` and `u1` [m], shape (n,), NaN where samples are missing; `bare_drift` is that of the test
-    without block in the same phase, None if not found. `predicted` is None if the model has no such motion.
+    `drift`, `bare_drift` and `u1` [m], shape (n,), are NaN where samples are missing; `bare_drift` is the drift of the
+    bare frame at the same phase, None if it is not found. `predicted` is None if the model has no such motion.
     """
 
     omega: float
@@ -78,14 +78,14 @@ class MeasuredMotion:
 
 @dataclass(frozen=True, eq=False)
 class Cycles:
-    """Periods of one test in phase with the table: drift and u1 [m], each shape (n,), NaN for lost samples."""
+    """Periods of one test, in phase with the table: drift and u1 [m], shape (n,) each, NaN for lost samples."""
 
     drift: Floats
     u1: Floats
 
 
 class Dwells:
-    """Finds the measured cycles of a harmonic campaign in its file."""
+    """Finds the measured cycles of a harmonic campaign in its data file."""
 
     def __init__(self, campaign: Campaign, signals: SignalMap) -> None:
         self._record, self._signals = campaign.record, signals
@@ -111,7 +111,7 @@ class Dwells:
         )
 
     def _cycles(self, omega: float, beta: float | None, peak: float | None) -> Cycles | None:
-        """Cycles of the attempt whose peak is closest to that of the point."""
+        """Cycles of the attempt whose peak drift is closest to the point's."""
         tries = [self._last_cycles(end, omega) for end in self._ends.get((omega, beta), ())]
         whole = [each for each in tries if each is not None]
         if peak is None or not whole:
@@ -164,9 +164,9 @@ def measured_figure(motions: Sequence[MeasuredMotion]) -> "Figure":
 
 
 def _ends_of_dwells(record: DataFile) -> dict[tuple[float, float | None], list[float]]:
-    """Ends [s of bench time] of the dwells at each frequency and stiffness (None: the bare frame).
+    """Ends [s of bench time] of the dwells at each frequency and stiffness ratio (None for the bare frame).
 
-    The running estimates identify the test; the dwell of the result follows the last of them.
+    The running estimates identify the test; the dwell with the result follows the last estimate.
     """
     changes = [event.time for event in record.events if event.kind in BOUNDARIES]
     estimates = record.columns_of(Estimate)
@@ -181,7 +181,7 @@ def _ends_of_dwells(record: DataFile) -> dict[tuple[float, float | None], list[f
 
 
 def _in_phase(signals: Floats, period: float) -> Cycles | None:
-    """Means over short equal parts of the period, starting at the first upward zero crossing of the table's
+    """Means over short, equal parts of the period, starting at the first upward zero crossing of the table's
     fundamental.
     """
     acceleration = signals[:, ACCELERATION]

@@ -1,5 +1,5 @@
 # pyright: reportUnknownMemberType=false
-"""Figure of a hold: deviation and control over the cycles, from the capture to the release."""
+"""Figure of a hold: peak drift and control in each cycle, from the free motion to the release."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -27,7 +27,7 @@ def hold_figure(cycles: Mapping[str, Sequence[Any]], omega: float, beta: float) 
     above.semilogy(number, MILLI * drift, "o", color=BLUE, markersize=2.5)
     above.set_ylabel("peak drift  [mm]")
     above.set_title(rf"$\Omega$ = {omega:g} rad/s,  $\beta$ = {beta:g}", loc="left", fontsize=9)
-    # a logarithmic axis has no zero: cycles without control are not drawn
+    # a logarithmic axis has no zero, so cycles without control are not drawn
     below.semilogy(number, 100.0 * np.where(control > 0.0, control, np.nan), "o", color=VERMILLION, markersize=2.5)
     below.set_ylabel("control  [% of amplitude]")
     below.set_xlabel("cycle of the hold")

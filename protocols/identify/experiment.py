@@ -44,7 +44,7 @@ class Identification(Prepared[IdentifyParameters]):
 
     @cached_property
     def forecast(self) -> Forecast:
-        """Demands of the strongest multisine, computed in advance since all motions are linear."""
+        """Demands of the strongest multisine, scaled from its level, since all motions are linear."""
         self.progress("predicting the demands of the run")
         found = self._found
         where = f"a multisine of {found.level:.3g} m/s2"
@@ -53,7 +53,7 @@ class Identification(Prepared[IdentifyParameters]):
 
     @cached_property
     def prediction(self) -> Table:
-        """Requested motion of the table, line by line."""
+        """Requested motion of the table at each line."""
         peak = np.abs(self._found.motions[0])
         return {
             "frequency": Column(self._found.grid.frequency, "Hz", "lines of the multisines"),
@@ -79,9 +79,7 @@ class Identification(Prepared[IdentifyParameters]):
 
 
 def thirds(model: TableModel) -> Iterator[IdentifiedBand]:
-    """The table model in third-octave bands centred at 1 Hz times powers of 2^(1/3); bands without a line are
-    omitted.
-    """
+    """Third-octave bands of the table model, centred at 1 Hz times powers of 2^(1/3); empty bands are omitted."""
     frequency = np.array(model.frequency)
     response = np.array(model.real) + 1j * np.array(model.imaginary)
     low, high = model.band
@@ -121,7 +119,7 @@ _COLUMNS = (
 
 
 def _table(points: Sequence[IdentifiedBand]) -> str:
-    """Table with a row for each third-octave band."""
+    """Text table with a row for each third-octave band."""
     if not points:
         return "Nothing was identified."
     return text_table(_COLUMNS, map(_cells, points))
@@ -165,7 +163,7 @@ def _response_figure(model: TableModel | None) -> "Figure":
     coherence.semilogy(f, np.maximum(1.0 - np.array(model.coherence), 1e-12), color=BLUE)
     uncertain.loglog(f, gain, color=BLUE, label="response")
     uncertain.loglog(f, np.array(model.uncertainty), color=BLACK, label="standard uncertainty")
-    # distortion is omitted where it does not exceed the noise
+    # distortion that does not exceed the noise is not drawn
     distortion = np.array(model.distortion)
     uncertain.loglog(f, np.where(distortion > 0.0, distortion, np.nan), ".", ms=2, color=VERMILLION, label="distortion")
     uncertain.legend(loc="best", fontsize=8)

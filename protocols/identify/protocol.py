@@ -6,7 +6,7 @@ from sim.parameters import Parameters, quantity
 
 
 class IdentifiedBand(Parameters):
-    """Response of the table in a third-octave band; relative quantities refer to this response."""
+    """Response of the table in a third-octave band, to which relative quantities refer."""
 
     frequency_hz: float = quantity(..., "Hz", "centre frequency of the third-octave band")
     gain_m_s2_v: float = quantity(..., "m/s2/V", "table acceleration per drive, rms over the lines")
@@ -16,7 +16,9 @@ class IdentifiedBand(Parameters):
     uncertainty: float = quantity(
         ..., "1", "expanded relative uncertainty of a line (k = 2) due to noise and distortion"
     )
-    distortion: float = quantity(..., "1", "relative standard deviation of one realisation due to nonlinear distortion")
+    distortion: float = quantity(
+        ..., "1", "relative standard deviation of a single realisation due to nonlinear distortion"
+    )
     noise_m_s2_hz: float = quantity(..., "m/s2/Hz^0.5", "spectral density of the noise in the acceleration")
     coherence: float = quantity(..., "1", "lowest fraction of the acceleration's power that is coherent with the drive")
     lines: int = quantity(..., "1", "number of lines in the band")

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MARGIN = 1.05
-"""Largest calibration level of the drive relative to the amplitude; it must be within the limits."""
+"""Largest level of the drive calibration relative to the amplitude, which must be within the limits."""
 
 _COLUMNS = (
     TextColumn("sensor", words=True),
@@ -53,7 +53,9 @@ _UNCLAMP = "Remove the clamps from the storeys."
 
 
 class LaserCalibrationRun(Prepared[LaserCalibrationParameters]):
-    """Laser calibration. Raises InvalidInput for lasers that do not measure the table, and motions beyond limits."""
+    """Laser calibration. Raises InvalidInput for lasers that do not measure the table, and for motions beyond
+    limits.
+    """
 
     def __init__(
         self, parameters: LaserCalibrationParameters, configuration: BenchConfiguration, stored: Sources | None = None
@@ -77,7 +79,7 @@ class LaserCalibrationRun(Prepared[LaserCalibrationParameters]):
         reach = min(configuration.half_stroke, limits.displacement)
         reach = min(reach, limits.laser_range * min(configuration.laser_half_ranges))
         if MARGIN * p.amplitude > reach:
-            raise InvalidInput("amplitude", p.amplitude, f"the bench allows {reach / MARGIN:.4g} m")
+            raise InvalidInput("amplitude", p.amplitude, f"the bench allows at most {reach / MARGIN:.4g} m")
         for quantity, unit, value in (
             ("velocity", "m/s", p.amplitude * p.omega),
             ("acceleration", "m/s2", p.amplitude * p.omega**2),
@@ -85,14 +87,14 @@ class LaserCalibrationRun(Prepared[LaserCalibrationParameters]):
             most = float(getattr(limits, quantity))
             if MARGIN * value > most:
                 needs = (
-                    f"at this frequency {p.amplitude:g} m needs {value:.3g} {unit}, but limits.{quantity} = "
-                    f"{most:g} {unit}"
+                    f"at this frequency, an amplitude of {p.amplitude:g} m needs {value:.3g} {unit}, but"
+                    f" limits.{quantity} = {most:g} {unit}"
                 )
                 raise InvalidInput("omega", p.omega, needs)
 
     @cached_property
     def forecast(self) -> Forecast:
-        """Demands of the largest pass: sines of the table with the clamped storeys as a rigid load."""
+        """Demands of the largest pass, a sine of the table with the clamped storeys as a rigid load."""
         self.progress("predicting the demands of the run")
         amplitude, omega = self.parameters.amplitude, self.parameters.omega
         duration = expected_duration(self.parameters)
@@ -154,7 +156,7 @@ def _fit_event(name: str, curve: ErrorCurve, delay: float, uncertainty: float) -
     at = np.linspace(curve.low, curve.high, curve.without.shape[1])
     fit = np.polynomial.chebyshev.chebval(np.linspace(-1.0, 1.0, at.size), curve.error)
     passes = {
-        f"without_{number}": Series(each - each.mean(), "m", f"same curve without pass {number}")
+        f"without_{number}": Series(each - each.mean(), "m", f"curve fitted without pass {number}")
         for number, each in enumerate(curve.without, 1)
     }
     return FitFinished(
@@ -170,7 +172,7 @@ def _fit_event(name: str, curve: ErrorCurve, delay: float, uncertainty: float) -
 
 
 def _calibrated_sensors(found: LaserCalibration) -> Iterator[CalibratedSensor]:
-    """One row for each sensor, and one for the ratio of the lasers."""
+    """One result for each sensor, and one for the ratio of the lasers."""
     for name, laser in (("laser_1", found.laser_1), ("laser_2", found.laser_2)):
         at = np.linspace(laser.lowest, laser.highest, 201)
         error = at - laser.corrected(at)
@@ -200,7 +202,7 @@ def _calibrated_sensors(found: LaserCalibration) -> Iterator[CalibratedSensor]:
 
 
 def _sensors_table(points: Sequence[CalibratedSensor]) -> str:
-    """Table with a row for each sensor; absent values are "-"."""
+    """Text table with a row for each sensor; absent values are "-"."""
     if not points:
         return "Nothing was calibrated."
     return text_table(_COLUMNS, map(_cells, points))
@@ -217,7 +219,7 @@ def _errors_figure(curves: tuple[ErrorCurve, ErrorCurve] | None) -> "Figure":
         orders.set_xlabel("order [1]")
         orders.set_ylabel("prediction error [µm]")
         set_grid(over)
-        # an order is an integer
+        # orders are integers
         orders.xaxis.get_major_locator().set_params(integer=True)
         set_grid(orders)
         if curves is None:

@@ -1,17 +1,18 @@
 """Errors of the lasers from cycles of a common motion.
 
-Under a slow sine of the table, a laser's reading is r = x + e(r) - d v + c omega^2 x, with its position-dependent error
-e, its delay d, and the compliance c of the clamps, which accelerate the storeys; passes at two frequencies separate c
-from a scale error. All are fitted by least squares to the mean cycles of the passes, at equal steps of the phase, with
-e as Chebyshev polynomials of the reading. The table's motion need not be a pure sine, since both sensors measure it.
+Under a slow sine of the table with displacement x and velocity v, a laser's reading is r = x + e(r) - d v + c omega^2
+x. Here e is the laser's position-dependent error, d its delay, and c the effect of the clamps, which are compliant and
+accelerate the storeys; passes at two frequencies separate c from a scale error. All are fitted by least squares to the
+mean cycles of the passes, at equal steps of the phase, with e as Chebyshev polynomials of the reading. The table's
+motion need not be a pure sine, since both sensors measure it.
 
-The order is chosen by cross-validation: the lowest whose curves, fitted to all passes but one, predict the omitted pass
-as well as the best order, within one standard error. The uncertainty of the curve combines the scatter of the curves
-that omit each pass in turn (jackknife) and the contribution of higher orders.
+The order is chosen by cross-validation. It is the lowest order whose curves, fitted to all passes but one, predict the
+omitted pass as well as the best order does, within one standard error. The uncertainty of the curve combines the
+scatter of the curves that omit each pass in turn (jackknife) and the contribution of higher orders.
 
-The lasers are the length standard: the smooth linearity error on their data sheets, relative to the span of the passes,
-determines the scale better than the table's sensors. Therefore the mean span of both lasers is the reference with which
-the table's sensors and each laser are compared.
+The lasers are the length standard, because the smooth linearity error on their data sheets, relative to the span of the
+passes, determines the scale better than the table's sensors. The table's sensors and each laser are therefore compared
+with the mean span of both lasers.
 """
 
 from collections.abc import Sequence
@@ -39,8 +40,8 @@ READINGS = 201
 
 @dataclass(frozen=True, eq=False)
 class Pass:
-    """Mean cycle of a pass at `omega` [rad/s]: table displacement [m] and its rate [m/s], and both lasers [m], each
-    shape (k,).
+    """Mean cycle of a pass at `omega` [rad/s]: displacement [m] and speed [m/s] of the table, and both lasers [m],
+    shape (k,) each.
     """
 
     omega: float
@@ -48,15 +49,15 @@ class Pass:
     speed: Array
     lasers: tuple[Array, Array]
     ratio: float
-    """Ratio of the table's displacement amplitude to that computed from its acceleration, a / omega^2."""
+    """Ratio of the table's displacement amplitude to the amplitude computed from its acceleration, a / omega^2."""
 
 
 @dataclass(frozen=True, eq=False)
 class ErrorCurve:
-    """Error curve of one laser relative to the measured table displacement, as Chebyshev coefficients `error` [m] over
-    the readings from `low` to `high` [m]; `delay` [s]. `scores` are the rms prediction errors [m] of each order from 1;
-    `residual` [m] is the rms contribution of higher orders. `without`, shape (passes, READINGS) [m], are the curves,
-    and `delays` [s] the delays, fitted without each pass in turn.
+    """Error curve of one laser relative to the measured table displacement: Chebyshev coefficients `error` [m] over the
+    readings from `low` to `high` [m], and `delay` [s]. `scores` are the rms prediction errors [m] of the orders from 1
+    on; `residual` [m] is the rms contribution of higher orders. `without`, shape (passes, READINGS) [m], are the
+    curves, and `delays` [s] the delays, fitted without each pass in turn.
     """
 
     low: float
@@ -83,18 +84,18 @@ class ErrorCurve:
 
     @property
     def slopes(self) -> Array:
-        """Slopes without each pass in turn, shape (passes,)."""
+        """Slopes of the curves fitted without each pass in turn, shape (passes,)."""
         spans: Array = self.without[:, -1] - self.without[:, 0]
         return spans / (self.high - self.low)
 
 
 def jackknife(found: Array) -> float:
-    """Jackknife standard uncertainty of a value from n passes, from the estimates without each pass, shape (n,)."""
+    """Jackknife standard uncertainty of a value from n passes, from the estimates without each one, shape (n,)."""
     return sqrt((found.size - 1) / found.size * float(np.sum((found - found.mean()) ** 2)))
 
 
 def mean_pass(cycles: Sequence[Cycle], omega: float) -> Pass:
-    """A pass at `omega` [rad/s], from its cycles, whose signals are relative to the values at rest."""
+    """A pass at `omega` [rad/s], computed from its cycles, whose signals are relative to the values at rest."""
     waves = mean_waves(cycles)
     moved = np.mean([cycle.fundamental for cycle in cycles], axis=0)
     return Pass(
@@ -107,9 +108,9 @@ def mean_pass(cycles: Sequence[Cycle], omega: float) -> Pass:
 
 
 def fit_curve(passes: Sequence[Pass], laser: int, rest: float) -> ErrorCurve:
-    """Error curve of laser 0 or 1 with the reading `rest` [m] at rest; at least two frequencies among the passes."""
+    """Error curve of laser 0 or 1, whose reading at rest is `rest` [m]; the passes must include two frequencies."""
     readings = [rest + each.lasers[laser] for each in passes]
-    # range covered by all passes
+    # the range that all passes cover
     low, high = max(float(r.min()) for r in readings), min(float(r.max()) for r in readings)
     rows = [_columns(r, each, low, high) for r, each in zip(readings, passes, strict=True)]
     errors = [r - each.displacement for r, each in zip(readings, passes, strict=True)]
@@ -125,7 +126,7 @@ def fit_curve(passes: Sequence[Pass], laser: int, rest: float) -> ErrorCurve:
 
     def missed(order: int, out: int) -> float:
         wrong = errors[out] - rows[out][:, [*range(order + 1), -2, -1]] @ solved(order, out)
-        # the rounding of the zero differs between passes
+        # the zero is rounded differently in each pass
         return float(np.var(wrong))
 
     squares: Array = np.array([[missed(order, out) for out in every] for order in range(1, HIGHEST + 1)])
@@ -162,11 +163,11 @@ def calibration(
 ) -> LaserCalibration:
     """Calibration of all sensors.
 
-    `reference_linearity` is that of the displacement sensor, relative to the covered range; `accuracy` and `ranges` [m]
-    are those of the lasers' data sheets.
+    `reference_linearity` is the linearity error of the displacement sensor, relative to the covered range; `accuracy`
+    and `ranges` [m] are taken from the lasers' data sheets.
     """
     slopes = [curve.slope for curve in curves]
-    # true displacement, by the mean span of the lasers: measured displacement times this factor
+    # true displacement, according to the mean span of the lasers, over measured displacement
     factor = 1.0 / (1.0 - 0.5 * sum(slopes))
     found = [
         LaserCurve(
@@ -205,15 +206,15 @@ def calibration(
 def _span_uncertainty(span: float, accuracy: SensorAccuracy, whole: float) -> float:
     """Relative standard uncertainty of a `span` [m] measured by one laser with the range `whole` [m].
 
-    The contribution of the scale is half the variance of the difference of two lasers. The shape of the linearity error
-    is unknown: the errors at both ends of the span, each with the variance of a sine, are taken as independent.
+    The variance due to the scale is half that of the difference between two lasers. Since the shape of the linearity
+    error is unknown, the errors at the two ends of the span are assumed independent, each with the variance of a sine.
     """
     return float(np.hypot(accuracy.laser_linearity * whole / span, accuracy.laser_mismatch / sqrt(2.0)))
 
 
 def _rescaled(curve: ErrorCurve, factor: float) -> Array:
     """Coefficients of the error relative to the true displacement, which is `factor` times the measured one: r - factor
-    (r - e).
+    * (r - e).
     """
     error = factor * curve.error
     error[:2] += (1.0 - factor) * np.array([0.5 * (curve.high + curve.low), 0.5 * (curve.high - curve.low)])
@@ -221,7 +222,7 @@ def _rescaled(curve: ErrorCurve, factor: float) -> Array:
 
 
 def _columns(readings: Array, each: Pass, low: float, high: float) -> Array:
-    """Chebyshev polynomials up to HIGHEST, effect of a delay, and effect of compliant clamps; (k, HIGHEST + 3)."""
+    """Chebyshev polynomials up to HIGHEST, effect of a delay, effect of compliant clamps, shape (k, HIGHEST + 3)."""
     place = (2.0 * readings - high - low) / (high - low)
     columns = (chebyshev.chebvander(place, HIGHEST), -each.speed, each.omega**2 * each.displacement)
     return np.column_stack(columns).astype(np.float64)

@@ -29,29 +29,29 @@ from protocols.laser_calibration.protocol import LaserCalibrationParameters
 from sim.channel import STOREYS
 
 REST = 2.0
-"""Time at rest for the laser readings and for zeroing the signals [s]."""
+"""Time at rest in which the lasers are read and the signals are zeroed [s]."""
 
 SMALLER = 0.01
 """Reduction of the amplitude from pass to pass, relative to the first."""
 
 END = 5.0
-"""Expected time of the last ramp and of the computation [s]."""
+"""Expected duration of the last ramp and of the computation [s]."""
 
 START, CHANGE = 12.0, 3.0
 """Duration of the sweep to the first pass, and between passes [s].
 
-With an amplifier that controls velocity, an asymmetric ramp leaves a displacement, from which the suspension returns
-the table within seconds.
+If the amplifier controls velocity, an asymmetric ramp leaves the table displaced, and the suspension returns it within
+seconds.
 """
 
 LEVELS = (0.2, 0.7)
-"""Calibration levels of the drive relative to the amplitude; the effect of friction decreases with the level."""
+"""Levels of the drive calibration relative to the amplitude; the effect of friction decreases with the level."""
 
 _LOOSE = "storey 1 has a permanent offset although no block is on the table: check lasers and clamps"
 
 
 def planned_passes(parameters: LaserCalibrationParameters) -> list[tuple[float, float]]:
-    """Frequencies [rad/s] and amplitudes [m] of the passes, slow ones first."""
+    """Frequencies [rad/s] and amplitudes [m] of the passes, the slow ones first."""
     slow = parameters.passes // 2
     return [
         (parameters.omega * (0.5 if number < slow else 1.0), parameters.amplitude * (1.0 - SMALLER * number))
@@ -67,7 +67,7 @@ def expected_duration(parameters: LaserCalibrationParameters) -> float:
 
 
 def _measuring(parameters: LaserCalibrationParameters, after: int = 0) -> float:
-    """Expected time of the passes after the first `after`, and of the end [s]."""
+    """Expected duration of the passes after the first `after`, and of the end [s]."""
     lengths = [CHANGE + (SETTLING + parameters.cycles) * tau / omega for omega, _ in planned_passes(parameters)]
     return sum(lengths[after:]) + (END if after < len(lengths) else 0.0)
 
@@ -75,7 +75,7 @@ def _measuring(parameters: LaserCalibrationParameters, after: int = 0) -> float:
 def measure(
     parameters: LaserCalibrationParameters, configuration: BenchConfiguration
 ) -> Generator[Step, Outcome, tuple[LaserCalibration, tuple[ErrorCurve, ErrorCurve]]]:
-    """Steps from the clamped frame to the stopped table; returns the calibration and the error curves of the lasers."""
+    """Steps of the measurement with the clamped frame; returns the calibration and the error curves of the lasers."""
     yield Publish(StepStarted("acquire the lasers at rest"))
     heard = yield AcquireAtRest(REST)
     if not isinstance(heard, RestSamples):
@@ -139,13 +139,13 @@ def _passes(parameters: LaserCalibrationParameters) -> Generator[Step, Outcome, 
 
 
 def _progress(parameters: LaserCalibrationParameters, finished: int, activity: str) -> Progress:
-    """Progress from the remaining plan, including the drive calibration before the first pass."""
+    """Progress, from the remaining duration of the plan, including the drive calibration before the first pass."""
     left = _measuring(parameters, finished)
     return Progress(1.0 - left / expected_duration(parameters), left, activity)
 
 
 def _rests(heard: RestSamples) -> tuple[float, float]:
-    """Readings of both lasers at rest [m]. Raises Unmeasurable if one has no valid reading."""
+    """Readings of both lasers at rest [m]. Raises Unmeasurable if a laser has no valid reading."""
     found: list[float] = []
     for name in STOREYS:
         column, channel = next((k, each) for k, each in enumerate(heard.channels) if each.name == name)

@@ -5,7 +5,7 @@ from sim.parameters import Parameters, quantity
 
 
 class LaserCalibrationParameters(Parameters):
-    """Slow sines of the table with the frame locked to it, so that all sensors measure a common motion."""
+    """Slow sines of the table with the frame locked to it, so that all sensors measure the same motion."""
 
     amplitude: float = quantity(
         0.050, "m", "amplitude of the first pass; readings beyond it remain uncalibrated", gt=0.001, le=1
@@ -41,7 +41,7 @@ class CalibratedSensor(Parameters):
     expanded (k = 2).
     """
 
-    sensor: str = quantity(..., "", "channel, or laser_2 / laser_1 for the ratio of the two")
+    sensor: str = quantity(..., "", "channel, or laser_2 / laser_1 for the ratio of the lasers")
     scale: float = quantity(..., "1", "ratio of reading to true value")
     scale_uncertainty: float = quantity(..., "1", "expanded uncertainty of the scale (k = 2)")
     lowest_m: float | None = quantity(None, "m", "smallest covered reading")
@@ -55,9 +55,9 @@ class CalibratedSensor(Parameters):
 
 PROTOCOL = Protocol(
     name="laser-calibration",
-    summary="Calibrate both lasers and the table's sensors by a common slow motion with the frame locked.",
+    summary="Calibrate both lasers and the table's sensors with a slow motion common to all, with the frame locked.",
     details=(
-        "The storeys are clamped to the table, which moves slowly over the range of the tests. The result is "
+        "The storeys are clamped to the table, which moves slowly over the range of the later tests. The result is "
         "the scale, the smooth linearity error and the delay of each laser, and their agreement. The key "
         "`laser_calibration` in the configuration of other runs names the result, laser_calibration.json. "
         "Without options, a run has eight passes of 50 mm and takes about four minutes."
