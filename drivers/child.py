@@ -1,7 +1,7 @@
-"""Child processes that serve a run, and must outlive the requests to end that reach the whole process group.
+"""Child processes that serve a run, and must outlive requests to end that are sent to the whole process group.
 
-While the output is driven, the program answers such a request by a ramp to zero. A child that ended first would be the
-loss of an instrument, which cuts the output at once. These children end with their standard input.
+While the output is driven, the program answers such a request by a ramp to zero. If a child ended first, the program
+would have lost an instrument and would cut the output at once. These children end when their standard input is closed.
 """
 
 import signal
@@ -13,7 +13,7 @@ OWN_CONSOLE = subprocess.CREATE_NO_WINDOW if sys.platform == "win32" else 0
 
 
 def ignore_requests() -> None:
-    """Ignore requests to end, which reach the whole process group; for children that end with their standard input."""
+    """Ignore requests to end, for child processes that end when their standard input is closed."""
     for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)

@@ -123,7 +123,7 @@ def _hang_up(connection: socket.socket) -> None:
 
 
 _PATIENCE = 60.0
-"""Time-out for a reply [s]; the bench comes to rest in less."""
+"""Time-out for a reply [s], longer than the bench takes to come to rest."""
 
 
 def ask(address: str, command: str, /, *, patience: float = _PATIENCE, **arguments: object) -> Any:

@@ -201,7 +201,7 @@ class SerialLaser:
             raise
 
     def take(self) -> Readings:
-        """All values received since the last call, at most 60 s; never waits.
+        """All values received since the last call, of the last 60 s at most; never waits.
 
         Raises ConnectionLost if the port disappeared or the sensor was switched off in between, RigError before
         `start`.

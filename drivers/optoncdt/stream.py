@@ -80,7 +80,7 @@ class Stream:
         return self._dialogue.judged(command, reply, timeout)
 
     def take(self) -> Readings:
-        """All values since the last call, at most 60 s; does not wait. Raises ConnectionLost."""
+        """All values since the last call, of the last 60 s at most; never waits. Raises ConnectionLost."""
         self._raise_failure()
         with self._changed:
             held, self._held, self._holding = self._held, deque(), 0

@@ -36,10 +36,10 @@ DIFFERS = "the difference from the prediction exceeds the combined uncertainty"
 
 @dataclass(frozen=True)
 class Conditions:
-    """Conditions of a test at `omega` [rad/s], and what its result is compared with.
+    """Conditions of a test at `omega` [rad/s], and the model and reference with which its result is compared.
 
     `reference` is the bare frame's dwell at the same frequency, `known` the uncertainty of the `specimen`. Stability on
-    the table is predicted for `shaker`, None if there is no model of it, which is controlled up to the harmonic
+    the table is predicted with the model `shaker`, if there is one, whose motion is controlled up to the harmonic
     `harmonics`.
     """
 
@@ -56,10 +56,10 @@ class Conditions:
         return predict_gain(self.specimen, self.omega, peak.amplitude, self.reference.peak.amplitude).layers
 
     def slope(self, name: str, peak: SteadyPeak) -> float:
-        """d ln alpha_2 / d ln amplitude of a branch, both tests at the same amplitude; 0 at the end of the branch.
+        """d ln alpha_2 / d ln amplitude of a branch, with both tests at the same amplitude; 0 at the end of the branch.
 
-        A central difference over the steady solver's orbits: the gains of the resting block and of the bare frame are
-        independent of the amplitude.
+        Central difference between orbits of the steady solver; the motions of the resting block and of the bare frame
+        are proportional to the amplitude.
         """
         around = (peak.amplitude * (1.0 - AMPLITUDE_STEP), peak.amplitude * (1.0 + AMPLITUDE_STEP))
         less, more = (predict_gain(self.specimen, self.omega, each).layers.get(name) for each in around)
@@ -74,7 +74,7 @@ class Conditions:
 
 @dataclass(frozen=True)
 class _Branch:
-    """Predicted branch with which gains are compared; `slope`: see `Conditions.slope`."""
+    """Predicted branch with which gains are compared; for `slope` see `Conditions.slope`."""
 
     conditions: Conditions
     layer: Layer | None
@@ -82,8 +82,8 @@ class _Branch:
     predicted: dict[str, Any]
 
     def compare(self, peak: SteadyPeak) -> tuple[Gain, bool | None]:
-        """Gain of a peak, and whether it agrees with the predicted one: they differ by no more than their combined
-        expanded uncertainty, |E_n| <= 1 of ISO 13528. None if one of them is unknown or the reference was not steady.
+        """Gain of a peak, and whether it agrees with the predicted gain: the two differ by no more than their combined
+        expanded uncertainty (|E_n| <= 1, ISO 13528). None if there is no prediction or the reference was not steady.
         """
         reference, layer = self.conditions.reference, self.layer
         measured = gain(peak, reference.peak, self.conditions.sensors, self.slope)
@@ -93,7 +93,7 @@ class _Branch:
         return measured, abs(measured.alpha_2 - layer.alpha_2) <= hypot(measured.uncertainty, uncertainty)
 
     def fields(self, peak: SteadyPeak, measured: Gain, agrees: bool | None, table: Settled | Held) -> dict[str, Any]:
-        """Fields of a measured motion: its gain, its comparison, and the errors of the table."""
+        """Fields of a measured motion: its gain, the comparison with the prediction, and the errors of the table."""
         return self.predicted | {
             "alpha_2": measured.alpha_2,
             "alpha_2_uncertainty": measured.uncertainty,
@@ -110,11 +110,11 @@ class _Branch:
 
 
 def judge(settled: Settled, conditions: Conditions, starts: int, held: Held | None = None) -> HarmonicPoint:
-    """Point of a dwell, compared with the branch with the nearest peaks of drift and u1, after `starts` tried.
+    """Point of a dwell after `starts` tried starts, compared with the branch whose peaks of drift and u1 are nearest.
 
     If the motion is not steady or the orbit is unstable, stability is also predicted on the table. If the motion was
-    then `held` on the rocking orbit, gain and comparison are those of the held motion, and the free one is described
-    beside them.
+    then `held` on the rocking orbit, gain and comparison are for the held motion, and the free motion is described in
+    addition.
     """
     peak, bare, shaker = settled.peak, conditions.reference.peak, conditions.shaker
     layers = conditions.layers(peak)
@@ -154,15 +154,15 @@ def judge(settled: Settled, conditions: Conditions, starts: int, held: Held | No
 
 
 def _held_point(free: HarmonicPoint, held: Held, conditions: Conditions) -> HarmonicPoint:
-    """The point of a free motion that was then held; unchanged but for its reason if the hold was released."""
+    """The point of a free motion that was then held; if the hold was released, only the reason is added."""
     peak = held.peak
     if peak is None:
-        released = f"the motion was to be held on its orbit, and released after {held.cycles} cycles"
+        released = f"the hold of the motion on its orbit was released after {held.cycles} cycles"
         text = f"{released if held.cycles else 'the motion could not be held on its orbit'}: {held.reason}"
         return _remarked(free, text)
     layers = conditions.layers(peak)
     if _nearest(layers, peak) != _ROCKING or _ROCKING not in layers:
-        return _remarked(free, "the motion on which the hold came to rest is not the rocking orbit")
+        return _remarked(free, "the held motion is not the rocking orbit")
     branch = conditions.branch(_ROCKING, layers[_ROCKING], peak)
     measured, agrees = branch.compare(peak)
     remarks = [f"free: {free.reason}"] if free.reason else []
@@ -218,7 +218,7 @@ def _rate_fields(rate: Rate | None) -> dict[str, Any]:
 
 
 def predicted_fields(name: str, layer: Layer | None, known: SpecimenKnowledge) -> dict[str, Any]:
-    """Prediction fields of a point for the branch `name`; each is None if the branch does not exist."""
+    """Prediction fields of a point for the branch `name`; the predicted values are None if it does not exist."""
     return {
         "layer": name if layer else "none",
         "alpha_2_predicted": layer.alpha_2 if layer else None,
@@ -228,7 +228,7 @@ def predicted_fields(name: str, layer: Layer | None, known: SpecimenKnowledge) -
 
 
 def _nearest(layers: dict[str, Layer], peak: SteadyPeak) -> str:
-    """The branch whose peaks of drift and u1 are closest, in ratio, to the measured ones."""
+    """The branch whose peaks of drift and u1 are closest to the measured peaks, by their ratios."""
 
     def distance(name: str) -> float:
         expected = layers[name].orbit.peaks
@@ -251,7 +251,7 @@ def _described(settled: Settled) -> str:
 
 
 def _growth(fixed: float, on_table: float | None) -> str:
-    """Growth or decay of disturbances, by the moduli of the slowest multipliers on fixed ground and on the table."""
+    """Growth or decay of disturbances, from the moduli of the slowest multipliers on fixed ground and on the table."""
 
     def change(modulus: float) -> str:
         return f"{'grow' if modulus > 1.0 else 'decay'} by {100.0 * abs(modulus - 1.0):.2g} % per cycle"
@@ -278,7 +278,7 @@ def _remarks(
         if orbit:
             gained = f"alpha_2 = {orbit['alpha_2_orbit']:.4f} +- {orbit['alpha_2_orbit_uncertainty']:.4f}"
             verdict = {True: ", which agrees with the prediction", False: ", which differs from the prediction"}
-            yield f"its mean cycle is that of the orbit: {gained}{verdict.get(orbit['orbit_agrees'], '')}"
+            yield f"its mean cycle gives the gain of the orbit: {gained}{verdict.get(orbit['orbit_agrees'], '')}"
     elif name in layers and not layers[name].stable:
         yield f"steady while measured; disturbances of the predicted orbit {_growth(layers[name].multiplier, on_table)}"
     elif name != _ROCKING and _ROCKING in layers and layers[_ROCKING].stable:

@@ -1,4 +1,4 @@
-"""Waiting for the steady state of a dwell, and its measurement."""
+"""Detection and measurement of the steady state of a dwell."""
 
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Sequence
@@ -22,20 +22,19 @@ INTERVAL = 6
 """Number of cycles between checks of the table's motion and of steadiness."""
 
 TRANSIENT = 2
-"""Number of cycles discarded at the beginning of an interval, in which the last correction of the drive takes
-effect.
+"""Number of cycles discarded at the start of an interval, in which the preceding correction of the drive takes effect.
 """
 
 AIM = 0.5
-"""Fraction of the tolerances that is aimed at; the rest allows for disturbances of the table by a block that has not
+"""Fraction of the tolerances to which the table is corrected; the rest allows for disturbances by a block that has not
 settled.
 """
 
 
 @dataclass(frozen=True)
 class TableState:
-    """Sine of the table at the end of a dwell: `turn` (see `Sine.turn`), the `shares` of its drive, and the `answer` of
-    its fundamental per share.
+    """Sine of the table at the end of a dwell: its `turn` (see `Sine.turn`), the `shares` of its drive, and `answer`,
+    the response of its fundamental per share.
     """
 
     turn: complex
@@ -45,10 +44,10 @@ class TableState:
 
 @dataclass(frozen=True)
 class Settled:
-    """A measured dwell: its peak, its steadiness, and its settling time [s]. `amplitude_error` (relative) and
-    `phase_error` [rad] are those of the table, after `updates` corrections of its drive. `motion` describes an unsteady
-    motion, and `orbit` is the peak of its mean cycle if it revolves about a periodic motion. `table` is the state in
-    which the dwell leaves the table; None where it is not known.
+    """A measured dwell: its peak, its steadiness, and its settling `time` [s]. `amplitude_error` (relative) and
+    `phase_error` [rad] are errors of the table, after `updates` corrections of its drive. `motion` describes an
+    unsteady motion; if this revolves about a periodic motion, `orbit` is the peak of its mean cycle. `table` is the
+    state of the table at the end of the dwell, None if unknown.
     """
 
     peak: SteadyPeak
@@ -64,11 +63,11 @@ class Settled:
 
 @dataclass(frozen=True)
 class Held:
-    """Result of a hold: the peak of the held motion, errors of the table as in `Settled`, after `updates` corrections.
+    """Result of a hold: the peak of the held motion, and the errors of the table as in `Settled`.
 
     `control` is the rms of the control over the measured cycles, as a share of the amplitude, and `captured` the number
-    of cycles until the capture. `peak` is None where the hold was released for a `reason`. `rate` is that of the
-    deviation without control after the measurement.
+    of cycles until the capture. `peak` is None if the hold was released, for the stated `reason`. `rate` is the rate of
+    change of the deviation without control, after the measurement.
     """
 
     peak: SteadyPeak | None
@@ -83,15 +82,17 @@ class Held:
 
 
 JUDGED = (ACCELERATION, DISPLACEMENT, LASER_1, LASER_2)
-"""Signals of the steadiness criterion: those of the sensors, since the jitter of a laser's delay affects only their
-phase, but the amplitudes of u1 and drift, which are small differences.
+"""Signals of the steadiness criterion. These are the sensors' signals, since the jitter of a laser's delay affects only
+their phases, whereas it affects the amplitudes of u1 and drift, which are small differences.
 """
 
 LASERS = (2, 3)
 """Indices of the lasers in `JUDGED`."""
 
 SHORTEST = 10.0
-"""Shortest wait [s]: at high frequencies two windows of cycles are shorter than the transient of the frame."""
+"""Shortest wait for steadiness [s], since two windows of cycles are shorter than the frame's transient at high
+frequencies.
+"""
 
 PRECEDING = 96
 """Largest number of cycles before the measured ones from which the remaining transient is estimated."""
@@ -109,8 +110,8 @@ def settle_and_measure(
 ) -> Generator[Step, Outcome, Settled | Fallen]:
     """Hold the table at `sine` until every signal is steady, then measure.
 
-    A motion that is not steady within the settle limit is measured as modulated. Without block, the `frame` checks the
-    lasers.
+    A motion that is not steady within the settle limit is measured as modulated. In a test of the bare frame, its model
+    `frame` checks the lasers.
     """
     detector = SteadyDetector(parameters.settle_tolerance, JUDGED, LASERS, sine.omega * accuracy.laser_timing)
     control = SineControl(
@@ -141,7 +142,7 @@ def settle_and_measure(
         # the first cycles after a correction of the drive are transient
         constant.extend(outcome.cycles if constant or not updates else outcome.cycles[TRANSIENT:])
         if ready:
-            # judge the measured cycles at twice the tolerance, since at the tolerance itself noise would decide
+            # twice the tolerance is allowed here, since noise would decide at the tolerance itself
             steadiness = detector.judge(allowance=2.0)
             if steadiness.steady or over:
                 used = outcome.cycles[-parameters.measured_cycles :]
@@ -170,16 +171,16 @@ def settle_and_measure(
 
 
 def linear_frame(configuration: BenchConfiguration) -> LinearFrame:
-    """The bare frame, whose tests check the lasers."""
+    """Model of the bare frame, with which its tests check the lasers."""
     grounded = configuration.laser_reference == "ground"
     return LinearFrame(configuration.known_specimen.bare(), grounded)
 
 
 def checked(sensors: SensorUncertainty, references: Iterable[Settled]) -> SensorUncertainty:
-    """Sensors whose linearity the steady tests of the bare frame have checked."""
+    """`sensors` with the checks of the lasers' linearity from the steady tests of the bare frame."""
     return replace(sensors, checks=tuple(each.peak.checks for each in references if each.peak.checks is not None))
 
 
 def preceding(constant: Sequence[Cycle], used: Sequence[Cycle]) -> Sequence[Cycle]:
-    """Cycles before the `used` ones at the end of those at a constant drive."""
+    """The cycles that precede the `used` ones, which are the last of those at `constant` drive."""
     return constant[: -len(used)][-PRECEDING:]

@@ -240,7 +240,7 @@ def _begin(task: Task, job: Job, tick: int) -> None:
 
 
 def _goes_with(waiting: Job, fired: Job) -> bool:
-    """Whether the starting job supplies every signal, trigger, clock or both, that a waiting job awaits."""
+    """Whether the starting job supplies all signals (trigger, clock) for which a job waits."""
     triggered = waiting.awaited is None or _same(waiting.awaited, fired.start_terminal)
     return triggered and (waiting.source is None or _same(waiting.source, fired.clock_terminal))
 
