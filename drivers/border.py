@@ -182,7 +182,7 @@ class CheckedRig:
         if isinstance(clock, CheckedClock):
             clock.now()
             if clock.fault:
-                raise BackendFault(self.backend, f"has no time: {clock.fault}")
+                raise BackendFault(self.backend, f"provides no time: {clock.fault}")
 
     def _number(self, name: str, highest: float) -> float:
         value, item = self._given(name), name.replace("_", " ")

@@ -21,7 +21,9 @@ class RecordedRun(Protocol):
         ...
 
     def counts(self, first: int, n: int) -> Counts:
-        """Counts at `n` samples from index `first` on, shape (n, n_channels); they lie within one section."""
+        """Counts at `n` samples from index `first` on, shape (n, n_channels); the samples must lie within one
+        section.
+        """
         ...
 
 
@@ -76,7 +78,7 @@ class Course(Protocol):
 
 
 class ReplayRig(RigBase):
-    """Rig that plays the next recorded run at each arming.
+    """Rig that replays the next recorded run at each arming.
 
     The drive is checked as in every rig but has no effect. A block ends early at a gap or the end of the recording;
     after a gap the next block begins at a later sample, and the samples of the gap consume no drive. `lead` is by

@@ -107,8 +107,8 @@ class OperatorTask(StrEnum):
     UNLOCK_TABLE = "unlock table"
     WATCH_BLOCK = "watch block"
     """The block stands alone, without spring, and the laser of storey 2 points horizontally at its face on the frame's
-    side, at the height of the amount above the table [m]: see `sim.block_face`. No spring can be mounted in this state;
-    without a block the laser has no target."""
+    side, at the height above the table given by the amount [m]: see `sim.block_face`. No spring can be mounted in this
+    state; without a block the laser has no target."""
     WATCH_STOREYS = "watch storeys"
     """The laser of storey 2 is aimed at its storey again."""
     TILT_BLOCK = "tilt block"

@@ -85,9 +85,7 @@ class SpecimenHandling:
         return pull
 
     def _free(self, now: Arrangement) -> Specimen:
-        """The present specimen with free storeys: every task that changes a clamped frame's specimen unlocks the
-        frame.
-        """
+        """The present specimen with free storeys, since every task on a clamped frame first unlocks it."""
         return now.specimen.model_copy(update={"frame": self._frame})
 
     @staticmethod
@@ -99,9 +97,13 @@ class SpecimenHandling:
 def _tilt(amount: float | None, now: Arrangement) -> float:
     """Rotation [rad] at which the block is held."""
     if now.specimen.beta is None:
-        raise RigError("tilt block is refused: there is no block on the table; watch block places it there")
+        raise RigError(
+            "tilt block is refused: there is no block on the table; carry out watch block first, to place it there"
+        )
     if now.specimen.beta > 0.0 or now.block_clamped:
-        raise RigError("tilt block is refused: the block does not stand alone; watch block removes its spring")
+        raise RigError(
+            "tilt block is refused: the block does not stand alone; carry out watch block first, to remove its spring"
+        )
     tilt = _needed("tilt", amount, "tilting the block requires its rotation in rad")
     block = now.specimen.block
     overturning = atan(block.b / block.h_b)

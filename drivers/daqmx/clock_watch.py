@@ -28,7 +28,7 @@ _ENDING = 2.0
 _MOST = 10_000
 
 Reading = tuple[float, int, float]
-"""Time before [s of the machine's clock], samples acquired, time after [s]."""
+"""A reading: time before [s of the machine's clock], number of samples acquired, time after [s]."""
 
 
 class ClockWatch:

@@ -14,13 +14,13 @@ from sim.errors import InvalidInput
 
 _READY = 2.0
 """Time-out for a server's first answer [s]."""
-_ENCRYPTED = ", and server_cert and server_key there; check the certificates and hardware.daq.tls.server_name"
+_ENCRYPTED = ", and for TLS server_cert and server_key; check the certificates and hardware.daq.tls.server_name"
 _PORT = 31763
 """Default port of NI gRPC Device Server (its README)."""
 
 
 class Connection:
-    """Connection to the driver of this PC or to a server, selected by the options for its tasks.
+    """Connection to the driver of this PC or of a server; it provides the options with which tasks are created there.
 
     Encrypted with `tls`; a `plain` connection may leave private networks. Raises DeviceNotFound if no server answers
     within 2 s, InvalidInput for an address without port, for a plain connection to a public network, and for

@@ -19,7 +19,8 @@ from drivers.daqmx.library import InputChannel
 
 @dataclass(frozen=True)
 class InputDelay:
-    """Delay of an input: its sample i is the signal `seconds` before edge i of the sample clock; negative: after it.
+    """Delay of an input: its sample i is the signal at `seconds` before edge i of the sample clock, after it if
+    negative.
 
     `uncertainty` is the standard uncertainty [s], infinite if the delay is unknown; `source` names the source of the
     value.
@@ -43,9 +44,9 @@ _SAMPLES = 40.0 + 5.0 / 512.0
 _FIGURE = 1.0e-6
 """Standard uncertainty of a delay in specifications [s]: rounding to two digits, and tolerance of analogue filters."""
 _KNOWN = {"9234": (2.6e-6, 5.0e-6), "9237": (4.5e-6, _FIGURE), "9239": (3.3e-6, _FIGURE)}
-"""Input delay of delta-sigma modules without a property for it: (40 + 5/512) samples and this time [s] with its
-standard uncertainty [s], from their specifications and NI's knowledge base, kA00Z0000004A0YSAU. No NI document was
-found that gives this time for the NI 9234; a value between those of related modules is assumed."""
+"""Input delay, by model, of delta-sigma modules without a property for it: time [s] in addition to (40 + 5/512)
+samples, and its standard uncertainty [s], from their specifications and NI's knowledge base, kA00Z0000004A0YSAU. No NI
+document was found that gives this time for the NI 9234; a value between those of related modules is assumed."""
 _CLOCKED = 1.0e-7
 """Standard uncertainty of a time determined by the device's clock [s], a few ticks."""
 _DELTA_SIGMA_BITS = 24
@@ -57,8 +58,8 @@ def input_delays(
 ) -> tuple[InputDelay, ...]:
     """The delay of each input of a clocked task, read from the device if it has a property for it, else tabulated.
 
-    `devices` are the devices of the channels, in order. If a device can remove the delay itself, this function is
-    switched off, so that the delay is removed in one place only.
+    `devices` are the devices of the channels, in order. Removal of the delay by the device itself is switched off, so
+    that the delay is removed in one place only.
     """
     several = len({device.name for device in devices}) > 1
     steps: dict[str, float | None] = {}

@@ -15,7 +15,7 @@ from drivers.daqmx.parameters import AnalogInput, Daq, Tls, device_name
 from sim.errors import InvalidInput
 
 _PATIENCE = 5.0
-"""Time for a call to a server [s]: the driver behind it may have to load."""
+"""Time allowed for a call to a server [s], whose driver may have to load first."""
 
 T = TypeVar("T")
 

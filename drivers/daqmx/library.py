@@ -47,7 +47,7 @@ class PhysicalInput(Named, Protocol):
 
 
 class Device(Named, Protocol):
-    """A DAQ device; reading a property that it lacks raises."""
+    """A DAQ device; reading a property that it lacks raises DaqError."""
 
     @property
     def product_type(self) -> str: ...

@@ -48,7 +48,7 @@ class Output:
             raise
 
     def prepare(self, trigger: str) -> None:
-        """Create a new task with the output at zero that starts on `trigger`."""
+        """Create a new task, with the output at zero, that starts on `trigger`."""
         self.clear()
         self.zero()
         task = self._make()
@@ -72,7 +72,7 @@ class Output:
         self._prefilled += volts.size
 
     def arm(self) -> None:
-        """Arm the task on its trigger; it must have samples."""
+        """Arm the task on its trigger; samples must have been written."""
         with translated("arming the output"):
             if self._task is not None:
                 self._task.start()

@@ -93,7 +93,7 @@ class EnableLine:
 WATCHDOG_TASK = "rockbench_watchdog"
 
 _PER_TIMEOUT = 4
-"""Number of resets within one time-out, at most."""
+"""Largest number of resets within one time-out."""
 _REFUSED = {
     int(DAQmxErrors.WATCHDOG_TIMER_NOT_SUPPORTED): "{device} has no watchdog: remove hardware.daq.watchdog",
     int(DAQmxErrors.WATCHDOG_TIMEOUT_OUT_OF_RANGE_AND_NOT_SPECIAL_VAL): "it is outside the range of {device}",

@@ -112,7 +112,8 @@ class Tasks:
 
     def rest(self) -> None:
         """Open the relay, stop the tasks, set the output to 0 V. Attempts every step, even after a failure or an
-        interrupt. Raises an error that is not a RigError, else the first failure of relay or output.
+        interrupt. Raises an error that is not a RigError, if there was one, otherwise the first failure of relay or
+        output.
         """
         failures: list[BaseException] = []
 
@@ -269,7 +270,7 @@ _UNKNOWN = ("FAILED_PRECONDITION", "NOT_FOUND")
 
 
 def clear_stale(connection: Connection, devices: Iterable[str]) -> tuple[str, ...]:
-    """Clear tasks of this program's names, and reset the devices if there were any; returns the names found.
+    """Clear existing tasks that have this program's names, and then reset the devices; returns the names found.
 
     Raises DeviceNotFound while another client drives the output. An idle client cannot be distinguished from a dead
     one: it loses its tasks, and its next `prepare` raises ConnectionLost.

@@ -175,7 +175,7 @@ class EmulatedBench:
 
     @property
     def fallen(self) -> bool:
-        """Whether the block is held by its catch."""
+        """Whether the block has fallen and is held by its catch."""
         return self._bench.fallen
 
     def _idle(self) -> None:
@@ -189,7 +189,7 @@ class EmulatedBench:
         n = self.tick() - first
         if n <= 0:
             return
-        # the output continues whatever the amplifier's state
+        # the output continues to play, whatever the state of the amplifier
         volts = np.zeros(n) if self._output is None else self._output(first, n)
         counts = self._bench.run(volts if self._enabled else np.zeros(n))
         for column, live in self._outputs.items():

@@ -185,5 +185,5 @@ def _result(address: str, command: str, line: bytes) -> Any:
             return answer["result"]
         error = str(answer["error"])
     except (ValueError, TypeError, KeyError):
-        raise RigError(f"invalid reply of {address} to {command}: check that it is an emulated laboratory") from None
+        raise RigError(f"invalid reply from {address} to {command}: check that it is an emulated laboratory") from None
     raise RigError(error)

@@ -15,7 +15,7 @@ from sim.virtual_bench import VirtualBenchParameters
 
 Connection = Literal["serial", "analogue"]
 Device = Literal["usb", "crio", "cDAQ-9174", "cDAQ-9185", "cRIO-9045", "cRIO-9049", "PCIe-6351", "USB-6351"]
-"""Selectable devices: two sets with a calibration polynomial, USB-6363 and cRIO-9045 with NI 9239, and the zoo's."""
+"""Selectable devices: two sets with a calibration polynomial, USB-6363 and cRIO-9045 with NI 9239, and `zoo`'s."""
 
 _VALUES = 4
 """Number of values per measurement on the serial line: distance, counter, and the two halves of the time stamp."""
@@ -108,10 +108,10 @@ def _contacts(devices: Sequence[DeviceModel], relays: DeviceModel) -> tuple[str,
 
 
 def sensors_within(parameters: VirtualBenchParameters, span: float) -> VirtualBenchParameters:
-    """The virtual bench with sensors whose outputs use inputs of +-`span` [V] as they use those of its converter.
+    """The virtual bench with its sensors rescaled from the range of its converter to inputs of +-`span` [V].
 
-    A laboratory connects sensors, and load resistors of the lasers, that match its inputs: at the 5 V of an NI 9234
-    those for 10 V would reach half of their measuring ranges, and the limits of the bench would never trip.
+    The sensors of a laboratory, and the load resistors of its lasers, match its inputs. At the 5 V of an NI 9234,
+    sensors for 10 V would reach only half of their measuring ranges, and the limits of the bench would never trip.
     """
     share = min(1.0, span / parameters.converter.range)
     changed: dict[str, Parameters] = {}

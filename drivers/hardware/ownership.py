@@ -1,4 +1,4 @@
-"""Locks that prevent two programs from opening a device: opening resets it, which would end the other's run.
+"""Locks on devices. Opening a device resets it, which would end the run of another program that uses it.
 
 Each device and serial port has a lock file on this machine. The operating system releases the lock when the process
 ends for any reason. The owner's name is in a second file, because a locked file cannot be read on Windows.

@@ -166,7 +166,7 @@ class HardwareRig(RigBase):
         """
         watched = [] if self._watch is None else self._watch.take()
         for before, count, after in watched:
-            # an earlier reading may be of the previous run
+            # an earlier reading may be from the previous run
             if before > self._started:
                 tracks.observe(before, count, after)
         if self._watch is not None and self._watch.alive and (watched or times == _FIRST_READINGS):

@@ -96,7 +96,7 @@ class Track:
 class Tracks:
     """Tracks of sensors that stream from construction on: call `begin` for each run, then `counts` for each block.
 
-    The sensors are closed by `close`, and if one of them cannot be started.
+    `close` closes the sensors; they are also closed if one of them cannot be started.
     """
 
     def __init__(self, tracks: Sequence[Track]) -> None:

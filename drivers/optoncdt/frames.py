@@ -205,7 +205,7 @@ class Assembler:
             expected = passed * (TICK * self._rate)
             turns = np.maximum(np.rint((expected - steps) / COUNTER_TURN), 0.0).astype(np.int64)
             steps = steps + turns * COUNTER_TURN
-            # in a gap in which the two may differ by a full period of the counter, the number of wraps is ambiguous
+            # in a gap so long that the clocks may differ by a period of the counter, the number of wraps is ambiguous
             slack = 2.0 * _SLACK + _RATE_SLACK * expected
             jump = (np.abs(expected - steps) > slack) | (slack > COUNTER_TURN // 2)
         if jump.any():

@@ -112,7 +112,7 @@ def _answer(dialogue: Dialogue, baud: int, command: str, tries: int) -> Answer |
             refusal = _refusal(dialogue, command)
         except DeviceTimeout:
             continue
-        # noise may resemble a prompt; only a name and a range count as a reply
+        # noise may resemble a prompt, so only a name and a range are accepted as a reply
         if (found := _identity(dialogue)) is not None:
             return Answer(baud, found, refusal)
     return None

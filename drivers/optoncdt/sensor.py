@@ -29,7 +29,7 @@ def require_sensor(
             f"{who} is a {info.model}, whose data format is not supported; connect an ILD1420, or correct the port"
         )
     if not isclose(info.measuring_range, measuring_range, rel_tol=1e-4):
-        allowed = f"{who} has a range of {info.measuring_range:g} m: correct it here, or the port of this laser"
+        allowed = f"{who} has a range of {info.measuring_range:g} m: correct this value, or the port of this laser"
         raise InvalidInput(f"hardware.{name}.measuring_range", measuring_range, allowed)
     if serial_number is not None and serial_number != info.serial:
         allowed = (

@@ -161,7 +161,7 @@ class SensorClock:
         points = self._bounds.points
         floor = floor_below(points, self._slope)
         delay = points.delay - self._slope * points.seconds - floor
-        # delays by bursts and by the scheduler add up and are rarely both short, so the smallest of n remains above
+        # delays due to bursts and to the scheduler add up and are rarely both short, so the smallest of n remains above
         # zero
         self._offset = floor - typical(delay) / np.sqrt(len(points))
         self._residual = float(np.sqrt(np.mean(delay**2)))

@@ -16,7 +16,7 @@ _KEPT = 120.0
 
 @dataclass(frozen=True)
 class Points:
-    """Readings at ascending `seconds` of one clock with their `delay` on another, shape (n,) both [s]."""
+    """Readings at ascending `seconds` of one clock, with their `delay` on another, shape (n,) each [s]."""
 
     seconds: NDArray[np.float64]
     delay: NDArray[np.float64]
@@ -37,7 +37,7 @@ class Bounds:
         return self._points
 
     def add(self, seconds: NDArray[np.float64], delay: NDArray[np.float64]) -> None:
-        """Add readings, shape (n,) both [s], none older than the last interval."""
+        """Add readings, shape (n,) each [s], none older than the last interval."""
         kept = self._points
         if seconds.size == 0:
             return
@@ -80,7 +80,7 @@ _QUARTER = 8
 """Minimum number of readings in a quarter of the history for the test in `bends`."""
 _CHANCE = 4.0
 """Multiple of mean/sqrt(n) that the smallest of n delays practically never exceeds, even if each is the sum of two
-delays, such as those by bursts and by the scheduler.
+delays, such as those due to bursts and to the scheduler.
 """
 
 _GROWTH = 0.02

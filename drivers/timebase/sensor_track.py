@@ -13,7 +13,7 @@ from drivers.timebase.resampling import Marks, Plausibility, Resampler
 
 @dataclass(frozen=True)
 class Line:
-    """Linear relation of clocks: second `time` of one is second `seconds` of another, which runs `rate` times as fast.
+    """Linear relation of two clocks: `time` on the first is `seconds` on the second, which runs `rate` times as fast.
 
     The point (`time`, `seconds`) is close to the present, to avoid rounding errors on clocks that have run for weeks.
     """

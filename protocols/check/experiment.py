@@ -1,9 +1,9 @@
 # pyright: reportUnknownMemberType=false
 """Loop check of a bench: tests every channel and the path through the shaker at low level.
 
-1. The storeys are clamped to the table, so that all sensors measure one motion. All channels are acquired at rest. 2.
-If every sensor gives valid samples, the drive is calibrated and sines of equal velocity amplitude are driven. 3. The
-clamps are removed.
+1. The storeys are clamped to the table, so that all sensors measure one motion. All channels are acquired at rest.
+2. If every sensor gives valid samples, the drive is calibrated and sines of equal velocity amplitude are driven.
+3. The clamps are removed.
 """
 
 import textwrap
@@ -100,7 +100,7 @@ class LoopCheck(Prepared[CheckParameters]):
 
     @cached_property
     def prediction(self) -> Table:
-        """Drive required by the simulated shaker; NaN for a real one."""
+        """Drive required by the simulated shaker; NaN for a real shaker."""
         omega = np.array(sorted(self.parameters.omega))
         expected = expected_drive(omega, self.configuration)
         drive = np.full(omega.shape, np.nan) if expected is None else expected

@@ -70,7 +70,7 @@ _FINEST = 1e-5
 """Step of the search for the dead time [s]."""
 
 _SIGN = "reverse the sign of {}, or the sensor: its signal is opposite to {}"
-_SCALE = "check {} and the calibration: the scale differs from {}"
+_SCALE = "check {} and the calibration: the scale differs from that of {}"
 _OWN_LATENCY = "the laser's internal latency is too long: raise its measuring rate, and disable its averaging"
 _SKEW = (
     "the two sensors show the same motion at different times: connect both to inputs of one module, or "
@@ -83,7 +83,7 @@ _OF_THE_LINE = {
     LOST: "check the cable, the RS422 adapter and its latency timer",
     IMPLAUSIBLE: "bits were changed on the line: check the cable, its shield and the RS422 adapter",
 }
-"""Remedies for values that a sensor measured but that did not arrive."""
+"""Remedies for values that were measured but arrived late, corrupted or not at all."""
 _MISSING = "the program does not read this input: make sure that its contact opens the enable chain directly"
 _ALONE = "nothing opens the enable relay if the program crashes: wire a heartbeat relay, or set a watchdog"
 

@@ -84,8 +84,7 @@ PROTOCOL = Protocol(
     summary="Check the loop of the configured bench at low level, and give a remedy for each line that fails.",
     details=(
         "Records every channel at rest, then drives sines of equal velocity with the frame locked to the "
-        "table, and checks polarity, scale and delay of all sensors, and the drive. The exit code is also 1 "
-        "if a line failed."
+        "table, and checks polarity, scale and delay of all sensors, and the drive. The exit code is 1 if a line fails."
     ),
     example="--config bench.toml",
     parameters=CheckParameters,

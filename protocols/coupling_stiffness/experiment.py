@@ -1,8 +1,8 @@
 """Identification of the stiffness of mounted springs, which is written to a specimen file for other runs.
 
-1. Decays of the bare frame are measured after pulses, unless a previous identification is used. 2. Each spring is
-mounted with the block clamped to the table, and decays are measured again. 3. The stiffness of the spring is the
-difference of the first storey's stiffnesses.
+1. Decays of the bare frame are measured after pulses, unless a previous identification is used.
+2. Each spring is mounted with the block clamped to the table, and decays are measured again.
+3. The stiffness of the spring is the difference between the two stiffnesses of the first storey.
 """
 
 from collections.abc import Callable, Generator, Sequence

@@ -40,8 +40,8 @@ SOURCE = "shift of the frame's modes with the block held"
 @dataclass(frozen=True, eq=False)
 class Reference:
     """Bare frame: `values` of the quantities `names`, shape (n,), k1 and k2 first. `apart`, shape (n, n), is their
-    covariance without the contributions of masses and timebase; `shift`, shape (n, 3), holds their sensitivities to
-    these.
+    covariance without the contributions of masses and timebase; `shift`, shape (n, 3), holds the sensitivities of the
+    quantities to both masses and the timebase.
     """
 
     names: tuple[str, ...]

@@ -1,9 +1,11 @@
 """Steps of the seismic campaign (section 5 of the paper).
 
 1. With the bare frame, the table is identified unless it is known. Then, for every record, the drive is iterated until
-the table follows the record, and is played once more for the measurement. 2. Each spring is mounted in turn, and every
-record is played with the drive found with the bare frame. If the block topples, the record is ended and the block is
-set upright. The springs form the outer loop, since they are changed by hand.
+   the table follows the record, and is played once more for the measurement.
+2. Each spring is mounted in turn, and every record is played with the drive found with the bare frame. If the block
+   topples, the record is ended and the block is set upright.
+
+The springs form the outer loop, since they are changed by hand.
 """
 
 from collections import Counter

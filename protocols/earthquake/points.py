@@ -157,7 +157,7 @@ def _remarks(found: Compared, observed: Observed) -> Iterator[str]:
     if agreement is not None and abs(agreement - 1.0) > ALIKE:
         yield (
             f"the table's displacement sensor measures {agreement:.3f} times the motion measured by its "
-            "accelerometer and is not used"
+            "accelerometer, and is therefore not used"
         )
 
 

@@ -65,16 +65,17 @@ class EarthquakeParameters(Parameters):
     spectrum_tolerance: float = quantity(
         0.01,
         "1",
-        "error of the table's response spectrum, excluding noise, from 0.1 to 1 s and at the periods of the "
-        "frame, which must also be reached for the passes to end",
+        "tolerance for the error of the table's response spectrum, excluding noise, from 0.1 to 1 s and at the "
+        "periods of the frame; the passes end when both tolerances are met",
         gt=0,
         lt=1,
     )
     usable: float = quantity(
         0.05,
         "1",
-        "rms error, excluding noise, relative to the record's rms, up to which the best drive is used if the "
-        "passes end before the tolerance is met, because of a limit, their number, or missing samples",
+        "largest rms error, excluding noise, relative to the record's rms, with which the best drive is still used "
+        "if the passes end before the tolerances are met, because of a limit, the number of passes, or missing "
+        "samples",
         gt=0,
         lt=1,
     )
@@ -178,10 +179,10 @@ PROTOCOL = Protocol(
     name="earthquake",
     summary="Earthquake records on the bare and the coupled frame: gain coefficient alpha_2 against prediction.",
     details=(
-        "Each record is limited to a band, scaled, and fitted to the stroke; the drive is iterated with the "
-        "bare frame, and the record is played with every spring. The measured gain of the peak drift is "
-        "compared with the one predicted for the achieved motion of the table. A toppled block is a valid "
-        "result. Records are files, or synthetic:NAME."
+        "Each record is limited to a band, scaled, and fitted to the stroke; the drive is iterated with the bare "
+        "frame, and the record is played with every spring. The measured gain of the peak drift is compared with the "
+        "gain predicted for the achieved motion of the table. A toppled block is a valid result. Records are files, "
+        "or synthetic:NAME."
     ),
     example="RECORD.AT2 --beta 0.25 0.64",
     parameters=EarthquakeParameters,

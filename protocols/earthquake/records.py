@@ -199,7 +199,7 @@ class Shaking:
 
 
 def band_used(parameters: EarthquakeParameters, configuration: BenchConfiguration) -> tuple[float, float]:
-    """Band [Hz] to which records are filtered. Raises InvalidInput for a band beyond that of the table."""
+    """Band [Hz] to which records are filtered. Raises InvalidInput for a band beyond the table's."""
     low, high = configuration.table_band
     band = band_of(parameters.table_band, configuration)
     if band is None:

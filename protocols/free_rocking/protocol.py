@@ -30,7 +30,7 @@ class FreeRockingParameters(Parameters):
         "direction in which the top of the block is tilted: towards the frame, away from it, or alternating",
     )
     height: float = quantity(0.30, "m", "height above the table at which laser 2 measures the block", gt=0)
-    height_uncertainty: float = quantity(0.001, "m", "standard uncertainty of that height", ge=0)
+    height_uncertainty: float = quantity(0.001, "m", "standard uncertainty of the height", ge=0)
     side_uncertainty: float = quantity(
         1e-4, "m", "standard uncertainty of the measured width and height of the block", ge=0
     )
@@ -55,12 +55,14 @@ class RockingPoint(Parameters):
     r_th: float = quantity(..., "1", "theoretical restitution of the block as measured, 1 - 2 M b^2 / J")
     r_th_uncertainty: float = quantity(..., "1", f"{_EXPANDED} of r_th, due to the block's sides")
     ratio: float = quantity(..., "1", "r_exp / r_th, the restitution factor of the configured block")
-    ratio_uncertainty: float = quantity(..., "1", f"{_EXPANDED} of the ratio, excluding that of r_th")
+    ratio_uncertainty: float = quantity(..., "1", f"{_EXPANDED} of the ratio, excluding the uncertainty of r_th")
     r_motion: float | None = quantity(None, "1", "restitution from the fit of the exact nonlinear motion")
     r_motion_uncertainty: float | None = quantity(None, "1", f"{_EXPANDED} of r_motion")
     r_amplitudes: float = quantity(..., "1", "restitution from the amplitudes of the swings alone")
     r_amplitudes_uncertainty: float = quantity(..., "1", f"{_EXPANDED} of r_amplitudes")
-    trend: float = quantity(..., "1", "change of r from zero impact velocity to that of a fall from the critical angle")
+    trend: float = quantity(
+        ..., "1", "change of r between zero impact velocity and the velocity of a fall from the critical angle"
+    )
     trend_uncertainty: float = quantity(..., "1", f"{_EXPANDED} of the trend")
     alpha_rad: float = quantity(..., "rad", "critical angle from the motion")
     alpha_uncertainty_rad: float = quantity(..., "rad", f"{_EXPANDED} of alpha_rad, mainly from the laser's scale")
@@ -77,7 +79,7 @@ class RockingPoint(Parameters):
         "push at the release, expressed as the relative change of the tilt that would have the same effect",
     )
     birge: float | None = quantity(
-        None, "1", "scatter of r_motion over the tilts, relative to that expected from the uncertainties"
+        None, "1", "scatter of r_motion over the tilts, relative to the scatter expected from the uncertainties"
     )
     uncertainty_parts: str = quantity("", "", "standard uncertainty of r_exp by contribution, JSON object")
     remarks: str = quantity("", "", "remarks on the tilt")
@@ -85,7 +87,7 @@ class RockingPoint(Parameters):
 
 PROTOCOL = Protocol(
     name="free-rocking",
-    summary="Free rocking of the block: restitution of its impacts, measured over theoretical.",
+    summary="Free rocking of the block: ratio of measured to theoretical restitution of its impacts.",
     details=(
         "The stand-alone block on a locked table is repeatedly tilted and released by hand; a laser measures "
         "its face. The exact nonlinear motion is fitted to each recording, and the amplitudes of the swings "

@@ -42,7 +42,7 @@ _FIT = "impacts of "
 """Prefix for the names of fits of single impacts."""
 
 _MOTION = (("r_motion", "r_exp"), ("r_motion_uncertainty", "r_exp_uncertainty"))
-"""Present field names, and those of older files, whose result is always from the fit."""
+"""Field names, with their names in older files, whose result is always from the fit."""
 
 
 @dataclass(frozen=True, eq=False)

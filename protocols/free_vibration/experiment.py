@@ -1,10 +1,11 @@
 """Identification of stiffness and damping of the bare frame from free vibration, written to a specimen file for other
 runs.
 
-1. The block is removed. 2. For releases by hand, the table is locked, and storey 2 is displaced and released for each
-decay. For pulses, the table is probed with increasing drive, from one too small to cause damage up to the required
-drift. 3. Each decay is recorded, fitted and published; an unusable decay is repeated once. 4. The result combines all
-decays.
+1. The block is removed.
+2. For releases by hand, the table is locked, and storey 2 is displaced and released for each decay. For pulses, the
+   table is probed with increasing drive, from one too small to cause damage up to the required drift.
+3. Each decay is recorded, fitted and published; an unusable decay is repeated once.
+4. The result combines all decays.
 """
 
 from collections.abc import Generator, Sequence

@@ -58,8 +58,8 @@ class Conditions:
     def slope(self, name: str, peak: SteadyPeak) -> float:
         """d ln alpha_2 / d ln amplitude of a branch, with both tests at the same amplitude; 0 at the end of the branch.
 
-        Central difference between orbits of the steady solver; the motions of the resting block and of the bare frame
-        are proportional to the amplitude.
+        Central difference between orbits of the steady solver. The gains of the resting block and of the bare frame do
+        not depend on the amplitude.
         """
         around = (peak.amplitude * (1.0 - AMPLITUDE_STEP), peak.amplitude * (1.0 + AMPLITUDE_STEP))
         less, more = (predict_gain(self.specimen, self.omega, each).layers.get(name) for each in around)

@@ -2,9 +2,9 @@
 
 1. Bare frame: calibrate the drive; then, at each frequency, hold the amplitude, wait for the steady state, and measure.
 2. Each spring: mount it, and calibrate the drive again at a level that leaves the block at rest; then, at each
-frequency, try the planned starts until the motion becomes steady. If a start topples the block, the test is ended, the
-block is set upright, and the next start is tried. If no start leads to a steady motion, the first motion without a fall
-is reported.
+   frequency, try the planned starts until the motion becomes steady. If a start topples the block, the test is ended,
+   the block is set upright, and the next start is tried. If no start leads to a steady motion, the first motion without
+   a fall is reported.
 """
 
 from collections.abc import Generator, Mapping, Sequence

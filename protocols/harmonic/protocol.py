@@ -116,7 +116,7 @@ class HarmonicPoint(Parameters):
     )
     alpha_2_greatest_high: float | None = quantity(None, "1", "upper end of the range of alpha_2_greatest_predicted")
     repeats_predicted: int | None = quantity(
-        None, "1", "predicted number of cycles after which the free motion repeats; absent: it does not repeat"
+        None, "1", "predicted number of cycles after which the free motion repeats; absent if it does not repeat"
     )
     falls_predicted: float | None = quantity(
         None, "1", "share of the specimens within the uncertainty whose block falls in a free motion"
@@ -137,8 +137,8 @@ class HarmonicPoint(Parameters):
     multiplier: float | None = quantity(
         None,
         "1",
-        "measured modulus of the slowest multiplier of an unsteady motion, or of a held one after its release; below "
-        "1, the motion becomes periodic",
+        "measured modulus of the slowest multiplier of an unsteady motion, or of a held motion after its release; "
+        "below 1, the motion becomes periodic",
     )
     multiplier_uncertainty: float | None = quantity(None, "1", "expanded uncertainty of the multiplier (k = 2)")
     multiplier_angle_rad: float | None = quantity(

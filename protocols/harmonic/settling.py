@@ -90,9 +90,7 @@ LASERS = (2, 3)
 """Indices of the lasers in `JUDGED`."""
 
 SHORTEST = 10.0
-"""Shortest wait for steadiness [s], since two windows of cycles are shorter than the frame's transient at high
-frequencies.
-"""
+"""Shortest wait for steadiness [s]; two windows of cycles may be shorter than the frame's transient."""
 
 PRECEDING = 96
 """Largest number of cycles before the measured ones from which the remaining transient is estimated."""

@@ -44,7 +44,7 @@ class Identification(Prepared[IdentifyParameters]):
 
     @cached_property
     def forecast(self) -> Forecast:
-        """Demands of the strongest multisine, scaled from its level, since all motions are linear."""
+        """Demands of the strongest multisine, known from its planning, since all motions are linear."""
         self.progress("predicting the demands of the run")
         found = self._found
         where = f"a multisine of {found.level:.3g} m/s2"

@@ -2,9 +2,9 @@
 
 Under a slow sine of the table with displacement x and velocity v, a laser's reading is r = x + e(r) - d v + c omega^2
 x. Here e is the laser's position-dependent error, d its delay, and c the effect of the clamps, which are compliant and
-accelerate the storeys; passes at two frequencies separate c from a scale error. All are fitted by least squares to the
-mean cycles of the passes, at equal steps of the phase, with e as Chebyshev polynomials of the reading. The table's
-motion need not be a pure sine, since both sensors measure it.
+accelerate the storeys; passes at two frequencies separate c from a scale error. The three are fitted by least squares
+to the mean cycles of the passes, at equal steps of the phase; e is a sum of Chebyshev polynomials of the reading. The
+table's motion need not be a pure sine, since both sensors measure it.
 
 The order is chosen by cross-validation. It is the lowest order whose curves, fitted to all passes but one, predict the
 omitted pass as well as the best order does, within one standard error. The uncertainty of the curve combines the
@@ -167,7 +167,7 @@ def calibration(
     and `ranges` [m] are taken from the lasers' data sheets.
     """
     slopes = [curve.slope for curve in curves]
-    # true displacement, according to the mean span of the lasers, over measured displacement
+    # ratio of the true displacement, according to the mean span of the lasers, to the measured one
     factor = 1.0 / (1.0 - 0.5 * sum(slopes))
     found = [
         LaserCurve(

@@ -32,7 +32,7 @@ REST = 2.0
 """Time at rest in which the lasers are read and the signals are zeroed [s]."""
 
 SMALLER = 0.01
-"""Reduction of the amplitude from pass to pass, relative to the first."""
+"""Reduction of the amplitude from pass to pass, relative to the first amplitude."""
 
 END = 5.0
 """Expected duration of the last ramp and of the computation [s]."""
@@ -67,7 +67,7 @@ def expected_duration(parameters: LaserCalibrationParameters) -> float:
 
 
 def _measuring(parameters: LaserCalibrationParameters, after: int = 0) -> float:
-    """Expected duration of the passes after the first `after`, and of the end [s]."""
+    """Expected duration of the passes after the first `after`, of the last ramp and of the computation [s]."""
     lengths = [CHANGE + (SETTLING + parameters.cycles) * tau / omega for omega, _ in planned_passes(parameters)]
     return sum(lengths[after:]) + (END if after < len(lengths) else 0.0)
 

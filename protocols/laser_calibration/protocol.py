@@ -55,11 +55,11 @@ class CalibratedSensor(Parameters):
 
 PROTOCOL = Protocol(
     name="laser-calibration",
-    summary="Calibrate both lasers and the table's sensors with a slow motion common to all, with the frame locked.",
+    summary="Calibrate both lasers and the table's sensors against each other in a slow motion with the frame locked.",
     details=(
         "The storeys are clamped to the table, which moves slowly over the range of the later tests. The result is "
-        "the scale, the smooth linearity error and the delay of each laser, and their agreement. The key "
-        "`laser_calibration` in the configuration of other runs names the result, laser_calibration.json. "
+        "the scale, the smooth linearity error and the delay of each laser, and the agreement between the lasers. "
+        "The key `laser_calibration` in the configuration of other runs names the result, laser_calibration.json. "
         "Without options, a run has eight passes of 50 mm and takes about four minutes."
     ),
     example="--config bench.toml",

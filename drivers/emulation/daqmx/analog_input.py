@@ -62,8 +62,8 @@ def require_wiring(inputs: AnalogInputs, wiring: int) -> None:
 
 
 _AUTOMATIC_BUFFER = ((100.0, 1_000), (10_000.0, 10_000), (1.0e6, 100_000), (float("inf"), 1_000_000))
-"""Sample rates and, up to each of them, the samples per channel in the driver's default buffer (NI-DAQmx help, "How Is
-Buffer Size Determined?").
+"""Sizes of the driver's default buffer in samples per channel, with the highest sample rate for each (NI-DAQmx help,
+"How Is Buffer Size Determined?").
 """
 
 
@@ -273,7 +273,7 @@ class AnalogInput:
 
     @property
     def _ahead(self) -> int:
-        """Time from the tick of a sample to its last input [ticks], rounded up."""
+        """Time from the tick of a sample until its last input is sampled [ticks], rounded up."""
         return ceil(max(-float(self.delays.min()) * self._plant.tick_rate, 0.0))
 
     def raw(self, counts: Seen) -> NDArray[np.int16 | np.int32]:

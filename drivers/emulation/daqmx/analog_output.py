@@ -184,7 +184,7 @@ class AnalogOutput:
         run, taken = self._run, 0
         while True:
             with self._instant.next() as tick:
-                # atomically with the plant, which must not receive samples after their due time
+                # atomic with respect to the plant, which must not receive samples after their due time
                 if self._playing and generation.dry(tick - 1):
                     raise _dried_up(taken)
                 part = volts[taken : taken + max(generation.space(tick - 1), 0)]

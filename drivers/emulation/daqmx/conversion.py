@@ -57,6 +57,6 @@ def delta_sigma_rate(asked: float, converters: Sequence[DeltaSigma]) -> float:
 
 def conversion_period(fastest: float, channels: int, rate: float) -> float:
     """Time between the conversions of two channels of a multiplexer [s]: the shortest plus the settling time, or, at
-    sample rates that leave no time for it, an even part of the sample period.
+    sample rates that leave no time for it, an equal share of the sample period.
     """
     return min(fastest + (_PADDING if channels > 1 else 0.0), 1.0 / (rate * channels))

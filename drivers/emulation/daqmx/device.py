@@ -137,7 +137,7 @@ class DeviceModel:
 
 
 _NEWTON_STEPS = 3
-"""Newton steps to invert a calibration polynomial, which is almost linear: accurate to a fraction of a count."""
+"""Number of Newton steps that invert an almost linear calibration polynomial to a fraction of a count."""
 
 
 class InputConverter:

@@ -150,7 +150,7 @@ SINGLE: dict[str, DeviceModel] = {
 }
 
 NAMES = (*CHASSIS, *SINGLE)
-"""Every device that can be emulated by its name."""
+"""The devices that can be emulated, by name."""
 SUGGESTED = ("9205", "9263", "9401", "9485")
 """Modules in a chassis by default: inputs, output, digital inputs, relays."""
 

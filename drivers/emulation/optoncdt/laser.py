@@ -175,7 +175,7 @@ class EmulatedLaser:
             self._line.silent_until = time.monotonic() + seconds
 
     def split_words(self, allowed: bool = True) -> None:
-        """Allow answers to split values: whether a real sensor does so is not documented."""
+        """Allow answers to split values; whether a real sensor splits them is not documented."""
         with self._lock:
             self._line.splits_words = allowed
 

@@ -2,8 +2,8 @@
 
     w(t) = sin(phi) - sin(2 phi) / 2,    phi = 2 pi t / T,    0 <= t <= T
 
-Its first two derivatives are zero at both ends, and so is its mean. A table whose velocity follows the drive returns to
-its initial position; one whose acceleration follows the drive ends at rest. T = 2 pi / sqrt(omega_1 omega_2) excites
+Its first two derivatives are zero at both ends, and its mean is zero. A table whose velocity follows the drive returns
+to its initial position; one whose acceleration follows the drive ends at rest. T = 2 pi / sqrt(omega_1 omega_2) excites
 both modes.
 """
 

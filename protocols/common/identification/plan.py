@@ -1,8 +1,9 @@
 """Steps of an identification.
 
 1. The specimen is mounted. The table is probed with increasing drive, from one too small to cause damage up to the
-level. 2. Multisines with random phases are played, each from rest; their first periods are discarded. 3. Response,
-noise and distortion are computed from the periods.
+   level.
+2. Multisines with random phases are played, each from rest; their first periods are discarded.
+3. Response, noise and distortion are computed from the periods.
 """
 
 from collections.abc import Callable, Generator, Sequence
