@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from bench.analysis.cycles import Cycle, Waves, mean_amplitude, mean_waves
 from bench.analysis.linearity import Checks, Harmonics, LinearFrame
 from bench.analysis.remaining_transient import remaining_transient
-from bench.analysis.sensor_accuracy import Draws, PeakReadings, SensorUncertainty, SharedDraws
+from bench.analysis.sensor_accuracy import Draws, PeakReadings, SensorUncertainty, Shapes
 from bench.analysis.sensor_accuracy import SensorAccuracy as SensorAccuracy
 from bench.analysis.signals import ACCELERATION, DRIFT, LASER_1, LASER_2, U1
 from bench.analysis.uncertainty import COVERAGE as COVERAGE
@@ -71,10 +71,13 @@ class SteadyPeak:
 
 @dataclass(frozen=True)
 class Gain:
-    """alpha_2 with its expanded uncertainty (k = 2) and the budget of standard uncertainties."""
+    """alpha_2 with its expanded uncertainty (k = 2), the budget of standard uncertainties, and the `shapes` of the
+    linearity errors that it is based on.
+    """
 
     alpha_2: float
     budget: Budget
+    shapes: Shapes
 
     @property
     def uncertainty(self) -> float:
@@ -99,12 +102,11 @@ def steady_peak(
     the same drive; `residual`, the relative bound of a further systematic effect, is treated as a rectangular
     distribution. The harmonics of the readings of a linear `frame` check the linearity of the lasers.
     """
-    waves = mean_waves([*before, *cycles], {DRIFT: PEAK_HARMONICS})
-    series = waves.there[:, DRIFT]
     waves = mean_waves(cycles, {DRIFT: PEAK_HARMONICS})
+    every = mean_waves([*before, *cycles], {DRIFT: PEAK_HARMONICS}) if before else waves
     drift = float(waves.peaks[DRIFT])
     scatter = _standard_error(waves.there[:, DRIFT])
-    transient = hypot(remaining_transient(series, len(cycles)), residual * drift / sqrt(3.0))
+    transient = hypot(remaining_transient(every.there[:, DRIFT], len(cycles)), residual * drift / sqrt(3.0))
     readings = _readings(waves, omega, drift, at_rest=False)
     checks = None if frame is None else _checks(cycles, waves, omega, frame)
     return replace(_peak(cycles, waves, readings, scatter, transient, float(waves.peaks[U1])), checks=checks)
@@ -193,17 +195,13 @@ def _standard_error(series: NDArray[np.float64]) -> float:
     return sqrt(variance / effective)
 
 
-def shared_draws() -> SharedDraws:
-    """Random draws for `gain`, made once for a running gain."""
-    return SharedDraws(SEED, DRAWS)
-
-
 def gain(
     coupled: SteadyPeak,
     bare: SteadyPeak,
     sensors: SensorUncertainty,
     amplitude_slope: float = 0.0,
-    shared: SharedDraws | None = None,
+    shared: Draws | None = None,
+    shapes: Shapes | None = None,
 ) -> Gain:
     """alpha_2 = peak drift coupled / peak drift bare (Eq. 10) at one frequency.
 
@@ -216,18 +214,20 @@ def gain(
     gain at the stated amplitude; it cancels for a proportional response. The bare test checks the linearity of the
     lasers, unless `sensors` has checks already, from several tests.
 
-    With `shared` draws the uncertainty differs by at most 1e-9 (relative), and its calculation takes a fraction of the
-    time.
+    With `shared` draws (`bench.analysis.running_gain`) the uncertainty differs by at most 1e-9 (relative), and its
+    calculation takes a fraction of the time. `shapes` are linearity errors of nearly the same motions, used in place of
+    those of the two peaks.
     """
     alpha = coupled.drift / bare.drift
-    draws = Draws(np.random.default_rng(SEED), DRAWS) if shared is None else shared.again()
-    if bare.checks is not None and not sensors.checks:
-        sensors = replace(sensors, checks=(bare.checks,))
-    errors = sensors.drift_errors((bare.readings, coupled.readings), draws)
+    draws = Draws(np.random.default_rng(SEED), DRAWS) if shared is None else shared
+    sensors = sensors.checked_by(bare.checks)
+    seen = (bare.readings, coupled.readings)
+    found = sensors.shapes(seen) if shapes is None else shapes
+    errors = sensors.drift_errors(seen, draws, found)
     parts = {name: float(np.std(each[1] / coupled.drift - each[0] / bare.drift)) for name, each in errors.items()}
     parts |= {
         "scatter of the cycles": hypot(coupled.scatter / coupled.drift, bare.scatter / bare.drift),
         "remaining transient": hypot(coupled.transient / coupled.drift, bare.transient / bare.drift),
         "amplitude of the table": abs(amplitude_slope) * sensors.table_scale,
     }
-    return Gain(alpha, Budget({name: alpha * value for name, value in parts.items()}))
+    return Gain(alpha, Budget({name: alpha * value for name, value in parts.items()}), found)

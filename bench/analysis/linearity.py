@@ -129,6 +129,10 @@ class LinearityErrors:
     moments: Array
     waves: float
 
+    def scaled(self, factors: Sequence[float]) -> "LinearityErrors":
+        """These errors times one factor per test."""
+        return replace(self, moments=self.moments * np.outer(factors, factors))
+
     def draws(self, normal: Array) -> Array:
         """Draws of the errors [m], shape (tests, n), from standard normal numbers of that shape."""
         tests = len(self.moments)

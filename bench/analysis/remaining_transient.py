@@ -8,6 +8,8 @@ mean square is the squared uncertainty.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
 from math import pi, sqrt
 
 import numpy as np
@@ -44,17 +46,57 @@ def remaining_transient(series: Array, measured: int) -> float:
     if n < FEWEST:
         return float(np.ptp(series))
     varying = series - series.mean()
-    coarse = _modes(*np.meshgrid(DECAYS, ANGLES, indexing="ij"), n)
-    k = int(_fitted(varying, coarse, measured)[0].argmin())
-    decay, angle = divmod(k, len(ANGLES))
-    fine = _modes(*np.meshgrid(_around(DECAYS, decay), _around(ANGLES, angle), indexing="ij"), n)
-    squares, shifts, gains = _fitted(varying, np.concatenate((coarse, fine)), measured)
+    coarse = _coarse(n, measured).fitted(varying)
+    decay, angle = divmod(int(coarse[0].argmin()), len(ANGLES))
+    fine = _fine(n, measured, decay, angle).fitted(varying)
+    squares, shifts, gains = (np.concatenate(each) for each in zip(coarse, fine, strict=True))
     least = float(squares.min())
     scatter = least / max(n - 5, 1)
     if scatter <= (ROUNDING * float(np.abs(series).max())) ** 2:
         return abs(float(shifts[squares.argmin()]))
     likely = np.exp(-0.5 * CAUTION * (squares - least) / scatter)
     return sqrt(float(likely @ (shifts**2 + scatter * gains) / likely.sum()))
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """Least squares of a constant and both parts of each of K modes over n cycles: `modes`, shape (K, n, 3), the
+    `inverse` of their normal equations, (K, 3, 3), the mean of the parts over the measured cycles, `share`, (K, 3), and
+    the variance of the mode's mean relative to that of white noise, `gains`, (K,).
+    """
+
+    modes: Array
+    inverse: Array
+    share: Array
+    gains: Array
+
+    @staticmethod
+    def of(decays: Sequence[float] | Array, angles: Sequence[float] | Array, n: int, measured: int) -> "_Fit":
+        """The fit of every modulus with every angle [rad]."""
+        modes = _modes(*np.meshgrid(decays, angles, indexing="ij"), n)
+        # the imaginary part of a mode with psi = 0 or pi is zero
+        normal = modes.transpose(0, 2, 1) @ modes
+        inverse = np.asarray(np.linalg.pinv(normal, rcond=1e-13, hermitian=True), dtype=np.float64)
+        share = modes[:, -measured:].mean(axis=1)
+        share[:, 0] = 0.0
+        return _Fit(modes, inverse, share, np.einsum("ki,kij,kj->k", share, inverse, share))
+
+    def fitted(self, series: Array) -> tuple[Array, Array, Array]:
+        """For each mode: sum of squares of the residuals, mean of the fitted mode over the measured cycles, `gains`."""
+        found = np.einsum("kij,kj->ki", self.inverse, self.modes.transpose(0, 2, 1) @ series)
+        residuals = series - np.einsum("kni,ki->kn", self.modes, found)
+        return np.sum(residuals**2, axis=1), np.sum(self.share * found, axis=1), self.gains
+
+
+@lru_cache(maxsize=16)
+def _coarse(n: int, measured: int) -> _Fit:
+    return _Fit.of(DECAYS, ANGLES, n, measured)
+
+
+@lru_cache(maxsize=64)
+def _fine(n: int, measured: int, decay: int, angle: int) -> _Fit:
+    """The fit of modes around an element of the grid."""
+    return _Fit.of(_around(DECAYS, decay), _around(ANGLES, angle), n, measured)
 
 
 def _around(grid: Sequence[float], k: int) -> Array:
@@ -69,17 +111,3 @@ def _modes(decays: Array, angles: Array, n: int) -> Array:
     at = np.arange(n)
     turned = (decays.ravel() * np.exp(1j * angles.ravel()))[:, None] ** at
     return np.stack((np.ones(turned.shape), turned.real, turned.imag), axis=2)
-
-
-def _fitted(series: Array, modes: Array, measured: int) -> tuple[Array, Array, Array]:
-    """For each mode: sum of squares of the residuals, mean of the fitted mode over the measured cycles, and variance of
-    this mean relative to that of white noise.
-    """
-    transposed = modes.transpose(0, 2, 1)
-    # the imaginary part of a mode with psi = 0 or pi is zero
-    inverse = np.linalg.pinv(transposed @ modes, rcond=1e-13, hermitian=True)
-    found = np.einsum("kij,kj->ki", inverse, transposed @ series)
-    residuals = series - np.einsum("kni,ki->kn", modes, found)
-    share = modes[:, -measured:].mean(axis=1)
-    share[:, 0] = 0.0
-    return np.sum(residuals**2, axis=1), np.sum(share * found, axis=1), np.einsum("ki,kij,kj->k", share, inverse, share)

@@ -9,7 +9,7 @@ them.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -86,6 +86,21 @@ class PeakReadings:
 
 
 @dataclass(frozen=True, eq=False)
+class Shapes:
+    """Errors of the same peaks due to the linearity of each laser, and, after a calibration, of its reference sensor,
+    which is common to both.
+    """
+
+    lasers: tuple[LinearityErrors | None, LinearityErrors | None]
+    common: LinearityErrors | None = None
+
+    def scaled(self, factors: Sequence[float]) -> "Shapes":
+        """These errors times one factor per peak."""
+        first, second, common = (None if each is None else each.scaled(factors) for each in (*self.lasers, self.common))
+        return Shapes((first, second), common)
+
+
+@dataclass(frozen=True, eq=False)
 class SensorUncertainty:
     """Uncertainty of the sensors from data sheets or a calibration.
 
@@ -103,10 +118,21 @@ class SensorUncertainty:
         """Relative standard uncertainty of the scales of the table's sensors."""
         return self.accuracy.table_scale if self.calibration is None else self.calibration.table_uncertainty
 
-    def drift_errors(self, seen: Sequence[PeakReadings], draws: "Draws") -> dict[str, Array]:
-        """Errors [m] of the peaks in tests with the same lasers, by contribution; each has the shape (tests, n)."""
-        first, second = (self.linearity(k, seen, draws) for k in range(2))
-        errors = {LINEARITY: second - first + self._common(seen, draws)}
+    def checked_by(self, checks: Checks | None) -> "SensorUncertainty":
+        """These sensors, checked by one test of the bare frame unless they have the checks of several."""
+        return self if self.checks or checks is None else replace(self, checks=(checks,))
+
+    def drift_errors(
+        self, seen: Sequence[PeakReadings], draws: "Draws", shapes: "Shapes | None" = None
+    ) -> dict[str, Array]:
+        """Errors [m] of the peaks in tests with the same lasers, by contribution; each has the shape (tests, n).
+
+        `shapes` are those of `seen`, or of motions that differ little from them.
+        """
+        found = self.shapes(seen) if shapes is None else shapes
+        first, second = (self._linearity(laser, found.lasers[laser], len(seen), draws) for laser in (0, 1))
+        common = 0.0 if found.common is None else found.common.draws(draws.normal(len(seen)))
+        errors = {LINEARITY: second - first + common}
         mismatch = self.accuracy.laser_mismatch
         if self.calibration is not None:
             mismatch = self.calibration.differential_uncertainty
@@ -117,44 +143,49 @@ class SensorUncertainty:
         sides = np.array([[each.sign] for each in seen])
         return {name: sides * each for name, each in errors.items()}
 
-    def linearity(self, laser: int, seen: Sequence[PeakReadings], draws: "Draws") -> Array:
+    def _linearity(self, laser: int, shape: LinearityErrors | None, tests: int, draws: "Draws") -> Array:
         """Errors [m] of the peaks due to the linearity of laser 0 or 1, in each test, shape (tests, n)."""
-        normal = draws.normal(len(seen))
+        normal = draws.normal(tests)
         if self.calibration is None:
-            return self.shape(laser, seen).draws(normal)
-        found = self.calibration.lasers[laser]
-        low, high = found.lowest - found.rest, found.highest - found.rest
-        beyond = [_beyond(each.effect(laser), low, high) for each in seen]
-        errors = found.uncertainty * draws.normal(len(seen))
-        if not any(each.weights.size for each in beyond):
-            return errors
+            assert shape is not None
+            return shape.draws(normal)
+        errors = self.calibration.lasers[laser].uncertainty * draws.normal(tests)
+        return errors if shape is None else errors + shape.draws(normal)
+
+    def shapes(self, seen: Sequence[PeakReadings]) -> "Shapes":
+        """Errors of the peaks due to the unknown shapes of the linearity errors."""
+        return Shapes((self._shape(0, seen), self._shape(1, seen)), self._common(seen))
+
+    def _shape(self, laser: int, seen: Sequence[PeakReadings]) -> LinearityErrors | None:
+        """Errors of laser 0 or 1; of a calibrated one those beyond the covered readings, None if there are none."""
         whole = self.ranges[laser]
         limit = self.accuracy.laser_linearity * whole
-        return errors + linearity_errors(beyond, _shares(seen), limit, whole).draws(normal)
-
-    def shape(self, laser: int, seen: Sequence[PeakReadings]) -> LinearityErrors:
-        """Linearity errors of laser 0 or 1 without calibration, with the number of waves of its curve."""
-        whole = self.ranges[laser]
-        checks = [each[laser].rounded(self.accuracy.laser_resolution) for each in self.checks]
         effects = [each.effect(laser) for each in seen]
-        return linearity_errors(effects, _shares(seen), self.accuracy.laser_linearity * whole, whole, checks)
+        if self.calibration is None:
+            checks = [each[laser].rounded(self.accuracy.laser_resolution) for each in self.checks]
+            return linearity_errors(effects, _shares(seen), limit, whole, checks)
+        found = self.calibration.lasers[laser]
+        low, high = found.lowest - found.rest, found.highest - found.rest
+        beyond = [_beyond(each, low, high) for each in effects]
+        if not any(each.weights.size for each in beyond):
+            return None
+        return linearity_errors(beyond, _shares(seen), limit, whole)
 
-    def rough(self, seen: Sequence[PeakReadings]) -> tuple[str, ...]:
+    def rough(self, shapes: "Shapes") -> tuple[str, ...]:
         """Remarks on lasers whose linearity error is not smooth according to the tests of the bare frame."""
         if self.calibration is not None or not self.checks or self.accuracy.laser_linearity == 0.0:
             return ()
-        waves = [self.shape(laser, seen).waves for laser in (0, 1)]
         return tuple(
-            f"the linearity error of laser_{laser} is not smooth, it has about {each:.1f} waves over the range: "
+            f"the linearity error of laser_{laser} is not smooth, it has about {each.waves:.1f} waves over the range: "
             "`rockbench run laser-calibration` measures it"
-            for laser, each in enumerate(waves, 1)
-            if each > SMOOTH
+            for laser, each in enumerate(shapes.lasers, 1)
+            if each is not None and each.waves > SMOOTH
         )
 
-    def _common(self, seen: Sequence[PeakReadings], draws: "Draws") -> Array | float:
-        """Error of the reference sensor of the calibration, common to both lasers [m], shape (tests, n)."""
+    def _common(self, seen: Sequence[PeakReadings]) -> LinearityErrors | None:
+        """Errors of the reference sensor of the calibration, common to both lasers; None without a calibration."""
         if self.calibration is None:
-            return 0.0
+            return None
         effects = list[Effect]()
         for each in seen:
             first, second = each.effect(0), each.effect(1)
@@ -168,8 +199,7 @@ class SensorUncertainty:
             for each, curve in zip(test, curves, strict=True)
         ]
         limit = self.calibration.common_linearity
-        errors = linearity_errors(effects, _shares(seen), limit, min(self.ranges), checks)
-        return errors.draws(draws.normal(len(seen)))
+        return linearity_errors(effects, _shares(seen), limit, min(self.ranges), checks)
 
     def late(self, seen: PeakReadings, laser: int, draws: "Draws") -> Array:
         """Errors [m] due to the delay of a laser with a free-running clock, uniform within one measuring period, shape

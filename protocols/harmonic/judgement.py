@@ -133,7 +133,7 @@ def judge(settled: Settled, conditions: Conditions, starts: int, held: Held | No
         orbit = {"alpha_2_orbit": gained.alpha_2, "alpha_2_orbit_uncertainty": gained.uncertainty, "orbit_agrees": same}
     remarks = (
         *_remarks(settled, conditions.reference, name, layers, agrees, on_table, orbit),
-        *conditions.sensors.rough((bare.readings, peak.readings)),
+        *conditions.sensors.rough(measured.shapes),
     )
     point = HarmonicPoint(
         omega_rad_s=conditions.omega,

@@ -13,7 +13,8 @@ from math import tau
 import numpy as np
 
 from bench.analysis.cycles import Cycle
-from bench.analysis.gain import gain, shared_draws, steady_peak
+from bench.analysis.gain import steady_peak
+from bench.analysis.running_gain import RunningGain, shared_draws
 from bench.analysis.sensor_accuracy import SensorUncertainty
 from bench.config.model import BenchConfiguration
 from bench.control.oscillator import DriveCalibration, Leg
@@ -275,7 +276,9 @@ class HarmonicPlan:
         reference = self._bare.get(omega)
         bare = reference.peak if reference else None
         predicted = float("nan")
+        running: RunningGain | None = None
         if specimen is not None and bare is not None:
+            running = RunningGain(bare, self._sensors, self._draws)
             layer = predict_gain(specimen, omega, self._amplitude, bare.amplitude).rocking
             predicted = layer.alpha_2 if layer else predicted
 
@@ -284,9 +287,9 @@ class HarmonicPlan:
             evaluated += len(cycles)
             peak = steady_peak(cycles, omega)
             alpha_2 = uncertainty = float("nan")
-            if bare is not None and specimen is not None:
-                running = gain(peak, bare, self._sensors, shared=self._draws)
-                alpha_2, uncertainty = running.alpha_2, running.uncertainty
+            if running is not None:
+                found = running.of(peak)
+                alpha_2, uncertainty = found.alpha_2, found.uncertainty
             beta = specimen.label if specimen else None
             yield Publish(Estimate(omega, beta, evaluated, peak.drift, alpha_2, uncertainty, predicted))
             yield Publish(self._pace.progress(f"settling at {omega:g} rad/s", omega, evaluated))

@@ -10,8 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bench.analysis.cycles import Cycle, fit_cycle
-from bench.analysis.gain import DRAWS, SEED, SensorAccuracy, SteadyPeak, gain, modulated_peak, shared_draws, steady_peak
+from bench.analysis.gain import DRAWS, SEED, SensorAccuracy, SteadyPeak, gain, modulated_peak, steady_peak
 from bench.analysis.laser_calibration import LaserCalibration, LaserCurve
+from bench.analysis.running_gain import shared_draws
 from bench.analysis.sensor_accuracy import SCALES, Draws, PeakReadings, SensorUncertainty
 from bench.analysis.signals import ACCELERATION, DRIFT, LASER_2
 from tests.made_cycles import pure_cycle
@@ -195,7 +196,7 @@ def test_a_running_gain_with_shared_draws_has_the_uncertainty_of_the_result(
 ) -> None:
     sensors = SensorUncertainty(SensorAccuracy(laser_resolution=resolution), (0.2, 0.2), calibration)
     expected = gain(coupled, bare, sensors)
-    for found in (gain(coupled, bare, sensors, shared=SHARED) for _ in range(2)):
+    for found in (gain(coupled, bare, sensors, shared=SHARED.again()) for _ in range(2)):
         assert found.alpha_2 == expected.alpha_2
         assert found.uncertainty == pytest.approx(expected.uncertainty, rel=1e-9)
         assert found.budget.parts == pytest.approx(expected.budget.parts, rel=1e-6, abs=1e-9 * expected.uncertainty)

@@ -1,0 +1,49 @@
+"""Gain coefficient during a test, evaluated at every check of the motion."""
+
+import numpy as np
+
+from bench.analysis.gain import DRAWS, SEED, Gain, SteadyPeak, gain
+from bench.analysis.sensor_accuracy import PeakReadings, SensorUncertainty, Shapes, SharedDraws
+
+CHANGED = 0.003
+"""Change of a reading, relative to the swing of its laser, below which a running gain keeps the shapes of the linearity
+errors.
+"""
+
+
+class RunningGain:
+    """alpha_2 during a test, with the budget of `gain` but for the amplitude of the table, which has no slope yet.
+
+    The linearity errors of the lasers, which take most of the time, are evaluated again once the readings have changed
+    by `CHANGED`; until then they are those of the earlier motion, relative to its drift, which changes the uncertainty
+    by less than a hundredth.
+    """
+
+    def __init__(self, bare: SteadyPeak, sensors: SensorUncertainty, shared: SharedDraws) -> None:
+        self._bare, self._shared = bare, shared
+        self._sensors = sensors.checked_by(bare.checks)
+        self._kept: tuple[PeakReadings, Shapes] | None = None
+
+    def of(self, coupled: SteadyPeak) -> Gain:
+        """The gain of a peak."""
+        shapes: Shapes | None = None
+        if self._kept is not None and not _changed(self._kept[0], coupled.readings):
+            at, kept = self._kept
+            shapes = kept.scaled((1.0, coupled.readings.drift / at.drift))
+        found = gain(coupled, self._bare, self._sensors, shared=self._shared.again(), shapes=shapes)
+        if shapes is None:
+            self._kept = coupled.readings, found.shapes
+        return found
+
+
+def _changed(before: PeakReadings, after: PeakReadings) -> bool:
+    if before.zero.shape != after.zero.shape or before.sign != after.sign:
+        return True
+    allowed = CHANGED * np.array(after.swings)
+    moved = np.maximum(np.abs(after.zero - before.zero).max(axis=1), np.abs(np.subtract(after.lasers, before.lasers)))
+    return not bool((moved <= allowed).all())
+
+
+def shared_draws() -> SharedDraws:
+    """Random draws for `gain`, made once for a running gain."""
+    return SharedDraws(SEED, DRAWS)
