@@ -9,8 +9,6 @@ import threading
 import time
 from typing import Self
 
-import numpy as np
-
 _NAP = 0.005
 TYPICAL, WORST = 0.005, 0.1
 """Lateness that a real-time test must bear [s]: of 99 naps in 100, and of any nap. The emulated lasers are placed to
@@ -43,6 +41,9 @@ class Lateness:
         """Reason to disregard a failure, with the figures; None where the machine kept time."""
         if not self._late:
             return None
+        # here, because conftest.py sets the threads of numpy's library before numpy is imported
+        import numpy as np
+
         typical, worst = float(np.quantile(self._late, 0.99)), self.worst
         if typical <= TYPICAL and worst <= WORST:
             return None

@@ -31,3 +31,8 @@ def test_a_headless_run_needs_no_window_no_driver_and_no_plot_until_its_end() ->
 def test_the_command_line_starts_without_the_window() -> None:
     loaded = _run("import sys; import bench.app.cli.main; print(*sys.modules)").split()
     assert not {"PySide6", "pyqtgraph"} & {name.split(".")[0] for name in loaded}
+
+
+def test_the_number_of_threads_is_set_before_numpy_is_imported() -> None:
+    """By the configuration of the tests: numpy's library reads it once, and its threads compete with the processes."""
+    assert "numpy" not in _run("import sys; import tests.conftest; print(*sys.modules)").split()
