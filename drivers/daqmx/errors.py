@@ -130,7 +130,6 @@ def is_unsupported(error: DaqError) -> bool:
 
 
 def code_of(error: DaqError) -> int:
-    """The driver's error code."""
     return int(error.error_code)
 
 

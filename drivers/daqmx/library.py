@@ -85,8 +85,6 @@ class Device(Named, Protocol):
 
 
 class Version(Protocol):
-    """Version of the driver."""
-
     @property
     def major_version(self) -> int: ...
     @property
@@ -177,16 +175,12 @@ class Timing(Protocol):
 
 
 class StartTrigger(Protocol):
-    """Start trigger of a task."""
-
     @property
     def term(self) -> str: ...
     def cfg_dig_edge_start_trig(self, trigger_source: str) -> None: ...
 
 
 class Triggers(Protocol):
-    """The triggers of a task."""
-
     @property
     def start_trigger(self) -> StartTrigger: ...
 
@@ -211,8 +205,6 @@ class OutStream(Protocol):
 
 
 class Task(Named, Protocol):
-    """A task of the driver."""
-
     @property
     def channel_names(self) -> Sequence[str]: ...
     @property
@@ -238,8 +230,6 @@ class Task(Named, Protocol):
 
 
 class WatchdogTask(Protocol):
-    """The watchdog of a device."""
-
     expir_trig_trig_on_network_conn_loss: bool
 
     @property
@@ -317,7 +307,6 @@ def unscaled_reader(task: Task) -> UnscaledReader:
 
 
 def analog_writer(task: Task, *, auto_start: bool) -> AnalogWriter:
-    """Writes the output of a task."""
     writer = cast(Any, AnalogSingleChannelWriter)(task.out_stream, auto_start)
     writer.verify_array_shape = False
     return cast(AnalogWriter, writer)

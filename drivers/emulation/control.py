@@ -70,7 +70,6 @@ class ControlServer:
                 thread.start()
 
     def _serve(self, connection: socket.socket) -> None:
-        """The thread of one connection."""
         # a client may disconnect at any time
         with connection, suppress(OSError), connection.makefile("rb") as lines:
             for line in _requests(lines):

@@ -132,7 +132,6 @@ class SafetyChain:
         self._change(lambda: self._broken.add(name))
 
     def mend_wire(self, name: str) -> None:
-        """Repair the wire."""
         self._change(lambda: self._broken.discard(name))
 
     def _change(self, change: Callable[[], object]) -> None:

@@ -141,7 +141,6 @@ def unplayed_point(
 
 
 def _remarks(found: Compared, observed: Observed) -> Iterator[str]:
-    """Remarks on the point."""
     if found.alpha_2_predicted is None:
         yield (
             "the nominal specimen topples under the achieved motion; the interval is computed from the draws that do "

@@ -73,7 +73,7 @@ class EarthquakeParameters(Parameters):
     usable: float = quantity(
         0.05,
         "1",
-        "largest rms error, excluding noise, relative to the record's rms, with which the best drive is still used "
+        "largest rms error, excluding noise, relative to the record's rms, at which the best drive is still used "
         "if the passes end before the tolerances are met, because of a limit, the number of passes, or missing "
         "samples",
         gt=0,

@@ -154,7 +154,6 @@ def _parts(panel: "Axes", found: Findings) -> None:
 
 
 def _impacts_figure(tilts: Sequence[Impacts], mean: float, theory: float) -> "Figure":
-    """Figure of single impacts."""
     figure = new_figure(7.0, 3.4)
     panel = figure.subplots()
     set_grid(panel)

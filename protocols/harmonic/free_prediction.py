@@ -20,8 +20,8 @@ def with_free_prediction(
 ) -> HarmonicPoint:
     """The point of an unsteady free motion, with the prediction of this motion at `amplitude` [m/s2] added.
 
-    Nothing is added to other points, without a model of the table, or where disturbances of the orbit decay, so that
-    the free motion tends to the orbit.
+    Other points are unchanged. Nothing is added without a model of the table, or where disturbances of the orbit decay,
+    since the free motion then tends to the orbit.
     """
     greatest, multiplier = point.alpha_2_greatest, point.table_multiplier
     if greatest is None or multiplier is None or multiplier <= 1.0:

@@ -269,7 +269,6 @@ def _remarks(
     on_table: float | None,
     orbit: Mapping[str, Any],
 ) -> Iterator[str]:
-    """Remarks on the point."""
     state, peak = settled.steadiness, settled.peak
     if not state.steady:
         yield f"not steady after {settled.time:.0f} s: {_described(settled)}, spread {100.0 * state.spread:.1f} %"

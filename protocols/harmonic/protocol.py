@@ -119,7 +119,7 @@ class HarmonicPoint(Parameters):
         None, "1", "predicted number of cycles after which the free motion repeats; absent if it does not repeat"
     )
     falls_predicted: float | None = quantity(
-        None, "1", "share of the specimens within the uncertainty whose block falls in a free motion"
+        None, "1", "share of specimens, drawn within the uncertainty, whose block falls in a free motion"
     )
     free_agrees: bool | None = quantity(
         None, "1", "whether alpha_2_greatest lies in the predicted range, extended by its uncertainty"

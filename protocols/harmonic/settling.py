@@ -180,5 +180,5 @@ def checked(sensors: SensorUncertainty, references: Iterable[Settled]) -> Sensor
 
 
 def preceding(constant: Sequence[Cycle], used: Sequence[Cycle]) -> Sequence[Cycle]:
-    """The cycles that precede the `used` ones, which are the last of those at `constant` drive."""
+    """The cycles in `constant`, all at the same drive, that precede the `used` ones at its end."""
     return constant[: -len(used)][-PRECEDING:]

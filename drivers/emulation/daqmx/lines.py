@@ -190,5 +190,4 @@ class DigitalOutput(LineTask):
 
     @property
     def levels(self) -> tuple[bool, ...]:
-        """Present levels of the lines."""
         return tuple(self._lines.is_high(line.name) for line in self.all_lines)

@@ -95,7 +95,7 @@ class Catalogue:
         self.devices = tuple(devices)
 
     def device(self, name: str) -> DeviceModel:
-        """The device of that name."""
+        """The device `name`. Raises DaqmxFailure if there is none."""
         for device in self.devices:
             if device.name.lower() == name.lower():
                 return device

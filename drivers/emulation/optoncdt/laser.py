@@ -133,7 +133,6 @@ class EmulatedLaser:
 
     @property
     def settings(self) -> Settings:
-        """Settings of the sensor."""
         return self._sensor.settings
 
     @property

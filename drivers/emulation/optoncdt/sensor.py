@@ -117,7 +117,6 @@ class Sensor:
         self._evaluation.restart()
 
     def apply(self, settings: Settings, now: float) -> None:
-        """Apply `settings` from `now` on."""
         if settings.rate != self.settings.rate:
             self.grid.change(settings.rate, now)
             self._following = self.grid.first

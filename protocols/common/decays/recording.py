@@ -56,7 +56,6 @@ class Pace:
     elapsed: float = 0.0
 
     def progress(self, activity: str) -> Progress:
-        """The present progress."""
         return Progress(self.elapsed / self.expected, self.expected - self.elapsed, activity)
 
     def finish(self, begun: float, planned: float) -> None:
