@@ -83,7 +83,7 @@ class SineProgram:
     def __init__(self, sweeps: Sequence[Sweep], phase: float = 0.0) -> None:
         for sweep in sweeps:
             if not sweep.duration > 0.0:
-                raise InvalidInput("duration of a sweep", sweep.duration, "it must be positive seconds")
+                raise InvalidInput("duration of a sweep", sweep.duration, "it must be a positive duration in s")
             if min(sweep.omega) <= 0.0:
                 raise InvalidInput("omega of a sweep", sweep.omega, "it must be positive rad/s")
         self.sweeps = tuple(sweeps)
@@ -107,7 +107,7 @@ class SampledRecord:
 
     def __init__(self, acceleration: NDArray[np.float64], dt: float) -> None:
         if not dt > 0.0:
-            raise InvalidInput("dt of a record", dt, "it must be positive seconds")
+            raise InvalidInput("dt of a record", dt, "it must be a positive time in s")
         if acceleration.ndim != 1 or acceleration.size < 2 or not np.isfinite(acceleration).all():
             raise InvalidInput(
                 "record", acceleration.shape, "it must be one-dimensional with at least two finite samples"

@@ -81,8 +81,7 @@ def predict_gain(
     """Gain coefficients under `amplitude` [m/s2] sin(`omega` [rad/s] t).
 
     `bare_amplitude` [m/s2] is the amplitude of the test without block, if different.
-    Raises InvalidInput for a bare specimen, or an amplitude or frequency that is not positive and finite.
-    Source: Eq. (10).
+    Raises InvalidInput for a bare specimen or values outside their ranges. Source: Eq. (10).
     """
     resting = resting_state(specimen, omega, amplitude)
     try:

@@ -15,20 +15,20 @@ from sim.specimen import Block, Frame, Specimen
 class SpecimenUncertainty(Parameters):
     """Relative half widths of independent uniform distributions (GUM 4.3.7)."""
 
-    stiffness: float = quantity(0.05, "1", "of the stiffness of each storey", ge=0, le=0.5)
-    damping: float = quantity(0.30, "1", "of the damping ratio of each mode", ge=0, le=0.9)
-    restitution: float = quantity(0.01, "1", "of the block's restitution", ge=0, le=0.2)
-    spring: float = quantity(0.10, "1", "of the stiffness of the coupling spring", ge=0, le=0.5)
+    stiffness: float = quantity(0.05, "1", "relative half width of the stiffness of each storey", ge=0, le=0.5)
+    damping: float = quantity(0.30, "1", "relative half width of the damping ratio of each mode", ge=0, le=0.9)
+    restitution: float = quantity(0.01, "1", "relative half width of the block's restitution", ge=0, le=0.2)
+    spring: float = quantity(0.10, "1", "relative half width of the stiffness of the coupling spring", ge=0, le=0.5)
 
 
 LARGEST_DAMPING = 0.999
-"""Upper bound of drawn damping ratios, below 1 as required of a frame."""
+"""Upper bound of drawn damping ratios, which must be below 1."""
 
 ELASTIC = 1.0 - 1e-12
-"""Upper bound of drawn restitutions, below 1 as required of a block, including rounding."""
+"""Upper bound of drawn restitutions, which must be below 1 even after rounding."""
 
 LEAST = 1e-3
-"""Lower bound of a drawn quantity as a fraction of its best estimate, so that none is negative."""
+"""Lower bound of a drawn quantity, as a fraction of its best estimate, so that no quantity is negative."""
 
 RECTANGULAR = 1.0 / sqrt(3.0)
 """Standard uncertainty of a uniform distribution with half width 1 (GUM 4.3.7)."""
@@ -48,26 +48,28 @@ _WIDTH = {
     RESTITUTION: "restitution",
     SPRING: "spring",
 }
-"""Half width of each quantity. Masses have none: they are weighed, or identified by a fit."""
+"""Name of the half width of each quantity. Masses have none, because they are weighed or identified by a fit."""
 
 _OF_MASSES = "stiffness"
-"""Half width with which lists of contributions group the masses: frame and masses come from one fit."""
+"""Half width with which lists of contributions group the masses, because one fit identifies frame and masses."""
 
 
 class SpecimenKnowledge(SpecimenUncertainty):
-    """Knowledge of a specimen: covariance of measured quantities (jointly normal), half widths of the others.
+    """Uncertainty of a specimen: covariance of measured quantities (jointly normal), half widths of the others.
 
-    Methods expect specimens with the measured values, see `Identified.applied`. `give` is an additional relative half
-    width of the restitution.
+    The methods expect specimens that have the measured values, see `Identified.applied`. `give` is an additional
+    relative half width of the restitution.
     """
 
     identified: Identified = Identified()
-    give: float = quantity(0.0, "1", "of the block's restitution, because the table moves at the impacts", ge=0, lt=1)
+    give: float = quantity(
+        0.0, "1", "relative half width of the block's restitution, because the table moves at the impacts", ge=0, lt=1
+    )
 
     def draws(self, specimen: Specimen, n: int, random: np.random.Generator) -> list[Specimen]:
-        """`n` random specimens from the distribution around `specimen`.
+        """Draw `n` random specimens from the distribution around `specimen`.
 
-        A restitution that would reach 1 is set just below it.
+        A restitution that would reach 1 is set just below 1.
         """
         widths = np.array([getattr(self, width) for width in _WIDTH.values()])
         columns = dict(zip(_WIDTH, (1.0 + widths * random.uniform(-1.0, 1.0, (n, widths.size))).T, strict=True))
@@ -90,10 +92,10 @@ class SpecimenKnowledge(SpecimenUncertainty):
         return {name: size for name, size in sizes.items() if size > 0.0}
 
     def correlations(self, specimen: Specimen) -> dict[tuple[str, str], float]:
-        """Correlation coefficients of pairs of those quantities; pairs that are not listed are independent."""
+        """Correlation coefficients of pairs of uncertain quantities; pairs that are absent are independent."""
         measured, sizes = self._measured(specimen), self.relative(specimen)
         names, (matrix, own) = list(measured), self._spread(measured)
-        # other sources of uncertainty are independent and reduce the correlations
+        # the other sources of uncertainty are independent and thus reduce the correlations
         shares = [size / sizes[name] if name in sizes else 0.0 for name, size in zip(names, own, strict=True)]
         weakened = matrix * np.outer(shares, shares)
         return {
@@ -106,8 +108,8 @@ class SpecimenKnowledge(SpecimenUncertainty):
     def deviations(self, specimen: Specimen) -> list[tuple[Specimen, Specimen]]:
         """Pairs of specimens, one standard uncertainty to either side of `specimen` along independent directions.
 
-        For a result y, the sum over the pairs of ((y_1 - y_2) / 2)^2 is its variance to first order: GUM 5.1.4, note 2,
-        along the principal axes of the correlation matrix.
+        For a result y, the sum over the pairs of ((y_1 - y_2) / 2)^2 is the variance to first order (GUM 5.1.4, note 2,
+        along the principal axes of the correlation matrix).
         """
         sizes = self.relative(specimen)
         names = list(sizes)
@@ -123,7 +125,7 @@ class SpecimenKnowledge(SpecimenUncertainty):
         return [(moved(step), moved(-step)) for step in steps.T if step.any()]
 
     def only(self, *widths: str) -> Self:
-        """The same knowledge with all other quantities taken as exact."""
+        """Return a copy in which all quantities other than those with these half `widths` are exact."""
         findings = [
             finding if _governor(finding.name) in widths else finding.model_copy(update={"standard_uncertainty": 0.0})
             for finding in self.identified.findings
@@ -134,7 +136,7 @@ class SpecimenKnowledge(SpecimenUncertainty):
         return self.model_copy(update={**zero, "identified": identified, "give": give})
 
     def _measured(self, specimen: Specimen) -> dict[str, Finding]:
-        """The findings that apply to `specimen`, by quantity."""
+        """Findings that apply to `specimen`, by quantity."""
         names = {name: name for name in (*FRAME, RESTITUTION)}
         if specimen.label:
             names[SPRING] = spring_name(specimen.label)
@@ -156,18 +158,18 @@ def root_of(matrix: Floats) -> Floats:
 
 
 def _governor(finding: str) -> str:
-    """Half width that is replaced by a finding."""
+    """Name of the half width that a finding replaces."""
     return _WIDTH.get(finding, _OF_MASSES if finding in FRAME else _WIDTH[SPRING])
 
 
 def _off(specimen: Specimen, factors: Mapping[str, float]) -> Specimen:
-    """`specimen` with its values multiplied by the factors, within the physical range.
+    """Return `specimen` with its values multiplied by the factors, within the physical range.
 
-    The spring's factor scales k_C, independent of k1.
+    The factor of the spring applies to k_C, and is independent of k1.
     """
     frame, block, beta = specimen.frame, specimen.block, specimen.beta
     f = dict.fromkeys((*FRAME, RESTITUTION, SPRING), 1.0) | {k: max(v, LEAST) for k, v in factors.items()}
-    # a new object: a copy would keep the frame's cached natural frequencies
+    # construct a new frame, because a copy would keep the cached natural frequencies
     values = frame.model_dump() | {name: getattr(frame, name) * f[name] for name in FRAME}
     values |= {name: min(values[name], LARGEST_DAMPING) for name in ("xi1", "xi2")}
     elastic = ELASTIC / block.restitution if block.restitution > 0.0 else 1.0

@@ -17,8 +17,8 @@ from sim.specimen import Frame, Specimen
 class Modes:
     """Undamped modes of a linear system, ascending.
 
-    `omega`, shape (n,) [rad/s]: sign(lambda) sqrt|lambda| for the eigenvalues lambda of M^-1 K. A negative entry is the
-    growth rate of a *divergent* mode, whose stiffness is negative.
+    `omega`, shape (n,) [rad/s]: sign(lambda) sqrt|lambda| for the eigenvalues lambda of M^-1 K. A negative element is
+    minus the growth rate of a *divergent* mode, whose stiffness is negative.
     `shapes`, shape (n, n): column i is mode i, scaled to a unit u1 (or to a unit largest entry where u1 vanishes).
     """
 
@@ -37,7 +37,7 @@ class Modes:
 
 
 def frame_matrices(frame: Frame) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Mass, damping and stiffness matrices of the bare frame over (u1, u2), each shape (2, 2)."""
+    """Mass, damping and stiffness matrices of the bare frame for (u1, u2), each of shape (2, 2)."""
     c1, c2 = frame.dashpots
     mass = np.diag([frame.m1, frame.m2])
     damping = np.array([[c1 + c2, -c2], [-c2, c2]])
@@ -46,17 +46,17 @@ def frame_matrices(frame: Frame) -> tuple[NDArray[np.float64], NDArray[np.float6
 
 
 def bare_modes(frame: Frame) -> Modes:
-    """The two modes of the frame without block; shapes over (u1, u2)."""
+    """Both modes of the frame without block, with shapes in (u1, u2)."""
     mass, _, stiffness = frame_matrices(frame)
     return _modes(mass, stiffness)
 
 
 def coupled_modes(specimen: Specimen) -> Modes:
-    """The three modes of the linearised coupled system; shapes over (u1, u2, theta). Source: Eq. (12) to (14).
+    """Modes of the linearised coupled system, with shapes in (u1, u2, theta). Source: Eq. (12) to (14).
 
-    The first is divergent while h1^2 k_C k1 / (k1 + k_C) < h_b M g: the overturning moment of gravity exceeds the
-    restoring moment of spring and frame in series. With the paper's frame h1^2 k1 < h_b M g, so this holds for every
-    k_C.
+    The first of the three modes is divergent if h1^2 k_C k1 / (k1 + k_C) < h_b M g: the overturning moment of gravity
+    then exceeds the restoring moment of spring and frame in series. With the paper's frame, h1^2 k1 < h_b M g, so that
+    this holds for every k_C.
     """
     frame, block = specimen.frame, specimen.block
     frame_mass, _, frame_stiffness = frame_matrices(frame)
@@ -74,11 +74,11 @@ def steady_response(
 ) -> tuple[complex, complex]:
     """Complex amplitudes (U1, U2) [m] in the steady state under `amplitude` [m/s2] sin(`omega` [rad/s] t).
 
-    By default for the bare frame; with `resting`, for the frame with its spring attached to a block that never lifts.
-    Raises InvalidInput unless omega > 0 and the amplitude is finite.
+    They apply to the bare frame or, with `resting`, to the frame whose spring is attached to a block that never lifts.
+    Raises InvalidInput unless omega is positive and finite, and the amplitude is finite.
     """
     if not (0.0 < omega < np.inf):
-        raise InvalidInput("omega", omega, "it must be positive rad/s")
+        raise InvalidInput("omega", omega, "it must be a positive circular frequency in rad/s")
     if not np.isfinite(amplitude):
         raise InvalidInput("amplitude", amplitude, "it must be a finite acceleration in m/s2")
     mass, damping, stiffness = frame_matrices(specimen.frame)
@@ -96,7 +96,7 @@ def steady_peaks(specimen: Specimen, omega: float, amplitude: float, *, resting:
 
 
 def _modes(mass: NDArray[np.float64], stiffness: NDArray[np.float64]) -> Modes:
-    """Modes of symmetric matrices K and M, M diagonal, from the eigenvectors of M^-1/2 K M^-1/2."""
+    """Modes for symmetric matrices K and M, M diagonal, from the eigenvectors of M^-1/2 K M^-1/2."""
     root = np.sqrt(np.diag(mass))
     values, vectors = np.linalg.eigh(stiffness / np.outer(root, root))
     shapes = vectors / root[:, None]

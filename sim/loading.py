@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from importlib import import_module
 
 MODEL = {"roots": 6, "watching": 8, "resting": 14, "steps": 3, "rocking": 20, "members": 40}
-"""Modules of `sim.kernel` used by every prediction, with their share of the compilation time."""
+"""Modules of `sim.kernel` used by every prediction, with their shares of the compilation time."""
 
 BENCH = {**MODEL, "laser": 3, "filter": 2, "plant": 8, "table": 15}
 """Modules used by a simulated bench."""
@@ -14,7 +14,7 @@ BENCH = {**MODEL, "laser": 3, "filter": 2, "plant": 8, "table": 15}
 def load_model(
     report: Callable[[str, int, int], None] = lambda _phase, _done, _all: None, modules: Mapping[str, int] = MODEL
 ) -> None:
-    """Import the `modules`. `report` is called with a description, the number of modules loaded and the total."""
+    """Import the `modules`. `report` is called with a description, the shares of the time that have passed and all."""
     if all(f"sim.kernel.{name}" in sys.modules for name in modules):
         return
     report("loading the model", 0, 0)

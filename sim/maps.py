@@ -1,7 +1,7 @@
 """Maps of the gain coefficients over frequency and stiffness: both steady motions, their existence and stability.
 
-Continuation over frequency gives a row at constant stiffness. From there the columns of a strip are continued over
-stiffness together, each predicted from the previous rows. No transient has to be integrated.
+Continuation over frequency gives the first row, at constant stiffness. From there, the columns of a strip are continued
+over stiffness together, and each row is predicted from the previous ones. No transient has to be integrated.
 """
 
 from collections.abc import Sequence
@@ -22,7 +22,7 @@ from sim.sweep import Done, processors, sweep
 Floats = NDArray[np.float64]
 
 STRIPS = 2
-"""Number of strips of columns per processor: enough to balance the load, few enough to keep each strip wide."""
+"""Number of strips of columns per processor: enough to balance the load, but few enough to keep each strip wide."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +30,8 @@ class LayerMap:
     """Branch of steady motion over the grid of n stiffnesses by m frequencies; NaN where it does not exist.
 
     `peaks`, shape (n, m, 3): |u1|, |u2 - u1| [m], |theta| [rad]. `bare`, shape (m, 3): the same without block.
-    `multipliers`, shape (n, m, 6) when rocking and (n, m, 4) at rest: Floquet multipliers per period of the drive.
+    `multipliers`: Floquet multipliers per period of the drive, shape (n, m, 6) of the rocking branch, (n, m, 4) of the
+    resting one.
     """
 
     peaks: Floats
@@ -65,10 +66,11 @@ class LayerMap:
 
 @dataclass(frozen=True, eq=False)
 class GainMap:
-    """Both steady motions over `betas`, shape (n,), and `omegas` [rad/s], shape (m,), under one amplitude [m/s2].
+    """Both branches of steady motion over `betas`, shape (n,), and `omegas` [rad/s], shape (m,), under one amplitude
+    [m/s2].
 
-    `sections`, shape (n, m, 6): a point of each rocking orbit, [phase, u1, u2, v1, v2, omega] right after the impact
-    into theta > 0; NaN where there is none.
+    `sections`, shape (n, m, 6): a point of each rocking orbit, [phase, u1, u2, v1, v2, omega], right after the impact
+    into theta > 0; NaN where there is no orbit.
     """
 
     specimen: Specimen
@@ -91,8 +93,9 @@ def gain_map(
 ) -> GainMap:
     """Gain coefficients of both branches at every stiffness ratio of `betas` and frequency of `omegas` [rad/s].
 
-    The base moves with `amplitude` [m/s2] sin(omega t), in the test without block with `bare_amplitude` if different.
-    `scheduler` and `done` are those of `sim.sweep.sweep`. Raises InvalidInput for an empty axis or meaningless numbers.
+    The base acceleration is `amplitude` [m/s2] sin(omega t); in the test without block, its amplitude is
+    `bare_amplitude`, if different. `scheduler` and `done` are those of `sim.sweep.sweep`. Raises InvalidInput for an
+    empty axis or values outside their ranges.
     """
     rows, row_of = np.unique(np.asarray(betas, dtype=np.float64), return_inverse=True)
     columns, column_of = np.unique(np.asarray(omegas, dtype=np.float64), return_inverse=True)
@@ -147,7 +150,7 @@ def _follow_strip(strip: _Strip) -> tuple[Floats, Floats, Floats]:
         row = newton(q, guess, slope, accuracy=2)
         before = parameters(strip.specimens[i - 1], strip.omegas, strip.amplitude)
         for j in np.flatnonzero(~row.found).tolist():
-            # from the previous row in shorter steps, or from a neighbour in this row
+            # continue from the previous row in shorter steps, or from a neighbour in this row
             starts = [(rows[-1], before, j), (row, q, j - 1), (row, q, min(j + 1, len(q) - 1))]
             known = ((at, origin[k], k) for at, origin, k in starts if k >= 0 and at.found[k])
             found = next(filter(None, (follow(origin, at.section[k], q[j]) for at, origin, k in known)), None)
@@ -204,7 +207,7 @@ def _linear_peaks(
 def _resting(specimens: list[Specimen], omegas: Floats, amplitude: float) -> tuple[Floats, NDArray[np.complex128]]:
     """Peaks, shape (n, m, 3), and multipliers, shape (n, m, 4), of the motion in which the block never lifts.
 
-    Source: Eq. (9) and (A.3) over a whole period, as `sim.steady.resting_state`.
+    Source: Eq. (9) and (A.3) over a whole period, as in `sim.steady.resting_state`.
     """
     block, springs = specimens[0].block, [specimen.k_c for specimen in specimens]
     peaks, u1 = _linear_peaks(specimens[0], springs, omegas, amplitude)

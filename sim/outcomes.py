@@ -1,6 +1,7 @@
 """Outcome of a given start-up: one of the two steady motions, another motion, or overturning.
 
-Several motions can coexist, and the transient to them is chaotic: only integration shows which one a test reaches.
+Several motions can coexist, and the transients that lead to them are chaotic, so that only integration shows which one
+a test reaches.
 """
 
 from collections.abc import Callable
@@ -27,22 +28,22 @@ WITHIN = 0.02
 """Largest relative difference of the peaks from those of a steady motion at which it counts as reached."""
 
 WINDOW = 20
-"""Periods of the drive over which the peaks are taken: longer than the beats of a modulated motion."""
+"""Number of drive periods over which the peaks are taken: longer than the beats of a modulated motion."""
 
 LEFT = 1e-3
-"""An undecided motion is continued until a disturbance of the stable orbit would have decayed to this fraction."""
+"""Fraction to which a disturbance of the stable orbit would decay while an undecided motion is continued."""
 
 FEWEST_ROUNDS, MOST_ROUNDS = 10, 100
-"""Minimum and maximum number of rounds of WINDOW periods for this continuation; without a stable orbit the minimum
-applies.
+"""Minimum and maximum number of rounds, of WINDOW periods each, for which an undecided motion is continued; the minimum
+applies without a stable orbit.
 """
 
 StartProgram = Callable[[float, float], SineProgram]
-"""Function of a final frequency [rad/s] and amplitude [m/s2] that returns the base excitation of a start-up."""
+"""Function of the final frequency [rad/s] and amplitude [m/s2] that returns the base excitation of a start-up."""
 
 
 class Outcome(StrEnum):
-    """Outcome of a start-up. OTHER: a motion unlike either steady motion, modulated or of another period."""
+    """Outcome of a start-up. OTHER: neither steady motion, but a motion that is modulated or of another period."""
 
     ROCKING = "rocking"
     RESTING = "resting"
@@ -55,9 +56,9 @@ class Outcome(StrEnum):
 class Reached:
     """Outcome of a start-up.
 
-    `time` [s] since its beginning at which the block overturned or the outcome was decided.
-
-    `side`: the corner of the overturning. `peaks` over the last 20 periods of the drive; None when toppled or failed.
+    `time` [s], from the beginning, is that at which the block overturned or the outcome was decided. `side` is the
+    corner about which it overturned. `peaks` are those of the last 20 periods of the drive; None if the block toppled
+    or the run failed.
     """
 
     outcome: Outcome
@@ -67,7 +68,7 @@ class Reached:
 
 
 class Steady(NamedTuple):
-    """Peaks of the stable steady motions at a point, or None, and the multiplier of the rocking motion."""
+    """Peaks of the stable steady motions at a point, None where there is none, and multiplier of the rocking motion."""
 
     rocking: Peaks | None
     resting: Peaks | None
@@ -78,8 +79,8 @@ class Steady(NamedTuple):
 class OutcomeMap:
     """Outcomes over the grid of a gain map, n stiffnesses by m frequencies, each array of shape (n, m).
 
-    `outcome`: values of `Outcome`. `time` [s] and `side` ("A", "B" or empty) as in `Reached`. `drift` [m]: greatest |u2
-    - u1| over the last 20 periods, NaN when toppled or failed.
+    `outcome` contains values of `Outcome`. `time` [s] and `side` ("A", "B" or empty) are those of `Reached`. `drift` is
+    the greatest |u2 - u1| [m] over the last 20 periods; NaN if the block toppled or the run failed.
     """
 
     outcome: NDArray[np.str_]
@@ -93,7 +94,7 @@ class OutcomeMap:
 
 
 def switched_on(omega: float, amplitude: float) -> SineProgram:
-    """A sine of constant amplitude from t = 0 for START_DURATION."""
+    """Program with a sine of constant amplitude from t = 0 to START_DURATION."""
     return SineProgram([Sweep.dwell(START_DURATION, amplitude, omega)])
 
 
@@ -104,22 +105,22 @@ def reached(
     start: StartProgram = switched_on,
     steady: Steady | None = None,
 ) -> Reached:
-    """Outcome of `start`, from rest, which ends with a sine of `omega` [rad/s] and `amplitude` [m/s2].
+    """Outcome of a start-up from rest that ends with a sine of `omega` [rad/s] and `amplitude` [m/s2].
 
-    The program must end with a dwell of at least WINDOW periods at these values. A motion that is then unlike either
-    steady motion is continued. `steady`: the steady motions, if already known.
+    The program that `start` returns must end with a dwell of at least WINDOW periods at these values. If the motion is
+    then unlike either steady motion, it is continued. `steady` are the steady motions, if already known.
 
-    Raises InvalidInput for a bare frame, meaningless numbers, or a program with a different end.
+    Raises InvalidInput for a bare frame, values outside their ranges, or a program with a different end.
     """
     check_steady(specimen, omega, amplitude)
     program, window = start(omega, amplitude), WINDOW * tau / omega
     last = program.sweeps[-1]
     if last.omega != (omega, omega) or last.amplitude != (amplitude, amplitude) or last.duration < window:
         allowed = f"it must end with a dwell of at least {window:g} s at {omega:g} rad/s and {amplitude:g} m/s2"
-        raise InvalidInput("end of a start", last, allowed)
+        raise InvalidInput("end of a start-up", last, allowed)
     steady = steady or _steady(specimen, omega, amplitude)
     phase = program.phase + sum(float(part.phase_at(np.array(part.duration))) for part in program.sweeps)
-    # whole periods, so that each round begins at the phase at which the previous one ended
+    # whole periods, so that each round begins at the phase with which the previous one ended
     more = SineProgram([Sweep.dwell(window, amplitude, omega)], phase % tau)
     motion = simulate(specimen, program, peaks_from=program.duration - window)
     time, rounds = motion.end_time, 0
@@ -132,9 +133,9 @@ def reached(
 def outcome_map(
     gain_map: GainMap, start: StartProgram = switched_on, scheduler: str | None = None, done: Done | None = None
 ) -> OutcomeMap:
-    """Outcome of `start` in every cell of a gain map. Raises InvalidInput as `reached` does.
+    """Outcomes of the start-up `start` in all cells of a gain map. Raises InvalidInput as `reached` does.
 
-    `scheduler` is that of `sim.sweep.sweep`; with a scheduler `start` must be picklable: a module-level function.
+    `scheduler` is that of `sim.sweep.sweep`. With a scheduler, `start` must be picklable: a module-level function.
     """
     n, m = len(gain_map.betas), len(gain_map.omegas)
     cells = [
@@ -189,7 +190,7 @@ def _steady(specimen: Specimen, omega: float, amplitude: float) -> Steady:
 
 
 def _patience(steady: Steady) -> int:
-    """Rounds of WINDOW periods for which an undecided motion is continued."""
+    """Number of rounds, of WINDOW periods each, for which an undecided motion is continued."""
     if steady.rocking is None:
         return FEWEST_ROUNDS
     return min(MOST_ROUNDS, max(FEWEST_ROUNDS, ceil(log(LEFT) / (WINDOW * log(steady.multiplier)))))

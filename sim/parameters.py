@@ -15,12 +15,12 @@ from pydantic.fields import FieldInfo
 NEAR, NEAR_ANGULAR = 20.0, 3.0
 """Factors around a default within which a value causes no notice.
 
-A wrong prefix is a factor of 1000, a wrong angular unit 2 pi: either is noticed if the intended value is within a
-factor of 50 or 2 of the default.
+A wrong prefix changes a value by a factor of 1000, and a wrong angular unit by 2 pi: the mistake is noticed if the
+intended value is within a factor of 50 or 2 of the default.
 """
 
 COUPLING = (0.02, 5.0)
-"""Usual stiffness ratios of coupling springs: the paper has 0.25 to 0.97 and computes up to 1.2."""
+"""Usual stiffness ratios of coupling springs. The springs of the paper have 0.25 to 0.97; its maps extend to 1.2."""
 
 _ANGULAR = ("rad/s", "Hz", "rad", "N/m")
 
@@ -31,7 +31,7 @@ class Parameters(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     def __repr_args__(self) -> Iterator[tuple[str | None, Any]]:
-        """Values that differ from the defaults."""
+        """Names and values of the fields that differ from their defaults."""
         for name, declared in type(self).model_fields.items():
             value = getattr(self, name)
             if declared.is_required() or value != declared.get_default(call_default_factory=True):
@@ -54,8 +54,8 @@ def quantity(
     """Declare a field of `Parameters` with its SI `unit` ("1" for a pure number) and its `limits` (gt, ge, lt, le).
 
     A magnitude outside `usual`, (lowest, highest) in that unit, causes a notice; see `usual_of`. A field that
-    is absent by default has an `example` of valid input. `formerly` is its name in earlier versions: readers of files
-    accept it, with a notice.
+    is absent by default has an `example` of valid input. `formerly` is the name of the field in earlier versions, which
+    readers of files accept with a notice.
     """
     extra: dict[str, Any] = {"unit": unit}
     if usual is not None:
@@ -76,15 +76,15 @@ def column(unit: str, description: str, **options: Any) -> Any:
 
 
 def unit_of(field: FieldInfo) -> str:
-    """The SI unit that `quantity` stored on a field; empty for strings, switches and nested groups."""
+    """SI unit that `quantity` stored in a field; empty for strings, switches and nested groups."""
     return str(_extra(field).get("unit", ""))
 
 
 def usual_of(field: FieldInfo) -> tuple[float, float] | None:
     """Range of magnitudes of a field that cause no notice; None if every value is plausible.
 
-    A quantity with a dimension and no declared range has one within a factor of `NEAR` of its default, or a smaller
-    factor where 2 pi or degrees are a likely mistake.
+    Without a declared range, the range of a quantity with a dimension extends to a factor of `NEAR` around its default,
+    or of `NEAR_ANGULAR` where a factor of 2 pi or a value in degrees is a likely mistake.
     """
     extra = _extra(field)
     if "usual" in extra:
@@ -106,7 +106,7 @@ def example_of(field: FieldInfo) -> Any:
 
 
 def former_name_of(field: FieldInfo) -> str | None:
-    """The name of a field in earlier versions; None if it has not changed."""
+    """Name of a field in earlier versions; None if it has not changed."""
     return _extra(field).get("formerly")
 
 
@@ -116,7 +116,7 @@ def _extra(field: FieldInfo) -> dict[str, Any]:
 
 
 def each_once(values: tuple[float, ...]) -> tuple[float, ...]:
-    """Validator of a list of points: returns its values, or raises ValueError if one occurs twice."""
+    """Validator that returns the `values` of a list, or raises ValueError if one occurs twice."""
     if len(set(values)) < len(values):
         raise ValueError("each value may occur once")
     return values

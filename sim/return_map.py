@@ -1,11 +1,12 @@
 """Return map of steady rocking, its fixed points by Newton's method, and their continuation.
 
-Section: just after the impact into theta > 0. Unknowns x = [phase, u1, u2, v1, v2, omega], shape (6,), with the phase
-[rad] of the base's sine at that impact. The map covers the next two impacts and subtracts 2 pi from the phase. Its
-section is an event, so its derivative needs no saltation matrices and its eigenvalues are the Floquet multipliers.
+The section is the state just after the impact into theta > 0: x = [phase, u1, u2, v1, v2, omega], shape (6,), where
+phase [rad] is that of the base's sine at this impact. The map covers the next two impacts and subtracts 2 pi from the
+phase. Because the section is an event, the derivative of the map needs no saltation matrices, and its eigenvalues are
+the Floquet multipliers.
 
-Parameters are one vector q, shape (18,): `Specimen.packed()`, omega [rad/s], amplitude [m/s2]. Everything is done for
-many points at once: q has shape (n, 18), x shape (n, 6).
+The parameters are one vector q, shape (18,): `Specimen.packed()`, omega [rad/s], amplitude [m/s2]. All functions apply
+to many points at once: q has shape (n, 18), x shape (n, 6).
 """
 
 from collections.abc import Sequence
@@ -21,19 +22,23 @@ from sim.specimen import Specimen
 Floats = NDArray[np.float64]
 
 ORDER, TOLERANCE = 18, 1e-11
-"""Tolerance of the Taylor steps: it makes the map smooth to rounding, as its numerical differentiation requires."""
+"""Order and tolerance of the Taylor steps. They make the map smooth to rounding, as its numerical differentiation
+requires.
+"""
 
 Accuracy = Literal[2, 4]
-"""Order of the differences for a Jacobian from 12 or 24 evaluations of the map."""
+"""Order of the finite differences for a Jacobian, which take 12 or 24 evaluations of the map."""
 
 DIFFERENCE: dict[Accuracy, float] = {2: 4e-6, 4: 5e-5}
-"""Relative steps at which truncation and rounding contribute equally to the multipliers' error, 5e-10 and 5e-11."""
+"""Relative steps at which truncation and rounding contribute equally to the error of the multipliers, which is 5e-10
+and 5e-11.
+"""
 
 STENCIL: dict[Accuracy, tuple[Floats, Floats]] = {
     2: (np.array([1.0, -1.0]), np.array([0.5, -0.5])),
     4: (np.array([1.0, -1.0, 2.0, -2.0]), np.array([8.0, -8.0, -1.0, 1.0]) / 12.0),
 }
-"""Central differences: nodes in steps, and their weights."""
+"""Central differences: nodes in units of the step, and their weights."""
 
 CLOSURE = 1e-12
 """Scaled mismatch over one period at which an orbit counts as closed."""
@@ -42,19 +47,19 @@ SLOW = 0.1
 """A known Jacobian is kept while each Newton step reduces the mismatch to less than this fraction."""
 
 NEAR = 0.3
-"""Scaled mismatch beyond which a start is rejected: Newton's method might converge to another orbit."""
+"""Scaled mismatch beyond which a start is rejected, because Newton's method might converge to another orbit."""
 
 MOST_ITERATIONS = 10
 SMALLEST_ADVANCE = 1e-3
 """Maximum number of Newton iterations, and limits on the steps of `follow` as fractions of the path."""
 
 MOST_KNOWN = 5
-"""Number of points used by an extrapolation: more would amplify the rounding errors of the Jacobians."""
+"""Number of points used by an extrapolation; more would amplify the rounding errors of the Jacobians."""
 
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """A fixed point: its section, shape (6,), the map's Jacobian there, shape (6, 6), peaks over the period, (3,)."""
+    """Fixed point: section, shape (6,), Jacobian of the map there, shape (6, 6), and peaks over the period, (3,)."""
 
     section: Floats
     jacobian: Floats
@@ -63,9 +68,9 @@ class Solution:
 
 @dataclass(frozen=True, eq=False)
 class Solutions:
-    """Fixed points: sections, shape (n, 6), Jacobians, (n, 6, 6), peaks, (n, 3), and which were found, (n,).
+    """Fixed points: sections, shape (n, 6), Jacobians, (n, 6, 6), peaks, (n, 3), and mask of those found, (n,).
 
-    The phase is not wrapped: it stays near that of the start. Rows of points not found are NaN.
+    The phase is not wrapped, and thus remains near that of the start. The rows of points not found are NaN.
     """
 
     section: Floats
@@ -74,17 +79,17 @@ class Solutions:
     found: NDArray[np.bool_]
 
     def one(self, i: int) -> Solution | None:
-        """Row `i`, or None if it was not found."""
+        """Solution in row `i`, or None if it was not found."""
         return Solution(self.section[i], self.jacobian[i], self.peaks[i]) if self.found[i] else None
 
     def put(self, i: int, solution: Solution) -> None:
-        """Set row `i` to a solution found by other means."""
+        """Set row `i` to a solution that was found by other means."""
         self.section[i], self.jacobian[i], self.peaks[i] = solution.section, solution.jacobian, solution.peaks
         self.found[i] = True
 
 
 def parameters(specimen: Specimen, omega: float | Floats, amplitude: float) -> Floats:
-    """Parameter vectors of one specimen, shape (n, 18), for each of the `omega` [rad/s], shape (n,) or a number."""
+    """Parameter vectors q of one specimen, shape (n, 18), one for each `omega` [rad/s], shape (n,) or a number."""
     omegas = np.atleast_1d(np.asarray(omega, dtype=np.float64))
     q = np.empty((omegas.size, 18))
     q[:, :16], q[:, 16], q[:, 17] = specimen.packed(), omegas, amplitude
@@ -92,7 +97,7 @@ def parameters(specimen: Specimen, omega: float | Floats, amplitude: float) -> F
 
 
 def scales(q: Floats) -> Floats:
-    """Scales of the unknowns, shape (n, 6): from the angle b / h_b, the block's diagonal and the drive's frequency."""
+    """Scales of x, shape (n, 6), from the angle b / h_b, the block's diagonal and the drive's frequency."""
     length, angle = np.hypot(q[:, 9], q[:, 10]), q[:, 9] / q[:, 10]
     velocity = np.maximum(q[:, 16] * angle, q[:, 17] / q[:, 16])
     sizes = np.empty((len(q), 6))
@@ -105,14 +110,14 @@ def images(q: Floats, x: Floats, *, watch_peaks: bool = False) -> tuple[Floats, 
     """Images of x, shape (n * m, 6), with m starts for each row of q, and their peaks, shape (n * m, 3).
 
     An image is NaN if the block does not return to the section within three periods. The peaks are the largest
-    |u1|, |u2 - u1|, |theta| until then, 0 unless `watch_peaks`.
+    |u1|, |u2 - u1|, |theta| until the return; they are 0 without `watch_peaks`.
     """
     from sim.kernel import members as kernel
 
     n, row = len(x), np.repeat(np.arange(len(q)), len(x) // len(q))
     omega, starts = q[row, 16], x[:, 5] > 0.0
     segments, states, reports = np.zeros((n, 10)), np.zeros((n, 6)), np.empty((n, kernel.REPORT))
-    # an orbit that has not returned after three periods is not one of the drive's period
+    # an orbit that has not returned after three periods does not have the period of the drive
     segments[:, 0], segments[:, 1], segments[:, 5], segments[:, 6] = 6.0 * pi / omega, q[row, 17], x[:, 0], omega
     states[:, :4], states[:, 5] = x[:, 1:5], x[:, 5]
     spans = np.arange(n)[:, None] + np.column_stack((np.zeros(n, np.int64), starts))
@@ -140,7 +145,7 @@ def images(q: Floats, x: Floats, *, watch_peaks: bool = False) -> tuple[Floats, 
 def jacobians(q: Floats, x: Floats, accuracy: Accuracy = 4) -> Floats:
     """Derivatives of the map at x, shape (n, 6, 6); NaN where the map is not defined around x."""
     nodes, weights = STENCIL[accuracy]
-    # actual steps after rounding
+    # the actual steps, after rounding
     steps = (x + DIFFERENCE[accuracy] * scales(q)) - x
     starts = x[:, None, None, :] + (nodes[:, None, None] * np.eye(6)) * steps[:, None, None, :]
     out, _ = images(q, starts.reshape(-1, 6))
@@ -148,11 +153,11 @@ def jacobians(q: Floats, x: Floats, accuracy: Accuracy = 4) -> Floats:
 
 
 def newton(q: Floats, x: Floats, known: Floats | None = None, accuracy: Accuracy | None = 4) -> Solutions:
-    """The fixed points near x, shape (n, 6); `known` are guesses of the Jacobians there, shape (n, 6, 6).
+    """Find the fixed points near x, shape (n, 6); `known` are guesses of the Jacobians there, shape (n, 6, 6).
 
-    A Jacobian is reused while Newton converges, since a chord step costs one evaluation; at the end it is computed
-    again with `accuracy`. None omits that, which saves most of the cost where only the points and their peaks are
-    needed.
+    A Jacobian is reused while Newton's method converges, because a chord step costs only one evaluation. At the end it
+    is computed again with `accuracy`; if this is None, the last computation is omitted, which saves most of the cost
+    where only the points and their peaks are needed.
     """
     n = len(x)
     place, peaks, sizes = x.copy(), np.full((n, 3), np.nan), scales(q)
@@ -181,10 +186,11 @@ def newton(q: Floats, x: Floats, known: Floats | None = None, accuracy: Accuracy
 
 
 def follow(origin: Floats, x: Floats, target: Floats) -> Solution | None:
-    """The fixed point at `target`, shape (18,), by continuation from `x`, near the one at `origin`.
+    """Find the fixed point for the parameters `target`, shape (18,), by continuation from `x`, which is near the fixed
+    point for `origin`.
 
-    The path is a straight line. Steps grow while Newton converges and are halved when it does not; returns None when
-    they become too short.
+    The path in parameter space is a straight line. Steps grow while Newton's method converges and are halved when it
+    does not. Returns None if they become too short.
     """
     solution = newton(origin[None], x[None]).one(0)
     if solution is None:
@@ -212,7 +218,7 @@ def follow(origin: Floats, x: Floats, target: Floats) -> Solution | None:
 
 
 def extrapolated(places: Sequence[float], values: Sequence[Floats], place: float) -> Floats:
-    """The polynomial through the last of the known values, of any shape, at `place` (Lagrange)."""
+    """Value at `place` of the polynomial through the last of the known `values`, of any shape (Lagrange)."""
     near, last = places[-MOST_KNOWN:], values[-MOST_KNOWN:]
     total = np.zeros_like(last[0])
     for at, value in zip(near, last, strict=True):

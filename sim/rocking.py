@@ -23,18 +23,18 @@ TOLERANCE = 1e-10
 """Default relative tolerance of a step. The error over 120 s of steady rocking is of the same order."""
 
 REST_ANGLE = 1e-12
-"""Bounce [rad] below which the block comes to rest; also the bound of the resulting error of the angle."""
+"""Angle of a bounce [rad] below which the block comes to rest; also the bound of the resulting error of the angle."""
 
 MOST_IMPACTS = 1_000_000
-"""Impacts after which a run fails; a decaying bounce needs about five hundred."""
+"""Number of impacts after which a run fails; decaying bounces have about five hundred."""
 
 
 SMALLEST_PART, LARGEST_PART = 8, 64
-"""Runs integrated in parallel by one thread: enough to fill the lanes, few enough to balance the load."""
+"""Number of runs integrated in parallel by one thread: enough to fill the lanes, few enough to balance the load."""
 
 
 class Mode(IntEnum):
-    """State of contact of the block; the value is the sign sg of the equations."""
+    """Contact mode of the block; the value is the sign sg in the equations."""
 
     REST = 0
     ROCK_A = 1
@@ -54,7 +54,7 @@ class Status(StrEnum):
 class State:
     """Displacements [m] and velocities [m/s] relative to the ground, angle [rad] and angular velocity [rad/s].
 
-    theta > 0 is about the left corner A, with the top moving towards the frame.
+    theta > 0 is a rotation about the left corner A, with the top moving towards the frame.
     """
 
     u1: float = 0.0
@@ -66,7 +66,9 @@ class State:
 
     @property
     def mode(self) -> Mode:
-        """The contact mode, from angle and angular velocity: theta = 0 with omega > 0 starts to rock about A."""
+        """Contact mode, from angle and angular velocity: with theta = 0 and omega > 0, the block starts to rock about
+        A.
+        """
         return Mode(int(np.sign(self.theta or self.omega)))
 
     def as_array(self) -> NDArray[np.float64]:
@@ -75,7 +77,7 @@ class State:
 
     @staticmethod
     def from_array(x: NDArray[np.float64]) -> "State":
-        """The state whose components are `x`, shape (6,)."""
+        """State with the components `x`, shape (6,)."""
         return State(*(float(value) for value in x))
 
 
@@ -92,8 +94,9 @@ class Peaks:
 class Motion:
     """Result of a run.
 
-    `end_time` [s] is the time of overturning or failure if there was one. `samples` has shape (n, 6), columns as
-    `State.as_array`; there are no rows after the end of the run. None when no samples were requested.
+    `end_time` [s] is the end of the run, or the time of overturning or failure if there was one. `samples` has shape
+    (n, 6) and the columns of `State.as_array`, without rows after the end of the run; None if no samples were
+    requested.
     """
 
     status: Status
@@ -106,7 +109,7 @@ class Motion:
 
     @property
     def overturned(self) -> Literal["A", "B"] | None:
-        """The corner about which the block overturned, at `end_time`; None if it did not."""
+        """Corner about which the block overturned, at `end_time`; None if it did not."""
         if self.status is Status.OVERTURNED_A:
             return "A"
         return "B" if self.status is Status.OVERTURNED_B else None
@@ -124,9 +127,9 @@ def simulate(
 ) -> Motion:
     """Integrate the specimen from `state` (default: at rest) through the whole `excitation`.
 
-    `sample_times`, shape (n,), ascending [s]; `peaks_from` [s] starts the window of the peaks, None requests none;
-    `overturning_angle` [rad] is the |theta| that ends the run. A run that overturns or fails is a result, not an error.
-    Samples and peaks do not affect the motion and cost time only when requested.
+    `sample_times` [s], shape (n,), are ascending. `peaks_from` [s] is the start of the window of the peaks; None
+    requests no peaks. `overturning_angle` [rad] is the |theta| that ends the run. A run that overturns or fails is a
+    result, not an error. Samples and peaks do not affect the motion, and take time only when requested.
 
     Raises InvalidInput, before anything is integrated, for values outside their range. Source: Eq. (8), (9), (A.1) and
     (A.3) of the paper; coming to rest is described in `sim.kernel.rocking.run`.
@@ -145,14 +148,14 @@ def simulate_many(
     tolerance: float = TOLERANCE,
     overturning_angle: float = pi / 2,
 ) -> list[Motion]:
-    """`simulate` for many runs on all processors, in order.
+    """Call `simulate` for many runs, on all processors, and return the results in order.
 
     A single specimen, excitation, state or window applies to all runs. Everything is checked before the first run
     starts.
 
     Raises InvalidInput if the sequences differ in length or a run is refused.
     """
-    import_module("sim.kernel.members")  # compiled once, before the threads start
+    import_module("sim.kernel.members")  # compile it once, before the threads start
 
     several = [len(item) for item in (specimens, excitations, states, peaks_from) if isinstance(item, Sequence)]
     runs = several[0] if several else 1
@@ -175,7 +178,7 @@ def simulate_many(
         )
         for i in range(runs)
     ]
-    # run members of equal order together, in batches that occupy every processor and finish within a second
+    # group runs of equal order in batches that occupy every processor and finish within a second
     alike: dict[int, list[int]] = {}
     for i, run in enumerate(prepared):
         alike.setdefault(run.order, []).append(i)
@@ -190,9 +193,9 @@ def simulate_many(
 def series_order(tolerance: float, segment: float) -> int:
     """Order of the Taylor series that reaches `tolerance` at minimum cost, for segments of a typical length [s].
 
-    Long segments take 1.6 orders per digit (measured). A record's samples end most steps, so a lower order that just
-    spans one interval is cheaper; the motion's radius of convergence is about 0.27 s. The step control meets the
-    tolerance with any order.
+    Long segments need 1.6 orders per digit (measured). Under a record, most steps end at a sample, so that a lower
+    order that just spans one interval is cheaper; the radius of convergence of the motion is about 0.27 s. The step
+    control meets the tolerance with any order.
     """
     longest = ceil(-1.6 * log10(tolerance))
     covering = 3 + ceil(log(tolerance) / log(min(segment, 0.2) / 0.27))
@@ -200,7 +203,7 @@ def series_order(tolerance: float, segment: float) -> int:
 
 
 def check_options(tolerance: float, overturning_angle: float) -> None:
-    """Raise InvalidInput for options outside their range."""
+    """Raise InvalidInput for options outside their ranges."""
     if not 1e-15 <= tolerance <= 1e-3:
         raise InvalidInput("tolerance", tolerance, "it must be between 1e-15 and 1e-3")
     if not 0.0 < overturning_angle <= pi / 2:
@@ -217,14 +220,14 @@ def check_state(specimen: Specimen, state: State, overturning_angle: float) -> N
     if abs(state.theta) >= overturning_angle:
         raise InvalidInput("theta", state.theta, f"the block must start below {overturning_angle:g} rad")
     if specimen.beta and abs(state.u1) >= specimen.d:
-        raise InvalidInput("u1", state.u1, f"the spring's length must stay positive: |u1| below d = {specimen.d:g} m")
+        raise InvalidInput("u1", state.u1, f"the spring's length must be positive: |u1| below d = {specimen.d:g} m")
 
 
 def motion_of(
     report: NDArray[np.float64], x: NDArray[np.float64], samples: NDArray[np.float64] | None, *, watched: bool
 ) -> Motion:
-    """Result from the kernel's `report`, shape (8,), and end state `x`, shape (6,), with peaks if they were requested
-    (`watched`).
+    """Result of a run, from the kernel's `report`, shape (8,), and the end state `x`, shape (6,); `watched` states
+    whether peaks were requested.
     """
     from sim.kernel import steps as kernel
 
@@ -245,13 +248,13 @@ def motion_of(
 
 
 class Drive:
-    """An excitation's table, checked: its segments, its duration [s] and the typical length of a segment [s]."""
+    """Checked table of an excitation: its segments, its duration [s], and the typical length of a segment [s]."""
 
     def __init__(self, excitation: Excitation) -> None:
         segments = excitation.packed()
         if segments.ndim != 2 or segments.shape[0] < 1 or segments.shape[1] != ROW:
             raise InvalidInput("excitation", segments.shape, f"its table must have at least one row of {ROW} numbers")
-        # a finite sum implies finite terms, and costs half as much as checking each one
+        # a finite sum implies finite terms, and takes half as long as a check of each
         if not np.isfinite(segments.sum()) and not np.isfinite(segments).all():
             raise InvalidInput("excitation", "a number that is not finite", "all of its numbers must be finite")
         lengths = segments[:, 0]
@@ -264,7 +267,7 @@ class Drive:
 
 @dataclass(frozen=True, eq=False)
 class _Run:
-    """A run; its arguments are checked on construction."""
+    """Run whose arguments are checked on construction."""
 
     specimen: Specimen
     drive: Drive
@@ -312,8 +315,8 @@ class _Run:
 
 
 def _side_by_side(runs: list[_Run]) -> list[Motion]:
-    """Same as `_Run.motion`, bit for bit, for several runs at once, which have no samples and share order, tolerance
-    and overturning angle.
+    """Results of several runs, computed together, bit-identical to those of `_Run.motion`. The runs have no samples,
+    and equal order, tolerance and overturning angle.
     """
     from sim.kernel import members as kernel
 

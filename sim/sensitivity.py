@@ -1,10 +1,10 @@
 """Sensitivities of the gain coefficients to every parameter.
 
-The rocking orbit is a fixed point x = F(x, p) of the return map. Implicit function theorem: dx/dp = (I - F_x)^-1 F_p;
-F_x is the matrix whose eigenvalues are the Floquet multipliers. A peak is a stationary value u(t*), so its derivative
-is that of u at a fixed t* (envelope theorem): dP/dp = u_x dx/dp + u_p. Differencing the larger of the two peaks is
-unsuitable: the excursions to the two sides are so similar that a small step changes which one is larger. alpha = P /
-P_bare then follows by the quotient rule.
+The rocking orbit is a fixed point x = F(x, p) of the return map. By the implicit function theorem,
+dx/dp = (I - F_x)^-1 F_p, where F_x is the matrix whose eigenvalues are the Floquet multipliers. A peak is a stationary
+value u(t*), so that its derivative is that of u at a fixed t* (envelope theorem): dP/dp = u_x dx/dp + u_p. The
+derivative of alpha = P / P_bare then follows by the quotient rule. Finite differences of the larger of both peaks are
+unsuitable: the excursions to the two sides are so similar that a small step changes which one is larger.
 """
 
 from collections.abc import Mapping
@@ -24,10 +24,10 @@ from sim.specimen import Block, Frame, Specimen
 from sim.steady import NoOrbit, Orbit, resting_state, rocking_orbit
 
 STEP = 3e-5
-"""Relative step of the differences, of fourth order; absolute for a parameter that is zero."""
+"""Step of the finite differences, of fourth order, relative to the parameter; absolute for a parameter that is zero."""
 
 TOLERANCE = 1e-13
-"""Integration tolerance of the runs that are differenced."""
+"""Integration tolerance of the runs from which finite differences are computed."""
 
 SAMPLES, ZOOMS = 401, 2
 """Samples of each search for a peak, and number of successive refinements."""
@@ -51,7 +51,7 @@ class _Point(NamedTuple):
 
 
 def parameter_values(specimen: Specimen, omega: float, amplitude: float) -> dict[str, float]:
-    """Every parameter that a prediction depends on, by name [SI]; h2 is absent because no equation contains it."""
+    """Parameters on which a prediction depends, by name [SI]. h2 is absent because no equation contains it."""
     frame, block = specimen.frame.model_dump(exclude={"h2"}), specimen.block.model_dump()
     others = {"beta": specimen.beta or 0.0, "d": specimen.d, "g": specimen.g}
     return {**frame, **block, **others, "omega": omega, "amplitude": amplitude}
@@ -64,13 +64,13 @@ def sensitivities(
     layer: Literal["rocking", "resting"] = "rocking",
     orbit: Orbit | None = None,
 ) -> dict[str, Sensitivity]:
-    """Derivatives of alpha_1 and alpha_2 with respect to every name of `parameter_values`.
+    """Derivatives of alpha_1 and alpha_2 with respect to all parameters of `parameter_values`.
 
-    `orbit`: the orbit there, if already known. The bare test depends on the parameters too: it has the same frame,
-    frequency [rad/s] and amplitude [m/s2]. beta is k_C / k1: a change of k1 alone changes k_C too. Where the peaks on
-    the two sides are equal, the derivative is that of one of them.
+    `orbit` is the orbit at these parameters, if already known. The bare test also depends on the parameters, because it
+    has the same frame, frequency [rad/s] and amplitude [m/s2]. beta is k_C / k1, so that a change of k1 alone also
+    changes k_C. If the peaks on both sides are equal, the derivative is that of one of them.
 
-    Raises InvalidInput as `rocking_orbit` does, NoOrbit when the branch does not exist.
+    Raises InvalidInput as `rocking_orbit` does, and NoOrbit if the branch does not exist.
     """
     if orbit is None:
         known = rocking_orbit if layer == "rocking" else resting_state
@@ -113,7 +113,7 @@ def _along_branch(orbit: Orbit, moved: list[_Point], steps: Floats) -> Floats:
 
 
 def _peak_times(orbit: Orbit) -> Floats:
-    """Times [s] at which |u1| and |u2 - u1| are greatest, shape (2,), from the orbit's section, within one period."""
+    """Times [s] at which |u1| and |u2 - u1| are greatest, shape (2,), within one period from the orbit's section."""
     found = np.empty(2)
     here = _Point(orbit.specimen, orbit.omega, orbit.amplitude)
     for which in range(2):
@@ -155,14 +155,14 @@ def _linear(point: _Point, *, resting: bool = False) -> Floats:
 
 
 def _slopes(values: Floats, steps: Floats) -> Floats:
-    """Derivatives with respect to n parameters, shape (n, k), from values at the nodes around each, shape (4 n, k)."""
+    """Derivatives with respect to n parameters, shape (n, k), from values at four nodes for each, shape (4 n, k)."""
     nodes, weights = STENCIL[4]
     return np.einsum("s,nsk->nk", weights, values.reshape(steps.size, nodes.size, -1)) / steps[:, None]
 
 
 def _moved(specimen: Specimen, values: dict[str, float], name: str, change: float) -> _Point:
-    """The point with one parameter changed. It is not validated, since a step may take a parameter just below its limit
-    of zero.
+    """Point with one parameter changed. It is not validated, because a step may take a parameter slightly below its
+    limit of zero.
     """
     new = {**values, name: values[name] + change}
 
@@ -189,10 +189,11 @@ def budget(
     standard_uncertainties: Mapping[str, float],
     correlation: Mapping[tuple[str, str], float] | None = None,
 ) -> Budget:
-    """Uncertainty of alpha_1 and alpha_2 from standard uncertainties [SI] of parameters, by name.
+    """Uncertainty of alpha_1 and alpha_2 from the standard uncertainties [SI] of parameters, by name.
 
-    `correlation`: coefficients of pairs of names; other pairs are independent. First order: JCGM 100:2008
-    (GUM), Eq. (10) and (13). Raises InvalidInput for unknown names, negative uncertainties, impossible correlations.
+    `correlation` contains the coefficients of pairs of names; other pairs are independent. To first order, JCGM
+    100:2008 (GUM), Eq. (10) and (13). Raises InvalidInput for unknown names, negative uncertainties or impossible
+    correlations.
     """
     names = list(standard_uncertainties)
     for name, size in standard_uncertainties.items():
@@ -208,7 +209,8 @@ def budget(
         i, j = names.index(one), names.index(other)
         matrix[i, j] = matrix[j, i] = coefficient
     if names and float(np.linalg.eigvalsh(matrix).min()) < -1e-12:
-        raise InvalidInput("correlation", dict(correlation or {}), "these correlations contradict each other")
+        allowed = "these correlations contradict each other: the correlation matrix has a negative eigenvalue"
+        raise InvalidInput("correlation", dict(correlation or {}), allowed)
     rows = [(sensitivities[name].alpha_1, sensitivities[name].alpha_2) for name in names]
     parts = np.array(rows).reshape(-1, 2) * np.array(list(standard_uncertainties.values()))[:, None]
     alpha_1, alpha_2 = np.sqrt(np.maximum(np.einsum("ia,ij,ja->a", parts, matrix, parts), 0.0)).tolist()

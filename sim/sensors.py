@@ -1,7 +1,7 @@
 """Models of the instruments from motion to counts: lasers, accelerometer, displacement sensor, converter.
 
-Each instrument is a group of parameters; `stream` starts it. The samples do not depend on the size of the blocks of
-ticks passed to a stream. Every stream draws from its own random generator, in order.
+Each instrument is a group of parameters; its method `stream` starts the instrument. The samples do not depend on how
+the ticks passed to a stream are divided into blocks. Every stream has its own random generator.
 """
 
 from math import floor
@@ -17,41 +17,43 @@ Array = NDArray[np.float64]
 
 
 class Laser(Parameters):
-    """A triangulation laser similar to the optoNCDT 1420, read at its analogue output; at rest it reads mid range.
+    """Triangulation laser similar to the optoNCDT 1420, read at its analogue output. The reading at rest is mid range.
 
     The current is 4 mA at the start and 20 mA at the end of the measuring range, with a reserve of 1 % on either side
-    (manual of the optoNCDT 1420 and of its family); the number of bits of the output and the error current are not
+    (manual of the optoNCDT 1420 and of its family). The number of bits of the output and the error current are not
     clearly documented and are therefore parameters.
     """
 
     measuring_range: float = quantity(0.200, "m", "measuring range; the storey rests at mid range", gt=0)
     rate: float = quantity(4000.0, "1/s", "measurements per second of the laser's own clock", gt=0)
     clock_error: float = quantity(20e-6, "1", "relative error of the laser's clock", gt=-0.01, lt=0.01)
-    latency: int = quantity(2, "1", "measurements between exposure and output", ge=0, le=100)
-    output_bits: int = quantity(12, "1", "bits of the analogue output over the measuring range", ge=8, le=24)
+    latency: int = quantity(2, "1", "number of measurements between exposure and output", ge=0, le=100)
+    output_bits: int = quantity(
+        12, "1", "resolution [bit] of the analogue output over the measuring range", ge=8, le=24
+    )
     noise: float = quantity(5e-6, "m", "standard deviation of a measurement", ge=0)
     linearity: float = quantity(
         0.0008, "1", "amplitude of the smooth linearity error over the measuring range", ge=0, lt=0.1
     )
     linearity_periods: float = quantity(
-        1.5, "1", "periods of the linearity error within the measuring range", ge=0, formerly="linearity_waves"
+        1.5, "1", "number of periods of the linearity error in the measuring range", ge=0, formerly="linearity_waves"
     )
     scale_error: float = quantity(0.0, "1", "relative error of the sensitivity", gt=-0.5, lt=0.5)
     load: float = quantity(500.0, "ohm", "load resistor that converts the current to a voltage", gt=0)
     error_current: float = quantity(0.0030, "A", "current without a valid measurement", ge=0)
     reference: Literal["ground", "table"] = quantity(
-        "ground", "", "where the laser is mounted: on the ground it measures x + u, on the table u"
+        "ground", "", "mounting of the laser: on the ground it measures x + u, on the table u"
     )
 
     @property
     def nominal(self) -> tuple[float, float]:
-        """(m/V, m): displacement = volts * first + second, from the data sheet."""
+        """Scale [m/V] and offset [m] from the data sheet: displacement = scale * volts + offset."""
         slope = self.measuring_range / (0.016 * self.load)
         return slope, -slope * 0.004 * self.load - 0.5 * self.measuring_range
 
     @property
     def valid_volts(self) -> tuple[float, float]:
-        """Range of voltages of valid measurements: 3.8 to 20.2 mA, the reserve included."""
+        """Range of voltages of valid measurements [V], from 3.8 to 20.2 mA, including the reserve."""
         return 0.0038 * self.load, 0.0202 * self.load
 
     def stream(self, sample_rate: float, seed: SeedSequence) -> "LaserStream":
@@ -60,7 +62,7 @@ class Laser(Parameters):
 
 
 class LaserStream:
-    """Running laser: converts the target's motion at the ticks to the output at the ticks."""
+    """Running laser, which converts the target's motion at the ticks to the output at the ticks."""
 
     def __init__(self, laser: Laser, sample_rate: float, seed: SeedSequence) -> None:
         from sim.kernel.laser import measure
@@ -90,7 +92,7 @@ class LaserStream:
         self._taken = np.empty(laser.latency + 1)
 
     def read(self, displacement: Array, velocity: Array) -> Array:
-        """Output [V] at each tick, shape (n,), for the target's position and velocity, shape (n,) [m], [m/s]."""
+        """Output [V] at each tick, shape (n,), for the position [m] and velocity [m/s] of the target, shape (n,)."""
         if self._tick == 0:
             # before the first tick, the output is a measurement of the storey at rest
             self._last[0] = displacement[0]
@@ -116,7 +118,7 @@ class LaserStream:
 
 
 class LinearSensor(Parameters):
-    """A sensor with a proportional voltage output."""
+    """Sensor with a proportional voltage output."""
 
     sensitivity: float
     noise_density: float
@@ -124,7 +126,7 @@ class LinearSensor(Parameters):
 
     @property
     def nominal(self) -> tuple[float, float]:
-        """(unit/V, unit): value = volts * first + second, from the calibration."""
+        """Scale [unit/V] and offset [unit] from the calibration: value = scale * volts + offset."""
         return 1.0 / self.sensitivity, 0.0
 
     def volts(self, value: Array, sample_rate: float, random: Generator) -> Array:
@@ -156,14 +158,14 @@ SIMULATED = ("acceleration", "velocity", "displacement")
 
 
 class PlacedSensor(LinearSensor):
-    """A further sensor with a proportional voltage output, for the motion of `place` relative to the ground."""
+    """Further sensor with a proportional voltage output, for the motion of `place` relative to the ground."""
 
-    name: str = quantity(..., "", "name of its channel")
-    measures: str = quantity(..., "", "one of SIMULATED")
+    name: str = quantity(..., "", "name of the sensor's channel")
+    measures: str = quantity(..., "", "measured quantity, one of SIMULATED")
     unit: str = quantity(..., "", "SI unit of the values")
-    place: Place = quantity(..., "", "part on which it is mounted")
+    place: Place = quantity(..., "", "part on which the sensor is mounted")
     sensitivity: float = quantity(..., "V/unit", "volts per unit as calibrated")
-    zero: float = quantity(0.0, "V", "voltage at zero")
+    zero: float = quantity(0.0, "V", "output voltage when the measured quantity is zero")
     noise_density: float = quantity(0.0, "unit/Hz^0.5", "spectral density of the white noise", ge=0)
 
     @property
@@ -175,11 +177,11 @@ class PlacedSensor(LinearSensor):
 
 
 class Converter(Parameters):
-    """The analogue-to-digital converter; beyond its range it saturates."""
+    """Analogue-to-digital converter, which saturates beyond its range."""
 
     bits: int = quantity(14, "1", "resolution", ge=8, le=16)
     range: float = quantity(10.0, "V", "largest input magnitude", gt=0)
-    noise: float = quantity(0.0004, "V", "standard deviation of the input noise of a sample", ge=0)
+    noise: float = quantity(0.0004, "V", "standard deviation of a sample due to input noise", ge=0)
 
     @property
     def lsb(self) -> float:
@@ -192,7 +194,7 @@ class Converter(Parameters):
         return -(2 ** (self.bits - 1)), 2 ** (self.bits - 1) - 1
 
     def counts(self, volts: Array, random: Generator) -> NDArray[np.int16]:
-        """Counts of the voltages of all channels, in the same shape (n, n_channels)."""
+        """Convert the voltages of all channels to counts, same shape (n, n_channels)."""
         noisy = random.standard_normal(volts.shape)
         noisy *= self.noise
         noisy += volts

@@ -1,11 +1,11 @@
-"""The long-stroke electrodynamic shaker: moving mass on a soft suspension, moving coil, power amplifier.
+"""Long-stroke electrodynamic shaker: moving mass on a soft suspension, moving coil, power amplifier.
 
     m x'' = Bl i - k_s x - c_s v - F_c tanh(v / v_c) - end stops + force noise - reaction of the specimen
 
-The amplifier either holds the coil voltage e, so that i = (e - Bl v) / R and the back-EMF makes the table nearly a
-velocity source, or it holds the current i, which makes it a force source. The coil's inductance is neglected: it
-matters only above several hundred hertz. Orders of magnitude follow the data sheets of long-stroke shakers such as the
-APS 400 and 420 (445 to 900 N, 0.15 m stroke, 1 m/s).
+The amplifier either controls the coil voltage e, so that i = (e - Bl v) / R and the back-EMF makes the table nearly a
+velocity source, or it controls the current i, which makes the table a force source. The inductance of the coil is
+neglected, because it matters only above several hundred hertz. The orders of magnitude follow the data sheets of
+long-stroke shakers such as the APS 400 and 420 (445 to 900 N, 0.15 m stroke, 1 m/s).
 """
 
 from typing import Literal
@@ -17,7 +17,7 @@ from sim.parameters import Parameters, quantity
 
 
 class Shaker(Parameters):
-    """An electrodynamic shaker with its table and its power amplifier."""
+    """Electrodynamic shaker with its table and its power amplifier."""
 
     moving_mass: float = quantity(50.0, "kg", "moving mass: armature, table and fixtures, without the specimen", gt=0)
     k_s: float = quantity(500.0, "N/m", "stiffness of the suspension", ge=0)
@@ -41,7 +41,7 @@ class Shaker(Parameters):
     half_stroke: float = quantity(0.075, "m", "distance from mid stroke to each end stop", gt=0)
     stop_stiffness: float = quantity(4.0e5, "N/m", "stiffness of an end stop", gt=0)
     stop_damping: float = quantity(
-        2.0, "s/m", "Hunt-Crossley damping of an end stop: relative increase of force per m/s of approach", ge=0
+        2.0, "s/m", "Hunt-Crossley damping of an end stop: relative increase of its force per m/s of approach", ge=0
     )
     force_noise: float = quantity(0.005, "N/Hz^0.5", "spectral density of the white force noise on the table", ge=0)
     band_low: float = quantity(1.0, "Hz", "lower end of the usable band", gt=0)
@@ -49,7 +49,7 @@ class Shaker(Parameters):
 
     @property
     def electric_damping(self) -> float:
-        """Damping by the back-EMF [N s/m]: Bl^2/R under a voltage amplifier, none under a current amplifier."""
+        """Damping by the back-EMF [N s/m]: Bl^2/R with a voltage amplifier, none with a current amplifier."""
         return self.bl**2 / self.resistance if self.amplifier == "voltage" else 0.0
 
     @property
@@ -65,14 +65,14 @@ class Shaker(Parameters):
         return min(motion, swing, self.amplifier_lag or motion)
 
     def frequency_response(self, omega: NDArray[np.float64] | float, payload: float = 0.0) -> NDArray[np.complex128]:
-        """Table acceleration per drive [m/s2/V] at `omega` [rad/s], with a rigid `payload` [kg] bolted on.
+        """Table acceleration per volt of drive [m/s2/V] at `omega` [rad/s], with a rigid `payload` [kg] bolted on.
 
-        Linear: no friction, no saturation, no end stops. Convention exp(+i omega t).
+        This is the linear response, without friction, saturation and end stops; the convention is exp(+i omega t).
         """
         s = 1j * np.asarray(omega, dtype=np.float64)
         impedance = (self.moving_mass + payload) * s * s + (self.c_s + self.electric_damping) * s + self.k_s
         return np.asarray(self.force_per_volt * s * s / (impedance * (1.0 + self.amplifier_lag * s)), np.complex128)
 
     def drive_for(self, acceleration: float, omega: float, payload: float = 0.0) -> float:
-        """Drive amplitude [V] of a sine of `acceleration` [m/s2] at `omega` [rad/s] by the linear response."""
+        """Drive amplitude [V] for a sine of amplitude `acceleration` [m/s2] at `omega` [rad/s], linear response."""
         return acceleration / float(np.abs(self.frequency_response(omega, payload)))

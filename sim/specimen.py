@@ -1,6 +1,6 @@
-"""The specimen: a two-storey shear frame, a rocking block, and the spring between them.
+"""Specimen: a two-storey shear frame, a rocking block, and the spring between them.
 
-Symbols are those of the paper (Tables 1 to 3); its values are the defaults.
+The symbols are those of the paper (Tables 1 to 3), and the values in the paper are the defaults.
 """
 
 from functools import cached_property
@@ -14,15 +14,15 @@ from sim.errors import InvalidInput
 from sim.parameters import COUPLING, Parameters, quantity
 
 SLOWEST, FASTEST = 1e-3, 1e5
-"""Plausible natural frequencies [rad/s] of a frame on a shake table; values beyond them are typing errors."""
+"""Plausible natural frequencies [rad/s] of a frame on a shake table; values beyond them result from typing errors."""
 
 
 DAMPING = (0.001, 0.15)
-"""Usual damping ratios of a laboratory frame of metal, with dampers or without: 0.1 % to 15 %."""
+"""Usual damping ratios of a metal laboratory frame with or without dampers: 0.1 % to 15 %."""
 
 
 class Frame(Parameters):
-    """The two-storey shear frame (Tables 1 and 3)."""
+    """Two-storey shear frame (Tables 1 and 3)."""
 
     h1: float = quantity(0.200, "m", "height of the first storey, where the spring acts", gt=0, usual=(0.02, 3.0))
     h2: float = quantity(0.496, "m", "height of the second storey", gt=0, usual=(0.02, 3.0))
@@ -44,7 +44,7 @@ class Frame(Parameters):
         except ArithmeticError:
             lower, upper = 0.0, 0.0
         if not (lower >= SLOWEST and upper <= FASTEST):
-            makes = f"with its masses and k2 a frequency is outside {SLOWEST:g} to {FASTEST:g} rad/s"
+            makes = f"with these masses and k2, a natural frequency is outside {SLOWEST:g} to {FASTEST:g} rad/s"
             raise InvalidInput("k1", self.k1, makes)
         return self
 
@@ -60,7 +60,7 @@ class Frame(Parameters):
     def dashpots(self) -> tuple[float, float]:
         """Dashpots (c1, c2) [N s/m] that give the modal damping ratios: phi_i' C phi_i = 2 xi_i omega_i.
 
-        The modes are mass-normalised; C = [[c1 + c2, -c2], [-c2, c2]], so each mode gives one linear equation
+        The modes are mass-normalised. With C = [[c1 + c2, -c2], [-c2, c2]], each mode gives one linear equation,
         phi_1i^2 c1 + (phi_2i - phi_1i)^2 c2 = 2 xi_i omega_i.
         """
         rows: list[tuple[float, float]] = []
@@ -75,7 +75,7 @@ class Frame(Parameters):
 
 
 class Block(Parameters):
-    """The rigid rocking block (Table 2). It neither slides nor lifts off both corners."""
+    """Rigid rocking block (Table 2), which neither slides nor lifts off at both corners."""
 
     b: float = quantity(0.025, "m", "half width of the block", gt=0, usual=(0.005, 0.5))
     h_b: float = quantity(0.200, "m", "half height of the block", gt=0, usual=(0.02, 2.0))
@@ -87,11 +87,11 @@ class Block(Parameters):
 
     @model_validator(mode="after")
     def _an_impact_gives_no_energy(self) -> "Block":
-        # below 0, as for a slab 1.42 times as wide as high, the impact would return it to the previous corner
+        # if r is below 0, as for a slab 1.42 times as wide as high, the impact would return it to the previous corner
         if not 0.0 <= self.restitution <= 1.0:
             allowed = (
                 f"with b = {self.b:g} m and h_b = {self.h_b:g} m it gives r = {self.restitution:.4g}, outside 0 to 1: "
-                "an impact neither increases nor reverses the speed"
+                "an impact can neither increase nor reverse the speed"
             )
             raise InvalidInput("restitution_factor", self.restitution_factor, allowed)
         return self
@@ -113,13 +113,13 @@ class Block(Parameters):
 
     @property
     def restitution(self) -> float:
-        """r = factor (J - 2b S_y) / J with S_y = M b: angular velocity after an impact over that before (Housner)."""
+        """r = factor (J - 2b S_y) / J, S_y = M b: ratio of angular velocities after and before an impact (Housner)."""
         return self.restitution_factor * (1.0 - 2.0 * self.b * self.mass * self.b / self.inertia)
 
     def restitution_on(self, table_mass: float) -> float:
-        """Restitution on a table of `table_mass` [kg] without specimen that moves freely during the impact.
+        """Restitution on a table that moves freely during the impact; `table_mass` [kg] is that without specimen.
 
-        Housner's balance with the table's share of the horizontal momentum: (r J - mu) / (J - mu) with
+        Housner's balance including the table's share of the horizontal momentum gives (r J - mu) / (J - mu) with
         mu = (M h_b)^2 / (m_t + M).
         """
         mu = (self.mass * self.h_b) ** 2 / (table_mass + self.mass)
@@ -127,10 +127,12 @@ class Block(Parameters):
 
 
 class Spring(Parameters):
-    """A coupling spring whose stiffness has been measured."""
+    """Coupling spring whose stiffness has been measured."""
 
-    label: float = quantity(..., "1", "label: beta, its nominal stiffness over k1", gt=0, usual=COUPLING)
-    k_c: float = quantity(..., "N/m", "its stiffness", gt=0, usual=(5.0, 1100.0))
+    label: float = quantity(
+        ..., "1", "label of the spring: beta, the ratio of its nominal stiffness to k1", gt=0, usual=COUPLING
+    )
+    k_c: float = quantity(..., "N/m", "measured stiffness of the spring", gt=0, usual=(5.0, 1100.0))
 
 
 class Specimen(Parameters):
@@ -138,8 +140,8 @@ class Specimen(Parameters):
 
     `beta = None` is the bare frame: no block, no spring.
 
-    Equations use `beta` and `k_c`. The `label` identifies a spring to its users; it does not change when k1 or k_C are
-    measured.
+    The equations use `beta` and `k_c`. The `label` identifies a spring for the user, and does not change when k1 or k_C
+    is measured.
     """
 
     frame: Frame = Frame()
@@ -147,11 +149,13 @@ class Specimen(Parameters):
     beta: float | None = quantity(
         None, "1", "stiffness ratio k_C/k1 of the spring; absent for the bare frame", ge=0, usual=COUPLING
     )
-    spring_label: float | None = quantity(None, "1", "label of the mounted spring; absent: beta", ge=0, usual=COUPLING)
+    spring_label: float | None = quantity(
+        None, "1", "label of the mounted spring; if absent, beta", ge=0, usual=COUPLING
+    )
     spring_k1: float | None = quantity(
         None,
         "N/m",
-        "reference k1 of the springs' labels: nominal k_C = label times this value; absent: k1",
+        "reference k1 of the springs' labels: nominal k_C = label times this value; if absent, k1",
         gt=0,
         usual=(40.0, 1100.0),
         example=213.44,
@@ -171,7 +175,7 @@ class Specimen(Parameters):
 
     @property
     def mass(self) -> float:
-        """Mass on the table [kg]: the frame's storeys, and the block unless the frame is bare."""
+        """Mass on the table [kg]: the storeys of the frame and, unless the frame is bare, the block."""
         block = self.block.mass if self.beta is not None else 0.0
         return self.frame.m1 + self.frame.m2 + block
 
@@ -187,7 +191,7 @@ class Specimen(Parameters):
 
     @property
     def nominal_k_c(self) -> float:
-        """Nominal stiffness of the mounted spring by its label [N/m]; 0 for the bare frame."""
+        """Nominal stiffness of the mounted spring [N/m], from its label; 0 for the bare frame."""
         return (self.label or 0.0) * (self.spring_k1 or self.frame.k1)
 
     @property
@@ -196,19 +200,23 @@ class Specimen(Parameters):
         return self.g / self.block.slenderness
 
     def coupled(self, label: float) -> "Specimen":
-        """The same specimen with the spring labelled `label`, with its measured or else its nominal stiffness."""
+        """Return the specimen with the spring labelled `label`, with its stiffness as measured or, if not measured, its
+        nominal stiffness.
+        """
         measured = next((each.k_c for each in self.springs if isclose(each.label, label)), None)
         if measured is not None:
             return self.with_spring(measured, label)
         return self._mounted(label) if self.spring_k1 is None else self.with_spring(label * self.spring_k1, label)
 
     def with_spring(self, k_c: float, label: float | None = None) -> "Specimen":
-        """The same specimen with a spring of `k_c` [N/m], labelled `label` or, by default, by its stiffness ratio."""
+        """Return the specimen with a spring of stiffness `k_c` [N/m], labelled `label` or, by default, by its stiffness
+        ratio.
+        """
         nominal = k_c / (self.spring_k1 or self.frame.k1)
         return self._mounted(k_c / self.frame.k1, nominal if label is None else label)
 
     def bare(self) -> "Specimen":
-        """The same frame without block and spring."""
+        """Return the frame without block and spring."""
         return self._mounted(None)
 
     def _mounted(self, beta: float | None, label: float | None = None) -> "Specimen":
@@ -216,7 +224,7 @@ class Specimen(Parameters):
         return Specimen(**kept, beta=beta, spring_label=label if label != beta else None)
 
     def packed(self) -> NDArray[np.float64]:
-        """The parameters for `sim.kernel`, shape (16,), in the order of `sim.kernel.packing`."""
+        """Parameters for `sim.kernel`, shape (16,), in the order of `sim.kernel.packing`."""
         f, k, (c1, c2) = self.frame, self.block, self.frame.dashpots
         frame = (f.m1, f.m2, f.k1, f.k2, c1, c2, f.h1, self.k_c, self.d)
         block = (k.b, k.h_b, k.mass, k.inertia, k.restitution, self.g, 0.0 if self.beta is None else 1.0)

@@ -1,8 +1,9 @@
-"""The steady response to a sine, as the solution of a boundary-value problem.
+"""Steady response to a sine, as the solution of a boundary-value problem.
 
-Two periodic motions exist: the block rocks with two impacts per period of the drive, or it never lifts. They can
-coexist. The rocking one is a fixed point of the return map of the section "just after the impact into theta > 0";
-it covers the full period, because the spring is on one side and the model is not symmetric in theta.
+There are two branches of periodic motion: the block rocks with two impacts per period of the drive, or it never lifts.
+Both motions can coexist. The rocking motion is a fixed point of the return map with the section "just after the impact
+into theta > 0". The map covers the full period, because the spring is on one side only, so that the model is not
+symmetric in theta.
 """
 
 from collections.abc import Sequence
@@ -25,7 +26,7 @@ SEED_SPECIMEN, SEED_OMEGA, SEED_AMPLITUDE = Specimen(beta=0.4), 16.0, 1.238512
 """Parameters of a known orbit, from which continuation starts."""
 
 SEED_SECTION = (3.11068, -0.0010828, 0.00037455, 0.049398, -0.11073, 0.67994)
-"""The known orbit to five digits, as a start for Newton's method: [phase, u1, u2, v1, v2, omega] on the section."""
+"""Known orbit to five digits, as a start for Newton's method: [phase, u1, u2, v1, v2, omega] on the section."""
 
 
 class NoOrbit(RockbenchError):
@@ -35,7 +36,7 @@ class NoOrbit(RockbenchError):
 
 
 def slowest_of(multipliers: NDArray[np.complex128]) -> complex:
-    """The multiplier of greatest modulus; of a conjugate pair the one in the upper half plane."""
+    """Multiplier with the greatest modulus; of a conjugate pair, the one in the upper half plane."""
     found = multipliers[int(np.argmax(np.abs(multipliers)))]
     return complex(found.real, abs(found.imag))
 
@@ -44,8 +45,8 @@ def slowest_of(multipliers: NDArray[np.complex128]) -> complex:
 class Orbit:
     """Steady motion with the period of the drive.
 
-    `phase` [rad] of the base's sine and `start`: a point of the orbit. `peaks` over the period; `impacts` in it.
-    `multipliers`: Floquet multipliers, complex, shape (6,) when rocking, (4,) when the block rests.
+    `start` is a point of the orbit, at the `phase` [rad] of the base's sine. `peaks` and `impacts` are those of one
+    period. `multipliers` are the complex Floquet multipliers, shape (6,) if the block rocks, (4,) if it rests.
     """
 
     specimen: Specimen
@@ -60,7 +61,7 @@ class Orbit:
 
     @property
     def section(self) -> NDArray[np.float64]:
-        """[phase, u1, u2, v1, v2, omega] at `start`, shape (6,): the point of the orbit on the return map's section."""
+        """Point of the orbit on the return map's section: [phase, u1, u2, v1, v2, omega] at `start`, shape (6,)."""
         x = self.start.as_array()
         return np.array([self.phase, *x[:4], x[5]])
 
@@ -71,7 +72,7 @@ class Orbit:
 
     @cached_property
     def slowest(self) -> complex:
-        """The multiplier of greatest modulus; of a conjugate pair the one in the upper half plane."""
+        """Multiplier with the greatest modulus; of a conjugate pair, the one in the upper half plane."""
         return slowest_of(self.multipliers)
 
     @cached_property
@@ -85,7 +86,7 @@ class Orbit:
         return self.multiplier < 1.0
 
     def samples(self, n: int) -> NDArray[np.float64]:
-        """One period at `n` equal steps, shape (n, 4): phase of the base's sine [rad] from 0, u1, u2 [m], theta [rad].
+        """One period in `n` equal steps, shape (n, 4): phase of the base's sine [rad] from 0, u1, u2 [m], theta [rad].
 
         Raises InvalidInput for n < 1.
         """
@@ -104,10 +105,11 @@ class Orbit:
 
 
 def rocking_orbit(specimen: Specimen, omega: float, amplitude: float, guess: Orbit | None = None) -> Orbit:
-    """The rocking motion of period 2 pi / `omega` [rad/s] under `amplitude` [m/s2] sin(omega t).
+    """Rocking motion of period 2 pi / `omega` [rad/s] under `amplitude` [m/s2] sin(omega t).
 
-    Continuation from `guess`, or from a known orbit, in all parameters at once with adaptive steps.
-    Raises InvalidInput for a bare frame or meaningless numbers, NoOrbit when it cannot be followed to the end.
+    Found by continuation from `guess`, or from a known orbit, in all parameters at once, with adaptive steps. Raises
+    InvalidInput for a bare frame or values outside their ranges, and NoOrbit if the continuation does not reach the
+    requested parameters.
     """
     check_steady(specimen, omega, amplitude)
     if guess is not None and guess.layer == "rocking":
@@ -118,7 +120,7 @@ def rocking_orbit(specimen: Specimen, omega: float, amplitude: float, guess: Orb
 
 
 def rocking_branch(specimen: Specimen, omegas: Sequence[float] | NDArray[np.float64], amplitude: float) -> list[Orbit]:
-    """`rocking_orbit` at each of `omegas`, in order: each is predicted from the previous ones.
+    """Rocking orbits at `omegas` [rad/s], in the given order, each extrapolated from the previous ones.
 
     Raises as `rocking_orbit` does.
     """
@@ -128,7 +130,7 @@ def rocking_branch(specimen: Specimen, omegas: Sequence[float] | NDArray[np.floa
 
 
 def branch_solutions(specimen: Specimen, omegas: Sequence[float], amplitude: float) -> dict[float, Solution]:
-    """The fixed points of `rocking_branch`, with phases unwrapped, in the order of the frequencies."""
+    """Fixed points for `rocking_branch`, by frequency, with unwrapped phases."""
     known: dict[float, Solution] = {}
     origin, section = _seed()
     for omega in omegas:
@@ -149,10 +151,10 @@ def branch_solutions(specimen: Specimen, omegas: Sequence[float], amplitude: flo
 
 
 def resting_state(specimen: Specimen, omega: float, amplitude: float) -> Orbit | None:
-    """The steady motion in which the block never lifts, in closed form; None where it does not exist.
+    """Steady motion in which the block never lifts, in closed form; None where it does not exist.
 
-    It exists if and only if |h_b M A - k_C h1 U1| < b g M with U1 the complex amplitude of the frame whose spring is
-    attached to the resting block (Eq. 9 and A.3 over a whole period). Always stable. Raises InvalidInput as
+    It exists if and only if |h_b M A - k_C h1 U1| < b g M, where U1 is the complex amplitude of the frame whose spring
+    is attached to the resting block (Eq. 9 and A.3 over a whole period). It is always stable. Raises InvalidInput as
     `rocking_orbit` does.
     """
     check_steady(specimen, omega, amplitude)
@@ -184,7 +186,7 @@ def resting_rates(specimen: Specimen) -> NDArray[np.complex128]:
 
 
 def resting_level(specimen: Specimen, omega: float) -> float:
-    """Amplitude of the base's sine [m/s2] at which a block that rests in the steady state would begin to lift.
+    """Amplitude of the base acceleration [m/s2] at which a block that rests in the steady state would begin to lift.
 
     The moment about a corner, h_b M A - k_C h1 U1, is linear in the amplitude A (Eq. 9 and A.3).
     """
@@ -196,11 +198,11 @@ def resting_level(specimen: Specimen, omega: float) -> float:
 
 
 def check_steady(specimen: Specimen, omega: float, amplitude: float) -> None:
-    """Raise InvalidInput for a bare frame, and for a frequency [rad/s] or amplitude [m/s2] that is not positive."""
+    """Raise InvalidInput for a bare frame, or unless frequency [rad/s] and amplitude [m/s2] are positive and finite."""
     if specimen.beta is None:
-        raise InvalidInput("specimen", "bare frame", "a rocking or resting block needs beta, 0 or more")
+        raise InvalidInput("specimen", "bare frame", "a steady motion with the block needs beta, 0 or more")
     if not (isfinite(omega) and omega > 0.0):
-        raise InvalidInput("omega", omega, "it must be positive rad/s")
+        raise InvalidInput("omega", omega, "it must be a positive circular frequency in rad/s")
     if not (isfinite(amplitude) and amplitude > 0.0):
         raise InvalidInput("amplitude", amplitude, "it must be a positive acceleration in m/s2")
 

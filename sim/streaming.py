@@ -1,6 +1,6 @@
 """Motion under a base acceleration that arrives in blocks, as from a live bench.
 
-The result is bit-identical for any division into blocks: all state that affects a step is carried over.
+The result is bit-identical for any division into blocks, because all state that affects a step is kept between them.
 """
 
 from math import isfinite, pi
@@ -26,14 +26,15 @@ from sim.specimen import Specimen
 
 
 class Stream:
-    """A specimen whose motion advances as its base acceleration arrives.
+    """Specimen whose motion advances as the base acceleration arrives.
 
-    The acceleration consists of values `dt` [s] apart, interpolated linearly; the very first value is only the start of
-    the first line. With `held`, each value is instead held for the following `dt`, as at a converter's output.
-    `divisions` states are evaluated in each interval, at equal parts up to its end: the drive's updates may be far
-    coarser than the samples required, because the motion between them is a polynomial. With 0, none are evaluated.
-    `peaks_from` [s] is the start of the window of the running peaks, or None for no peaks; the other arguments are
-    those of `sim.rocking.simulate`, and the motion is bit-identical to the one that it returns for a `SampledRecord`.
+    The acceleration consists of values at intervals of `dt` [s], interpolated linearly, where the very first value is
+    only the start of the first interval. With `held`, each value is instead held for the following `dt`, as at the
+    output of a converter. In each interval, `divisions` states are evaluated, at the ends of equal parts. The intervals
+    may be far longer than those of the required states, because the motion within them is a polynomial. With 0, no
+    states are evaluated. `peaks_from` [s] is the start of the window of the running peaks, or None for no peaks. The
+    other arguments are those of `sim.rocking.simulate`, and the motion is bit-identical to that which it returns for a
+    `SampledRecord`.
 
     Raises InvalidInput for values outside their range.
     """
@@ -56,7 +57,7 @@ class Stream:
         check_options(tolerance, overturning_angle)
         check_state(specimen, start, overturning_angle)
         if not (dt > 0.0 and isfinite(dt)):
-            raise InvalidInput("dt", dt, "it must be positive seconds")
+            raise InvalidInput("dt", dt, "it must be a positive time in s")
         if divisions < 0:
             raise InvalidInput("divisions", divisions, "it must be 0 or more samples per interval")
         if peaks_from is not None and not peaks_from >= 0.0:
@@ -77,12 +78,12 @@ class Stream:
 
     @property
     def state(self) -> State:
-        """The state at the end of the last interval, or at the end of the run."""
+        """State at the end of the last interval, or at the end of the run."""
         return State.from_array(self._x)
 
     @property
     def time(self) -> float:
-        """Seconds since the start."""
+        """Time since the start [s]."""
         return float(self._report[self._kernel.END])
 
     @property
@@ -95,10 +96,10 @@ class Stream:
         return motion_of(self._report, self._x, None, watched=self._watched)
 
     def feed(self, acceleration: ArrayLike) -> NDArray[np.float64]:
-        """Advance through the next values [m/s2], shape (n,), any n; returns the states evaluated, shape (m, 6).
+        """Advance through the next values [m/s2], shape (n,), any n. Returns the states evaluated, shape (m, 6).
 
-        m is `divisions` for each interval completed; columns as `State.as_array`. Rows after an overturning or a
-        failure are missing, and later input is ignored: see `status`.
+        m is `divisions` times the number of completed intervals; the columns are those of `State.as_array`. There are
+        no rows after an overturning or a failure, and later input is ignored, see `status`.
 
         Raises InvalidInput, without advancing, for values that are not finite or not one-dimensional.
         """

@@ -1,4 +1,4 @@
-"""Parallel application of one function to many items, on this machine or through a dask.distributed scheduler."""
+"""Parallel application of a function to many items, on this computer or through a dask.distributed scheduler."""
 
 import os
 from collections.abc import Callable, Generator, Iterable
@@ -17,10 +17,10 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 PATIENCE = 10.0
-"""Time-out for a scheduler's answer [s]."""
+"""Time-out for the response of a scheduler [s]."""
 
 Done = Callable[[int, int], None]
-"""Called with the number of items done and the total."""
+"""Function called with the number of completed items and the total."""
 
 
 class SchedulerUnavailable(RockbenchError):
@@ -30,9 +30,10 @@ class SchedulerUnavailable(RockbenchError):
 
 
 def processors(scheduler: str | None = None) -> int:
-    """Number of processors of a sweep: this machine's, or the threads of all workers of a `scheduler`.
+    """Number of processors for a sweep: those of this computer, or the threads of all workers of a `scheduler`.
 
-    That of this machine while the scheduler has no worker. Raises as `sweep` does for its scheduler.
+    While the scheduler has no workers, this is the number of processors of this computer. Raises the errors of `sweep`
+    that concern the scheduler.
     """
     here = os.cpu_count() or 1
     if scheduler is None:
@@ -49,15 +50,15 @@ def sweep(
     batch: int = 1,
     done: Done | None = None,
 ) -> list[Result]:
-    """`function` of each item, in order; the first exception that it raises is raised here.
+    """Apply `function` to each item and return the results in order. The first exception in `function` is raised here.
 
-    By default in as many threads as there are processors, see `in_threads`. With the address of a dask `scheduler`,
-    such as "tcp://10.0.0.5:8786", its workers run it; they need this package, and function and items must be picklable.
-    A task has `batch` items; choose a value that makes a task much longer than the few milliseconds of its transfer.
-    `done` then counts tasks.
+    By default, the function runs in as many threads as there are processors, see `in_threads`. With the address of a
+    dask `scheduler`, such as "tcp://10.0.0.5:8786", it runs in the workers of the scheduler, which need this package;
+    function and items must be picklable. A task has `batch` items: choose a value with which a task takes much longer
+    than the few milliseconds of its transfer. `done` then counts tasks.
 
-    Raises InvalidInput for batch < 1, MissingExtra without the extra "distributed", SchedulerUnavailable when the
-    scheduler does not answer.
+    Raises InvalidInput for batch < 1, MissingExtra without the extra "distributed", and SchedulerUnavailable if the
+    scheduler does not respond.
     """
     if batch < 1:
         raise InvalidInput("batch", batch, "a task must have at least one item")
@@ -70,11 +71,12 @@ def sweep(
 def in_threads(
     function: Callable[[Item], Result], items: Iterable[Item], done: Done | None = None, *, threads: int | None = None
 ) -> list[Result]:
-    """`function` of each item, in order, in as many `threads` as there are processors by default: right for work that
-    runs in `sim.kernel`, which releases the interpreter lock. `done` is called in this thread.
+    """Apply `function` to each item in `threads`, by default as many as there are processors, and return the results in
+    order. `done` is called in this thread.
 
-    The first exception that it raises is raised here, as is KeyboardInterrupt: then no further item starts, and items
-    in progress are not awaited.
+    Threads are suitable for work in `sim.kernel`, which releases the interpreter lock. The first exception in
+    `function` is raised here, as is KeyboardInterrupt; then no further item is started, and items in progress are not
+    awaited.
     """
     pool = ThreadPoolExecutor(threads or processors())
     try:
@@ -95,7 +97,7 @@ def _distributed(
     function: Callable[[Item], Result], items: list[Item], scheduler: str, batch: int, done: Done | None
 ) -> list[Result]:
     with _connected(scheduler) as client:
-        # pure=False: a result of an earlier sweep must not be reused
+        # pure=False, so that a result of an earlier sweep is not reused
         groups = [items[i : i + batch] for i in range(0, len(items), batch)]
         futures: Any = client.map(_each, groups, function=function, pure=False)
         while not all(future.done() for future in futures):
@@ -109,7 +111,7 @@ def _distributed(
 @contextmanager
 def _connected(scheduler: str) -> Generator[Any, None, None]:
     require("distributed", f"scheduler = {scheduler!r}")
-    # `Any`: an optional dependency, which publishes no types
+    # `Any`, because this is an optional dependency without type annotations
     distributed: Any = import_module("distributed")
     try:
         client: Any = distributed.Client(scheduler, timeout=PATIENCE, set_as_default=False)

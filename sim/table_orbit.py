@@ -2,8 +2,8 @@
 
 The motion of the table is part of the state: a disturbance of the block moves the table, which changes the stability of
 the orbit, so that the same orbit may be stable on a light table and unstable on fixed ground. The drive is periodic and
-unchanging, as under a slow amplitude control within a few cycles; its harmonics are such that the acceleration of the
-table is a sine.
+constant from cycle to cycle, as it is within a few cycles of a slow amplitude control. Its harmonics are such that the
+acceleration of the table is a sine.
 """
 
 from dataclasses import dataclass
@@ -23,14 +23,14 @@ from sim.steady import NoOrbit, Orbit, slowest_of
 Array = NDArray[np.float64]
 
 TICKS, SUBSTEPS = 600, 2
-"""Intervals of a constant drive per period, and Runge-Kutta steps in each; the error of the multipliers is 4e-5."""
+"""Intervals of constant drive per period, and Runge-Kutta steps in each. The error of the multipliers is 4e-5."""
 
 STEP = 1e-5
-"""Step of the differences, relative to the magnitude of each state."""
+"""Step of the finite differences, relative to the scale of each state."""
 
 CLOSED, QUICK = 1e-9, 0.2
-"""Relative mismatch over a period at which an orbit counts as closed, and the reduction per Newton step below which the
-derivatives are kept.
+"""Relative mismatch over a period below which an orbit counts as closed, and ratio of successive mismatches up to which
+the derivatives are kept.
 """
 
 PURE = 1e-4
@@ -42,10 +42,12 @@ NEWTON, CORRECTIONS = 20, 12
 
 @dataclass(frozen=True, eq=False)
 class TableOrbit:
-    """Steady rocking on the table. `start`, shape (8,), is the state [x, v, u1, u2, v1, v2, theta, omega] at the start
-    of the period, where the base's sine has the `phase` [rad]; `drive` and `acceleration`, shape (H,), are the
-    complex harmonics of the amplifier's command [V or A] and of the table's acceleration [m/s2], and `multipliers`,
-    complex, shape (8,), the Floquet multipliers of table and specimen together.
+    """Steady rocking on the table.
+
+    `start`, shape (8,), is the state [x, v, u1, u2, v1, v2, theta, omega] at the start of the period, at the `phase`
+    [rad] of the base's sine. `drive` and `acceleration`, shape (H,), are the complex harmonics of the amplifier's
+    command [V or A] and of the table's acceleration [m/s2]. `multipliers`, shape (8,), are the complex Floquet
+    multipliers of table and specimen together. `drift` [m] is the peak drift.
     """
 
     omega: float
@@ -58,7 +60,7 @@ class TableOrbit:
 
     @cached_property
     def slowest(self) -> complex:
-        """The multiplier of greatest modulus; of a conjugate pair the one in the upper half plane."""
+        """Multiplier with the greatest modulus; of a conjugate pair, the one in the upper half plane."""
         return slowest_of(self.multipliers)
 
     @property
@@ -68,16 +70,17 @@ class TableOrbit:
 
 
 def table_orbit(fixed: Orbit, shaker: Shaker, harmonics: int = 5) -> TableOrbit:
-    """The orbit on the table of `shaker` that corresponds to the rocking orbit `fixed` on fixed ground.
+    """Orbit on the table of `shaker` that corresponds to the rocking orbit `fixed` on fixed ground.
 
-    The harmonics 1 to `harmonics` of the drive give the table's acceleration the fundamental of `fixed` and no others.
-    Raises NoOrbit when Newton's method does not find it, or the block comes to rest or falls.
+    The harmonics 1 to `harmonics` of the drive are such that, of these harmonics, the table's acceleration has only the
+    fundamental, with the amplitude of `fixed`. Raises NoOrbit if Newton's method does not find the orbit, or the block
+    comes to rest or falls.
     """
     period = TablePeriod(fixed.specimen, shaker, fixed.omega)
     phase, start = _widest(fixed)
     orders: Array = np.arange(1.0, harmonics + 1.0)
     wanted = np.zeros(harmonics, dtype=np.complex128)
-    # a sine of the phase, as coefficients of exp(i k omega t)
+    # the base's sine as coefficients of exp(i k omega t)
     wanted[0] = -1j * fixed.amplitude * np.exp(1j * phase)
     frequencies: Array = orders * fixed.omega
     response = shaker.gain / shaker.frequency_response(frequencies, fixed.specimen.mass)
@@ -100,7 +103,7 @@ def table_orbit(fixed: Orbit, shaker: Shaker, harmonics: int = 5) -> TableOrbit:
 
 
 def harmonics_of(accelerations: Array, harmonics: int) -> NDArray[np.complex128]:
-    """Harmonics 1 to `harmonics` of an acceleration given by its means over the ticks of a period."""
+    """Harmonics 1 to `harmonics` of an acceleration, from its means over the ticks of a period."""
     orders = np.arange(1.0, harmonics + 1.0)
     found = 2.0 * np.fft.rfft(accelerations)[1 : harmonics + 1] / accelerations.size
     # a mean over a tick has the phase of its middle
@@ -108,7 +111,7 @@ def harmonics_of(accelerations: Array, harmonics: int) -> NDArray[np.complex128]
 
 
 def corner(state: Array) -> int:
-    """Mode of a rocking block in `state`."""
+    """Contact mode of a rocking block in `state`."""
     from sim.kernel.plant import ROCK_A, ROCK_B
 
     return ROCK_A if state[6] > 0.0 else ROCK_B
@@ -129,7 +132,7 @@ def _widest(fixed: Orbit) -> tuple[float, Array]:
 
 
 class TablePeriod:
-    """One period of table and specimen under a periodic drive, held constant in each of `ticks` intervals."""
+    """One period of table and specimen under a periodic drive that is held constant in each of `ticks` intervals."""
 
     def __init__(
         self, specimen: Specimen, shaker: Shaker, omega: float, ticks: int = TICKS, substeps: int = SUBSTEPS
@@ -139,19 +142,20 @@ class TablePeriod:
         self._stream, self._substeps = table.stream, substeps
         self._plant = plant_of(specimen, shaker, catch_angle=np.pi / 2)
         self._omega, self._tick = omega, tau / omega / ticks
-        # each command is held for a tick: its phase is that of the middle of the tick
+        # each command is held for a tick, so that its phase is that of the middle of the tick
         self._phase = np.asarray((np.arange(ticks) + 0.5) * (tau / ticks), dtype=np.float64)
         self._step: Array | None = None
 
     def commands(self, drive: NDArray[np.complex128]) -> Array:
-        """The command in each tick, shape (ticks,), of the complex harmonics `drive`, shape (H,)."""
+        """Commands in the ticks of a period, shape (ticks,), from the complex harmonics `drive`, shape (H,)."""
         orders = np.arange(1, drive.size + 1)
         return np.ascontiguousarray((np.exp(1j * np.outer(self._phase, orders)) @ drive).real)
 
     def advance(self, mode: int, y: Array, carried: Array, commands: Array) -> tuple[int, Array]:
-        """Mode after a period, and the samples, shape (ticks, 9), with the mean acceleration after each of them.
+        """Advance by one period. Returns the mode after it, and the samples, shape (ticks, 9).
 
-        Updates the state `y`, shape (8,), and `carried`, see `sim.kernel.table.stream`.
+        The last column of the samples is the mean acceleration in the tick that follows the sample. Updates the state
+        `y`, shape (8,), and `carried`, see `sim.kernel.table.stream`.
         """
         samples = np.empty((commands.size, 9))
         after = self._stream(
@@ -162,10 +166,10 @@ class TablePeriod:
         return after, samples
 
     def run(self, start: Array, drive: NDArray[np.complex128], change: Array | None = None) -> tuple[Array, Array]:
-        """State after one period, and the samples, see `advance`.
+        """Return the state after one period, and the samples, see `advance`.
 
-        `change`, shape (ticks,), is added to the commands of the period. Raises NoOrbit if, at the end, the block does
-        not rock on the corner at which it started.
+        `change`, shape (ticks,), is added to the commands of the period. Raises NoOrbit if the block does not rock, at
+        the end of the period, on the corner on which it started.
         """
         commands, y, mode = self.commands(drive), start.copy(), corner(start)
         if change is not None:
@@ -176,8 +180,8 @@ class TablePeriod:
         return y, samples
 
     def closed(self, start: Array, drive: NDArray[np.complex128]) -> Array:
-        """Start of the closed orbit under this drive, by Newton's method; the derivatives are kept while each
-        step reduces the mismatch by `QUICK`.
+        """Start of the closed orbit under this drive, by Newton's method. The derivatives are kept while each step
+        reduces the mismatch to at most the fraction `QUICK`.
         """
         y, before = start, np.inf
         for _ in range(NEWTON):
@@ -199,7 +203,7 @@ class TablePeriod:
         return np.stack(columns, axis=1)
 
     def scales(self, y: Array) -> Array:
-        """Size of each state: a displacement and an angle of the widest state, times omega for a rate."""
+        """Scales of the states: largest displacement and angle in `y`, multiplied by omega for velocities."""
         lengths, angle = float(np.abs(y[[0, 2, 3]]).max()), abs(float(y[6]))
         rates = np.array([1.0, self._omega, 1.0, 1.0, self._omega, self._omega, 1.0, self._omega])
         return rates * np.where(np.arange(8) < 6, lengths, angle)

@@ -23,10 +23,10 @@ Array = NDArray[np.float64]
 _LONGEST_STEP = 5.0e-4
 """Longest integration step [s]; its error in two seconds of violent rocking is below 1e-8 m."""
 _STEPS_PER_TIME_CONSTANT = 5
-"""Least number of steps within the shaker's shortest time constant."""
+"""Smallest number of steps within the shaker's shortest time constant."""
 _PLACES = ("table", "storey 1", "storey 2")
 _LET_GO = 3.0, 5.0
-"""Earliest and latest release of a hand-held block or frame after the rig is armed [s]."""
+"""Shortest and longest time from the arming of the rig to the release of a hand-held block or frame [s]."""
 
 
 class VirtualBenchParameters(Parameters):
@@ -53,14 +53,16 @@ class VirtualBenchParameters(Parameters):
     @model_validator(mode="after")
     def _lasers_stand_together(self) -> "VirtualBenchParameters":
         if self.laser_1.reference != self.laser_2.reference:
-            allowed = f"the drift needs both lasers on one reference, laser_1.reference = {self.laser_1.reference!r}"
+            allowed = (
+                f"the drift needs both lasers on one reference, but laser_1.reference = {self.laser_1.reference!r}"
+            )
             raise InvalidInput("laser_2.reference", self.laser_2.reference, allowed)
         return self
 
 
 @dataclass(frozen=True)
 class Truth:
-    """True motion at the ticks of the last block, arrays of shape (n,), for tests only."""
+    """True motion at the ticks of the last block, as arrays of shape (n,); for tests only."""
 
     x: Array
     v: Array
@@ -74,12 +76,12 @@ class Truth:
 
 
 class VirtualBench:
-    """Bench that converts drive voltage to counts, tick by tick, indefinitely.
+    """Bench that converts drive voltage to counts, tick by tick, without limit of time.
 
-    The channels of the `further` sensors follow those of table and lasers. All random numbers depend on `seed`; the
+    The channels of the `further` sensors follow those of table and lasers. All random numbers depend on `seed`: the
     same seed and drive give the same counts, however the drive is divided into blocks. Tick i of a block is sampled
-    just before its drive sample takes effect. A part held by hand is released between two ticks, without a push, a few
-    seconds after `arm`.
+    just before its drive sample takes effect. A part held by hand is released between two ticks, without an initial
+    velocity, a few seconds after `arm`.
     """
 
     def __init__(
@@ -114,12 +116,12 @@ class VirtualBench:
 
     @property
     def arrangement(self) -> Arrangement:
-        """The specimen on the table, with its present clamps and manual restraints."""
+        """Specimen on the table, with its present clamps and manual restraints."""
         return self._arrangement
 
     @property
     def specimen(self) -> Specimen:
-        """The specimen on the table."""
+        """Specimen on the table."""
         return self._arrangement.specimen
 
     @property
@@ -129,7 +131,7 @@ class VirtualBench:
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """The input channels in column order, with nominal calibrations that ignore the simulated scale errors."""
+        """Input channels in column order, with nominal calibrations that do not include simulated scale errors."""
         p, lsb = self.parameters, self.parameters.converter.lsb
         lowest, highest = (code + inward for code, inward in zip(p.converter.codes, (1, -1), strict=True))
         linear = (
@@ -154,21 +156,21 @@ class VirtualBench:
 
     @property
     def truth(self) -> Truth:
-        """The motion at the ticks of the last `run` or `coast`."""
+        """True motion at the ticks of the last `run` or `coast`."""
         x, v, u1, u2, v1, v2, theta, omega, a = self._samples.T
         return Truth(x=x, v=v, a=a, u1=u1, u2=u2, v1=v1, v2=v2, theta=theta, omega=omega)
 
     @property
     def sights(self) -> Array:
-        """True motion of the lasers' targets in the last `run` or `coast`, shape (4, n): `sim.arrangement.sights`."""
+        """True motion of the lasers' targets in the last `run` or `coast`, see `sim.arrangement.sights`."""
         return self._seen(np.ascontiguousarray(self._samples.T))
 
     def _seen(self, states: Array) -> Array:
-        # both lasers have the same reference, see the parameters
+        # both lasers have the same reference, as the parameters require
         return sights(states, self._arrangement, self.parameters.laser_1.reference == "ground")
 
     def run(self, volts: Array) -> NDArray[np.int16]:
-        """Play `volts`, shape (n,) [V], and return the counts sampled at the same ticks, shape (n, n_channels)."""
+        """Play `volts` [V], shape (n,), and return the counts sampled at the same ticks, shape (n, n_channels)."""
         if volts.size == 0:
             return np.empty((0, 4 + len(self._further)), dtype=np.int16)
         self._move(volts)
@@ -180,10 +182,10 @@ class VirtualBench:
         self._move(np.zeros(max(1, round(seconds * self.parameters.sample_rate))))
 
     def mount(self, arrangement: Arrangement) -> None:
-        """Set this arrangement with the specimen at rest; a block held by its catch is put upright.
+        """Set up this arrangement with the specimen at rest; a block held by its catch is put upright.
 
-        The table stops at its present position, or is locked at mid stroke. Raises InvalidInput, without a change, for
-        a block held beyond its catch.
+        The table stops at its present position, or is locked at mid stroke. Raises InvalidInput, without changing
+        anything, if the block would be held by hand beyond the angle of its catch.
         """
         catch = self.parameters.catch_angle
         if abs(arrangement.tilt) >= catch:
@@ -197,7 +199,7 @@ class VirtualBench:
         if arrangement.table_locked:
             self._state[0] = 0.0
         self._carried[:] = 0.0
-        # a hand-held block moves no more than one held by the catch
+        # a block held by hand is as fixed as one held by the catch
         self._mode = self._kernel.REST if arrangement.tilt == 0.0 else self._kernel.FALLEN
 
     def arm(self) -> None:
@@ -206,7 +208,7 @@ class VirtualBench:
             self._held_for = round(self._hand_random.uniform(*_LET_GO) * self.parameters.sample_rate)
 
     def disarm(self) -> None:
-        """Disarm the bench: a part held by hand is no longer released."""
+        """Disarm the bench: a part that is still held by hand will not be released."""
         self._held_for = None
 
     def _arrange(self, arrangement: Arrangement) -> None:
@@ -214,7 +216,7 @@ class VirtualBench:
         self._plant = arrangement.plant(self.parameters.shaker, self.parameters.catch_angle)
 
     def _let_go(self) -> None:
-        """Release block and frame, both at rest."""
+        """Release block and frame from rest."""
         if self._arrangement.tilt != 0.0:
             self._mode = self._kernel.ROCK_A if self._arrangement.tilt > 0.0 else self._kernel.ROCK_B
         self._arrange(self._arrangement.let_go())
@@ -237,7 +239,7 @@ class VirtualBench:
             self._held_for -= n
 
     def _stream(self, ticks: slice, requests: Array, noise: Array) -> None:
-        """Advance through part of a block's ticks."""
+        """Advance through some of the ticks of a block."""
         self._mode = self._kernel.stream(
             self._plant,
             1.0 / self.parameters.sample_rate,
@@ -269,8 +271,8 @@ class VirtualBench:
     def _motion(self, s: Array) -> dict[str, Array]:
         """Displacement, velocity and acceleration of table and storeys relative to the ground, each of shape (3, n).
 
-        The acceleration of a storey is the mean since the previous tick: the kernel integrates it and keeps its
-        velocity.
+        The acceleration of a storey is the mean since the previous tick, from the difference of the velocities that the
+        kernel returns.
         """
         x, v, u1, u2, v1, v2, _, _, a = s
         velocity = np.stack((v, v + v1, v + v2))

@@ -1,4 +1,4 @@
-"""Waits of the main thread, in short steps, since on Windows before Python 3.14 Ctrl-C does not end a wait for a
+"""Waits of the main thread, in short steps, because on Windows before Python 3.14 Ctrl-C does not end the wait for a
 lock.
 """
 
@@ -12,40 +12,40 @@ from threading import Condition, Event, Thread
 from typing import TypeVar
 
 STEP = 0.2
-"""Longest wait during which a signal may remain unanswered [s]."""
+"""Longest time for which a signal may remain unhandled [s]."""
 
 Result = TypeVar("Result")
 Item = TypeVar("Item")
 
 
 def join(thread: Thread, timeout: float = float("inf")) -> bool:
-    """Wait until a thread has ended; False after `timeout` [s]."""
+    """Wait until a thread has ended. Returns False after `timeout` [s]."""
     return _repeat(lambda step: thread.join(step) or not thread.is_alive(), timeout)
 
 
 def wait(event: Event, timeout: float = float("inf")) -> bool:
-    """Wait until an event is set; False after `timeout` [s]."""
+    """Wait until an event is set. Returns False after `timeout` [s]."""
     return _repeat(event.wait, timeout)
 
 
 def wait_for(changed: Condition, predicate: Callable[[], bool], timeout: float) -> bool:
-    """Wait until `predicate` holds, with the condition's lock held; False after `timeout` [s]."""
+    """Wait until `predicate` is true; the caller holds the lock of the condition. Returns False after `timeout` [s]."""
     return _repeat(lambda step: changed.wait_for(predicate, step), timeout)
 
 
 def result(future: Future[Result]) -> Result:
-    """Wait for the result of a future. Raises its exception."""
+    """Wait for the result of a future. Raises the exception of the future, if any."""
     while True:
         try:
             return future.result(STEP)
         except NotYet:
             if future.done():
-                # an exception raised by the work itself
+                # return the result, or raise the exception of the work itself
                 return future.result(0.0)
 
 
 def put(queue: Queue[Item], item: Item, timeout: float) -> bool:
-    """Wait until a queue has room for `item`; False after `timeout` [s]."""
+    """Put `item` into a queue as soon as there is room. Returns False after `timeout` [s]."""
 
     def within(step: float) -> bool:
         try:
@@ -58,7 +58,7 @@ def put(queue: Queue[Item], item: Item, timeout: float) -> bool:
 
 
 def end(process: "Popen[bytes]", timeout: float) -> None:
-    """Wait until a process has ended; kills it after `timeout` [s]."""
+    """Wait until a process has ended. Kills it after `timeout` [s]."""
 
     def ended(step: float) -> bool:
         try:
@@ -78,7 +78,7 @@ def sleep(seconds: float) -> None:
 
 
 def _repeat(wait_once: Callable[[float], object], timeout: float) -> bool:
-    """Call `wait_once(step)`, at least once, until it is true; False after `timeout` [s]."""
+    """Call `wait_once(step)`, at least once, until it returns a true value. Returns False after `timeout` [s]."""
     end = time.monotonic() + timeout
     remaining = timeout
     while True:
