@@ -49,7 +49,7 @@ def test_fits_and_points_are_shown_with_their_units(tmp_path: Path) -> None:
     assert picture.figure.axes[-1].get_xlabel() == "time  [s]"
     results = points.parts[0]
     assert isinstance(results, Table)
-    assert [column.heading for column in results.columns] == ["frequency hz [Hz]", "noise [m/s²/√Hz]", "remark"]
+    assert [column.heading for column in results.columns] == ["frequency [Hz]", "noise [m/s²/√Hz]", "remark"]
     assert results.rows == [["8", "1·10⁻⁷", "β = 0.4"]]
 
 
