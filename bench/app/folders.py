@@ -36,7 +36,7 @@ def make_folder(first: Path, taken: Container[Path] = ()) -> Path:
         if folder in taken:
             continue
         try:
-            # another process may remove an empty parent in between
+            # another process may have removed an empty parent in the meantime
             for _ in range(100):
                 with suppress(FileNotFoundError):
                     _make_parent(folder)

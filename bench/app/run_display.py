@@ -160,8 +160,8 @@ def _share(value: float) -> str:
 
 @dataclass
 class RunDisplay:
-    """The displayed state: `rows` of finished points, the latest `notices` about other events, and the values displayed
-    next to them. `live` has the live values of the protocol, one line each, by label.
+    """The displayed state: `rows` of finished points, the latest `notices` about other events, state, step and
+    progress. `live` has the live values of the protocol, one line each, by label.
     """
 
     time: float = 0.0

@@ -55,7 +55,9 @@ def map_section(specimen: Specimen, amplitude_factor: float, measured: Sequence[
 
 
 def _axis(low: float, high: float, step: float, places: Sequence[float], margin: float) -> tuple[float, ...]:
-    """Equal steps over the usual or the measured range, coarser if there would be too many."""
+    """Equally spaced values over the range `low` to `high`, extended to include the measured `places`; the step is
+    larger than `step` if there would be too many values.
+    """
     least = min([low, *(place - margin for place in places if place < low)])
     most = max([high, *(place + margin for place in places if place > high)])
     least = max(least, step)

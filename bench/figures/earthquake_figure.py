@@ -59,7 +59,7 @@ def gain_figure(points: Sequence[PointLike], prediction: Mapping[str, NDArray[An
     """alpha_2 against beta, one panel per record.
 
     `points` have the fields of an earthquake point; `prediction` has record, beta and alpha_2 under the requested
-    motion (NaN where the block topples). Intervals hold 95 % of the expected measurements; a cross at the upper edge
+    motion (NaN where the block topples). Intervals contain 95 % of the expected measurements; a cross at the upper edge
     marks a toppled block.
     """
     rows = plain(points)

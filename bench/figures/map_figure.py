@@ -30,7 +30,7 @@ GAINING, LOSING = "#DCEBF5", "#B9B9B9"
 """Light where the block reduces the response, dark where it does not."""
 
 FEWEST_LEVELS = 4
-"""Number of usual levels crossed below which other levels are drawn."""
+"""Least number of usual levels that a gain must cross; otherwise other levels are drawn."""
 
 JUMP = 0.1
 """Step in the frequency of least gain, as a fraction of the range, above which it counts as a jump between valleys."""

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 WIDTH, ROW = 9.0, 4.2
-"""Width of the figure, height of a record [inch]."""
+"""Width of the figure, height per record [inch]."""
 
 LATE = 0.8
 """Position in a history, as a fraction of its length, beyond which the peak value is printed to the left of its
@@ -118,7 +118,7 @@ def stroke_figure(title: str, histories: Sequence[History], spectra: Spectra, re
         for sign in (-1.0, 1.0) if limit is not None else ():
             panel.axhline(sign * (limit or 0.0), color=GREY, linewidth=0.8, linestyle=":")
     panels[0].set_title(title, loc="left", fontsize=9)
-    panels[-1].set_xlabel("time on the record's clock  [s]")
+    panels[-1].set_xlabel("time in the record  [s]")
     _draw_spectra(figure.add_subplot(grid[:3, 1]), figure.add_subplot(grid[3:, 1]), spectra)
     add_legend(figure, panels[:1], 3)
     return figure

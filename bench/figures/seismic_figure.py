@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 DRIFT_WIDTH, DRIFT_ROW, MARGIN = 7.5, 1.25, 0.9
-"""Width of the figure, height of a record, height of legend and axis [inch]."""
+"""Width of the figure, height per record, height of legend and axis [inch]."""
 
 WIDTH, HEIGHT, ROW = 7.5, 6.4, 0.16
 """Width, height without the strip of toppled blocks, height of a record in the strip [inch]."""
@@ -45,8 +45,8 @@ PANELS, PANELS_WIDTH, PANEL_HEIGHT = 3, 9.5, 2.5
 """Panels per row; width of the figure and height of a row [inch]."""
 
 TOPPLED, LOWER, HEADROOM = 0.96, 0.06, 0.3
-"""Height of the marks for a toppled block, offset for each further stiffness, and space for the marks, relative to the
-panel.
+"""Height of the marks for a toppled block, their offset for each further stiffness, and the space reserved for them,
+relative to the height of the panel.
 """
 
 

@@ -1,8 +1,8 @@
 # pyright: reportUnknownMemberType=false
 """Style of all figures: colours, grid, axes, legend; creation and saving.
 
-matplotlib is imported on first use, and never through pyplot, which has global state and opens windows. Its keyword
-arguments are untyped, hence the pyright comment in the first line of every figure module.
+matplotlib is imported on first use, and never through pyplot, which has global state and opens windows. The keyword
+arguments of matplotlib are untyped, hence the pyright comment in the first line of every figure module.
 """
 
 from collections.abc import Iterable

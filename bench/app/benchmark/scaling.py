@@ -105,7 +105,7 @@ STARTUP_COLUMNS = (
     Column("runs", "runs", "d"),
     Column("min_s", "min [s]", ".2f"),
     Column("median_s", "median [s]", ".2f"),
-    Column("processor_s", "processor time each [s]", ".2f"),
+    Column("processor_s", "processor time per run [s]", ".2f"),
 )
 
 

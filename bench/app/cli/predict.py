@@ -187,34 +187,33 @@ gain_map = _sine(
 stability = _sine(
     StabilityRequest,
     "stability",
-    "Stability boundaries of the rocking motions in frequency, on fixed ground and on a table.\n\nThe "
-    "block pushes the table, which changes how a disturbance grows or decays: a motion may be stable on "
-    "the table and unstable on fixed ground. The motion of the table is a sine up to --harmonics, under "
-    "a drive that does not react within a period. The boundaries are listed; --csv, --json and --plot "
-    "contain the multipliers of every point.",
+    "Stability boundaries of the rocking motions in frequency, on fixed ground and on a table.\n\nThe block pushes "
+    "the table, which changes how a disturbance grows or decays: a motion may be stable on the table and unstable on "
+    "fixed ground. The table's motion is a sine up to the harmonic --harmonics; the drive does not react within a "
+    "period. The boundaries are listed; --csv, --json and --plot contain the multipliers of every point.",
 )
 attractor = _sine(
     AttractorRequest,
     "attractor",
-    "Long-term motions on a table, where the periodic rocking motion is unstable: period, peaks, falls.\n\n"
-    "From the disturbed orbit the motion is followed for --cycles, under a drive that keeps the mean of the table's "
-    "harmonics. It repeats after several cycles, does not repeat, or ends with a fall. The range of the greatest peak "
-    "and the share of falls are those of drawn specimens. With many frequencies the figure is a bifurcation diagram.",
+    "Long-term motions on a table, where the periodic rocking motion is unstable: period, peaks, falls.\n\nThe motion "
+    "is simulated from the disturbed orbit for --cycles; the drive keeps the mean of the table's harmonics. The "
+    "motion repeats after several cycles, does not repeat, or ends with a fall. The range of the greatest peak and "
+    "the share of falls are computed with randomly drawn specimens. With many frequencies the figure is a bifurcation "
+    "diagram.",
 )
 seismic = _under_records(
     SeismicRequest,
     "seismic",
-    "Gain curves under earthquake records: alpha_1 and alpha_2 against the stiffness.\n\n"
-    "Each record is trimmed, limited to the band of the table, scaled to its peak, and on request fitted to the "
-    "stroke; motions start at rest. For a block that topples, the time of toppling is given instead of a gain. The "
-    "figure is like the paper's "
-    "Fig. 8(a) and 9(a).",
+    "Gain curves under earthquake records: alpha_1 and alpha_2 against the stiffness.\n\nEach record is trimmed, "
+    "limited to the band of the table, scaled to the peak --peak-factor, and on request fitted to the stroke; motions "
+    "start at rest. For a block that topples, the time of toppling is given instead of a gain. The figure is like the "
+    "paper's Fig. 8(a) and 9(a).",
     drawable=28,
 )
 band_study = _under_records(
     BandStudyRequest,
     "band_study",
-    "Gain and toppling under earthquake records, against the lower end of the table's band.\n\n"
-    "Like `seismic`, with each record scaled to its peak at every lower end. The figure has a panel for each record.",
+    "Gain and toppling under earthquake records, against the lower end of the table's band.\n\nLike `seismic`, with "
+    "each record limited to every band and scaled to the same peak in it. The figure has a panel for each record.",
     drawable=15,
 )

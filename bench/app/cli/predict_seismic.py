@@ -152,7 +152,9 @@ def _band_curve(curves: Sequence[SeismicCurve], k: int) -> BandCurve:
 
 
 def _extremes(lines: "Sequence[tuple[NDArray[Any], NDArray[Any], NDArray[Any]]]", unit: str) -> Table:
-    """Number of toppled blocks, and positions of the least and largest gain, of lines (x, alpha_2, toppled)."""
+    """For each line (x, alpha_2, toppled): number of toppled blocks, and the least and the largest gain with their
+    positions.
+    """
     rows: list[list[float]] = []
     for x, alpha, toppled in lines:
         found = [nan] * 4

@@ -106,7 +106,8 @@ def _text(replayed: "Replayed", table: str) -> str:
     if replayed.ended is not None:
         lines.append(f"The recording is incomplete: {replayed.ended}")
     lines += [
-        f"Not reproducible from the samples, replaced by a requested abort: {reason}" for reason in replayed.in_place
+        f"Not reproducible from the samples, therefore replaced by a requested abort: {reason}"
+        for reason in replayed.in_place
     ]
     compared = ", ".join(f"{count} {part}" for part, count in replayed.found.compared.items() if count)
     if not replayed.same_wording:

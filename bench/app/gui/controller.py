@@ -227,7 +227,7 @@ class Controller(QObject):
         self._started, self._stopped_at = now(), None
 
     def _introduce(self, run: Run, elapsed: float) -> None:
-        # a simulated bench that is not in real time lags with its model
+        # a simulated bench that does not run in real time may be silent while the model computes
         paced = run.realtime or run.configuration.real_time_only
         self._longest_quiet = SILENCE + run.configuration.acquisition.block_duration if paced else inf
         self.run, self._started = run, now() - elapsed
@@ -303,7 +303,7 @@ class Controller(QObject):
         if self._link is None:
             return
         messages = self._link.take()
-        # the number of columns must be known before traces are drawn, and the run of an attached session before its rig
+        # `opened` precedes traces, which need the number of columns; in an attached session, the run precedes `opened`
         for message in messages:
             if isinstance(message, Attached):
                 self._take(message)

@@ -116,7 +116,7 @@ def meters_of(configuration: BenchConfiguration, margins: Sequence[Margin] = ())
 
 
 class MetersView(QWidget):
-    """The meters below one another: a bar up to the limit, a line at the peak, a triangle at the planned value."""
+    """The meters, one below the other: a bar up to the limit, a line at the peak, a triangle at the planned value."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -165,7 +165,7 @@ class MetersView(QWidget):
                 meter.add(time, magnitudes[meter.key])
 
     def event(self, event: object) -> bool:
-        """Show the numbers of the meter below the pointer."""
+        """Show the numbers of the meter at the pointer."""
         if isinstance(event, QHelpEvent) and self.meters:
             place = min(int(event.pos().y() / self._row), len(self.meters) - 1)
             QToolTip.showText(event.globalPos(), self.meters[place].explanation, self)

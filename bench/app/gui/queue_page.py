@@ -219,7 +219,7 @@ class QueuePage(QWidget):
         column.addLayout(row)
         column.addWidget(self.kept)
         whole = QVBoxLayout(self)
-        # status and start never scroll
+        # the status and the start button never scroll
         whole.addLayout(top)
         whole.addWidget(scrolling(content, FITTING[0], LOWEST), 1)
 

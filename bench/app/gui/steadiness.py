@@ -23,8 +23,8 @@ HARMONICS = 3
 """Number of fitted harmonics: enough for the fundamental and the peak of a trace with a few hundred bins per cycle."""
 
 SENSORS = MEASURED_BY
-"""Signals as measured by the sensors. u1 and drift are small differences between these: the clock error of a laser
-changes their amplitude, but only the phase of its own signal.
+"""Signals as measured by the sensors. u1 and drift, which are small differences between these signals, are unsuitable:
+the clock error of a laser changes their amplitude, whereas it only shifts the phase of the laser's signal.
 """
 LASERS = (2, 3)
 

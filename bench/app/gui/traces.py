@@ -136,7 +136,7 @@ class TracePlot(QWidget):
         self._fresh = True
 
     def draw(self) -> None:
-        """Update the curves; without new samples they only scroll, for at most a limited time."""
+        """Update the curves; without new samples they only scroll, for `AHEAD` seconds at most."""
         if self.stale != self._stale:
             self._stale = self.stale
             self.use_theme(self._theme)

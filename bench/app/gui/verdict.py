@@ -28,7 +28,7 @@ SPACE = 0.31
 
 
 def verdict_of(view: RunView, finished: Parameters) -> str:
-    """The result of a finished point: value, prediction, verdict and point, or why it has no value."""
+    """The result of a finished point: value, prediction, verdict and point, or the reason for a missing value."""
     point = finished.model_dump()
     rows = rows_of(_columns(type(finished)), [point], view.labels)
     found = next((row for row in rows if row.field == view.headline), rows[0] if rows else None)

@@ -116,8 +116,8 @@ def scrolling(content: QWidget, width: int, height: int) -> QScrollArea:
 
 
 class _Holder(QWidget):
-    """Keeps `content` at its natural size. It has no layout, since with one an area gives wrapped text its preferred
-    height and scrolls although the contents would fit.
+    """Keeps `content` at its natural size. It has no layout: with a layout, the area would give wrapped text its
+    preferred height and scroll although the contents fit.
     """
 
     def __init__(self, content: QWidget, width: int, height: int) -> None:

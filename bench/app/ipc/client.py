@@ -91,7 +91,7 @@ class ClientConnection:
 
     @property
     def status(self) -> Literal["starting", "linked", "no link", "over"]:
-        """State of the connection: "no link" when the session has died or is silent before its final message."""
+        """State of the connection: "no link" when the session has ended, or is silent, before its final message."""
         if self._over:
             return "over"
         if not self.lives:

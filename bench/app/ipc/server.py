@@ -110,7 +110,7 @@ class SessionServer:
         self.answers = SimpleQueue[Answer]()
         self._notes = SimpleQueue[Note]()
         self.publish: Callable[[Event], None] | None = None
-        """Publishes an event of the run, in the engine's thread; None before its file exists."""
+        """Publishes an event of the run, in the engine's thread; None before the data file exists."""
         self.connected = True
         """Whether the owner is present."""
         self._attached: list[SendQueue] = []
@@ -283,7 +283,7 @@ class Publisher:
             self._host.outbox.put(Preparing(phase, done, total))
 
     def opened(self, rig: Rig, publish: Callable[[Event], None], prepared: Prepared[Any] | None = None) -> None:
-        """Start to send traces of the run that was `prepared`; None if its plan is not known. `publish` publishes an
+        """Start sending traces of the run that was `prepared` (None if its plan is not known). `publish` publishes an
         event of the run.
         """
         self._host.publish = publish

@@ -65,7 +65,7 @@ def gains_picture(curves: Sequence[SeismicCurve], words: str) -> Picture:
     limits = "none, whole records" if band is None else f"{band[0]:g} to {band[1]:g} Hz"
     return Picture(
         seismic_figure(drawn, limits),
-        f"Gains over the stiffness ratio, records {words} (predicted). Crosses at the bottom: the block topples.",
+        f"Gains against the stiffness ratio, records {words} (predicted). Crosses at the bottom: the block topples.",
         "Curves of alpha 2 and alpha 1 against the stiffness ratio, one for each record.",
     )
 

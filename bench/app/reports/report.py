@@ -45,7 +45,7 @@ def points_section(campaign: Campaign) -> Section | None:
     rows = [[_cell(each, row) for each in results.values()] for row in range(min(len(campaign.points), MOST_CELLS))]
     parts: list[Part] = [Table(f"Results of the protocol {campaign.protocol}", columns, rows)]
     if len(campaign.points) > MOST_CELLS:
-        parts.append(f"The file contains {len(campaign.points) - MOST_CELLS} more.")
+        parts.append(f"The file contains {len(campaign.points) - MOST_CELLS} more results.")
     meanings = [f"{_heading(name, each.unit)}: {first_words(each.description)}" for name, each in results.items()]
     return Section("points", "Results", [*parts, Listing(meanings)])
 
@@ -127,7 +127,7 @@ def limits_section(campaign: Campaign) -> Section:
             Listing(warnings[:MOST_LISTED]),
         ]
         if len(warnings) > MOST_LISTED:
-            parts.append(f"The file contains {len(warnings) - MOST_LISTED} more.")
+            parts.append(f"The file contains {len(warnings) - MOST_LISTED} more warnings.")
     else:
         parts.append("No warning was issued and no limit was exceeded.")
     parts.append(
