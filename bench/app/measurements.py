@@ -123,8 +123,8 @@ class Campaign:
 
     @property
     def status(self) -> str:
-        """Completed, stopped, aborted or failed; running while the file is being written, and also if its writer was
-        killed.
+        """Status: completed, stopped, aborted or failed; running while the file is being written, and also if its
+        writer was killed.
         """
         return self._file.status
 
@@ -174,7 +174,7 @@ class Campaign:
 
     @property
     def sample_rate(self) -> float:
-        """Samples per second [1/s]."""
+        """Sample rate [1/s]."""
         return self._file.sample_rate
 
     @property

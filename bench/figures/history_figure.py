@@ -22,7 +22,7 @@ WIDTH, ROW, MARGIN = 9.0, 2.0, 0.9
 class Motion:
     """A motion. `values` has time_s, drift_m, bare_drift_m, u1_m and theta_rad, each shape (n,), NaN after a fall.
 
-    `name` describes its start or the steady motion, `status` its end.
+    `name` describes the start or the steady motion, `status` the end.
     """
 
     omega: float

@@ -27,7 +27,7 @@ LEVELS = (0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 5.0, 10.0, 20
 """Gains at which contours are drawn."""
 
 GAINING, LOSING = "#DCEBF5", "#B9B9B9"
-"""Light where the block reduces the response, dark where it does not."""
+"""Colours of the gain: light where the block reduces the response, dark where it does not."""
 
 FEWEST_LEVELS = 4
 """Least number of usual levels that a gain must cross; otherwise other levels are drawn."""
@@ -43,7 +43,7 @@ MARK: Mapping[str, Any] = {
     "markeredgecolor": BLUE,
     "markeredgewidth": 1.6,
 }
-"""Measured points: marker with a gain, marker without a gain, common style."""
+"""Styles of measured points: marker with a gain, marker without a gain, common properties."""
 
 SYMBOLS = {"alpha_1": r"$\alpha_1$", "alpha_2": r"$\alpha_2$"}
 
@@ -245,7 +245,7 @@ def _add_legend(figure: "Figure", unstable: bool, boundary: bool, measured: Sequ
 
 
 def least_over_omega(omegas: Floats, gain: Floats) -> Floats:
-    """Frequency [rad/s] of the least `gain`, shape (n, m), within the range of `omegas`, shape (m,): shape (n,).
+    """Frequency [rad/s], shape (n,), of the least `gain`, shape (n, m), within the range of `omegas`, shape (m,).
 
     Fits a parabola to three points of log(gain); NaN where the least value lies on the edge or its neighbours
     are absent.
@@ -262,8 +262,8 @@ def least_over_omega(omegas: Floats, gain: Floats) -> Floats:
 
 
 def levels_for(gain: Floats, usual: Sequence[float]) -> list[float]:
-    """The `usual` contour levels that a gain crosses, ascending; round numbers between its extremes if there are too
-    few.
+    """The `usual` contour levels that a gain crosses, ascending; if these are too few, round numbers between the
+    extremes of the gain.
     """
     from matplotlib.ticker import MaxNLocator
 

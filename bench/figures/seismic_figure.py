@@ -33,13 +33,13 @@ DRIFT_WIDTH, DRIFT_ROW, MARGIN = 7.5, 1.25, 0.9
 """Width of the figure, height per record, height of legend and axis [inch]."""
 
 WIDTH, HEIGHT, ROW = 7.5, 6.4, 0.16
-"""Width, height without the strip of toppled blocks, height of a record in the strip [inch]."""
+"""Width, height without the strip of toppled blocks, height per record in the strip [inch]."""
 
 DASHES = ("-", "--", "-.", ":")
 BAND_SHADE = 0.15
 
 LETTERS = 100
-"""Length of a legend line in characters, of which the curve sample takes eight."""
+"""Length of a legend line in characters; the sample of the curve takes eight of them."""
 
 PANELS, PANELS_WIDTH, PANEL_HEIGHT = 3, 9.5, 2.5
 """Panels per row; width of the figure and height of a row [inch]."""
@@ -64,8 +64,8 @@ class ModelDrift:
 class GainCurve:
     """Gains against stiffness under one record, each shape (n,), in ascending order of `beta`.
 
-    Gains are NaN where the run ended early; `toppled` is True where the block fell. `band` is the lower and upper end
-    of the 95 % interval of alpha_2.
+    Gains are NaN where the run ended early; `toppled` is True where the block fell. `band` contains the lower and the
+    upper end of the 95 % interval of alpha_2.
     """
 
     name: str

@@ -156,7 +156,7 @@ def export(
     if integrity.failing:
         print_warning(f"{file}: {integrity}")
     size = sum(each.stat().st_size for each in written)
-    print(f"{len(written)} files, {size / 1e6:.1f} MB, are in {out}")
+    print(f"{len(written)} files ({size / 1e6:.1f} MB) are in {out}")
     return 0
 
 

@@ -77,7 +77,7 @@ def configuration_from(file: Path | None, seed: str | None, specimen: Path | Non
 
 
 def with_profile(configuration: "BenchConfiguration", profile: "Profile | None") -> "BenchConfiguration":
-    """The configuration with the timing of a profile. Raises InvalidInput where its devices do not allow it."""
+    """The configuration with the timing of a profile. Raises InvalidInput if the devices do not allow it."""
     if profile is None:
         return configuration
     from bench.config.model import BenchConfiguration

@@ -23,7 +23,7 @@ GROUPS = {
         "predict steady --omega 16 --beta 0.4 --json",
     ),
     "records": (
-        "Read earthquake records: formats, intensity measures, and their fit to the table.",
+        "Describe earthquake records, and fit them to the table.",
         "records info RECORD.AT2",
     ),
     "file": ("Inspect, verify and recover data files.", "file verify campaign.h5"),

@@ -48,7 +48,7 @@ def print_result(
     """Print the result of a command on standard output: its text, or one JSON object in which a number that is not
     finite is null.
 
-    The `error` with which a result ended is only part of the object, under the key "error".
+    An `error` with which the command ended is printed only in the object, under the key "error".
     """
     if not as_json:
         print(shown(text()))
@@ -114,10 +114,10 @@ class Result:
 
 
 def check_files(options: "ResultOptions") -> None:
-    """Check that no output file exists, is impossible to create, has an unknown extension, or is named twice; creates
-    none.
+    """Check the output files without creating them.
 
-    Raises InvalidInput naming the option.
+    Raises InvalidInput, naming the option, if a file exists, cannot be created, has an unknown extension or is named
+    twice.
     """
     import tempfile
 

@@ -109,7 +109,7 @@ def band_study(
         request,
         subject,
         curves,
-        f"from {min(request.corner):g} to {max(request.corner):g} Hz on, up to {upper:g} Hz",
+        f"lower end {min(request.corner):g} to {max(request.corner):g} Hz, upper end {upper:g} Hz",
         columns_text(summary, _STUDY_SHOWN),
         lambda: band_figure(drawn, modes, upper),
     )

@@ -177,7 +177,7 @@ def stability(request: StabilityRequest, subject: Subject, progress: Progress) -
 
     def text() -> str:
         if not boundaries["beta"].values.size:
-            return "no boundary of stability lies in the range"
+            return "no stability boundary lies in the range"
         return columns_text(boundaries, _BOUNDARIES)
 
     def figure() -> "Figure":

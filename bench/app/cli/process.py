@@ -139,7 +139,7 @@ class PhaseBar:
         from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
         columns = (TextColumn("{task.description}", markup=False), BarColumn(), TaskProgressColumn())
-        # its own redirection would wrap long lines
+        # the redirection by rich would wrap long lines
         bar = Progress(
             *columns,
             TimeRemainingColumn(),

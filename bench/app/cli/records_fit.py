@@ -128,7 +128,7 @@ def _text(fits: "StrokeFits") -> str:
         [
             f"{record.name}: {record.source}, sha256 {record.sha256}",
             *fits.unfitted.steps,
-            f"the table may move {1e3 * reach.displacement:.3g} mm and {reach.velocity:.3g} m/s",
+            f"the table is limited to {1e3 * reach.displacement:.3g} mm and {reach.velocity:.3g} m/s",
             "",
             text_table(columns, rows),
             "",

@@ -129,7 +129,7 @@ def _text(replayed: "Replayed", table: str) -> str:
 def _software(replayed: "Replayed") -> str:
     if replayed.changed:
         return f"Changed since the recording: {'; '.join(replayed.changed)}"
-    return "The software is that of the recording: git hash and all versions are the same"
+    return "The software is that of the recording: the git hash and all versions are identical"
 
 
 def _different(file: Path, replayed: "Replayed") -> str:

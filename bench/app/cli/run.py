@@ -34,7 +34,7 @@ _EXIT_CODES = (
 
 
 def __getattr__(name: str) -> App:
-    """The command of the protocol `name`; cyclopts imports it from this module when it is used or listed."""
+    """The command of the protocol `name`; cyclopts imports it from this module when the command is used or listed."""
     if name not in protocol_names():
         raise AttributeError(name)
     try:

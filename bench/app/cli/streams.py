@@ -7,7 +7,7 @@ from typing import Any, TextIO, cast
 
 
 class _Lasting:
-    """A stream whose errors are ignored: a closed pipe or terminal, and a full disk behind it.
+    """A stream that ignores write errors: a closed pipe or terminal, or a full disk.
 
     Nothing is written to it after the first error. Its buffer is then sent to the null device; otherwise the
     interpreter would report the same error at exit.

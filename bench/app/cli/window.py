@@ -24,7 +24,7 @@ PROBE = "from PySide6.QtGui import QGuiApplication; QGuiApplication([])"
 """Start-up test of Qt, for a separate process: on failure Qt ends the process with SIGABRT."""
 
 PATIENCE = 20.0
-"""Timeout for the display [s]; a forwarded one may be slow."""
+"""Timeout for the display [s]; a forwarded display may be slow."""
 
 PACKAGES = {
     "libEGL.so": "libegl1",
@@ -87,7 +87,7 @@ def gui(
         print_warning(line)
     # the paper's campaign is selected first
     protocols = sorted(protocols, key=lambda each: each.name != "harmonic")
-    # until the window installs its own handler, which closes it
+    # until the window installs the handler that closes it
     with leaving():
         return open_window(configuration, protocols, config, queue)
 

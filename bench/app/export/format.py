@@ -180,7 +180,7 @@ class ExportFormat:
 
 
 def load_format(name: str) -> ExportFormat:
-    """The export format `name`. Raises InvalidInput for one that is not installed or fails to load."""
+    """The export format `name`. Raises InvalidInput if the format is not installed or fails to load."""
     return load_plugin(EXPORTS, name, "--to", ExportFormat)
 
 

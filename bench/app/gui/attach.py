@@ -32,7 +32,7 @@ class SessionWatch(QObject):
             controller.changed.emit()
 
     def toggle(self) -> None:
-        """Attach to the session under way elsewhere, or detach from the one attached to."""
+        """Attach to the session under way elsewhere, or detach from the attached session."""
         if self._controller.attached is not None and self._controller.running:
             self._controller.detach()
             self.look()

@@ -24,8 +24,8 @@ class Reader(QObject):
     """
 
     found = Signal(object)
-    """The value that the function returned, or the error that it raised. Errors other than RockbenchError and OSError
-    are raised in the window's thread as well.
+    """Emits the value that the function returned, or the error that it raised. Errors other than RockbenchError and
+    OSError are raised in the window's thread as well.
     """
     _done = Signal(int, object)
 
@@ -65,7 +65,7 @@ class Command(QObject):
     """A `rockbench` command in a separate process at low priority, which continues when the window closes."""
 
     over = Signal(int, str)
-    """Exit code and output."""
+    """Emits exit code and output."""
 
     def __init__(self, arguments: Sequence[str], parent: QObject) -> None:
         super().__init__(parent)

@@ -12,7 +12,9 @@ STEP = 0.01
 KEPT = 500
 """Number of stored angles: five seconds."""
 BEHIND = 2.0
-"""Largest lag of the twin behind the measurement [s of bench time]: a run may be faster than the clock."""
+"""Largest permitted lag of the twin behind the measurement [s of bench time]. Such lags occur when a run is faster than
+real time.
+"""
 CAPACITY = 30_000
 """Number of stored bins: a minute at two milliseconds each."""
 

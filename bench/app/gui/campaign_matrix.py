@@ -23,7 +23,7 @@ Place = tuple[int, int]
 
 @dataclass
 class Cell:
-    """A point: its status, which is one of its protocol or one of `texts`, and its result as text."""
+    """A point: its result as text, and its status, which is declared by the protocol or in `texts`."""
 
     status: str = texts.POINT_WAITS
     result: str = ""

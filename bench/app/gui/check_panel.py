@@ -40,10 +40,10 @@ MARKS = {
 
 
 class CheckPanel(QWidget):
-    """Runs `rockbench check` with default parameters; others can be set on the Protocol page."""
+    """Runs `rockbench check` with default parameters; other values can be set on the Protocol page."""
 
     predicted = Signal(object)
-    """An empty prediction, emitted when a check begins, since a check measures no gains."""
+    """Emits an empty prediction when a check begins, since a check measures no gains."""
 
     def __init__(self, controller: Controller, theme: Theme) -> None:
         super().__init__()

@@ -53,23 +53,23 @@ class Controller(QObject):
     """The only user of the connection to the session; it lives in the window's thread."""
 
     changed = Signal()
-    """The state, a time or the connection changed."""
+    """Emitted when the state, a time or the connection has changed."""
     opened = Signal(object)
-    """`Opened`: the rig of the run is open."""
+    """Emits `Opened` when the rig of the run is open."""
     traced = Signal(object)
-    """A list of `Traces`."""
+    """Emits a list of `Traces`."""
     noticed = Signal(object)
-    """A `bench.app.run_display.Notice` for the log."""
+    """Emits a `bench.app.run_display.Notice` for the log."""
     event_received = Signal(object)
-    """An event of the engine."""
+    """Emits an event of the engine."""
     asked = Signal(object)
-    """A `Question`; None when it is no longer open."""
+    """Emits a `Question`, and None when it is no longer open."""
     plan_checked = Signal(object, object)
-    """Result of `check_plan`: `PlanChecked` or `Refused`, and the object that requested it."""
+    """Emits the result of `check_plan`, `PlanChecked` or `Refused`, and the object that requested it."""
     began = Signal(object)
-    """The `Run` that was just started."""
+    """Emits the `Run` that was just started."""
     ended = Signal(object)
-    """`Ended` or `Refused`: how the run ended."""
+    """Emits how the run ended: `Ended` or `Refused`."""
     _heard = Signal()
 
     def __init__(self, parent: QObject | None = None) -> None:

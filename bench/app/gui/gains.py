@@ -52,7 +52,7 @@ class Mark:
 
     @property
     def kind(self) -> Kind:
-        """Axes of the point."""
+        """Kind of axes on which the point is drawn."""
         return "curve" if isinstance(self.group, str) else "spectrum"
 
     @property

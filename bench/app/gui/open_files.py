@@ -221,7 +221,7 @@ class FileList(QListWidget):
 
 
 PARTS = 1200
-"""Parts of the visible range, with two points each."""
+"""Number of parts of the visible range, with two points each."""
 SETTLE = 150
 """Delay between a zoom and the reading of the file [ms]."""
 

@@ -197,7 +197,7 @@ DONE, NEXT, LATER = "✓", "▶", "○"
 
 
 class LeavePanel(QFrame):
-    """Inline question whether to close the window during a run; `leave` closes it."""
+    """A panel that asks whether to close the window during a run; `leave` closes it."""
 
     def __init__(self, leave: Callable[[], None]) -> None:
         super().__init__()

@@ -76,7 +76,9 @@ class Drawing:
         corner = middle - block.b if angle > 0.0 else middle + block.b
 
         def turned(x: float, y: float) -> tuple[float, float]:
-            """Positive theta: rotation about the left corner, top towards the frame."""
+            """Position of a point of the rotated block. A positive angle is a rotation about the left corner, with the
+            top towards the frame.
+            """
             x -= corner
             return corner + x * cos(angle) - y * sin(angle), x * sin(angle) + y * cos(angle)
 

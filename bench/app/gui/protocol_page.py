@@ -27,13 +27,13 @@ class ProtocolPage(QWidget):
     """Form and plan of a run. A plan must be checked before it is started or queued, and again after each change."""
 
     queued = Signal(object)
-    """A `Queued` to append to the queue."""
+    """Emits a `Queued` to append to the queue."""
     saved = Signal(object, object)
-    """The edited `Queued`, and its replacement."""
+    """Emits the edited `Queued` and its replacement."""
     left = Signal()
-    """Editing of a queued test has ended."""
+    """Emitted when the editing of a queued test has ended."""
     predicted = Signal(object)
-    """The prediction of the run that is about to begin."""
+    """Emits the prediction of the run that is about to begin."""
 
     def __init__(
         self, controller: Controller, configuration: BenchConfiguration, entries: Sequence[Protocol[Any]], tour: bool

@@ -36,11 +36,11 @@ class QueueCheck(QObject):
     """
 
     good = Signal()
-    """All plans were accepted."""
+    """Emitted when all plans were accepted."""
     refused = Signal(object, str)
-    """The test whose plan was refused, or None if the tests were refused together, and the reason."""
+    """Emitted at a refusal: the refused test, or None if the tests were refused together, and the reason."""
     changed = Signal()
-    """The check of another test has begun."""
+    """Emitted when the check of another test has begun."""
 
     def __init__(self, controller: Controller, parent: QObject) -> None:
         super().__init__(parent)

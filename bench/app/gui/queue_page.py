@@ -45,7 +45,7 @@ class QueuePage(QWidget):
     """List of tests; every action applies to the selected test and has a shortcut key."""
 
     edit_asked = Signal(object, int)
-    """A `Queued` that has not begun, to be edited, and its number."""
+    """Emits a `Queued` that is to be edited and has not begun, and its number."""
 
     def __init__(self, controller: Controller, runner: QueueRunner, entries: Sequence[Protocol[Any]]) -> None:
         super().__init__()

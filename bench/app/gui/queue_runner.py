@@ -25,11 +25,11 @@ class QueueRunner(QObject):
     """
 
     changed = Signal()
-    """A test changed, or the queue was started or paused."""
+    """Emitted when a test has changed, or the queue was started or paused."""
     troubled = Signal(object)
-    """A `Trouble`: the queue could not be saved, or a change was refused."""
+    """Emits a `Trouble` when the queue could not be saved or a change was refused."""
     predicted = Signal(object)
-    """Prediction of the test that is about to begin."""
+    """Emits the prediction of the test that is about to begin."""
 
     def __init__(
         self,

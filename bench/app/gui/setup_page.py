@@ -203,7 +203,7 @@ class SetupPage(QWidget):
     """
 
     opened = Signal(object)
-    """The `BenchConfiguration` of the following runs."""
+    """Emits the `BenchConfiguration` for the following runs."""
 
     def __init__(
         self, controller: Controller, configuration: BenchConfiguration, path: Path | None, theme: Theme
@@ -224,7 +224,7 @@ class SetupPage(QWidget):
         self._refresh()
 
     def open_configuration(self, path: Path) -> None:
-        """Use the configuration in a file; if it is invalid, the reason is shown and the current one stays in use."""
+        """Use the configuration in a file; if it is invalid, show the reason and keep the current configuration."""
         try:
             configuration = read_configuration(path)
         except RockbenchError as error:
@@ -234,9 +234,7 @@ class SetupPage(QWidget):
         self._use(configuration, path)
 
     def open_identified(self, path: Path) -> None:
-        """Use the identified specimen in a file; if it is invalid, the reason is shown and the current one stays in
-        use.
-        """
+        """Use the identified specimen in a file; if it is invalid, show the reason and keep the current one."""
         try:
             configuration = with_identified(self.configuration, read_specimen(path))
         except RockbenchError as error:

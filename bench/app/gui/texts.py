@@ -23,12 +23,12 @@ ATTACHING_WHY = "waiting for the session: {run}"
 PLANNING_LATE = "no message for {age:.0f} s: the computer is busy; nothing is armed"
 ATTACHED_RUN = "{owner}'s run: {run}."
 ATTACHED_READ_ONLY = "STOP works here; questions and Ramp out are handled by {owner}."
-ATTACHED_CONTROLS = "Its window is lost; its questions can be answered in this window."
+ATTACHED_CONTROLS = "Its window was lost; answer its questions in this window."
 OWNERS = {"window": "another window", "terminal": "a terminal"}
 UNNAMED = "operator at the window"
 OWN_RUN = "This window's run: {run}."
 ATTACH, ATTACH_TIP = "Attach", "Shows the run that is under way on this computer; STOP then stops it (Ctrl+Shift+A)."
-DETACH, DETACH_TIP = "Detach", "Leaves the run, which is not affected (Ctrl+Shift+A)."
+DETACH, DETACH_TIP = "Detach", "Detaches this window from the run, which continues (Ctrl+Shift+A)."
 STARTING_WHY = "starting the session process"
 NO_LINK_WHY = (
     "no message from the bench for {age:.1f} s: its state is unknown. If the table moves, press the emergency stop."
@@ -237,14 +237,15 @@ TROUBLE_CLOSE_TIP = "Hides this message; it stays in the log and in the data fil
 CONFIGURATION_TITLES = ("key", "value", "unit")
 OPEN_CONFIGURATION = "Open a configuration …"
 OPEN_CONFIGURATION_TIP = (
-    "Opens another TOML file; if it is refused, the reason is shown and the current one stays in use (Ctrl+Shift+O)."
+    "Opens another configuration file (TOML). If it is refused, the reason is shown and the current configuration "
+    "stays in use (Ctrl+Shift+O)."
 )
 OPEN_SPECIMEN = "Open a specimen file …"
 OPEN_SPECIMEN_TIP = (
     "Uses identified parameters of the specimen instead of the assumed ones, like --specimen (Ctrl+Shift+P)."
 )
 IDENTIFIED = "Specimen: {path}"
-CONFIGURATION_KEPT = "{text}. The current one stays in use."
+CONFIGURATION_KEPT = "{text}. The current configuration stays in use."
 MUST_BE = "It must be {allowed}."
 FIND = "Search for devices"
 FIND_TIP = (

@@ -54,7 +54,7 @@ _NOW_DEVICE = (
     "page."
 )
 _NOW_DISK = (
-    "Free disk space, or enter a folder on another disk under Results in. `rockbench file info` describes the "
+    "Free disk space, or enter a folder on another disk under *Results in*. `rockbench file info` describes the "
     "recorded file."
 )
 NOW = {

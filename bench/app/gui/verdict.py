@@ -90,7 +90,7 @@ class VerdictLabel(QLabel):
             self._fit()
 
     def allow(self, page: int) -> None:
-        """Use at most a share of the height of the `page` [px]."""
+        """Limit the height to a share of the height of the `page` [px]."""
         self._space = round(SPACE * page)
         self._fit()
 

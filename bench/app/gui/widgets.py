@@ -47,7 +47,7 @@ class ElidingLabel(QLabel):
         painter.end()
 
     def setText(self, text: str) -> None:
-        """Show another text."""
+        """Set the text, and clear the tooltip if the text has changed."""
         if text != self.text():
             super().setText(text)
             self.setToolTip("")

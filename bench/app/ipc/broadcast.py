@@ -10,7 +10,7 @@ from bench.app.ipc.messages import FromSession, Opened, Preparing, Published, Qu
 from bench.events import Estimate, Event, LiveValue, PointFinished, RunningGain, StepStarted, TwinEstimate
 
 EVENTS, TRACES = 5000, 64
-"""Capacity in messages and in blocks of traces of 0.1 s each."""
+"""Capacity in messages, and in blocks of traces (0.1 s each)."""
 
 
 class SendQueue:

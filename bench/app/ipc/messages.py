@@ -272,8 +272,8 @@ BIN = 0.002
 
 
 def extremes(values: NDArray[np.float64], width: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Minimum and maximum of every `width` rows of `values`, shape (n, m); the last bin contains the remainder. NaN
-    only for bins without other values.
+    """Minimum and maximum of every `width` rows of `values`, shape (n, m); the last bin contains the remainder. A bin
+    is NaN only if all its values are NaN.
     """
     starts = np.arange(0, len(values), width)
     low = np.fmin.reduceat(values, starts, axis=0)

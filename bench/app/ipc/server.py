@@ -48,7 +48,7 @@ FAREWELL = 2.0
 """Longest wait at the end for a client that does not read its messages [s]."""
 
 PERIOD = 0.5
-"""Shortest interval between readings [s]; independently, the guard reads the inputs in every block."""
+"""Shortest interval between readings of the safety inputs for the display [s]. The guard reads them in every block."""
 
 
 class SafetyWatch:
@@ -61,7 +61,7 @@ class SafetyWatch:
         self._time = 0.0
 
     def watch(self, rig: Rig) -> None:
-        """Read the inputs of this rig."""
+        """Set the rig whose inputs are read."""
         self._rig = rig
         self.look(0.0, at_once=True)
 
@@ -84,7 +84,9 @@ class SafetyWatch:
 
 
 _LOOK = 0.1
-"""Interval [s] at which other reasons to end are polled while waiting for the operator's answer."""
+"""Interval [s] at which requests to end and the loss of the client are checked while waiting for the operator's
+answer.
+"""
 
 
 class SessionServer:
@@ -201,7 +203,7 @@ class SessionServer:
                     self._attending.add(queue)
                     if isinstance(message, Leave):
                         break
-                    # only the owner controls the run while present, but every client may stop it
+                    # while the owner is present, no other client controls the run, but every client may stop it
                     stops = isinstance(message, Ask) and message.end in ("abort", "halt")
                     if not self.connected or isinstance(message, Note) or stops:
                         self._heed(message)

@@ -21,8 +21,8 @@ FOLDER = "ROCKBENCH_SESSIONS"
 
 @dataclass(frozen=True)
 class RunningSession:
-    """A session to which a client can attach: process, address and key of its listener, and its run. `real` is a bench
-    with hardware; `began` is in seconds since 1970.
+    """A session to which a client can attach: process, address and key of its listener, and its run. `real` is True for
+    a bench with hardware; `began` is in seconds since 1970.
     """
 
     process: int

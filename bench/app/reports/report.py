@@ -260,7 +260,7 @@ def _summary(campaign: Campaign) -> list[Part]:
     tested = _tested(campaign)
     betas = listed([f"{beta:g}" for beta in _betas(campaign)]) if tested else ""
     springs = f", bare and coupled by springs of β = {betas}" if betas else ""
-    what = listed(tested) or f"{campaign.protocol or 'an experiment'}, which measures no gain,"
+    what = listed(tested) or f"{campaign.protocol or 'an experiment'} (no gain measured)"
     backend = str(campaign.devices.get("backend", "not stated"))
     ended = f"ended {moment(record.end_time)}" if record.end_time else "not ended"
     parts: list[Part] = [

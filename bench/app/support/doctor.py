@@ -159,7 +159,7 @@ def usb_suspend(devices: Path = Path("/sys/bus/usb/devices"), system: str = sys.
     ours = [device.name for device in suspended if _read(device / "idVendor") in _VENDORS]
     if not ours:
         return Finding(item, Health.GOOD, "no NI device and no serial adapter is suspended")
-    remedy = f"write the word on to the file power/control of each device in {devices}, or add a udev rule that does so"
+    remedy = f'write "on" to the file power/control of each device in {devices}, or add a udev rule that does so'
     return Finding(item, Health.BAD, f"may be suspended: {', '.join(ours)}", remedy)
 
 

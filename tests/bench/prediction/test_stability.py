@@ -58,7 +58,7 @@ def test_no_boundary_is_said_and_the_multipliers_are_still_there(
 ) -> None:
     flags = ["--omega", "16", "17", "--beta", "0.64", "--csv", str(tmp_path / "points.csv")]
     assert main(["predict", "stability", *flags, "--plot", str(tmp_path / "stability.png")]) == 0
-    assert "no boundary of stability lies in the range" in capsys.readouterr().out
+    assert "no stability boundary lies in the range" in capsys.readouterr().out
     assert (tmp_path / "stability.png").stat().st_size > 1000
     (points,) = (path for path in tmp_path.iterdir() if path.suffix == ".csv" and "points" in path.name)
     rows = np.genfromtxt(points, delimiter=",", names=True)
