@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, Generic, TypeAlias, TypeVar
 from typing import Protocol as Interface
 
@@ -207,6 +208,7 @@ class Protocol(Generic[P]):
     again, else None. It raises InvalidInput for parameters beyond the capabilities of the bench. Listing the protocols
     imports this object: wrap a `prepare` with heavy imports in `deferred`.
 
+    `events` names the events that it declares itself and that have a table in the data file, as "module:Event".
     `example` holds arguments shown in the help. `figures` and `files` name all files that a run may write in addition
     to data file and summary, with the main figure first. `positional` is the parameter that the command line accepts
     without a flag. `log_line` formats a point as one log line: the run is then displayed as a log, not as a plot.
@@ -224,11 +226,17 @@ class Protocol(Generic[P]):
     example: str = "--dry-run"
     figures: tuple[str, ...] = ()
     files: tuple[str, ...] = ()
+    events: tuple[str, ...] = ()
     positional: str | None = None
     log_line: Callable[[Any], str] | None = None
     reanalysis: Reanalysis[P] | None = None
     report: "Callable[[Campaign], Sequence[Section]] | None" = None
     view: RunView = field(default_factory=RunView)
+
+    @property
+    def event_types(self) -> "tuple[type[Event], ...]":
+        """The types of `events`, imported now."""
+        return tuple(resolve_name(each) for each in self.events)
 
 
 def deferred(reference: str) -> Callable[..., Any]:

@@ -14,7 +14,7 @@ from bench.config.review import Review, review
 from bench.config.usual import notices_of, scales_of
 from bench.datafile.declared import EVENT_TABLES
 from bench.datafile.tables import Table
-from bench.events import TwinEstimate
+from bench.live_values import TwinEstimate
 from bench.plugins import plugin_code
 from bench.preflight.margins import Forecast, Margin, bounds, drive_table, margins, margins_table, refusal, warnings
 from bench.progress import Progress, silent

@@ -8,18 +8,8 @@ from time import monotonic
 from typing import Any
 
 from bench.app.formatting import ABSENT, difference, measurement, number, one_line, plus_minus, setpoint
-from bench.events import (
-    Estimate,
-    Event,
-    LiveValue,
-    PointFinished,
-    Progress,
-    RunningGain,
-    State,
-    StateChanged,
-    StepStarted,
-    TwinEstimate,
-)
+from bench.events import Event, PointFinished, Progress, State, StateChanged, StepStarted
+from bench.live_values import Estimate, LiveValue, RunningGain, TwinEstimate
 
 NOTICES = 5
 """Number of recent events that are displayed."""

@@ -79,7 +79,7 @@ def run_session(
         progress("predicting the results")
         with plugin_code(name):
             prediction = {"prediction": prepared.prediction} if prepared.prediction else {}
-            sources = prepared.sources
+            sources, events = prepared.sources, protocol.event_types
         tables = {**prediction, **preflight.tables, **sources}
         metadata = _metadata(protocol, prepared.parameters, configuration)
         metadata |= {"plan_hash": preflight.plan_hash, **(about or {})}
@@ -99,6 +99,7 @@ def run_session(
             channels=rig.channels,
             sample_rate=rig.sample_rate,
             point_type=protocol.point,
+            events=events,
             metadata=metadata | {"devices": json.dumps(rig.description)},
             tables=tables,
             # virtual time does not advance while waiting for the disk

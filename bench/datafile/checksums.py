@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.datafile import hdf5
-from bench.datafile.declared import FIT_VIEWS
+from bench.datafile.findings_tables import FIT_VIEWS
 from bench.datafile.hdf5_reading import UNREADABLE, reason
 from sim.sweep import Done
 

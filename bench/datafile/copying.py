@@ -67,7 +67,7 @@ class Copying:
         copied = target.create_dataset(
             name, shape=(0,), maxshape=(None,), dtype=stored.dtype, chunks=stored.chunks, **filters
         )
-        rows = min(self.counted[part_of(stored.name)], intact_rows(stored, self.size))
+        rows = min(self.counted[part_of(stored.name, self.counted)], intact_rows(stored, self.size))
         done, step = 0, max(1, BYTES_AT_ONCE // stored.dtype.itemsize)
         while done < rows:
             count = min(step, rows - done)
@@ -122,16 +122,19 @@ def renew_drive(entry: hdf5.Group) -> None:
         hdf5.append(made, np.full(min(_ROWS_AT_ONCE, rows - start), np.nan, dtype=np.float32))
 
 
-def renew_tables(entry: hdf5.Group, lost: Iterable[str]) -> None:
-    """Empty every table of which a dataset is among the `lost` paths; the journal may refill it."""
+def renew_tables(entry: hdf5.Group, lost: Iterable[str], own: Iterable[str]) -> None:
+    """Empty every table of which a dataset is among the `lost` paths; the journal may refill it. Those of the protocol's `own` events, whose
+    columns only the protocol knows, are removed.
+    """
     gone = tuple(lost)
-    for path, fields in TABLES.items():
+    for path in (*TABLES, *own):
         if any(each == f"/entry/{path}" or each.startswith(f"/entry/{path}/") for each in gone):
             folder, _, name = path.rpartition("/")
             parent = hdf5.group(entry, folder) if folder else entry
             if name in parent:
                 hdf5.delete(parent, name)
-            rows_of(parent, name, fields)
+            if path in TABLES:
+                rows_of(parent, name, TABLES[path])
 
 
 def cut(entry: hdf5.Group, counted: Mapping[str, int]) -> dict[str, int]:
@@ -143,7 +146,7 @@ def cut(entry: hdf5.Group, counted: Mapping[str, int]) -> dict[str, int]:
     parts: dict[str, list[hdf5.Dataset]] = {name: [] for name in counted}
     for stored in hdf5.datasets(entry):
         if hdf5.grows(stored):
-            parts[part_of(stored.name)].append(stored)
+            parts[part_of(stored.name, counted)].append(stored)
     rows = {name: min((each.shape[0] for each in stored), default=0) for name, stored in parts.items()}
     row, run, first = (
         hdf5.dataset(entry, f"instrument/blocks/{name}")[: rows["blocks"]] for name in ("row", "run", "first")

@@ -1,177 +1,21 @@
 """The growing tables of the file, except the samples, and their names.
 
-The tables of events follow from the declarations in `bench.events`; fitted models and identified
-values have their own tables, whose rows refer to one another.
-
-No group can be added to a file that is being read, so one dataset holds the concatenated values of all fits. The NXdata
-groups of a closed file are views of it (HDF5 virtual datasets) without their own values, for viewers such as silx,
-NexPy and h5web.
+The tables of events follow from their declarations, in `bench.events`, `bench.live_values`, `bench.findings`
+and, of the events of a protocol, in its own modules.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from datetime import datetime
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
-from bench import events
-from bench.datafile import hdf5
-from bench.datafile.fields import Field, Kind, Rows, decode, fields_of, parts_of
+from bench import events, findings, live_values
+from bench.datafile.fields import Field, Kind, fields_of, parts_of
+from bench.datafile.findings_tables import FINDING_TABLES, FIT_TABLES
 from bench.datafile.samples import TIME
-from bench.events import Event, FitFinished, FittedParameter, Series
-from sim.identified import Correlation, Finding, Identified
-
-FIT_VIEWS = "fitted"
-FITS = (
-    Field("time", Kind.REAL, "s", "bench time"),
-    Field("name", Kind.TEXT, "", "name of the fit"),
-    Field("text", Kind.TEXT, "", "summary of the fit in one line"),
-    Field("rows", Kind.WHOLE, "1", "number of values in each column"),
-    Field("columns", Kind.WHOLE, "1", "number of columns, each a row of fit_columns"),
-    Field("parameters", Kind.WHOLE, "1", "number of parameters, each a row of fit_parameters"),
-)
-FIT_COLUMNS = (
-    Field("name", Kind.TEXT, "", "name of the column; the first of a fit is its axis"),
-    Field("unit", Kind.TEXT, "", "its unit"),
-    Field("description", Kind.TEXT, "", "description"),
-)
-FIT_PARAMETERS = (
-    Field("name", Kind.TEXT, "", "name of the parameter"),
-    Field("value", Kind.REAL, "of the row", "identified value, in the unit of the row"),
-    Field("uncertainty", Kind.REAL, "of the row", "its standard uncertainty; NaN if unknown"),
-    Field("unit", Kind.TEXT, "", "unit of value and standard uncertainty"),
-)
-FIT_VALUES = (Field("value", Kind.REAL, "of the column", "concatenated columns, fit by fit"),)
-FIT_TABLES = {"fits": FITS, "fit_columns": FIT_COLUMNS, "fit_parameters": FIT_PARAMETERS, "fit_values": FIT_VALUES}
-
-
-def add_fit(rows: Mapping[str, Rows], fit: FitFinished) -> None:
-    """Append a fit to its tables."""
-    length = len(next(iter(fit.columns.values())).values)
-    rows["fits"].add(fit.time, fit.name, fit.text, length, len(fit.columns), len(fit.parameters))
-    for name, series in fit.columns.items():
-        rows["fit_columns"].add(name, series.unit, series.description)
-        rows["fit_values"].extend(series.values)
-    for name, found in fit.parameters.items():
-        rows["fit_parameters"].add(name, found.value, found.uncertainty, found.unit)
-
-
-def read_fits(entry: hdf5.Group, whole: int) -> list[FitFinished]:
-    """The first `whole` fits in the file, as published."""
-    columns, parameters = _table(entry, "fit_columns"), _table(entry, "fit_parameters")
-    values = hdf5.dataset(entry, "fit_values/value")
-    found: list[FitFinished] = []
-    column = parameter = at = 0
-    for fit in _table(entry, "fits")[:whole]:
-        own = columns[column : column + fit["columns"]]
-        series: dict[str, Series] = {}
-        for one in own:
-            series[one["name"]] = Series(values[at : at + fit["rows"]], one["unit"], one["description"])
-            at += fit["rows"]
-        known = {
-            one["name"]: FittedParameter(one["value"], one["uncertainty"], one["unit"])
-            for one in parameters[parameter : parameter + fit["parameters"]]
-        }
-        column, parameter = column + len(own), parameter + len(known)
-        found.append(FitFinished(fit["name"], fit["text"], series, known, time=fit["time"]))
-    return found
-
-
-def add_fit_views(entry: hdf5.Group, whole: int) -> None:
-    """Create an NXdata group for each of the first `whole` fits, in a file without readers."""
-    if not whole:
-        return
-    views = hdf5.create_group(entry, FIT_VIEWS, "NXcollection")
-    source, at = hdf5.dataset(entry, "fit_values/value"), 0
-    for number, fit in enumerate(read_fits(entry, whole), start=1):
-        name = fit.name if fit.name not in views else f"{fit.name} ({number})"
-        view = hdf5.create_group(views, name, "NXdata")
-        axis, *others = fit.columns
-        view.attrs["signal"], view.attrs["axes"] = (others or [axis])[0], [axis]
-        view.attrs[f"{axis}_indices"], view.attrs["title"] = 0, fit.text
-        # columns with another unit have another scale and would flatten the plot
-        if alike := [each for each in others[1:] if fit.columns[each].unit == fit.columns[others[0]].unit]:
-            view.attrs["auxiliary_signals"] = alike
-        for each, series in fit.columns.items():
-            made = hdf5.view(view, each, source, slice(at, at + len(series.values)))
-            made.attrs["units"], made.attrs["description"] = series.unit, series.description
-            made.attrs["long_name"] = f"{each} [{series.unit}]"
-            at += len(series.values)
-        for each, found in fit.parameters.items():
-            view.attrs[f"parameter_{each}"] = np.array([found.value, found.uncertainty])
-            view.attrs[f"parameter_{each}_units"] = found.unit
-
-
-def whole_fits(entry: hdf5.Group) -> int:
-    """Number of complete fits in a file whose tables may be truncated."""
-    if "fits" not in entry:
-        return 0
-    fits = _table(entry, "fits")
-    needed = np.cumsum(
-        [(fit["columns"], fit["parameters"], fit["columns"] * fit["rows"]) for fit in fits] or [(0, 0, 0)], axis=0
-    )
-    there = [len(_table(entry, "fit_columns")), len(_table(entry, "fit_parameters"))]
-    there.append(hdf5.dataset(entry, "fit_values/value").shape[0])
-    return min(len(fits), int(np.count_nonzero((needed <= there).all(axis=1))))
-
-
-def _table(entry: hdf5.Group, name: str) -> list[dict[str, Any]]:
-    group = hdf5.group(entry, name)
-    columns = {column: decode(hdf5.dataset(group, column)) for column in group}
-    return [dict(zip(columns, row, strict=False)) for row in zip(*columns.values(), strict=False)]
-
-
-FINDINGS = (
-    Field("number", Kind.WHOLE, "1", "number of earlier sets of findings; the last set is valid"),
-    Field("time", Kind.REAL, "s", "bench time"),
-    Field("name", Kind.TEXT, "", "the quantity, as in a specimen file"),
-    Field("value", Kind.REAL, "of the row", "best estimate"),
-    Field("standard_uncertainty", Kind.REAL, "of the row", "standard uncertainty (k = 1)"),
-    Field("unit", Kind.TEXT, "", "SI unit of value and standard uncertainty"),
-    Field("source", Kind.TEXT, "", "source of the value"),
-    Field("date", Kind.TEXT, "", "date of the measurement, ISO 8601 with time zone"),
-)
-CORRELATIONS = (
-    Field("number", Kind.WHOLE, "1", "number of earlier sets of findings, as in the rows of the two findings"),
-    Field("first", Kind.TEXT, "", "name of a finding"),
-    Field("second", Kind.TEXT, "", "name of another finding"),
-    Field("coefficient", Kind.REAL, "1", "correlation coefficient of their errors; 0 for other pairs"),
-)
-FINDING_TABLES = {"identified": FINDINGS, "identified_correlations": CORRELATIONS}
-
-
-def add_findings(rows: Mapping[str, Rows], time: float, identified: Identified) -> None:
-    """Append an event to its tables."""
-    number = len(rows["identified"])
-    for one in identified.correlations:
-        rows["identified_correlations"].add(number, one.first, one.second, one.coefficient)
-    for each in identified.findings:
-        uncertain = (each.value, each.standard_uncertainty, each.unit)
-        rows["identified"].add(number, time, each.name, *uncertain, each.source, each.date.isoformat())
-
-
-def last_findings(
-    findings: Sequence[Mapping[str, Any]], correlations: Sequence[Mapping[str, Any]]
-) -> Identified | None:
-    """The last findings, from the rows of both tables; None if there are none."""
-    if not findings:
-        return None
-    number = findings[-1]["number"]
-    names = ("name", "value", "standard_uncertainty", "source")
-    return Identified(
-        findings=tuple(
-            Finding(**{name: row[name] for name in names}, date=datetime.fromisoformat(row["date"]))
-            for row in findings
-            if row["number"] == number
-        ),
-        correlations=tuple(
-            Correlation(first=row["first"], second=row["second"], coefficient=row["coefficient"])
-            for row in correlations
-            if row["number"] == number
-        ),
-    )
-
+from bench.events import Event
 
 BLOCKS = (
     Field("row", Kind.WHOLE, "1", "row of the samples at which the block begins"),
@@ -237,7 +81,11 @@ class EventTable:
             yield tuple(values)
 
 
-def _table_of(kind: type[Event]) -> EventTable:
+@lru_cache(maxsize=256)
+def event_table(kind: type[Event]) -> EventTable | None:
+    """The table that the declaration of an event implies; None for an event without a table."""
+    if not kind.table:
+        return None
     fields, parts = fields_of(kind), parts_of(kind)
     several = parts is not None or any(field.array for field in fields)
     kept = tuple(field for field in fields if not (several and field.name == "time"))
@@ -247,17 +95,24 @@ def _table_of(kind: type[Event]) -> EventTable:
     return EventTable(kind.table, (*kept, *inner), (parts[0], tuple(field.name for field in inner)))
 
 
-EVENT_TABLES: Mapping[type[Event], EventTable] = {
-    kind: _table_of(kind)
-    for kind in vars(events).values()
-    if isinstance(kind, type) and issubclass(kind, Event) and kind.table
-}
-"""The events with a table, in the order of their declaration."""
+def event_tables(kinds: Iterable[object]) -> dict[type[Event], EventTable]:
+    """The tables of those of `kinds` that are events with a table, in the order of their declaration."""
+    declared = (kind for kind in kinds if isinstance(kind, type) and issubclass(kind, Event))
+    return {kind: table for kind in declared if (table := event_table(kind)) is not None}
+
+
+EVENT_TABLES: Mapping[type[Event], EventTable] = event_tables(
+    kind for module in (events, live_values, findings) for kind in vars(module).values()
+)
+"""Tables of events that every file has; those of a protocol's events follow."""
 
 ENTRY_TABLES: Mapping[type[Event], EventTable] = {
     kind: table for kind, table in EVENT_TABLES.items() if kind.journalled and table.single
 }
-"""The tables with exactly one row for each journal entry of their kind."""
+"""Those with exactly one row for each journal entry of their kind."""
+
+ENTRY_PATHS = {**{kind.__name__: table.path for kind, table in ENTRY_TABLES.items()}, "PassFinished": "passes"}
+"""Tables of journal entries of earlier versions, which do not name them."""
 
 TABLES: Mapping[str, tuple[Field, ...]] = {
     "instrument/blocks": BLOCKS,
@@ -267,27 +122,36 @@ TABLES: Mapping[str, tuple[Field, ...]] = {
     **FIT_TABLES,
     **FINDING_TABLES,
 }
-"""Every growing table by its path below /entry, except the points, whose columns depend on the protocol."""
+"""Growing tables of every file by path below /entry, except the points, whose columns depend on the protocol."""
 
 _PATHS = {path.rpartition("/")[2]: path for path in (*TABLES, "points")}
-_FIRST = (
+FORMER = (
     *("samples", "blocks", "events", "estimates", "points", "alignments"),
     *("running_gains", "passes", "table_response"),
     *("fits", "fit_columns", "fit_parameters", "fit_values"),
     "twin",
     *("identified", "identified_correlations", "live_values"),
     *("state_changes", "operator_actions", "warnings", "exceeded_limits", "operator_requests", "operator_answers"),
+    *("raw_values", "hold_cycles", "operator_notes"),
 )
-"""Tables in the order of their indices in earlier versions; later tables follow in the order of declaration."""
-
-COUNTED = (*_FIRST, *(name for name in _PATHS if name not in _FIRST))
-"""Names of the counters in the dataset `complete`: rows beyond these counts were incomplete when the disk or the writer
-failed.
+"""Names of the counters in the dataset `complete` of earlier versions, which do not name them, in this order: rows
+beyond these counts were incomplete when the disk or the writer failed.
 """
+
+
+def counters(own: Iterable[str]) -> tuple[str, ...]:
+    """Names of the counters of a new file, whose protocol has its `own` tables of events."""
+    return (*FORMER, *(name for name in (*_PATHS, *own) if name not in FORMER))
+
+
+def path_of(counter: str) -> str:
+    """Path below /entry of the table with this counter."""
+    return _PATHS.get(counter, counter)
+
 
 FIXED_GROUPS = (
     *("checksums", "data", "fitted", "instrument", "metadata", "notes", "recovery", "user"),
-    *(path for path in _PATHS.values() if "/" not in path),
+    *(path for path in map(path_of, counters(())) if "/" not in path and path != "samples"),
 )
 FIXED_ENTRIES = ("complete", "end_time", "program_name", "start_time", "status", "summary", "title")
 FIXED_INSTRUMENTS = (
@@ -295,9 +159,9 @@ FIXED_INSTRUMENTS = (
     *("drive", "sample_rate", TIME),
 )
 
-_PARTS = {f"/entry/{path}": name for name, path in _PATHS.items()}
 
-
-def part_of(path: str) -> str:
+def part_of(path: str, counted: Mapping[str, int]) -> str:
     """The counter in `complete` that applies to a growing dataset: that of its table, or that of the samples."""
-    return _PARTS.get(path.rpartition("/")[0], "samples")
+    folder = path.rpartition("/")[0]
+    name = folder.rpartition("/")[2]
+    return name if name in counted and folder == f"/entry/{path_of(name)}" else "samples"

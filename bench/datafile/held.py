@@ -1,4 +1,4 @@
-"""Locks of other programs on the data file while it is being written.
+"""Flushing of the data file to the disk, and locks of other programs on it while it is being written.
 
 On Windows locks are mandatory: while a reader with the usual locks of HDF5 has the file open, every write fails with
 errno 13, and HDF5 cannot repeat a flush that has failed. Therefore the writer excludes such readers: it locks one byte
@@ -7,10 +7,14 @@ program, are not affected.
 """
 
 import errno
+import os
 import re
+import shutil
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
 
 from bench.datafile.hdf5_reading import DataFileError
 
@@ -80,3 +84,80 @@ def in_use(error: BaseException) -> str:
     """Message for an error that `is_held` recognises."""
     number = getattr(error, "errno", None) or errno.EACCES
     return f"another program has locked it (errno {number}): close the program that displays or scans it"
+
+
+class FileSync:
+    """Flushes a file from the system's cache to the disk through a separate handle, since HDF5 does not give access to
+    its own handle on some systems. Detects changes to the file by other programs.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._handle = os.open(path, os.O_RDWR)
+        self._size = 0
+        wait_until_free(lambda: keep_lockers_out(self._handle))
+        # on some network shares a file's identity changes with every query
+        self._identified = os.path.samestat(os.fstat(self._handle), path.stat())
+        sync_folder(path.parent)
+
+    def sync(self) -> None:
+        """Flush the file to the disk. Raises OSError if the disk fails, and DataFileError like `check`."""
+        os.fsync(self._handle)
+        self.check()
+        self._size = os.fstat(self._handle).st_size
+
+    def touch(self) -> None:
+        """Write the first byte again. Raises PermissionError while another program's lock forbids writing."""
+        os.lseek(self._handle, 0, os.SEEK_SET)
+        first = os.read(self._handle, 1)
+        os.lseek(self._handle, 0, os.SEEK_SET)
+        os.write(self._handle, first)
+
+    def check(self) -> None:
+        """Raise DataFileError if another program has truncated, renamed, replaced or deleted the file.
+
+        Must be called before HDF5 looks for data in the file, because HDF5 would search for hours for truncated data.
+        """
+        if (size := os.fstat(self._handle).st_size) < self._size:
+            raise DataFileError(f"another program has truncated it from {self._size} to {size} bytes")
+        try:
+            there = self._path.stat()
+        except FileNotFoundError:
+            raise DataFileError(f"another program has {self._gone()}") from None
+        if self._identified and not os.path.samestat(os.fstat(self._handle), there):
+            raise DataFileError("another program has replaced it")
+
+    def restore(self) -> None:
+        """Write the file again, with the data flushed so far, if it was deleted and no other file has its name."""
+        with suppress(OSError):
+            if os.fstat(self._handle).st_nlink or self._path.exists():
+                return
+            with self._path.open("xb") as copy, os.fdopen(os.dup(self._handle), "rb") as kept:
+                kept.seek(0)
+                shutil.copyfileobj(kept, copy)
+                os.fsync(copy.fileno())
+
+    def close(self) -> None:
+        """Close the file; may be called repeatedly."""
+        with suppress(OSError):
+            os.close(self._handle)
+        self._handle = -1
+
+    def _gone(self) -> str:
+        if not os.fstat(self._handle).st_nlink:
+            return "deleted it"
+        with suppress(OSError):
+            # on Linux the present name of an open file can be queried
+            return f"renamed it to {Path(os.readlink(f'/proc/self/fd/{self._handle}')).name}"
+        return "renamed or deleted it"
+
+
+def sync_folder(folder: Path) -> None:
+    """Flush the directory entry of a new file to the disk, if the system requires it."""
+    # Windows cannot open folders, and flushes their entries without a request
+    with suppress(OSError):
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)

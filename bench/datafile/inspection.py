@@ -185,7 +185,7 @@ def _of_layout(stored: hdf5.Dataset, counted: Mapping[str, int], size: int, *, c
         if not is_within(stored, size):
             yield f"{path} lies beyond the end of the file: it is truncated"
         return
-    length, rows = stored.shape[0], counted[part_of(path)]
+    length, rows = stored.shape[0], counted[part_of(path, counted)]
     # in a file that was not closed, rows beyond the count are incomplete
     if length < rows or (closed and length > rows):
         yield f"{path} has {length} rows, but {rows} were written"

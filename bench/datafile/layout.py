@@ -12,11 +12,12 @@ import numpy as np
 
 from bench.datafile import hdf5, tables
 from bench.datafile.checksums import Checksums
-from bench.datafile.declared import COUNTED, FIXED_ENTRIES, FIXED_GROUPS, FIXED_INSTRUMENTS, TABLES
-from bench.datafile.fields import Growing, Rows, fields_of, rows_of
+from bench.datafile.declared import FIXED_ENTRIES, FIXED_GROUPS, FIXED_INSTRUMENTS, TABLES, counters, event_tables
+from bench.datafile.fields import Field, Growing, Rows, fields_of, rows_of
 from bench.datafile.opening import FORMAT, FORMAT_VERSION, INTERVALS, WORDING
 from bench.datafile.samples import Samples, chunk_of, companions, create_plot
 from bench.datafile.tables import Table
+from bench.events import Event
 from drivers.rig import Channel
 from sim.errors import InvalidInput
 from sim.parameters import Parameters
@@ -46,6 +47,13 @@ class Skeleton:
     point_type: type[Parameters]
     metadata: Mapping[str, str]
     tables: Mapping[str, Table]
+    events: Sequence[type[Event]] = ()
+    """Events of the protocol whose tables the file has."""
+
+    @property
+    def own(self) -> dict[str, tuple[Field, ...]]:
+        """Fields of the tables of these events, by path below /entry."""
+        return {table.path: table.fields for table in event_tables(self.events).values()}
 
     def check(self) -> None:
         """Raise InvalidInput for contents that the file cannot store."""
@@ -56,7 +64,8 @@ class Skeleton:
         names = [channel.name for channel in self.channels]
         _check_names("channel", names, (*FIXED_INSTRUMENTS, *(each for name in names for each in companions(name))))
         _check_names("metadata entry", list(self.metadata), ())
-        _check_names("table", list(self.tables), (*FIXED_GROUPS, *FIXED_ENTRIES))
+        _check_names("table of events", list(self.own), (*TABLES, "points", "data", *FIXED_ENTRIES))
+        _check_names("table", list(self.tables), (*FIXED_GROUPS, *FIXED_ENTRIES, *self.own))
         for name, table in self.tables.items():
             _check_names(f"column of table {name}", list(table), ())
             tables.check(name, table)
@@ -113,21 +122,25 @@ def build(file: hdf5.File, skeleton: Skeleton) -> Parts:
     time = create_plot(entry, skeleton.channels, chunk_of(skeleton.sample_rate))
     samples = Samples(instrument, skeleton.channels, skeleton.sample_rate, time)
     rows = dict[str, Rows]()
-    for path, fields in {**TABLES, "points": fields_of(skeleton.point_type)}.items():
+    for path, fields in {**TABLES, **skeleton.own, "points": fields_of(skeleton.point_type)}.items():
         folder, _, name = path.rpartition("/")
         rows[name] = rows_of(instrument if folder else entry, name, fields)
-    replaced = create_ends(entry)
+    replaced = create_ends(entry, counters(skeleton.own))
     grown = [*samples.grown, *(each for table in rows.values() for each in table.grown)]
     checksums = Checksums(entry, [*(each.path for each in grown), *(each.name for each in replaced)])
     return Parts(samples, rows, grown, *replaced, checksums)
 
 
-def create_ends(entry: hdf5.Group) -> tuple[hdf5.Dataset, hdf5.Dataset, hdf5.Dataset, hdf5.Dataset]:
-    """Create `complete`, `status`, `summary` and `end_time` with their initial values."""
+def create_ends(
+    entry: hdf5.Group, counted: Sequence[str]
+) -> tuple[hdf5.Dataset, hdf5.Dataset, hdf5.Dataset, hdf5.Dataset]:
+    """Create `complete`, which counts the rows of `counted`, `status`, `summary` and `end_time` with initial values."""
+    complete = hdf5.write_numbers(
+        entry, "complete", np.zeros(len(counted), dtype=np.int64), unit="1", description="complete rows of each part"
+    )
+    complete.attrs["parts"] = " ".join(counted)
     return (
-        hdf5.write_numbers(
-            entry, "complete", np.zeros(len(COUNTED), dtype=np.int64), unit="1", description=f"rows of {COUNTED}"
-        ),
+        complete,
         hdf5.write_text(entry, "status", Status.RUNNING, width=STATUS_WIDTH),
         hdf5.write_text(entry, "summary", "", width=SUMMARY_WIDTH, description="reason for the end of the campaign"),
         hdf5.write_text(

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from bench.datafile import hdf5
-from bench.datafile.declared import COUNTED, part_of
+from bench.datafile.declared import FORMER, part_of
 from bench.datafile.hdf5 import is_let_go
 from bench.datafile.hdf5_reading import UNREADABLE, DataFileError, reason
 from bench.datafile.structure import check_attributes, check_structure
@@ -48,7 +48,7 @@ def check_whole(entry: hdf5.Group, counted: Mapping[str, int], size: int) -> Non
         for name in stored.attrs:
             _ = stored.attrs[name]
         if hdf5.grows(stored):
-            whole = intact_rows(stored, size) >= min(counted[part_of(stored.name)], stored.shape[0])
+            whole = intact_rows(stored, size) >= min(counted[part_of(stored.name, counted)], stored.shape[0])
         else:
             whole = is_within(stored, size)
         if not whole:
@@ -129,9 +129,11 @@ def _rehearse(path: Path) -> None:
 
 
 def counts(entry: hdf5.Group) -> Mapping[str, int]:
-    """Number of complete rows of every part; older files have fewer parts, newer ones may have more."""
-    stored = [max(0, count) for count in hdf5.read(hdf5.dataset(entry, "complete"), slice(None)).tolist()]
-    return dict(zip(COUNTED, [*stored, *[0] * (len(COUNTED) - len(stored))], strict=False))
+    """Number of complete rows of every part; older files do not name the parts and may have fewer."""
+    complete = hdf5.dataset(entry, "complete")
+    stored = [max(0, count) for count in hdf5.read(complete, slice(None)).tolist()]
+    names = str(complete.attrs["parts"]).split() if "parts" in complete.attrs else FORMER
+    return dict.fromkeys(FORMER, 0) | dict(zip(names, stored, strict=False))
 
 
 def _check_format(path: Path, file: hdf5.File, kinds: tuple[str, ...]) -> None:

@@ -11,15 +11,17 @@ from numpy.typing import NDArray
 
 from bench.datafile import checksums, hdf5, tables
 from bench.datafile.checksums import SMALL, Integrity, integrity
-from bench.datafile.declared import EVENT_TABLES, FINDING_TABLES, FIXED_GROUPS, TABLES, last_findings, read_fits
+from bench.datafile.declared import FIXED_GROUPS, TABLES, event_table, path_of
 from bench.datafile.fields import Field, decode, field_of
+from bench.datafile.findings_tables import FINDING_TABLES, last_findings, read_fits
 from bench.datafile.hdf5_reading import UNREADABLE, DataFileError, reading, reason
 from bench.datafile.opening import open_file
 from bench.datafile.samples import PLOT as PLOT
 from bench.datafile.samples import TIME
 from bench.datafile.series import ROWS_AT_ONCE, SampleReader
 from bench.datafile.tables import Column, as_rows
-from bench.events import Event, FitFinished, SensorsAligned
+from bench.events import Event, SensorsAligned
+from bench.findings import FitFinished
 from drivers.optoncdt.codec import IMPLAUSIBLE, LATE, LOST, MID_RANGE, marked
 from drivers.rig import Alignment, RawValues
 from drivers.timebase.resampling import Marks, resampled
@@ -198,7 +200,8 @@ class DataFile(SampleReader):
 
         An absent value is None, an unknown one NaN. Empty for an older file without this table.
         """
-        return {field.name: values for field, values in self.growing(EVENT_TABLES[event].path).items()}
+        table = event_table(event)
+        return {} if table is None else {field.name: values for field, values in self.growing(table.path).items()}
 
     def rows_of(self, event: type[Event]) -> list[dict[str, Any]]:
         """The columns of `columns_of` as one dict per row."""
@@ -274,15 +277,20 @@ class DataFile(SampleReader):
         return {
             name: tables.read(hdf5.group(self._entry, name))
             for name, member in hdf5.members(self._entry)
-            if name not in FIXED_GROUPS and not hdf5.is_dataset(member)
+            if name not in FIXED_GROUPS and name not in self.counted and not hdf5.is_dataset(member)
         }
+
+    @property
+    def own_tables(self) -> list[str]:
+        """Paths of the tables of events that are declared by the protocol, or were by one of an earlier version."""
+        paths = map(path_of, self.counted)
+        return [each for each in paths if each not in (*TABLES, "points") and hdf5.has(self._entry, each)]
 
     @cached_property
     def _growing(self) -> list[str]:
         """Paths of the datasets that change during recording."""
         paths = [f"instrument/{channel.name}/counts" for channel in self.channels]
-        folders = [*TABLES, "points"]
-        folders = [folder for folder in folders if hdf5.has(self._entry, folder)]
+        folders = [folder for folder in map(path_of, self.counted) if hdf5.has(self._entry, folder)]
         paths += [f"{folder}/{name}" for folder in folders for name in hdf5.names(hdf5.group(self._entry, folder))]
         paths += [f"{PLOT}/{TIME}"] if self.format_version > 1 else []
         return [*paths, "instrument/drive/voltage", "status", "summary", "end_time"]

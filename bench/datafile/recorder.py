@@ -70,8 +70,9 @@ class Recorder:
     DataFileError, once; later data are not recorded, and earlier data stay readable. A disk that is too slow causes the
     same error: a call waits for it at most `hold_up` seconds, which is non-zero only in virtual time.
 
-    `metadata` is stored as strings under /entry/metadata, `tables` (such as {"prediction": ...}) under /entry. Raises
-    InvalidInput, without creating a file, if `path` exists or cannot be created, or if a name or table is invalid.
+    `metadata` is stored as strings under /entry/metadata, `tables` (such as {"prediction": ...}) under /entry. `events`
+    are those of the protocol whose tables the file needs. Raises InvalidInput, without creating a file, if `path`
+    exists or cannot be created, or if a name or table is invalid.
     """
 
     def __init__(
@@ -83,6 +84,7 @@ class Recorder:
         point_type: type[Parameters],
         metadata: Mapping[str, str],
         tables: Mapping[str, Table] | None = None,
+        events: Sequence[type[Event]] = (),
         title: str = "rocking-bench campaign",
         hold_up: float = 0.0,
     ) -> None:
@@ -91,7 +93,7 @@ class Recorder:
         self._n_channels = len(channels)
         self._numbers = {channel.name: number for number, channel in enumerate(channels)}
         self._writer = DataFileWriter(
-            path, Skeleton(title, tuple(channels), sample_rate, point_type, metadata, tables or {})
+            path, Skeleton(title, tuple(channels), sample_rate, point_type, metadata, tables or {}, events)
         )
         self._queue: queue.Queue[_Block | Event | _Sync] = queue.Queue(BACKLOG)
         self._end: _End | None = None
@@ -119,6 +121,8 @@ class Recorder:
                 f"point of type {type(event.point).__name__} was not recorded: {self.path} is for"
                 f" {self._point_type.__name__}"
             )
+        elif not self._writer.has_table(type(event)):
+            raise DataFileError(f"{type(event).__name__} was not recorded: name it in `events` of its protocol")
         elif not isinstance(event, Progress):
             self._offer(event)
 

@@ -4,6 +4,7 @@ an old version.
 The original is not changed. The copy has the intact data in the present layout, with checksums.
 """
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
@@ -17,14 +18,16 @@ from bench.datafile import hdf5
 from bench.datafile.checksums import GROUP as CHECKSUMS
 from bench.datafile.checksums import Checksums, Integrity
 from bench.datafile.copying import Copying, cut, drop_channels, renew_drive, renew_tables
-from bench.datafile.declared import COUNTED, ENTRY_TABLES, FIT_VIEWS, add_fit_views, part_of, whole_fits
+from bench.datafile.declared import ENTRY_PATHS, part_of
 from bench.datafile.fields import field_of
+from bench.datafile.findings_tables import FIT_VIEWS, add_fit_views, whole_fits
 from bench.datafile.hdf5_reading import UNREADABLE, DataFileError, reason
+from bench.datafile.held import FileSync
 from bench.datafile.layout import STATUS_WIDTH, SUMMARY_WIDTH, TIME_WIDTH, Status, create_ends, now
 from bench.datafile.opening import FORMAT, FORMAT_VERSION
 from bench.datafile.reader import DataFile, open_datafile
 from bench.datafile.samples import Timeline, chunk_of, create_plot, read_channels
-from bench.datafile.writer import FileSync, journal_path, read_journal
+from bench.datafile.writer import journal_path, read_journal
 from bench.progress import Progress, counting, silent
 from bench.unfinished import finish, unfinished
 from sim.errors import InvalidInput
@@ -43,10 +46,13 @@ def add_lost_events(entry: hdf5.Group, lines: Sequence[Row]) -> tuple[int, int]:
     events = _beyond(hdf5.group(entry, "events"), lines, ("time", "kind"))
     results = _beyond(hdf5.group(entry, "points"), points)
     columns: list[tuple[hdf5.Dataset, NDArray[Any]]] = []
-    for kind, table in ENTRY_TABLES.items():
-        rows = [line["columns"] for line in lines if line["kind"] == kind.__name__ and "columns" in line]
-        if rows and hdf5.has(entry, table.path):
-            columns += _beyond(hdf5.group(entry, table.path), rows)
+    rows = defaultdict[str, list[Row]](list)
+    for line in lines:
+        if "columns" in line and (path := line.get("table", ENTRY_PATHS.get(line["kind"]))) is not None:
+            rows[path].append(line["columns"])
+    for path, values in rows.items():
+        if hdf5.has(entry, path):
+            columns += _beyond(hdf5.group(entry, path), values)
     for stored, values in (*events, *results, *columns):
         hdf5.append(stored, values)
     return max((len(values) for _, values in events), default=0), max((len(values) for _, values in results), default=0)
@@ -108,8 +114,8 @@ def write_ends(record: DataFile, path: Path, entry: hdf5.Group, lengths: Mapping
 
     `lengths` are the numbers of rows of every part; `loss` describes the missing data.
     """
-    complete, status, summary, end_time = create_ends(entry)
-    complete[...] = [lengths.get(name, 0) for name in COUNTED]
+    complete, status, summary, end_time = create_ends(entry, tuple(record.counted))
+    complete[...] = [lengths.get(name, 0) for name in record.counted]
     was, told, end = (_text(record, name) for name in ("status", "summary", "end_time"))
     if was not in [each.value for each in Status] or was == Status.RUNNING:
         # the time of the crashed writer's last known activity
@@ -182,7 +188,7 @@ def _rebuild(record: DataFile, path: Path, temporary: Path, target: Path, progre
         drop_channels(entry, copying.lost)
         _require_channels(entry)
         renew_drive(entry)
-        renew_tables(entry, copying.lost)
+        renew_tables(entry, copying.lost, record.own_tables)
         cut(entry, copying.counted)
         gone = {at: told for at, told in copying.lost.items() if not _is_made_anew(at)}
         damage = gone | {at: told for at, told in judged.failing.items() if not _is_made_anew(at)}
@@ -192,10 +198,11 @@ def _rebuild(record: DataFile, path: Path, temporary: Path, target: Path, progre
         except DataFileError as error:
             damage["journal"] = str(error)
         grown = {each.name: each.shape[0] for each in hdf5.datasets(entry) if hdf5.grows(each)}
-        lengths = {part_of(at): rows for at, rows in grown.items()}
+        parts = {at: part_of(at, copying.counted) for at in grown}
+        lengths = {parts[at]: rows for at, rows in grown.items()}
         lost = {part: left for part, rows in copying.counted.items() if (left := rows - lengths.get(part, 0)) > 0}
         # a truncated dataset differs from its checksum, but its loss has already been reported
-        damage = {at: told for at, told in damage.items() if at not in grown or part_of(at) not in lost}
+        damage = {at: told for at, told in damage.items() if at not in grown or parts[at] not in lost}
         _fill_plot(entry, lengths["samples"])
         result = Recovery(target, lengths["samples"], events, points, lost, tuple(damage.values()))
         write_ends(record, path, entry, lengths, "; ".join(filter(None, (result.loss, *gone.values()))))
@@ -227,7 +234,8 @@ def _counted(record: DataFile, judged: Integrity) -> Mapping[str, int]:
     lengths = dict.fromkeys(record.counted, 0)
     for stored in hdf5.datasets(hdf5.group(record.file, "entry"), {}):
         if hdf5.grows(stored):
-            lengths[part_of(stored.name)] = max(lengths[part_of(stored.name)], stored.shape[0])
+            part = part_of(stored.name, lengths)
+            lengths[part] = max(lengths[part], stored.shape[0])
     return lengths
 
 

@@ -15,7 +15,7 @@ import h5py.h5d
 import h5py.h5g
 import h5py.h5s
 
-from bench.datafile.declared import FIT_VIEWS
+from bench.datafile.findings_tables import FIT_VIEWS
 from bench.datafile.hdf5_objects import is_hard_link, stored_member
 from bench.datafile.hdf5_reading import UNREADABLE, DataFileError, File
 

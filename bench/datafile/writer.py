@@ -2,7 +2,6 @@
 
 import json
 import os
-import shutil
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
@@ -13,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.datafile import hdf5
-from bench.datafile.declared import COUNTED, EVENT_TABLES, add_findings, add_fit, add_fit_views
+from bench.datafile.declared import counters, event_table
+from bench.datafile.findings_tables import add_findings, add_fit, add_fit_views
 from bench.datafile.hdf5_reading import DataFileError, reason
-from bench.datafile.held import keep_lockers_out, wait_until_free
+from bench.datafile.held import FileSync, wait_until_free
 from bench.datafile.layout import (
     STATUS_WIDTH,
     SUMMARY_WIDTH,
@@ -26,86 +26,10 @@ from bench.datafile.layout import (
     now,
 )
 from bench.datafile.samples import Timeline
-from bench.events import Event, FitFinished, PointFinished, SpecimenIdentified
+from bench.events import Event, PointFinished
+from bench.findings import FitFinished, SpecimenIdentified
 from drivers.rig import Counts, RawValues
 from sim.errors import InvalidInput
-
-
-class FileSync:
-    """Flushes a file from the system's cache to the disk through a separate handle, since HDF5 does not give access to
-    its own handle on some systems. Detects changes to the file by other programs.
-    """
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._handle = os.open(path, os.O_RDWR)
-        self._size = 0
-        wait_until_free(lambda: keep_lockers_out(self._handle))
-        # on some network shares a file's identity changes with every query
-        self._identified = os.path.samestat(os.fstat(self._handle), path.stat())
-        sync_folder(path.parent)
-
-    def sync(self) -> None:
-        """Flush the file to the disk. Raises OSError if the disk fails, and DataFileError like `check`."""
-        os.fsync(self._handle)
-        self.check()
-        self._size = os.fstat(self._handle).st_size
-
-    def touch(self) -> None:
-        """Write the first byte again. Raises PermissionError while another program's lock forbids writing."""
-        os.lseek(self._handle, 0, os.SEEK_SET)
-        first = os.read(self._handle, 1)
-        os.lseek(self._handle, 0, os.SEEK_SET)
-        os.write(self._handle, first)
-
-    def check(self) -> None:
-        """Raise DataFileError if another program has truncated, renamed, replaced or deleted the file.
-
-        Must be called before HDF5 looks for data in the file, because HDF5 would search for hours for truncated data.
-        """
-        if (size := os.fstat(self._handle).st_size) < self._size:
-            raise DataFileError(f"another program has truncated it from {self._size} to {size} bytes")
-        try:
-            there = self._path.stat()
-        except FileNotFoundError:
-            raise DataFileError(f"another program has {self._gone()}") from None
-        if self._identified and not os.path.samestat(os.fstat(self._handle), there):
-            raise DataFileError("another program has replaced it")
-
-    def restore(self) -> None:
-        """Write the file again, with the data flushed so far, if it was deleted and no other file has its name."""
-        with suppress(OSError):
-            if os.fstat(self._handle).st_nlink or self._path.exists():
-                return
-            with self._path.open("xb") as copy, os.fdopen(os.dup(self._handle), "rb") as kept:
-                kept.seek(0)
-                shutil.copyfileobj(kept, copy)
-                os.fsync(copy.fileno())
-
-    def close(self) -> None:
-        """Close the file; may be called repeatedly."""
-        with suppress(OSError):
-            os.close(self._handle)
-        self._handle = -1
-
-    def _gone(self) -> str:
-        if not os.fstat(self._handle).st_nlink:
-            return "deleted it"
-        with suppress(OSError):
-            # on Linux the present name of an open file can be queried
-            return f"renamed it to {Path(os.readlink(f'/proc/self/fd/{self._handle}')).name}"
-        return "renamed or deleted it"
-
-
-def sync_folder(folder: Path) -> None:
-    """Flush the directory entry of a new file to the disk, if the system requires it."""
-    # Windows cannot open folders, and flushes their entries without a request
-    with suppress(OSError):
-        handle = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
 
 
 def journal_path(path: Path) -> Path:
@@ -208,10 +132,14 @@ class DataFileWriter:
             hdf5.let_go(self._file)
             path.unlink(missing_ok=True)
             raise DataFileError(f"{path} could not be created ({reason(error)}): check the disk") from error
-        self._tables = [self._parts.rows[name] for name in COUNTED if name != "samples"]
+        self._counters = counters(skeleton.own)
         self._timeline = Timeline(skeleton.sample_rate)
         self._complete: list[int] = []
         self._point_fields = tuple(skeleton.point_type.model_fields)
+
+    def has_table(self, event: type[Event]) -> bool:
+        """Whether the file has the table of an event, or the event has none."""
+        return (table := event_table(event)) is None or table.name in self._parts.rows
 
     @property
     def full_chunks(self) -> int:
@@ -232,10 +160,11 @@ class DataFileWriter:
         """Append an event other than a block."""
         rows = self._parts.rows
         more = dict[str, Any]()
-        if (table := EVENT_TABLES.get(type(event))) is not None:
+        if (table := event_table(type(event))) is not None:
             for row in table.rows(event):
                 rows[table.name].add(*row)
                 if table.single:
+                    more["table"] = table.path
                     # JSON has only finite numbers
                     more["columns"] = {
                         field.name: None if value != value else value
@@ -259,13 +188,14 @@ class DataFileWriter:
 
     def commit(self, *, partial: bool) -> None:
         """Write pending rows to the disk, visible to readers; incomplete chunks of samples only if `partial`."""
-        samples, tables = self._parts.samples, self._tables
+        samples, tables = self._parts.samples, self._parts.rows
         self._file_sync.check()
         wait_until_free(self._file_sync.touch)
         samples.write(partial=partial)
-        for rows in tables:
+        for rows in tables.values():
             rows.write(partial=partial)
-        complete = [samples.written, *(rows.written for rows in tables)]
+        written = {"samples": samples.written, **{name: rows.written for name, rows in tables.items()}}
+        complete = [written.get(name, 0) for name in self._counters]
         if complete == self._complete:
             return
         # if the disk or computer fails, a dataset's new length may be stored without its rows; the count of complete

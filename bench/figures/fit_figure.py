@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.events import FitFinished
 from bench.figures.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, VERMILLION, new_figure, set_grid
+from bench.findings import FitFinished
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

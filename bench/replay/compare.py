@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.datafile.declared import ENTRY_TABLES, EVENT_TABLES
+from bench.datafile.declared import ENTRY_PATHS, EVENT_TABLES, event_table
 from bench.datafile.fields import TEXT_WIDTH
 from bench.datafile.hdf5 import clip_text
 from bench.datafile.reader import DataFile
-from bench.events import Acquired, Event, PointFinished, SensorsAligned, TwinEstimate
+from bench.events import Acquired, Event, PointFinished, SensorsAligned
+from bench.live_values import TwinEstimate
 from bench.replay.recording import RecordedCourse
 
 ROUNDING = 1e-9
@@ -57,16 +58,21 @@ class Comparison:
         self._journal: list[tuple[str, str, int]] = []
         self._blocks = 0
         self._points: list[Mapping[str, Any]] = []
-        self._own: dict[type[Event], list[Mapping[str, Any]]] = {kind: [] for kind in EVENT_TABLES}
+        paths = (*(table.path for table in EVENT_TABLES.values()), *record.own_tables)
+        self._own: dict[str, list[Mapping[str, Any]]] = {path: [] for path in paths}
+        self._entries = {path: kind for kind, path in ENTRY_PATHS.items()}
+        """Kind of the journal entries of a table that has one row for each."""
 
     def __call__(self, event: Event) -> None:
         if isinstance(event, Acquired):
             self._drive.push(event)
             self._blocks += 1
             return
-        if (table := EVENT_TABLES.get(type(event))) is not None:
+        if (table := event_table(type(event))) is not None:
+            if event.journalled and table.single:
+                self._entries[table.path] = type(event).__name__
             names = [each.name for each in table.fields]
-            self._own[type(event)] += (dict(zip(names, row, strict=True)) for row in table.rows(event))
+            self._own.setdefault(table.path, []).extend(dict(zip(names, row, strict=True)) for row in table.rows(event))
         if not self._course.journalled(event):
             return
         text = event.line
@@ -90,20 +96,20 @@ class Comparison:
         entries = Counter(kind for kind, *_ in self._compare_journal(found, broken_off))
         same = self._course.same_wording, self._course.same_intervals
         _compare_rows(found, POINTS, self._record.points, self._points, *same)
-        for kind, rows in self._own.items():
-            if kind is TwinEstimate and not self._course.twin_in_time:
+        for path, rows in self._own.items():
+            if path == TwinEstimate.table and not self._course.twin_in_time:
                 continue
-            stored = self._course.rows_of(kind)
+            stored = self._course.rows_of(path)
             if stored is None:
                 continue
             common = max(len(stored), len(rows))
-            if broken_off is not None and kind in (TwinEstimate, SensorsAligned):
+            if broken_off is not None and path in (TwinEstimate.table, SensorsAligned.table):
                 # a killed program may lose its last samples but not the twin's estimates from them, and it has not
                 # published the end of its run
                 common = min(len(stored), len(rows))
-            elif broken_off is not None and kind in ENTRY_TABLES:
-                common = entries[kind.__name__]
-            name = EVENT_TABLES[kind].name.replace("_", " ")
+            elif broken_off is not None and path in self._entries:
+                common = entries[self._entries[path]]
+            name = path.rpartition("/")[2].replace("_", " ")
             _compare_rows(found, name, stored[:common], rows[:common], *same)
         return found
 

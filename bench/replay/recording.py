@@ -18,14 +18,8 @@ from bench.datafile.declared import ENTRY_TABLES
 from bench.datafile.opening import INTERVALS, WORDING, columns_from
 from bench.datafile.reader import DataFile
 from bench.datafile.tables import as_rows
-from bench.events import (
-    Event,
-    SpecimenMounted,
-    State,
-    StateChanged,
-    TwinEstimate,
-    Warned,
-)
+from bench.events import Event, SpecimenMounted, State, StateChanged, Warned
+from bench.live_values import TwinEstimate
 from drivers.rig import Alignment, Channel, Counts
 from sim.errors import CauseCode, InvalidInput
 
@@ -236,12 +230,13 @@ class RecordedCourse:
                 run = int(np.searchsorted(self._numbers, int(blocks["run"][entry.blocks - 1])))
                 self._opened[run] = int(ends[entry.blocks - 1]), entry.columns["subject"].split(", ")
 
-    def rows_of(self, kind: type[Event]) -> Sequence[Mapping[str, Any]] | None:
-        """Rows of the table of a reproducible event; None if the file has no such table."""
-        if kind in ENTRY_TABLES:
-            return self._rows.get(kind.__name__)
-        columns = self._record.columns_of(kind)
-        return as_rows(columns) if columns else None
+    def rows_of(self, path: str) -> Sequence[Mapping[str, Any]] | None:
+        """Rows of the table of a reproducible event at `path`; None if the file has no such table."""
+        for kind, table in ENTRY_TABLES.items():
+            if table.path == path:
+                return self._rows.get(kind.__name__)
+        columns = self._record.growing(path)
+        return as_rows({field.name: values for field, values in columns.items()}) if columns else None
 
     @property
     def first_warnings(self) -> list[str]:

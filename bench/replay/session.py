@@ -9,14 +9,7 @@ from bench.datafile.reader import DataFile
 from bench.engine.engine import configured_engine
 from bench.engine.interface import EventStream, Requests
 from bench.engine.steps import Plan
-from bench.events import (
-    Acquired,
-    Event,
-    OperatorAnswered,
-    OperatorAsked,
-    Subscriber,
-    Warned,
-)
+from bench.events import Acquired, Event, OperatorAnswered, OperatorAsked, Subscriber, Warned
 from bench.provenance import revision, software
 from bench.replay.compare import DRIVE, ENDING, Comparison, Difference, Found
 from bench.replay.recording import DataFileRecording, RecordedCourse

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from bench.analysis.signals import ACCELERATION, DISPLACEMENT, LASER_1, LASER_2
 from bench.analysis.transient_base import MODEL_RATE
 from bench.config.model import BenchConfiguration
-from bench.events import TwinEstimate
+from bench.live_values import TwinEstimate
 from bench.twin.ensemble import Ensemble, Gains, Measured, Members
 from sim.errors import RockbenchError
 

@@ -15,17 +15,8 @@ from numpy.typing import NDArray
 
 from bench.config.model import BenchConfiguration
 from bench.engine.interface import Requests
-from bench.events import (
-    Acquired,
-    Estimate,
-    Event,
-    RunningGain,
-    SpecimenMounted,
-    State,
-    StateChanged,
-    TwinEstimate,
-    Warned,
-)
+from bench.events import Acquired, Event, SpecimenMounted, State, StateChanged, Warned
+from bench.live_values import Estimate, RunningGain, TwinEstimate
 from bench.twin.ensemble import Measured, Members, draw_members
 from bench.twin.estimator import Estimator, Limit, Setting, laser_lag
 from drivers.rig import OperatorTask

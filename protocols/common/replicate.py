@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
+from math import nan
 from typing import Literal
 
 import numpy as np
@@ -13,13 +14,37 @@ from bench.control.replication import Replication, ReplicationParameters, Status
 from bench.control.table_model import TableModel
 from bench.control.target import Target
 from bench.engine.steps import Arm, Fallen, Outcome, Play, Played, Publish, RampOut, Step
-from bench.events import Event, PassFinished, StepStarted, Warned
+from bench.events import Event, StepStarted, Warned, event
 from bench.guard.limits import Limits
+from sim.parameters import column
 
 Array = NDArray[np.float64]
 
 REST = 2.0
 """Time at rest before each pass, in which the signals are zeroed [s]."""
+
+
+@event(table="passes", notice="pass")
+class PassFinished(Event):
+    """Pass `number` of a replication, the iteration that makes the table follow `motion`, has ended.
+
+    `error`, `repeatable`, `peak_error` and `spectrum_error` are relative, see `bench.control.passes.Pass`; `text`
+    summarises the pass.
+    """
+
+    time: float = column("s", "bench time at the end of the pass", default=nan, kw_only=True)
+    motion: str = column("", "motion commanded to the table")
+    number: int = column("1", "number of the pass, from 1 for each replication")
+    error: float = column("1", "measured rms error relative to the rms of the target")
+    repeatable: float = column("1", "error excluding its non-repeatable part")
+    peak_error: float = column("1", "largest error relative to the peak of the target")
+    spectrum_error: float = column("1", "largest relative deviation of the response spectrum")
+    accepted: bool = column("1", "whether the error is the smallest so far; otherwise the previous drive is restored")
+    text: str
+
+    @property
+    def line(self) -> str:
+        return f"{self.motion}: {self.text}"
 
 
 Ending = Status | Literal["samples lost"]

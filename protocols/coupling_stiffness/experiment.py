@@ -16,8 +16,9 @@ from bench.config.model import BenchConfiguration
 from bench.config.result_files import write_specimen
 from bench.datafile.tables import Column, Table
 from bench.engine.steps import OperatorAction, Outcome, Publish, Step
-from bench.events import PointFinished, SpecimenIdentified, Warned
+from bench.events import PointFinished, Warned
 from bench.figures.style import write_figure
+from bench.findings import SpecimenIdentified
 from bench.preflight.margins import Forecast
 from bench.protocol import Plan, Prepared, Result, Sources
 from drivers.rig import OperatorTask

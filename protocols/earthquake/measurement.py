@@ -12,7 +12,7 @@ from bench.analysis.transient_base import BaseMotion, base_motion
 from bench.analysis.transient_peak import RunningPeak, TransientPeak, running_peak, transient_peak
 from bench.control.passes import SpectrumCheck
 from bench.control.starts import CATCH_ANGLE
-from bench.events import RunningGain
+from bench.live_values import RunningGain
 from protocols.earthquake.records import Shaking
 from sim.rocking import simulate
 from sim.specimen import Specimen

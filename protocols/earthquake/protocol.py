@@ -188,6 +188,7 @@ PROTOCOL = Protocol(
     parameters=EarthquakeParameters,
     point=EarthquakePoint,
     prepare=deferred("protocols.earthquake.campaign:EarthquakeCampaign"),
+    events=("protocols.common.replicate:PassFinished",),
     figures=(
         "gain_curves.png",
         "table_motions.png",

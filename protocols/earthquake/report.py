@@ -15,8 +15,8 @@ from bench.datafile.tables import arrays
 from bench.document.campaign import Campaign
 from bench.document.document import Column, Listing, Notice, Part, Picture, Section, Table
 from bench.document.typography import ABSENT, counted, percent, plain, typeset, with_uncertainty, yes_or_no
-from bench.events import RunningGain
 from bench.figures.earthquake_figure import DriftPicture, MotionPicture, drift_figure, gain_figure, motion_figure
+from bench.live_values import RunningGain
 from protocols.earthquake.campaign import check_statement
 from protocols.earthquake.measurement import STEP, History, observe
 from protocols.earthquake.protocol import EarthquakeParameters

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bench.analysis.free_rocking.findings import SCATTERED, Findings, Tilt
 from bench.analysis.free_rocking.fit import NAMES, R
 from bench.analysis.gain import COVERAGE
-from bench.events import FitFinished, FittedParameter, Series
+from bench.findings import FitFinished, FittedParameter, Series
 from protocols.free_rocking.protocol import FreeRockingParameters, RockingPoint
 from sim.free_rocking import critical_angle, frequency_parameter, theoretical_restitution
 from sim.identified import Finding, Identified

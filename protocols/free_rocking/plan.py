@@ -27,7 +27,8 @@ from bench.analysis.free_rocking.swings import NotRocking, Recording
 from bench.analysis.signals import LASER_2
 from bench.config.model import BenchConfiguration
 from bench.engine.steps import Arm, OperatorAction, Outcome, Play, Played, Publish, RampOut, Step
-from bench.events import Event, PointFinished, Progress, SpecimenIdentified, StepStarted, Warned
+from bench.events import Event, PointFinished, Progress, StepStarted, Warned
+from bench.findings import SpecimenIdentified
 from drivers.rig import OperatorTask
 from protocols.common.calibrate import Unmeasurable
 from protocols.free_rocking.evaluation import fit_events, identified_specimen, inconsistencies, rocking_point

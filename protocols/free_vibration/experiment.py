@@ -19,8 +19,9 @@ from bench.config.model import BenchConfiguration
 from bench.config.result_files import write_specimen
 from bench.datafile.tables import Column, Table
 from bench.engine.steps import OperatorAction, Outcome, Publish, Step
-from bench.events import PointFinished, SpecimenIdentified, Warned
+from bench.events import PointFinished, Warned
 from bench.figures.style import write_figure
+from bench.findings import SpecimenIdentified
 from bench.preflight.demands import demands_of
 from bench.preflight.margins import Forecast, bounds
 from bench.preflight.motion import laser_demands

@@ -16,7 +16,7 @@ from bench.config.model import BenchConfiguration
 from bench.control.sine import Sine, SineControl, SineResponse, Tolerance
 from bench.control.stabiliser import BLEND, DELAY, HoldMonitor, Stabiliser, StabiliserDesign, observed
 from bench.engine.steps import Dwell, Fallen, Measured, Outcome, Publish, SetHarmonics, Step
-from bench.events import HoldCycle, StepStarted
+from bench.events import Event, StepStarted, event
 from protocols.harmonic.protocol import HarmonicParameters
 from protocols.harmonic.settling import (
     AIM,
@@ -29,6 +29,7 @@ from protocols.harmonic.settling import (
     TableState,
 )
 from sim.cycle_map import cycle_map
+from sim.parameters import column
 from sim.shaker import Shaker
 from sim.steady import NoOrbit, Orbit
 
@@ -51,6 +52,18 @@ KICK, FADING = 0.003, 12
 a hundred cycles to grow from the noise; and number of cycles after it in which the effects of the other multipliers
 fade.
 """
+
+
+@event(table="hold_cycles", journalled=False)
+class HoldCycle(Event):
+    """One cycle of an unstable motion that a stabiliser holds; values are NaN if the cycle could not be measured."""
+
+    omega: float = column("rad/s", "circular frequency of the base motion")
+    beta: float | None = column("1", "stiffness ratio of the coupling spring")
+    cycle: int = column("1", "number of the cycle since the beginning of the hold")
+    drift_peak: float = column("m", "peak drift in the cycle")
+    deviation: float = column("1", "estimated deviation from the periodic motion, relative to that motion")
+    control: float = column("1", "magnitude of the control in the cycle, relative to the table's amplitude")
 
 
 def prepared(orbit: Orbit | None, shaker: Shaker | None, harmonics: int) -> StabiliserDesign | None:

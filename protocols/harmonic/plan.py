@@ -22,7 +22,8 @@ from bench.control.sine import Sine
 from bench.control.stabiliser import GROWTH, StabiliserDesign
 from bench.control.starts import Start
 from bench.engine.steps import Arm, Calibrate, Fallen, OperatorAction, Outcome, Publish, RampOut, Step, Sweep
-from bench.events import Estimate, PointFinished, Progress, StepStarted, Warned
+from bench.events import PointFinished, Progress, StepStarted, Warned
+from bench.live_values import Estimate
 from drivers.rig import OperatorTask, RigError
 from protocols.common.calibrate import calibrate_drive, harmonic_frequencies
 from protocols.harmonic.free_prediction import with_free_prediction

@@ -228,6 +228,7 @@ PROTOCOL = Protocol(
     point=HarmonicPoint,
     prepare=deferred("protocols.harmonic.campaign:HarmonicCampaign"),
     figures=("gain_spectra.png",),
+    events=("protocols.harmonic.holding:HoldCycle",),
     reanalysis=Reanalysis(HarmonicSettings, deferred("protocols.harmonic.reanalysis:HarmonicFollower")),
     report=deferred("protocols.harmonic.report:harmonic_sections"),
     view=RunView(

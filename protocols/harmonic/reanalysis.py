@@ -16,7 +16,8 @@ from bench.control.oscillator import DriveCalibration
 from bench.control.sine import Sine, SineResponse
 from bench.datafile.reader import DataFile
 from bench.engine.steps import Arm, Calibrate, Dwell, Measured, Outcome, Publish, SetHarmonics, Step, Sweep
-from bench.events import Acquired, Estimate, Event, PointFinished, StepStarted
+from bench.events import Acquired, Event, PointFinished, StepStarted
+from bench.live_values import Estimate
 from protocols.harmonic.free_prediction import with_free_prediction
 from protocols.harmonic.judgement import Conditions, judge, predicted_fields
 from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, HarmonicSettings, PointStatus

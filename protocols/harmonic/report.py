@@ -11,11 +11,11 @@ from bench.document.campaign import Campaign
 from bench.document.document import Column, Listing, Notice, Part, Picture, Section, Table
 from bench.document.gain_map import map_section
 from bench.document.typography import ABSENT, counted, percent, plain, typeset, with_uncertainty, yes_or_no
-from bench.events import HoldCycle
 from bench.figures.budget_figure import budget_figure
 from bench.figures.map_figure import MapPoint
 from bench.figures.spectra_figure import gain_spectra
 from bench.prediction.bands import expanded_uncertainty
+from protocols.harmonic.holding import HoldCycle
 from protocols.harmonic.report_cycles import Dwells, MeasuredMotion, measured_figure
 from protocols.harmonic.report_hold import hold_figure
 from sim.errors import InvalidInput

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from bench.analysis.signals import ACCELERATION, DRIFT, SIGNALS, U1, SignalMap
 from bench.datafile.reader import DataFile
 from bench.document.campaign import Campaign
-from bench.events import Estimate
 from bench.figures.style import (
     BLACK,
     BLUE,
@@ -27,6 +26,7 @@ from bench.figures.style import (
     new_figure,
     set_grid,
 )
+from bench.live_values import Estimate
 from sim.gain import Layer
 
 if TYPE_CHECKING:

@@ -15,9 +15,10 @@ from bench.config.result_files import write_calibration
 from bench.control.oscillator import Leg, program
 from bench.datafile.tables import Column, Table
 from bench.engine.steps import OperatorAction, Outcome, Publish, Step
-from bench.events import FitFinished, FittedParameter, PointFinished, Series
+from bench.events import PointFinished
 from bench.figures.style import BLACK, BLUE, GREY, new_figure, set_grid, write_figure
 from bench.figures.text_table import TextColumn, text_table
+from bench.findings import FitFinished, FittedParameter, Series
 from bench.preflight.demands import demands_of, load, response_of
 from bench.preflight.margins import Forecast
 from bench.preflight.motion import laser_demands

@@ -22,7 +22,8 @@ from bench.comparators.catalogue import solve
 from bench.config.model import BenchConfiguration
 from bench.config.sections import Simulation
 from bench.engine.interface import EventStream, Requests
-from bench.events import Acquired, Event, SpecimenMounted, State, StateChanged, TwinEstimate
+from bench.events import Acquired, Event, SpecimenMounted, State, StateChanged
+from bench.live_values import TwinEstimate
 from bench.twin.ensemble import Ensemble, draw_members
 from bench.twin.live import live_twin
 from drivers.clock import WallClock

@@ -5,20 +5,23 @@ Without `--write` the names of the pages that differ from the program are printe
 
 import argparse
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from inspect import getdoc
 from pathlib import Path
 from typing import Any
 
 from cyclopts import App
 
+import bench.events
+import bench.findings
+import bench.live_values
 from bench.app.catalogue import CHECK, all_protocols
 from bench.app.cli.main import COMMANDS, GROUPS, rockbench_app
 from bench.app.formatting import as_typed
 from bench.config.backend import RigSettings
 from bench.config.declared import Declared, declared
 from bench.config.model import BenchConfiguration
-from bench.datafile.declared import EVENT_TABLES
+from bench.datafile.declared import EVENT_TABLES, event_tables
 from bench.datafile.fields import Field, fields_of
 from bench.events import Event
 from bench.protocol import Protocol
@@ -55,6 +58,9 @@ _PROTOCOLS = """\
 Parameters and results of every protocol. A parameter is an option of the command, with `-` in place of `_`, and a key
 of a protocol file. A column of the points is a dataset in `/entry/points` of the [data file](../file-format.md)."""
 
+SHARED = (bench.events, bench.live_values, bench.findings)
+"""Modules with the events of all protocols."""
+
 _EVENTS = """\
 # Events
 
@@ -70,7 +76,7 @@ def pages() -> Mapping[str, str]:
         "configuration.md": _configuration(),
         "commands.md": _commands(rockbench_app(), check),
         "protocols.md": _protocols(protocols),
-        "events.md": _events(),
+        "events.md": _events(protocols),
     }
     note = f"<!-- written by `{COMMAND}`: do not edit -->\n\n"
     return {name: note + "\n".join(lines) + "\n" for name, lines in made.items()}
@@ -165,17 +171,24 @@ def _protocols(protocols: Iterable[Protocol[Any]]) -> Iterator[str]:
         yield from _columns(fields_of(protocol.point))
 
 
-def _events() -> Iterator[str]:
+def _events(protocols: Sequence[Protocol[Any]]) -> Iterator[str]:
     yield _EVENTS
-    kinds = [kind for kind in Event.__subclasses__() if kind.__module__ == Event.__module__]
-    links = {kind: f"[`{table.path}`](#entry{table.path.replace('/', '')})" for kind, table in EVENT_TABLES.items()}
+    own = event_tables(kind for each in protocols for kind in each.event_types)
+    members = [each for module in SHARED for each in vars(module).values()]
+    modules = [module.__name__ for module in SHARED]
+    events = [each for each in members if isinstance(each, type) and issubclass(each, Event) and each is not Event]
+    kinds = [*dict.fromkeys(each for each in events if each.__module__ in modules), *own]
+    tables = {**EVENT_TABLES, **own}
+    links = {kind: f"[`{table.path}`](#entry{table.path.replace('/', '')})" for kind, table in tables.items()}
     rows = (
         (f"`{kind.__name__}`", "yes" if kind.journalled else "", links.get(kind, ""), _first_paragraph(kind))
         for kind in kinds
     )
     yield from _table(("event", "journal", "table", "meaning"), rows)
-    for kind, table in EVENT_TABLES.items():
-        yield f"\n## /entry/{table.path}\n\nRows of `{kind.__name__}`."
+    for kind, table in tables.items():
+        of = [f"`{each.name}`" for each in protocols if kind in each.event_types]
+        only = f" Only in files of {' and '.join(of)}." if of else ""
+        yield f"\n## /entry/{table.path}\n\nRows of `{kind.__name__}`.{only}"
         yield from _columns(table.fields)
 
 

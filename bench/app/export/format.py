@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from bench.app.catalogue import EXPORTS
 from bench.datafile.checksums import Integrity
-from bench.datafile.declared import EVENT_TABLES, FINDING_TABLES
+from bench.datafile.declared import EVENT_TABLES
+from bench.datafile.findings_tables import FINDING_TABLES
 from bench.datafile.reader import DataFile
 from bench.datafile.series import RecordedRun
 from bench.plugins import load_plugin, plugin_code
@@ -129,7 +130,7 @@ def _tables(record: DataFile) -> Iterator[tuple[str, list[TableColumn]]]:
     points, about = record.points, record.results
     if points:
         yield "points", [_column(name, about[name].unit, about[name].description, points) for name in points[0]]
-    for path in (*(table.path for table in EVENT_TABLES.values()), *FINDING_TABLES, "events"):
+    for path in (*(table.path for table in EVENT_TABLES.values()), *record.own_tables, *FINDING_TABLES, "events"):
         columns = record.growing(path)
         if any(columns.values()):
             named = [_plain(field.name, field.unit, field.description, values) for field, values in columns.items()]

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.app.ipc.messages import Traces
-from bench.events import TWIN_TRACE, TwinEstimate
+from bench.live_values import TWIN_TRACE, TwinEstimate
 
 _SECONDS, _THETA = (TWIN_TRACE.index(name) for name in ("seconds", "theta"))
 STEP = 0.01

@@ -14,7 +14,8 @@ from bench.app.formatting import number
 from bench.app.gui import texts
 from bench.app.gui.palette import Theme
 from bench.app.ipc.messages import Run
-from bench.events import Estimate, Event, PointFinished, RunningGain
+from bench.events import Event, PointFinished
+from bench.live_values import Estimate, RunningGain
 from bench.protocol import Axis, Protocol
 
 Place = tuple[int, int]

@@ -16,7 +16,7 @@ from bench.app.gui.gains import LEAST, Kind, Line, Mark, kind_of, lines_of, mark
 from bench.app.gui.palette import Theme
 from bench.app.gui.widgets import colour_axes, round_down
 from bench.datafile.tables import Table
-from bench.events import Estimate, RunningGain
+from bench.live_values import Estimate, RunningGain
 
 DASHES = (Qt.PenStyle.SolidLine, Qt.PenStyle.DashLine, Qt.PenStyle.DotLine, Qt.PenStyle.DashDotLine)
 SYMBOLS = ("o", "s", "t", "d", "star")

@@ -12,7 +12,7 @@ from PySide6.QtCore import Qt
 from bench.app.gui import texts
 from bench.app.gui.palette import Theme
 from bench.app.gui.widgets import colour_axes, in_screen_unit, label, typeset
-from bench.events import FitFinished, Series, TableIdentified
+from bench.findings import FitFinished, Series, TableIdentified
 
 MOST = 6
 """Largest number of drawn series."""

@@ -14,7 +14,7 @@ from bench.app.gui.buffers import Ring
 from bench.app.gui.palette import Theme
 from bench.app.gui.widgets import colour_axes
 from bench.app.ipc.messages import TRACES
-from bench.events import TWIN_TRACE, TwinEstimate
+from bench.live_values import TWIN_TRACE, TwinEstimate
 
 Kind = Literal["spectrum", "phase", "Poincaré"]
 KINDS: tuple[Kind, ...] = ("spectrum", "phase", "Poincaré")

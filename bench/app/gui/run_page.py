@@ -44,18 +44,9 @@ from bench.app.gui.widgets import (
 )
 from bench.app.ipc.messages import Opened, Run, Traces
 from bench.datafile.tables import Table
-from bench.events import (
-    Estimate,
-    Event,
-    FitFinished,
-    LiveValue,
-    PointFinished,
-    RunningGain,
-    SpecimenMounted,
-    StepStarted,
-    TableIdentified,
-    TwinEstimate,
-)
+from bench.events import Event, PointFinished, SpecimenMounted, StepStarted
+from bench.findings import FitFinished, TableIdentified
+from bench.live_values import Estimate, LiveValue, RunningGain, TwinEstimate
 from bench.protocol import Protocol
 
 GAINS_HEIGHT, LOWEST = 150, 540

@@ -13,7 +13,7 @@ from bench.app.gui import texts
 from bench.app.gui.point_table import rows_of
 from bench.app.gui.widgets import typeset, unit_text
 from bench.datafile.tables import Column
-from bench.events import Estimate, LiveValue, RunningGain
+from bench.live_values import Estimate, LiveValue, RunningGain
 from bench.protocol import RunView
 from sim.parameters import Parameters, unit_of
 

@@ -7,7 +7,8 @@ from collections import deque
 from collections.abc import Hashable
 
 from bench.app.ipc.messages import FromSession, Opened, Preparing, Published, Question, SafetyInputs, Traces
-from bench.events import Estimate, Event, LiveValue, PointFinished, RunningGain, StepStarted, TwinEstimate
+from bench.events import Event, PointFinished, StepStarted
+from bench.live_values import Estimate, LiveValue, RunningGain, TwinEstimate
 
 EVENTS, TRACES = 5000, 64
 """Capacity in messages, and in blocks of traces (0.1 s each)."""

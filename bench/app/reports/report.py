@@ -23,8 +23,8 @@ from bench.document.typography import (
     with_uncertainty,
     without_unit,
 )
-from bench.events import FitFinished
 from bench.figures.fit_figure import fit_figure
+from bench.findings import FitFinished
 from bench.progress import Progress, silent
 from bench.protocol import Protocol
 from sim.loading import load_model

@@ -14,7 +14,8 @@ from bench.analysis.free_decay.response import K1, K2, NAMES, UNITS, XI1, XI2
 from bench.analysis.uncertainty import in_brackets
 from bench.config.model import BenchConfiguration
 from bench.engine.steps import Outcome, Publish, Step
-from bench.events import FitFinished, FittedParameter, Series, Warned
+from bench.events import Warned
+from bench.findings import FitFinished, FittedParameter, Series
 from protocols.common.decays.frame import FrameResult
 from protocols.common.decays.parameters import DecayParameters
 from sim.channel import STOREYS, TABLE_DISPLACEMENT

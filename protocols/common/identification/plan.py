@@ -18,7 +18,8 @@ from bench.config.model import BenchConfiguration
 from bench.control.identification import identify_table, line_amplitudes, line_response, sensor_agreement, waveform
 from bench.control.table_model import TableModel
 from bench.engine.steps import Arm, Fallen, OperatorAction, Outcome, Play, Played, Publish, RampOut, Step
-from bench.events import Event, Progress, StepStarted, TableIdentified, Warned
+from bench.events import Event, Progress, StepStarted, Warned
+from bench.findings import TableIdentified
 from bench.guard.limits import Limits
 from bench.preflight.motion import RESTING, resting_demands
 from drivers.rig import OperatorTask

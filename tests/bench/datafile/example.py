@@ -7,10 +7,7 @@ import numpy as np
 
 from bench.datafile.recorder import Recorder
 from bench.datafile.tables import Column
-from bench.events import (
-    Acquired,
-    Event,
-)
+from bench.events import Acquired, Event
 from drivers.rig import Block, Channel
 from protocols.harmonic.protocol import HarmonicPoint, PointStatus
 from sim.parameters import Parameters, quantity

@@ -43,7 +43,7 @@ path, flushes = Path(sys.argv[1]), int(sys.argv[2])
 locking = access.locking
 access.locking = hdf5.locking = lambda: locking("win32")
 if sys.argv[3] == "guarded":
-    writer.keep_lockers_out = lambda handle: fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    held.keep_lockers_out = lambda handle: fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
 held.HELD = float(sys.argv[4])
 waits, sleep = [], time.sleep
 class Time:

@@ -13,7 +13,6 @@ from bench.datafile.reader import open_datafile
 from bench.datafile.recorder import Recorder
 from bench.events import (
     Acquired,
-    Estimate,
     LimitExceeded,
     OperatorAnswered,
     PointFinished,
@@ -23,6 +22,7 @@ from bench.events import (
     StepStarted,
     Warned,
 )
+from bench.live_values import Estimate
 from drivers.rig import Block
 from protocols.harmonic.protocol import HarmonicPoint, PointStatus
 from sim.errors import InvalidInput

@@ -1,5 +1,6 @@
 """One declaration of an event: its columns in the file, its reading, export, comparison in replay, and its lines."""
 
+import json
 from dataclasses import replace
 from io import StringIO
 from pathlib import Path
@@ -11,12 +12,19 @@ from bench import events
 from bench.app.cli.terminal import PlainLines
 from bench.app.export.format import content_of
 from bench.app.run_display import RunDisplay, notice_of
-from bench.datafile.declared import COUNTED, EVENT_TABLES
+from bench.datafile.declared import EVENT_TABLES, counters
+from bench.datafile.hdf5_reading import DataFileError
 from bench.datafile.reader import open_datafile
+from bench.datafile.recovery import recover
+from bench.datafile.writer import journal_path
 from bench.engine.interface import EventStream
-from bench.events import Event, LiveValue, SensorsAligned, StepStarted, TableIdentified, Warned
+from bench.events import Event, SensorsAligned, StepStarted, Warned, event
+from bench.findings import TableIdentified
+from bench.live_values import LiveValue
 from drivers.clock import VirtualClock
 from drivers.rig import Alignment
+from sim.errors import InvalidInput
+from sim.parameters import column
 from tests.bench.datafile.example import begin, block, record
 from tests.command_line import rendered
 
@@ -42,7 +50,8 @@ def test_what_files_of_before_counted_keeps_its_place() -> None:
         *("table_response", "fits", "fit_columns", "fit_parameters", "fit_values", "twin", "identified"),
         *("identified_correlations", "live_values"),
     )
-    assert COUNTED[: len(counted)] == counted
+    assert counters(["own"])[: len(counted)] == counted
+    assert counters(["own"])[-1] == "own"
 
 
 def test_a_live_value_is_recorded_read_and_exported_by_its_declaration(tmp_path: Path) -> None:
@@ -63,6 +72,51 @@ def test_a_live_value_is_recorded_read_and_exported_by_its_declaration(tmp_path:
         assert (exported["value"].values[1], exported["label"].values[0]) == (PERIOD.value, "period")
         units = {column.name: column.unit for column in tables["table_response"]}
         assert (units["frequency"], units["noise"]) == ("Hz", "m/s2/Hz^0.5")
+
+
+@event(table="tones", notice="tone")
+class Tone(Event):
+    """An event that a protocol declares."""
+
+    level: float = column("m", "level of the tone")
+    loud: bool = column("1", "whether it is loud", default=False)
+
+
+def test_an_event_of_a_protocol_is_recorded_read_exported_and_recovered(tmp_path: Path) -> None:
+    path, copy = tmp_path / "campaign.h5", tmp_path / "recovered.h5"
+    record(begin(path, events=(Tone,)), block(0, 10), Tone(0.25, time=1.0), Tone(0.5, True, time=2.0))
+    expected = [{"time": 1.0, "level": 0.25, "loud": False}, {"time": 2.0, "level": 0.5, "loud": True}]
+    recover(path, copy)
+    for each in (path, copy):
+        with open_datafile(each) as kept:
+            assert kept.rows_of(Tone) == expected
+            assert kept.own_tables == ["tones"]
+            assert "tones" not in kept.tables
+            assert kept.counted["tones"] == 2
+            assert [entry.kind for entry in kept.events] == ["Tone", "Tone"]
+            exported = content_of(kept, each, raw=False).tables["tones"]
+            assert [(column.name, column.unit) for column in exported] == [("time", "s"), ("level", "m"), ("loud", "")]
+
+
+def test_rows_that_only_the_journal_has_are_recovered(tmp_path: Path) -> None:
+    path, copy = tmp_path / "campaign.h5", tmp_path / "recovered.h5"
+    record(begin(path, events=(Tone,)), block(0, 10), Tone(0.25, time=1.0))
+    with journal_path(path).open("a", encoding="utf-8") as journal:
+        columns = {"time": 2.0, "level": 0.5, "loud": True}
+        line = {"time": 2.0, "kind": "Tone", "text": "loud", "columns": columns, "table": "tones"}
+        journal.write(json.dumps(line) + "\n")
+    recover(path, copy)
+    with open_datafile(copy) as kept:
+        assert kept.rows_of(Tone)[1] == columns
+
+
+def test_an_event_that_the_protocol_does_not_name_is_refused(tmp_path: Path) -> None:
+    recorder = begin(tmp_path / "campaign.h5")
+    with pytest.raises(DataFileError, match="Tone was not recorded: name it in `events`"):
+        recorder(Tone(0.25, time=1.0))
+    recorder.close("completed")
+    with pytest.raises(InvalidInput, match="points"):
+        begin(tmp_path / "other.h5", events=(event(table="points")(type("Points", (Tone,), {"__doc__": "x"})),))
 
 
 def test_the_line_of_an_event_is_that_of_journal_terminal_and_window(tmp_path: Path) -> None:

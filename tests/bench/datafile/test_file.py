@@ -46,7 +46,7 @@ def edited(path: Path, change: Callable[[Any], None]) -> None:
 
 def as_format_1(file: Any) -> None:
     """What the previous layout had not: a time axis, checksums, the later tables."""
-    for name in ("checksums", "data", "passes", "running_gains", "table_response", "user", "notes"):
+    for name in ("checksums", "data", "running_gains", "table_response", "user", "notes"):
         del file["entry"][name]
     counted = file["entry/complete"][:6]
     del file["entry/complete"]

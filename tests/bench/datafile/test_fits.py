@@ -10,7 +10,7 @@ from bench.app.run_display import notice_of
 from bench.datafile.inspection import verify
 from bench.datafile.reader import DataFile, open_datafile
 from bench.datafile.recovery import recover
-from bench.events import FitFinished, FittedParameter, Series
+from bench.findings import FitFinished, FittedParameter, Series
 from tests.bench.datafile.example import begin, block, record
 
 TIME = np.arange(700) / 200.0

@@ -9,7 +9,7 @@ import pytest
 from bench.app.export.format import content_of
 from bench.datafile.reader import open_datafile
 from bench.datafile.writer import journal_path
-from bench.events import SpecimenIdentified
+from bench.findings import SpecimenIdentified
 from sim.identified import Correlation, Finding, Identified
 from tests.bench.datafile.example import begin, record
 

@@ -7,7 +7,9 @@ import h5py  # pyright: ignore[reportMissingTypeStubs]
 import numpy as np
 
 from bench.datafile.reader import open_datafile
-from bench.events import Event, PassFinished, RunningGain
+from bench.events import Event
+from bench.live_values import RunningGain
+from protocols.common.replicate import PassFinished
 from tests.bench.datafile.example import begin, block, record
 
 PASS = PassFinished("Ω record", 1, 0.0381, 0.0379, 0.046, 1.0 / 3.0, True, "pass 1 (gain 1): error 3.81%", time=7.5)
@@ -21,7 +23,9 @@ def stored(event: Event) -> dict[str, object]:
 def test_they_come_back_exactly(tmp_path: Path) -> None:
     path = tmp_path / "campaign.h5"
     second = replace(PASS, number=2, accepted=False)
-    record(begin(path), block(0, 10), PASS, second, GAIN, replace(GAIN, beta=None, predicted=0.9))
+    record(
+        begin(path, events=(PassFinished,)), block(0, 10), PASS, second, GAIN, replace(GAIN, beta=None, predicted=0.9)
+    )
     with open_datafile(path) as kept:
         assert kept.rows_of(PassFinished) == [stored(PASS), stored(second)]
         gains = kept.columns_of(RunningGain)
@@ -39,7 +43,7 @@ def test_they_come_back_exactly(tmp_path: Path) -> None:
 
 def test_they_can_be_read_while_the_file_is_written(tmp_path: Path) -> None:
     path = tmp_path / "campaign.h5"
-    recorder = begin(path)
+    recorder = begin(path, events=(PassFinished,))
     with open_datafile(path) as kept:
         assert (kept.rows_of(PassFinished), kept.columns_of(RunningGain)["record"]) == ([], [])
         recorder(PASS)
@@ -53,7 +57,7 @@ def test_they_can_be_read_while_the_file_is_written(tmp_path: Path) -> None:
 
 def test_a_file_of_before_has_none(tmp_path: Path) -> None:
     path = tmp_path / "campaign.h5"
-    record(begin(path), block(0, 10))
+    record(begin(path, events=(PassFinished,)), block(0, 10))
     with h5py.File(path, "r+") as file:
         counted = file["entry/complete"][:6]
         for name in ("entry/passes", "entry/running_gains", "entry/complete"):

@@ -19,8 +19,9 @@ from bench.control.oscillator import DriveCalibration, Leg
 from bench.datafile.reader import open_datafile
 from bench.engine.interface import Requests
 from bench.engine.steps import Arm, Calibrate, Dwell, Measured, OperatorAction, Plan, Publish, RampOut, Sweep
-from bench.events import Acquired, Estimate, Event, PointFinished, Warned
+from bench.events import Acquired, Event, PointFinished, Warned
 from bench.guard.limits import Limits
+from bench.live_values import Estimate
 from bench.provenance import software
 from bench.replay import session
 from bench.replay.compare import DRIVE, JOURNAL, POINTS

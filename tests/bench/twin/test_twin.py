@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from bench.config.sections import Twin
 from bench.datafile.reader import open_datafile
 from bench.engine.steps import OperatorAction, Plan
-from bench.events import Acquired, Event, RunningGain, SpecimenMounted, State, StateChanged, TwinEstimate
+from bench.events import Acquired, Event, SpecimenMounted, State, StateChanged
+from bench.live_values import RunningGain, TwinEstimate
 from bench.replay.session import replay
 from bench.twin.ensemble import draw_members
 from bench.twin.estimator import Estimator, Setting

@@ -13,8 +13,9 @@ from bench.config.sections import Simulation, Twin
 from bench.engine.engine import Engine
 from bench.engine.interface import Ending, EventStream, Requests, Unattended
 from bench.engine.steps import Arm, Fallen, OperatorAction, Plan, Play, Publish, RampOut
-from bench.events import Acquired, Event, Subscriber, TwinEstimate, Warned
+from bench.events import Acquired, Event, Subscriber, Warned
 from bench.guard.guard import Guard
+from bench.live_values import TwinEstimate
 from bench.twin.live import live_twin
 from drivers.rig import OperatorTask
 from drivers.simulated import SimulatedRig

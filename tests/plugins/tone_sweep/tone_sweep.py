@@ -13,9 +13,10 @@ from bench.datafile.tables import Column, Table
 from bench.document.campaign import Campaign
 from bench.document.document import Picture, Section
 from bench.engine.steps import Arm, Calibrate, Dwell, Measured, OperatorAction, Publish, RampOut, Sweep
-from bench.events import LiveValue, PointFinished, StepStarted
+from bench.events import PointFinished, StepStarted
 from bench.figures.style import new_figure, write_figure
 from bench.figures.text_table import TextColumn, text_table
+from bench.live_values import LiveValue
 from bench.preflight.demands import load, response_of
 from bench.preflight.margins import Demand, Forecast, Stage, bounds
 from bench.protocol import Plan, Prepared, Protocol, Result

@@ -17,13 +17,13 @@ from bench.datafile.recorder import Recorder
 from bench.engine.engine import Engine
 from bench.engine.interface import Ending, EventStream, Requests, Unattended
 from bench.engine.steps import Arm, Done, Fallen, Outcome, Plan, Play, Played, RampOut, Step
-from bench.events import Acquired, Event, PassFinished, StateChanged, StepStarted
+from bench.events import Acquired, Event, StateChanged, StepStarted
 from bench.guard.guard import Guard
 from bench.guard.limits import Limits, Ramps
 from bench.preflight.motion import RESTING, resting_demands
 from drivers.rig import Rig
 from drivers.simulated import SimulatedRig
-from protocols.common.replicate import Replicated, replicate
+from protocols.common.replicate import PassFinished, Replicated, replicate
 from protocols.identify.protocol import IdentifiedBand
 from sim.specimen import Frame, Specimen
 from sim.virtual_bench import VirtualBenchParameters
@@ -92,6 +92,7 @@ def test_half_a_percent_within_five_passes_and_never_worse(
         channels=rig.channels,
         sample_rate=rig.sample_rate,
         point_type=IdentifiedBand,
+        events=(PassFinished,),
         metadata={},
         hold_up=10.0,
     )

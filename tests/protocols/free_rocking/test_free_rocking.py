@@ -16,7 +16,8 @@ from bench.config.sections import Simulation
 from bench.datafile.reader import open_datafile
 from bench.document.campaign import Campaign
 from bench.engine.interface import Requests, Unattended
-from bench.events import Acquired, Event, FitFinished, OperatorAnswered, OperatorAsked, PointFinished, Warned
+from bench.events import Acquired, Event, OperatorAnswered, OperatorAsked, PointFinished, Warned
+from bench.findings import FitFinished
 from bench.guard.limits import Limits
 from bench.results import FILE
 from protocols.free_rocking.plan import planned_tilts

@@ -22,7 +22,8 @@ from bench.document.campaign import Campaign
 from bench.document.document import Picture, Table
 from bench.engine.interface import Requests, Unattended
 from bench.engine.steps import OperatorAction, Plan
-from bench.events import Acquired, Event, FitFinished, OperatorAsked, StepStarted, Warned
+from bench.events import Acquired, Event, OperatorAsked, StepStarted, Warned
+from bench.findings import FitFinished
 from bench.guard.limits import Limits
 from bench.protocol import Prepared, Protocol
 from bench.results import FILE

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from bench.config.model import BenchConfiguration
 from bench.engine.interface import Ending
-from bench.events import Acquired, Event, HoldCycle, LimitExceeded, PointFinished
+from bench.events import Acquired, Event, LimitExceeded, PointFinished
 from drivers.rig import Counts
 from drivers.simulated import SimulatedRig
 from protocols.harmonic.campaign import HarmonicCampaign
+from protocols.harmonic.holding import HoldCycle
 from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, PointStatus
 from sim.specimen import Specimen
 from tests.recorded import recorded

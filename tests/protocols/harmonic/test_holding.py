@@ -9,7 +9,7 @@ import pytest
 
 from bench.app.cli.main import main
 from bench.datafile.reader import open_datafile
-from bench.events import HoldCycle
+from protocols.harmonic.holding import HoldCycle
 
 QUICK = ["--settle-limit", "30", "--ramp-time", "4", "--harmonics", "5", "--starts", "2"]
 

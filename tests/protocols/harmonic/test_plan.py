@@ -16,7 +16,8 @@ from bench.engine.steps import (
     RampOut,
     Sweep,
 )
-from bench.events import Estimate, Progress
+from bench.events import Progress
+from bench.live_values import Estimate
 from drivers.rig import OperatorTask
 from protocols.common.calibrate import PROBE, Unmeasurable
 from protocols.harmonic.protocol import PointStatus

@@ -19,7 +19,8 @@ from bench.config.sections import Simulation
 from bench.control.table_model import TableModel
 from bench.datafile.reader import open_datafile
 from bench.engine.interface import Requests, Unattended
-from bench.events import Acquired, Event, PointFinished, StepStarted, TableIdentified, Warned
+from bench.events import Acquired, Event, PointFinished, StepStarted, Warned
+from bench.findings import TableIdentified
 from bench.guard.limits import Limits, Ramps
 from bench.preflight.demands import response_of
 from bench.preflight.motion import RESTING, resting_demands

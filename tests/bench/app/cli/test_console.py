@@ -14,22 +14,21 @@ from bench.app.formatting import clock, difference, number, one_line, plus_minus
 from bench.app.run_display import RunDisplay
 from bench.events import (
     Acquired,
-    Estimate,
     Event,
     LimitExceeded,
     OperatorAnswered,
     OperatorAsked,
-    PassFinished,
     PointFinished,
     Progress,
-    RunningGain,
     State,
     StateChanged,
     StepStarted,
-    TableIdentified,
     Warned,
 )
+from bench.findings import TableIdentified
+from bench.live_values import Estimate, RunningGain
 from drivers.rig import Block
+from protocols.common.replicate import PassFinished
 from protocols.harmonic.protocol import HarmonicPoint, PointStatus
 from protocols.identify.protocol import IdentifiedBand
 from tests.bench.twin.twin_bench import estimate

@@ -22,7 +22,8 @@ from bench.config.model import BenchConfiguration
 from bench.datafile.reader import open_datafile
 from bench.datafile.recorder import Recorder
 from bench.datafile.tables import Column
-from bench.events import Acquired, Estimate, PointFinished, StepStarted
+from bench.events import Acquired, PointFinished, StepStarted
+from bench.live_values import Estimate
 from drivers.rig import Block, Channel
 from sim.errors import InvalidInput
 from sim.parameters import Parameters, quantity

@@ -23,7 +23,8 @@ from bench.app.ipc.messages import Question
 from bench.app.queue.queue import Stage, queued
 from bench.config.model import BenchConfiguration
 from bench.config.sections import Simulation
-from bench.events import Estimate, Event
+from bench.events import Event
+from bench.live_values import Estimate
 from bench.results import FILE
 from protocols.harmonic.protocol import HarmonicParameters
 

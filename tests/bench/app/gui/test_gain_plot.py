@@ -12,7 +12,7 @@ from bench.app.gui.gain_plot import GainPlot
 from bench.app.gui.gains import lines_of, mark_of
 from bench.app.gui.palette import DARK, LIGHT
 from bench.datafile.tables import Column, Table
-from bench.events import Estimate, RunningGain
+from bench.live_values import Estimate, RunningGain
 from protocols.earthquake.protocol import EarthquakePoint
 from protocols.earthquake.protocol import PointStatus as Ended
 from protocols.harmonic.protocol import HarmonicPoint, PointStatus

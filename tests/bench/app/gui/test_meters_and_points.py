@@ -19,8 +19,9 @@ from bench.app.gui.motion_plot import spectrum, stroboscopic
 from bench.app.gui.verdict import LARGEST, VerdictLabel, verdict_of
 from bench.app.run_display import Notice
 from bench.config.model import BenchConfiguration
-from bench.events import Estimate, PointFinished
+from bench.events import PointFinished
 from bench.guard.motion import WATCHED, MotionWatch
+from bench.live_values import Estimate
 from bench.preflight.margins import Demand, bounds, margins
 from drivers.rig import Channel
 from protocols.free_rocking.protocol import PROTOCOL as FREE_ROCKING

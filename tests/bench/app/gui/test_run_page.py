@@ -21,18 +21,9 @@ from bench.app.gui.window import Window
 from bench.app.ipc.messages import TRACES, Beat, Ended, PlanChecked, Published, Question, Traces
 from bench.app.run_display import Notice
 from bench.datafile.tables import Column
-from bench.events import (
-    Estimate,
-    FitFinished,
-    FittedParameter,
-    LiveValue,
-    PointFinished,
-    Series,
-    SpecimenMounted,
-    State,
-    StateChanged,
-    Warned,
-)
+from bench.events import PointFinished, SpecimenMounted, State, StateChanged, Warned
+from bench.findings import FitFinished, FittedParameter, Series
+from bench.live_values import Estimate, LiveValue
 from drivers.clock import now
 from drivers.rig import OperatorTask
 from protocols.earthquake.protocol import EarthquakePoint

@@ -13,7 +13,8 @@ from bench.config.sections import Acquisition, Simulation
 from bench.control.oscillator import Leg
 from bench.datafile.tables import Column, Table
 from bench.engine.steps import Arm, Calibrate, Dwell, OperatorAction, Publish, RampOut, Sweep
-from bench.events import Estimate, PointFinished, StepStarted
+from bench.events import PointFinished, StepStarted
+from bench.live_values import Estimate
 from bench.protocol import Plan, Prepared, Protocol, Result, Sources
 from drivers.rig import OperatorTask
 from sim.errors import InvalidInput

@@ -9,8 +9,9 @@ from bench.datafile.reader import open_datafile
 from bench.datafile.recorder import Recorder
 from bench.document.campaign import Campaign
 from bench.document.document import Picture, Table
-from bench.events import FitFinished, FittedParameter, PointFinished, Series
+from bench.events import PointFinished
 from bench.figures.fit_figure import fit_figure
+from bench.findings import FitFinished, FittedParameter, Series
 from bench.testing.loopback import LoopbackRig
 from sim.parameters import Parameters, quantity
 

@@ -20,7 +20,8 @@ from bench.datafile.tables import Column
 from bench.document.campaign import Campaign
 from bench.document.document import Listing, Picture, Table
 from bench.engine.steps import Arm, OperatorAction, Plan, Play, RampOut
-from bench.events import PointFinished, RunningGain, Warned
+from bench.events import PointFinished, Warned
+from bench.live_values import RunningGain
 from bench.testing.loopback import LoopbackRig
 from drivers.rig import Channel, OperatorTask
 from protocols.earthquake.measurement import GainMonitor
