@@ -17,7 +17,7 @@ from sim.errors import InvalidInput
 class Drive:
     """Checks written samples and counts those queued, without playing them.
 
-    `range` is the largest magnitude [V], `lead` the number of samples required beyond those of a block. Raises
+    `range` is the largest magnitude [V], `lead` the number of samples required in addition to a block. Raises
     InvalidInput for a negative lead.
     """
 

@@ -118,13 +118,13 @@ class Daq(Parameters):
     start_trigger: str | None = quantity(
         None,
         "",
-        "terminal of the inputs' start trigger; if absent, that of the input task",
+        "terminal of the inputs' start trigger; if absent, the terminal of the input task",
         example="/Dev1/ai/StartTrigger",
     )
     clock: str | None = quantity(
         None,
         "",
-        "terminal of the output's sample clock; if absent, that of the input task; OnboardClock: the "
+        "terminal of the output's sample clock; if absent, the terminal of the input task; OnboardClock: the "
         "output's own clock, started together with the inputs",
         example="OnboardClock",
     )

@@ -281,7 +281,7 @@ def _make_safe(connection: Connection, daq: Daq) -> None:
             line = EnableLine(connection, daq.enable_line)
             line.close()
             if line.chassis_expired:
-                # the watchdog may be that of a program that has crashed
+                # the watchdog may have been left by a program that has crashed
                 with translated("looking for the chassis, whose watchdog has expired,"):
                     found = [described(device) for device in library.system(connection.options()).devices]
                 if (chassis := chassis_of(daq.enable_line, found)) is not None:

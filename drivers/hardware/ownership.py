@@ -28,8 +28,8 @@ machine.
 
 
 def devices_of(hardware: Hardware) -> list[str]:
-    """The devices that a rig opens: those of the drive and of the digital lines, each module after its chassis, and the
-    serial ports. A chassis is locked too, because resetting it resets all its modules.
+    """The devices that a rig opens: the DAQ devices of the drive and of the digital lines, each module after its
+    chassis, and the serial ports. A chassis is locked too, because resetting it resets all its modules.
     """
     daq = hardware.daq
     where = f" at {_same_address(daq.server)}" if daq.server else ""

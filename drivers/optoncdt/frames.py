@@ -76,8 +76,7 @@ TICK = 10e-6
 _LOCK = 8
 """Number of consecutive measurements required before values are accepted."""
 _FACTORY = 100
-"""Number of consecutive measurements of a single word from which it is concluded that the sensor sends distances alone.
-"""
+"""Number of consecutive single-word measurements that show that the sensor sends distances alone."""
 _SLACK = 2.0
 """Largest deviation of the time-stamp step from one period between consecutive measurements [periods]."""
 _RATE_SLACK = 0.01

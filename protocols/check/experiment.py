@@ -106,7 +106,9 @@ class LoopCheck(Prepared[CheckParameters]):
         drive = np.full(omega.shape, np.nan) if expected is None else expected
         return {
             "omega": Column(omega, "rad/s", "circular frequency of the table's motion"),
-            "drive": Column(drive, "V s2/m", "amplitude of the drive relative to that of the table's acceleration"),
+            "drive": Column(
+                drive, "V s2/m", "amplitude of the drive relative to the amplitude of the table's acceleration"
+            ),
         }
 
     def plan(self) -> Plan:

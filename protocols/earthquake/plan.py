@@ -269,7 +269,7 @@ def table_model(
         return source.model
 
     def carry_out(step: Step) -> Generator[Step, Outcome, Outcome]:
-        # the campaign's progress replaces that of the identification
+        # only the campaign's progress is published, not the identification's
         if isinstance(step, Publish) and isinstance(step.event, Progress):
             return Done()
         return (yield replace(step, watch=_counted(step.watch, pace)) if isinstance(step, Play) else step)

@@ -12,7 +12,7 @@ Stiffness = Annotated[float, Field(gt=0, le=100)]
 
 
 class EarthquakeParameters(Parameters):
-    """Earthquake records on the bare and the coupled frame; stiffnesses and peak are those of the paper."""
+    """Earthquake records on the bare and the coupled frame; the default stiffnesses and peak are the paper's."""
 
     records: tuple[str, ...] = quantity(
         (),

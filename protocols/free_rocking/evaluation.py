@@ -173,7 +173,7 @@ def _impacts(tilt: Tilt, alone: Findings, number: int) -> FitFinished:
         "speed": Series(
             relation.speed,
             "1",
-            "angular velocity before the impact, relative to that of a fall from the critical angle",
+            "angular velocity before the impact, relative to the velocity in a fall from the critical angle",
         ),
         "angle_before": Series(relation.angles[:-1], "rad", "largest angle before the impact"),
         "angle_after": Series(relation.angles[1:], "rad", "largest angle after the impact"),

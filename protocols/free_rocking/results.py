@@ -177,7 +177,7 @@ def _draw_impacts(panel: "Axes", tilts: Sequence[Impacts], mean: float, theory: 
     panel.axhline(mean, color=BLACK, lw=1.2, label="all tilts")
     panel.axhline(theory, color=GREY, ls="--", lw=1.2, label="theory")
     panel.set_ylabel("r of single impacts,\nby amplitudes (k = 2, noise)")
-    panel.set_xlabel("angular velocity at the impact relative to that of a fall from the critical angle")
+    panel.set_xlabel("angular velocity at the impact relative to a fall from the critical angle")
     panel.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8)
 
 

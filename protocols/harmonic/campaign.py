@@ -111,8 +111,7 @@ class HarmonicCampaign(Prepared[HarmonicParameters]):
     def _steady_motion(self, beta: float | None, omega: float) -> Travel | None:
         """Peaks of the storeys, as the lasers measure them, and of the drift in the steady state at `omega` [rad/s].
 
-        The motion is that of the bare frame if `beta` is None, otherwise the rocking motion; None if no orbit was
-        found.
+        For `beta` None the motion of the bare frame, otherwise the rocking motion; None if no orbit was found.
         """
         if (beta, omega) not in self._motions:
             grounded = self.configuration.laser_reference == "ground"

@@ -48,7 +48,7 @@ class HarmonicParameters(Parameters):
     calibration_level: float = quantity(
         0.5,
         "1",
-        "level of the drive calibration relative to that of the test; below 1, so that the block stays at rest",
+        "level of the drive calibration relative to the level of the test; below 1, so that the block stays at rest",
         gt=0,
         lt=1,
     )

@@ -23,7 +23,7 @@ Analog Input Modules", "Scanned Modules"; M and X Series alike)."""
 class DeltaSigma:
     """A delta-sigma converter: master timebase [1/s], and input delay of `samples` samples and `seconds`.
 
-    The delay is that of the digital filter (NI knowledge base, kA00Z0000004A0YSAU, "Calculate the Input Delay"). The
+    The delay is caused by the digital filter (NI knowledge base, kA00Z0000004A0YSAU, "Calculate the Input Delay"). The
     driver does not remove it: a client must account for the differences (NI-DAQmx help, "cdaqmultidevice"). `readable`:
     whether the device has the properties AI.FilterDelay and AI.RemoveFilterDelay.
     """

@@ -12,7 +12,7 @@ from drivers.emulation.daqmx.errors import DaqmxFailure
 from drivers.emulation.daqmx.zoo import build
 
 _CALIBRATED = 2
-"""The input with a non-linear calibration, if any: that of the first laser's analogue output."""
+"""The input with a non-linear calibration, if any: the input for the first laser's analogue output."""
 _BEND = 1.0e-4
 """Contribution of each of the square and cubic terms of the calibration at full scale, relative to the range."""
 
