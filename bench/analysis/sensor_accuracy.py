@@ -143,8 +143,11 @@ class SensorUncertainty:
         sides = np.array([[each.sign] for each in seen])
         return {name: sides * each for name, each in errors.items()}
 
-    def _linearity(self, laser: int, shape: LinearityErrors | None, tests: int, draws: "Draws") -> Array:
+    def linearity(self, laser: int, seen: Sequence[PeakReadings], draws: "Draws") -> Array:
         """Errors [m] of the peaks due to the linearity of laser 0 or 1, in each test, shape (tests, n)."""
+        return self._linearity(laser, self._shape(laser, seen), len(seen), draws)
+
+    def _linearity(self, laser: int, shape: LinearityErrors | None, tests: int, draws: "Draws") -> Array:
         normal = draws.normal(tests)
         if self.calibration is None:
             assert shape is not None
