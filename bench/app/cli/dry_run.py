@@ -127,7 +127,7 @@ def _text(found: "Preflight") -> str:
 
 
 def _margins(margins: "tuple[Margin, ...]") -> str:
-    """Table of margins, tightest first; the column "95 %" covers the specimens within the uncertainty."""
+    """Table of margins, tightest first; the columns "at 95 %" hold for 95 % of the specimens within the uncertainty."""
 
     def number(value: float | None) -> str:
         return ABSENT if value is None else f"{value:.4g}"

@@ -220,7 +220,7 @@ def carry_out(
         except InvalidInput:
             raise
         except KeyboardInterrupt:
-            # a summary exists only after a run: `check_folder` refuses a folder that has one before
+            # a summary exists only after a run: `check_folder` refuses a folder that already contains one
             if (out / SUMMARY).exists():
                 raise KeyboardInterrupt(f"interrupted after the run: {out} has its results, without figures") from None
             raise KeyboardInterrupt("interrupted before anything moved") from None

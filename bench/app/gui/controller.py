@@ -124,7 +124,7 @@ class Controller(QObject):
 
     @property
     def owner(self) -> str:
-        """Description of whose run is shown and what this window may do; empty without a run."""
+        """Text that states whose run is shown and what this window may do; empty without a run."""
         if not self._running:
             return ""
         if self.attached is not None:

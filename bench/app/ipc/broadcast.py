@@ -77,7 +77,7 @@ class Broadcast:
         return bool(self._queues)
 
     def put(self, message: FromSession, *, always: bool = False) -> None:
-        """Append a message to the queue of every client; with `always`, even to a full one."""
+        """Append a message to the queue of every client; with `always`, even to a full queue."""
         with self._lock:
             self._store(message)
             for queue in self._queues:

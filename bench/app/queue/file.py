@@ -110,7 +110,7 @@ class Owner:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._lock.acquire()
         except Timeout:
-            raise InvalidInput(ITEM, str(path), f"{self._other()} has it: {REMEDY}") from None
+            raise InvalidInput(ITEM, str(path), f"it is in use by {self._other()}: {REMEDY}") from None
         except OSError as error:
             reason = f"{self._lock.lock_file} cannot be locked: {error.strerror or error}"
             raise InvalidInput(ITEM, str(path), reason) from None

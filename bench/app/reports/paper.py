@@ -30,7 +30,7 @@ Named = tuple[str, Statement]
 
 def verdicts_table(named: Sequence[Named]) -> Table:
     """Table of verdicts, one row per statement."""
-    columns = [Column("statement", words=True), Column("of what", words=True), Column("verdict", words=True)]
+    columns = [Column("statement", words=True), Column("subject", words=True), Column("verdict", words=True)]
     rows = [[number, each.title, str(each.verdict)] for number, each in named]
     caption = "Verdicts. As expected: a known and documented deviation of the model from the paper"
     return Table(caption, columns, rows)

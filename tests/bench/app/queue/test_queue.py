@@ -294,7 +294,7 @@ def test_a_queue_has_one_owner_and_none_when_that_one_dies(
         for refused in (["run", "harmonic", "--queue", "queue.json"], ["queue", "queue.json"]):
             assert main_with(session, refused) == 2
             told = capsys.readouterr().err
-            assert f"another window (process {other.pid}) has it" in told
+            assert f"in use by another window (process {other.pid})" in told
             assert "choose another file" in told
         assert Path("queue.json").read_bytes() == before
         assert _queue(session, "--dry-run") == 0, "what only looks is let"
@@ -322,7 +322,7 @@ def test_a_file_system_without_locks_is_named(tmp_path: Path, monkeypatch: pytes
 def test_the_lock_is_released_once_and_by_any_thread(tmp_path: Path) -> None:
     path = tmp_path / "queue.json"
     first = Owner(path, "first")
-    with pytest.raises(InvalidInput, match=r"first \(process \d+\) has it"):
+    with pytest.raises(InvalidInput, match=r"in use by first \(process \d+\)"):
         Owner(path, "second")
     thread = threading.Thread(target=first.release)
     thread.start()
