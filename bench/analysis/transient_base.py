@@ -17,12 +17,14 @@ limits the weight of a sensor.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from bench.analysis.inverse_transform import real_inverse
 from bench.analysis.signals import ACCELERATION, DISPLACEMENT
 from sim.errors import InvalidInput
 from sim.excitation import SampledRecord
@@ -85,10 +87,16 @@ class BaseMotion:
         """A possible true motion: the measured motion scaled by `scale`, with a random realisation of the noise
         added.
         """
-        lines = self.noise.size
-        waves = random.standard_normal(lines) + 1j * random.standard_normal(lines)
-        spectrum = np.sqrt(self.noise * self.acceleration.size / (4.0 * self.dt)) * waves
-        return SampledRecord(scale * self.acceleration + np.fft.irfft(spectrum, self.acceleration.size), self.dt)
+        spectrum = np.empty(self.noise.size, np.complex128)
+        spectrum.real = self._root * random.standard_normal(spectrum.size)
+        spectrum.imag = self._root * random.standard_normal(spectrum.size)
+        return SampledRecord(scale * self.acceleration + real_inverse(spectrum, self.acceleration.size), self.dt)
+
+    @cached_property
+    def _root(self) -> Array:
+        """Standard deviation of the real and the imaginary part of each line of the noise."""
+        root: Array = np.sqrt(self.noise * self.acceleration.size / (4.0 * self.dt))
+        return root
 
 
 def base_motion(signals: Array, rest: Array, sample_rate: float) -> BaseMotion:

@@ -10,10 +10,11 @@ from bench.analysis.transient_base import ALIKE
 from bench.config.model import BenchConfiguration
 from bench.control.passes import Pass
 from protocols.common.replicate import Replicated
+from protocols.earthquake.draws import predict_draws
 from protocols.earthquake.measurement import Observed, Tracking, difference, overturning_time, tracking
 from protocols.earthquake.protocol import EarthquakeParameters, EarthquakePoint, PointStatus
 from protocols.earthquake.records import Shaking
-from protocols.earthquake.uncertainty import Compared, compare, predict_draws
+from protocols.earthquake.uncertainty import Compared, compare
 from sim.specimen import Specimen
 
 Array = NDArray[np.float64]

@@ -12,24 +12,18 @@ together.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib import import_module
-from math import nan
 
 import numpy as np
 from numpy.random import SeedSequence
 from numpy.typing import NDArray
 
 from bench.analysis.sensor_accuracy import Draws, PeakReadings, SensorUncertainty
-from bench.analysis.transient_base import BaseMotion
 from bench.analysis.uncertainty import COVERAGE, Budget
 from bench.config.model import BenchConfiguration
-from bench.control.starts import CATCH_ANGLE
-from protocols.earthquake.measurement import TOLERANCE, Observed, PeakSeen
-from sim.excitation import SampledRecord
+from protocols.earthquake.draws import Predicted, predict_draws
+from protocols.earthquake.measurement import Observed, PeakSeen
 from sim.knowledge import SpecimenKnowledge
-from sim.rocking import Status, simulate
 from sim.specimen import Specimen
-from sim.sweep import in_threads
 
 Array = NDArray[np.float64]
 
@@ -52,25 +46,6 @@ _KEPT = {
     "restitution of the block": ("restitution",),
 }
 """Contributions of the specimen's uncertainty, and the knowledge fields that define them."""
-
-
-@dataclass(frozen=True)
-class Predicted:
-    """Predicted gains under a pair of motions; NaN where the block topples with the nominal specimen.
-
-    `alpha_1` and `alpha_2`, shape (n,), are the gains of the draws, NaN where the block topples; `times` [s] are the
-    times of overturning.
-    """
-
-    nominal: tuple[float, float]
-    alpha_1: Array
-    alpha_2: Array
-    times: Array
-
-    @property
-    def chance(self) -> float:
-        """Predicted probability of toppling."""
-        return float(np.mean(np.isnan(self.alpha_2)))
 
 
 @dataclass(frozen=True)
@@ -107,45 +82,6 @@ class Compared:
     def alpha_1_agrees(self) -> bool | None:
         """Whether alpha_1 is within its interval; None if there is no interval."""
         return _within(self.alpha_1, self.alpha_1_low, self.alpha_1_high)
-
-
-def predict_draws(
-    bare: BaseMotion,
-    coupled: BaseMotion,
-    specimen: Specimen,
-    uncertainty: SpecimenKnowledge,
-    n: int,
-    seed: int | SeedSequence,
-    *,
-    table_scale: float = 0.0,
-    noisy: bool = True,
-) -> Predicted:
-    """Gains of `n` draws of the specimen and of the table motions within their uncertainties."""
-    import_module("sim.kernel.rocking")  # compiled once, before the threads start
-    root = seed if isinstance(seed, SeedSequence) else SeedSequence(seed)
-    specimens, scale, *seeds = root.spawn(2 + n)
-    drawn = uncertainty.draws(specimen, n, np.random.default_rng(specimens))
-    scales = 1.0 + table_scale * np.random.default_rng(scale).standard_normal(n)
-
-    def motion(base: BaseMotion, k: int, random: np.random.Generator) -> SampledRecord:
-        return base.draw(random, scales[k]) if noisy else SampledRecord(scales[k] * base.acceleration, base.dt)
-
-    def one(k: int) -> tuple[float, float, float]:
-        random = np.random.default_rng(seeds[k])
-        return gains(drawn[k], motion(bare, k, random), motion(coupled, k, random))
-
-    found = np.array(in_threads(one, range(n))).reshape(n, 3)
-    nominal = gains(specimen, bare.record, coupled.record)
-    return Predicted(nominal[:2], found[:, 0], found[:, 1], found[np.isnan(found[:, 1]), 2])
-
-
-def gains(specimen: Specimen, bare: SampledRecord, coupled: SampledRecord) -> tuple[float, float, float]:
-    """alpha_1, alpha_2, and the time of overturning [s]; NaN for those that do not exist."""
-    moved = simulate(specimen, coupled, tolerance=TOLERANCE, overturning_angle=CATCH_ANGLE)
-    if moved.status is not Status.COMPLETED:
-        return nan, nan, moved.end_time
-    free = simulate(specimen.bare(), bare, tolerance=TOLERANCE)
-    return moved.peaks.u1 / free.peaks.u1, moved.peaks.drift / free.peaks.drift, nan
 
 
 def compare(

@@ -12,8 +12,9 @@ from bench.analysis.signals import U1
 from bench.analysis.transient_base import BaseMotion
 from bench.analysis.transient_peak import TransientPeak
 from protocols.earthquake.campaign import check_statement
+from protocols.earthquake.draws import predict_draws
 from protocols.earthquake.measurement import STEP, GainMonitor, History, PeakSeen, observe, overturning_time
-from protocols.earthquake.uncertainty import drift_errors, predict_draws
+from protocols.earthquake.uncertainty import drift_errors
 from sim.excitation import SampledRecord
 from sim.gain import seismic_curve
 from sim.knowledge import SpecimenKnowledge

@@ -16,9 +16,10 @@ from bench.analysis.transient_base import BaseMotion
 from bench.analysis.transient_peak import TransientPeak
 from bench.config.model import BenchConfiguration
 from protocols.earthquake import uncertainty
+from protocols.earthquake.draws import Predicted
 from protocols.earthquake.measurement import Observed, PeakSeen, observe, overturning_time
 from protocols.earthquake.points import _remarks
-from protocols.earthquake.uncertainty import Compared, Predicted, compare
+from protocols.earthquake.uncertainty import Compared, compare
 from sim.excitation import SampledRecord
 from sim.knowledge import SpecimenUncertainty
 from sim.rocking import simulate

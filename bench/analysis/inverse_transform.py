@@ -1,0 +1,52 @@
+"""Inverse Fourier transform of real series whose length has a large prime factor, for repeated use.
+
+For such a length n = a p the usual algorithm transforms series of more than twice the length, outside the processor's
+cache. With j = p l + i and k = a m + q the transform is one of length p for each q, a rotation, and one of length a for
+each i (Cooley and Tukey, 1965), of which the symmetry of the spectrum saves half.
+"""
+
+from functools import lru_cache
+from math import isqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+LARGE = 64
+"""Prime factor above which the length is split."""
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+def real_inverse(spectrum: Complex, n: int) -> Floats:
+    """Same as `numpy.fft.irfft`, to rounding: series, shape (n,), with this `spectrum`, shape (n // 2 + 1,)."""
+    a, p = _factors(n)
+    if p <= LARGE or a == 1:
+        return np.fft.irfft(spectrum, n)
+    places, mirrored, rotations = _split(n)
+    parts = spectrum[places]
+    np.conjugate(parts, out=parts, where=mirrored)
+    parts = np.fft.ifft(parts, axis=1)
+    parts *= rotations
+    return np.fft.irfft(parts, a, axis=0).reshape(n)
+
+
+def _factors(n: int) -> tuple[int, int]:
+    """n / p and p, the largest prime factor of n."""
+    rest, largest = n, 1
+    for factor in range(2, isqrt(n) + 1):
+        while rest % factor == 0:
+            rest, largest = rest // factor, factor
+    largest = max(largest, rest)
+    return n // largest, largest
+
+
+@lru_cache(maxsize=4)
+def _split(n: int) -> tuple[NDArray[np.intp], NDArray[np.bool_], Complex]:
+    """Places in the spectrum, which of them are mirrored, and rotations, shapes (a // 2 + 1, p)."""
+    a, p = _factors(n)
+    q = np.arange(a // 2 + 1)[:, None]
+    k = a * np.arange(p) + q
+    mirrored = k > n // 2
+    rotations = np.exp(2j * np.pi / n * (q * np.arange(p) % n))
+    return np.where(mirrored, n - k, k), mirrored, rotations
