@@ -21,9 +21,9 @@ _OWN_UNIT = "any"
 
 
 class CheckLine(Parameters):
-    """One line of the check; numbers are in its unit. Missing values are None."""
+    """One line of the check. Its numbers are in the unit `unit`; missing values are None."""
 
-    subject: str = quantity(..., "", "channel or part of the bench")
+    subject: str = quantity(..., "", "channel or part of the bench that is checked")
     what: str = quantity(..., "", "measured property")
     verdict: Verdict = quantity(..., "", "verdict of the line")
     measured: float | None = quantity(None, _OWN_UNIT, "measured value, in `unit`")
@@ -88,5 +88,5 @@ def failed(subject: str, what: str, remedy: str) -> CheckLine:
 
 
 def untested(subject: str, what: str, remedy: str) -> CheckLine:
-    """A line for something that could not be measured."""
+    """A line for a quantity that could not be measured."""
     return CheckLine(subject=subject, what=what, verdict=Verdict.UNTESTED, remedy=remedy)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 HARMONICS = 10
-"""Number of jointly fitted harmonics; the drift of a rocking frame has less than 1e-5 of its peak above them."""
+"""Number of jointly fitted harmonics; above them, the drift of a rocking frame has less than 1e-5 of its peak."""
 
 COMPLETE = 0.98
 """Minimum fraction of valid samples in a cycle: with fewer, a laser that leaves its range at every peak would bias the
@@ -25,7 +25,7 @@ _ANGLES: NDArray[np.float64] = np.arange(_GRID, dtype=np.float64) * (tau / _GRID
 
 
 def _basis(phase: NDArray[np.float64], harmonics: int) -> NDArray[np.float64]:
-    """Columns 1, cos k phase, sin k phase for k = 1..harmonics; shape (n, 1 + 2 harmonics)."""
+    """Columns 1, cos(k phase) and sin(k phase) for k = 1 to harmonics; shape (n, 1 + 2 harmonics)."""
     turns = np.exp(1j * phase)
     powers = np.cumprod(np.broadcast_to(turns[:, None], (phase.size, harmonics)), axis=1)
     basis = np.ones((phase.size, 1 + 2 * harmonics))
@@ -108,7 +108,9 @@ the vertex is 5e-6 for a sine and 3e-3 for a fifth harmonic.
 
 @lru_cache(maxsize=8)
 def _parabola(points: int) -> NDArray[np.float64]:
-    """Least squares of a parabola through `points` samples at -h..h: rows for 1, x, x^2."""
+    """Matrix that fits a parabola by least squares to `points` samples at -h to h; its rows give the coefficients of 1,
+    x, x^2.
+    """
     x = np.arange(points, dtype=np.float64) - points // 2
     return np.linalg.pinv(np.stack([np.ones_like(x), x, x**2], axis=1)).astype(np.float64)
 
@@ -137,9 +139,10 @@ def mean_amplitude(cycles: Sequence[Cycle], column: int) -> float:
 class Waves:
     """The mean of many cycles.
 
-    `waveform` and its `rates` [per rad of phase], shape (k, m), over one period; `peaks`, shape (m,), are the largest
-    magnitudes, in row `at` of the waveform; `there`, shape (n, m), is each cycle's magnitude at that point.
-    `harmonics`, shape (m,), is the rms of all harmonics above the fundamental, divided by the fundamental.
+    `waveform` and `rates`, its derivative with respect to the phase [1/rad], both of shape (k, m), cover one period;
+    `peaks`, shape (m,), are the largest magnitudes, in row `at` of the waveform; `there`, shape (n, m), is each cycle's
+    magnitude at that point. `harmonics`, shape (m,), is the rms of all harmonics above the fundamental, divided by the
+    fundamental.
     """
 
     waveform: NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""Detection of a fallen block from the first storey alone."""
+"""Detection of a fallen block from the signal of the first storey alone."""
 
 from collections import deque
 from math import isfinite, pi, sin

@@ -38,7 +38,7 @@ UNKNOWN = 0.1
 """Standard uncertainty of the modulus above which no rate is stated, since the multiplier is then due to noise."""
 
 SMALL = 0.15
-"""Largest relative deviation of the peaks from their mean at which the peak of the orbit is still stated."""
+"""Largest relative deviation of the peaks from their mean up to which the peak of the orbit is stated."""
 
 SHORTEST, SINGULAR, STEP = 24, 1e8, 1e-6
 """For a rate: smallest number of changes, largest condition number of the equations, and step of the finite
@@ -64,7 +64,7 @@ class Rate:
 
 @dataclass(frozen=True)
 class FreeMotion:
-    """Peaks of the drift per cycle [m]: smallest, mean and largest. `repeats` is the number of cycles after which the
+    """Smallest, mean and largest peak of the drift per cycle [m]. `repeats` is the number of cycles after which the
     motion repeats, 0 if it does not; `rate` is None if the changes are not those of a linear system.
     """
 
@@ -133,7 +133,7 @@ def _rate(amplitudes: NDArray[np.complex128]) -> Rate | None:
 
 def _uncertainty(found: NDArray[Any], spread: NDArray[Any], scatter: NDArray[np.float64]) -> float:
     """Standard uncertainty of the largest modulus, to first order; the covariance of the elements of `found` is the
-    product of `spread` (rows) and `scatter` (columns).
+    product of `spread` (for the rows) and `scatter` (for the columns).
     """
 
     def modulus(change: NDArray[np.float64]) -> float:

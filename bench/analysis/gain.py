@@ -25,7 +25,7 @@ ZERO_PLACES = 32
 """Number of points that represent a cycle."""
 
 CHECK_PLACES = 64
-"""Number of points of a cycle whose readings check the linearity of a laser."""
+"""Number of points of a cycle at which the readings check the linearity of a laser."""
 
 FRAME_SHARE = 0.3
 """Relative standard uncertainty of a harmonic of the bare frame that is computed from the same harmonic of the
@@ -113,8 +113,8 @@ def steady_peak(
 
 
 def modulated_peak(cycles: Sequence[Cycle], omega: float) -> SteadyPeak:
-    """Largest peak of all cycles, from their samples (see `bench.analysis.free_motion`); the scatter is the spread of
-    the largest peaks of four quarters of the cycles.
+    """Largest peak of all cycles, from their samples (see `bench.analysis.free_motion`); the scatter is the standard
+    deviation of the largest peaks of the four quarters of the cycles.
     """
     peaks = np.array([cycle.extreme[DRIFT] for cycle in cycles])
     quarters = [quarter.max() for quarter in np.array_split(peaks, 4) if quarter.size]

@@ -33,7 +33,7 @@ class LaserCurve(Parameters):
         usual=(0.0, 2e-3),
     )
     uncertainty: float = quantity(
-        ..., "m", "standard uncertainty of that error at one reading", ge=0, usual=(1e-6, 1e-3)
+        ..., "m", "standard uncertainty of the laser's error at one reading", ge=0, usual=(1e-6, 1e-3)
     )
     scale: float = quantity(
         ..., "1", "relative span of the laser's readings, normalised to a mean of 1 over both lasers"
@@ -62,12 +62,12 @@ class LaserCalibration(Parameters):
     laser_2: LaserCurve
     differential_scale: float = quantity(..., "1", "ratio of the scales of laser 2 and laser 1, before the correction")
     differential_uncertainty: float = quantity(
-        ..., "1", "standard uncertainty of that ratio, after the correction", ge=0
+        ..., "1", "standard uncertainty of the ratio of the scales, after the correction", ge=0
     )
     common_linearity: float = quantity(
         ...,
         "m",
-        "largest smooth error common to both corrected lasers: that of the reference sensor",
+        "largest smooth error common to both corrected lasers, which is that of the reference sensor",
         usual=(1e-6, 1e-3),
     )
     table_displacement: float = quantity(..., "1", "ratio of true to measured displacement of the table", gt=0)

@@ -41,7 +41,7 @@ class SensorAccuracy(Parameters):
     )
     laser_resolution: float = quantity(5e-5, "m", "smallest step of a laser's output", ge=0, le=0.01)
     laser_timing: float = quantity(
-        2.5e-4, "s", "wander of a laser's delay due to its free clock: one measuring period", ge=0, le=0.01
+        2.5e-4, "s", "wander of a laser's delay due to its free-running clock: one measuring period", ge=0, le=0.01
     )
     laser_linearity: float = quantity(
         0.0008, "1", "largest linearity error of a laser over its range, from its data sheet", ge=0, le=0.05
@@ -211,8 +211,8 @@ class SensorUncertainty:
         return seen.speeds[laser] * self.accuracy.laser_timing * draws.uniform(-0.5, 0.5)
 
     def steps(self, seen: PeakReadings, laser: int, draws: "Draws") -> Array:
-        """Errors [m] due to a laser's resolution, shape (n,): averaged rounding errors of the fit, and one rounding
-        error of a zero at rest.
+        """Errors [m] due to a laser's resolution, shape (n,): the averaged rounding errors of the fit, and one rounding
+        error if the zero was taken at rest.
         """
         step = self.accuracy.laser_resolution
         if step == 0.0:
@@ -241,7 +241,7 @@ def _beyond(effect: Effect, low: float, high: float) -> Effect:
 
 
 class Draws:
-    """`n` draws of sensor errors from one generator, in the order of the calls."""
+    """Draws of sensor errors from one generator, `n` per call, in the order of the calls."""
 
     def __init__(self, random: np.random.Generator, n: int) -> None:
         self._random, self.n = random, n

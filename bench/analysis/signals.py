@@ -54,7 +54,7 @@ class SignalMap:
         names = [channel.name for channel in channels]
         for name in MEASURED_BY:
             if name not in names:
-                raise InvalidInput("channels", ", ".join(names), f"the harmonic analysis needs a channel {name}")
+                raise InvalidInput("channels", ", ".join(names), f"the signals require a channel {name}")
         self._columns = [names.index(name) for name in MEASURED_BY]
         self.further = further_of(channels)
         self._others = [names.index(each.name) for each in self.further]
@@ -101,8 +101,8 @@ class SignalMap:
 
 
 def scatter(signals: NDArray[np.float64]) -> float:
-    """The larger of the standard deviations of u1 and drift [m] in signals of shape (n, n_signals); infinite if samples
-    are missing.
+    """The larger of the standard deviations [m] of u1 and of the drift in signals of shape (n, n_signals); infinite if
+    samples are missing.
     """
     deviation = np.std(signals[:, [U1, DRIFT]], axis=0)
     return float(np.nan_to_num(deviation, nan=np.inf).max())

@@ -1,4 +1,4 @@
-"""Detection of a steady state, cycle by cycle on every signal."""
+"""Detection of a steady state from the cycles of every signal."""
 
 from collections import deque
 from collections.abc import Sequence

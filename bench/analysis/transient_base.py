@@ -36,7 +36,7 @@ def noise_density(rest: Array, sample_rate: float) -> tuple[Array, Array]:
     """Frequencies [Hz] and one-sided spectral density [unit^2/Hz] of `rest`, shape (n,), without its linear trend."""
     from scipy import signal
 
-    # `Any`: scipy's stubs lack the linear trend
+    # `Any`: scipy's stubs do not contain the linear trend
     tools: Any = signal
     frequency, power = tools.welch(rest, sample_rate, nperseg=max(rest.size // 4, 8), detrend="linear")
     return np.asarray(frequency), np.asarray(power)
@@ -50,12 +50,12 @@ _TOP = 0.4
 _NOISE_BAND = (2.0, 60.0)
 """Frequencies [Hz] between which the sensors' noise is assumed white."""
 _PASSING = 0.05
-"""Interval in which a sensor's resolution steps are counted [s]: a fraction of the relevant periods."""
+"""Interval [s] in which a sensor's resolution steps are counted; it is a fraction of the relevant periods."""
 _CLEAR = 100.0
 """Ratio of power to noise above which a sensor measures the motion."""
 ALIKE = 0.02
-"""Relative difference of the two sensors' scales above which one is assumed wrong and only the accelerometer is
-used.
+"""Relative difference between the two sensors' scales above which one of them is assumed to be wrong and only the
+accelerometer is used.
 """
 
 
@@ -140,7 +140,9 @@ def _density(rest: Array, values: Array, sample_rate: float) -> float:
 
 
 def _of_steps(values: Array, sample_rate: float) -> float:
-    """Density [unit^2/Hz] of the rounding of `values` to their resolution; zero without motion."""
+    """Spectral density [unit^2/Hz] of the error due to the rounding of `values` to their resolution; zero without
+    motion.
+    """
     apart: Array = np.diff(np.unique(values))
     if not apart.size:
         return 0.0
@@ -152,13 +154,17 @@ def _of_steps(values: Array, sample_rate: float) -> float:
 
 
 def _levelled(values: Array, still: int) -> Array:
-    """Values minus the line through their means at rest: a sensor's offset drifts."""
+    """Values minus the line through their means at rest before and after the motion, because a sensor's offset
+    drifts.
+    """
     begin, end = float(values[:still].mean()), float(values[-still:].mean())
     return values - np.linspace(begin, end, values.size)
 
 
 def _closed(values: Array, still: int) -> Array:
-    """Values with the final offset removed smoothly, since friction may stop a table at a different position."""
+    """Values from which the final offset has been removed smoothly, because friction may stop the table at a different
+    position.
+    """
     begin, end = float(values[:still].mean()), float(values[-still:].mean())
     x = np.linspace(0.0, 1.0, values.size)
     return values - begin - (end - begin) * x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
@@ -175,12 +181,12 @@ def _alignment(
     """Ratio of the displacement sensor's scale to the accelerometer's, None if it cannot be measured, and the
     displacement sensor's lead [s].
     """
-    # a density and the spectrum of n samples at rate f: |S|^2 = density n f / 2
+    # relation between a density and the spectrum S of n samples at rate f: |S|^2 = density n f / 2
     to_power = 0.5 * duration * (2.0 * frequency[-1]) ** 2
     clear = (np.abs(a) ** 2 > _CLEAR * noise_a * to_power) & (np.abs(x) ** 2 > _CLEAR * noise_x * to_power)
     if np.count_nonzero(clear) < 8:
         return None, 0.0
-    # each line is weighted by the precision of its ratio
+    # each line is weighted by the precision of the ratio at that line
     weight, omega = 1.0 / (noise_a[clear] + noise_x[clear]), 2.0 * np.pi * frequency[clear]
     cross = weight * np.conj(a[clear]) * x[clear]
     side = 1.0 if np.sum(cross.real) >= 0.0 else -1.0

@@ -58,7 +58,7 @@ _NARROWEST = 6
 _WIDEST = 0.5 * pi
 """Largest omega_6 h: a quarter of a period to either side."""
 _BAND = (4.0, 50.0)
-"""Frequencies [Hz] at which the noise of a fit is evaluated; below them, a frame may still vibrate at rest."""
+"""Band [Hz] in which the noise of a fit is evaluated; below it, a frame may still vibrate at rest."""
 _STANDS_OUT, _SMOOTHED = 4.0, 0.5
 """Power, relative to the noise, above which a frequency counts as signal, and width [Hz] over which the power is
 averaged first.
@@ -175,7 +175,7 @@ def _smoothed(signal: Array, half: int) -> Array:
 
 
 def _candidates(smooth: Array, near: float) -> NDArray[np.intp]:
-    """Samples at local maxima of |smooth| that are less than `near` below the greatest."""
+    """Samples at local maxima of |smooth| that are less than `near` below the largest maximum."""
     size = np.abs(smooth)
     inner = np.flatnonzero((size[1:-1] >= size[:-2]) & (size[1:-1] > size[2:])) + 1
     places = np.append(inner, size.argmax())
@@ -187,7 +187,7 @@ def _maximum(signal: Array, known: NDArray[np.bool_], place: int, half: int, sig
     low, high = max(place - half, 0), min(place + half + 1, signal.size)
     used = known[low:high]
     if np.count_nonzero(used) < (1.0 - _MISSING) * (2 * half + 1):
-        raise InvalidInput("transient", f"sample {place}", "too few valid samples around its peak")
+        raise InvalidInput("transient", f"sample {place}", "it has too few valid samples around its peak")
     powers = np.vander((np.arange(low, high)[used] - place) / half, DEGREE + 1, increasing=True)
     inverse = np.linalg.pinv(powers)
     polynomial = np.polynomial.Polynomial(inverse @ signal[low:high][used])

@@ -97,7 +97,9 @@ COVERAGE = 2.0
 
 @dataclass(frozen=True)
 class Budget:
-    """Independent contributions to one result: standard uncertainties in its unit, by name."""
+    """Independent contributions to the uncertainty of one result: standard uncertainties in the unit of the result, by
+    name.
+    """
 
     parts: Mapping[str, float]
 

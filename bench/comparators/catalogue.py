@@ -32,7 +32,7 @@ further subdivision".
 def paper(problem: Problem, step: float) -> Motion:
     """Section 3.3 of the paper, literally.
 
-    Under a sampled record a step with an impact is repeated in SEISMIC_PARTS parts.
+    If the excitation is a sampled record, a step with an impact is repeated in SEISMIC_PARTS parts.
     """
     from bench.comparators.kernel.fixed_step import run_paper
 
@@ -110,7 +110,7 @@ SOLVERS: Mapping[str, Solver] = MappingProxyType(
                 (1e-15, 1e-3),
                 None,
             ),
-            Solver("paper", "RK4 at 1 ms with a sign test, as section 3.3", "step", PAPER_STEP, (1e-6, 0.1), paper),
+            Solver("paper", "RK4 at 1 ms with a sign test, as in section 3.3", "step", PAPER_STEP, (1e-6, 0.1), paper),
             Solver("rk4-located", "RK4 with events located by stepping", "step", PAPER_STEP, (1e-6, 0.1), rk4_located),
             Solver("dop853", "scipy's DOP853 with its events", "tolerance", TOLERANCE, (1e-13, 1e-3), dop853),
         )
@@ -173,7 +173,7 @@ gives the same result for any window.
 
 @dataclass(frozen=True, eq=False)
 class TimedGain:
-    """alpha_1 and alpha_2 over the last periods of `motion`; meaningless for a run that ended early."""
+    """alpha_1 and alpha_2 over the last periods of `motion`; they are meaningless if the run ended early."""
 
     alpha_1: float
     alpha_2: float
@@ -196,8 +196,8 @@ def steady_gain_by_time(
 
     Without `state` the run starts on the exact rocking orbit, at its phase [rad] of the base's sine, and settles on the
     solver's steady state; from rest, the outcome would depend on a chaotic transient. The peaks of the bare frame are
-    computed exactly. Raises as `bench.comparators.catalogue.solve` and `sim.steady.rocking_orbit` do, and InvalidInput
-    for a run shorter than LAST_PERIODS periods. Source: Eq. (10).
+    computed exactly. Raises the errors of `bench.comparators.catalogue.solve` and `sim.steady.rocking_orbit`, and
+    InvalidInput for a run shorter than LAST_PERIODS periods. Source: Eq. (10).
     """
     from sim.steady import rocking_orbit
 

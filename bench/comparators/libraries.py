@@ -25,7 +25,7 @@ from bench.comparators.case import AMPLITUDE, DURATION, OMEGA, PHASE, SPECIMEN, 
 
 @dataclass(frozen=True)
 class Outcome:
-    """End state, shape (6,), counts, and peaks of |u1|, |u2 - u1|, |theta| if requested."""
+    """End state, shape (6,), numbers of impacts and steps, and peaks of |u1|, |u2 - u1| and |theta| if requested."""
 
     end: NDArray[Any]
     impacts: int
@@ -75,7 +75,7 @@ class HeyokaPeer:
         return Outcome(np.array(ta.state), self._impacts, int(steps), peaks)
 
     def _on_impact(self) -> Any:
-        # a function, not a method, because heyoka copies its callbacks with everything bound to them
+        # a function, not a method, because heyoka copies a callback with every object bound to it
         def strike(ta: Any, _sign: int) -> bool:
             self._impacts += 1
             ta.state[4] = self._real(0)
@@ -125,7 +125,7 @@ Vector = NDArray[np.float64]
 
 
 class CvodePeer:
-    """The standard case at one relative tolerance; the absolute one is a hundredth of it."""
+    """The standard case at one relative tolerance; the absolute tolerance is a hundredth of it."""
 
     def __init__(self, tolerance: float) -> None:
         from bench.comparators.kernel.fixed_step import driven_rates

@@ -1,4 +1,4 @@
-"""Validated input of every solver."""
+"""Validated input that is common to all solvers."""
 
 from dataclasses import dataclass
 from math import inf
@@ -23,9 +23,9 @@ from sim.specimen import Specimen
 class Problem:
     """An initial value problem ready for a solver.
 
-    `parameters`: `Specimen.packed()`, shape (16,). `segments`: packed excitation, shape (n, 10). `start`, shape (6,).
-    `times`: of the samples, shape (m,) [s]. `sampled`: whether samples are requested. `peaks_from` [s]: infinite when
-    no peaks are requested.
+    `parameters`: `Specimen.packed()`, shape (16,). `segments`: packed excitation, shape (n, 10). `start`: initial
+    state, shape (6,). `times`: times of the samples, shape (m,) [s]. `sampled`: whether samples are requested.
+    `peaks_from` [s]: time from which peaks are taken; infinite if no peaks are requested.
     """
 
     parameters: NDArray[np.float64]
@@ -50,7 +50,7 @@ class Problem:
         peaks_from: float | None,
         overturning_angle: float,
     ) -> "Problem":
-        """The problem from the arguments of `sim.rocking.simulate`. Raises InvalidInput as that does."""
+        """The problem from the arguments of `sim.rocking.simulate`. Raises InvalidInput for the same errors."""
         check_options(TOLERANCE, overturning_angle)
         drive, start = Drive(excitation), state or State()
         check_state(specimen, start, overturning_angle)

@@ -26,11 +26,11 @@ WATCHED = (
     (np.array([-1.0, 1.0, 0.0, 0.0, 0.0, 0.0]), np.array([0.0, 0.0, -1.0, 1.0, 0.0, 0.0])),
     (np.array([0.0, 0.0, 0.0, 0.0, 1.0, 0.0]), np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])),
 )
-"""u1, u2 - u1 and theta as combinations of the state, each with its velocity."""
+"""Combinations of the state that give u1, u2 - u1 and theta, each with its velocity."""
 
 
 def dop853(problem: Problem, tolerance: float) -> Motion:
-    """DOP853 (Hairer, Norsett and Wanner, 1993) of scipy with a relative tolerance."""
+    """scipy's DOP853 (Hairer, Norsett and Wanner, 1993) with a relative tolerance."""
     return integrate("DOP853", problem, tolerance)
 
 
@@ -118,7 +118,9 @@ def integrate(method: Method, problem: Problem, tolerance: float, equations: Dri
 
 
 def python_rates(p: Vector, sg: float, row: Vector, t: float, x: Vector, out: Vector) -> None:
-    """`bench.comparators.kernel.fixed_step.driven_rates` without compilation, as scipy is usually used."""
+    """`bench.comparators.kernel.fixed_step.driven_rates` without compilation, like most right-hand sides passed to
+    scipy.
+    """
     from bench.comparators.kernel import fixed_step
 
     plain_base, plain_rates = _python(fixed_step.base), _python(fixed_step.rates)
@@ -139,7 +141,9 @@ def _events(
     holding: float,
     moment: Callable[[Vector, float, Vector], float],
 ) -> list[Function]:
-    """Events that end the phase: impact and overturning while rocking, uplift at rest, none for the bare frame."""
+    """Events that end the phase: impact and overturning while the block rocks, uplift while it is at rest, none for the
+    bare frame.
+    """
     from sim.kernel.equations import COUPLED
 
     limit = problem.overturning_angle

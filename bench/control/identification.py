@@ -26,17 +26,19 @@ Complex = NDArray[np.complex128]
 Quantity = Literal["displacement", "velocity", "acceleration"]
 
 _CLIPPINGS = 200
-"""Number of clipping rounds: the crest factor falls from about 3.5 to 1.5, in less than 0.1 s for 16 000 samples."""
+"""Number of clipping rounds. They reduce the crest factor from about 3.5 to 1.5, in less than 0.1 s for 16 000
+samples.
+"""
 _FIRST_CLIP, _LAST_CLIP = 0.75, 0.95
-"""Clipping level relative to the peak in the first and in the last round."""
+"""Clipping levels of the first and the last round, relative to the peak."""
 
 
 @dataclass(frozen=True)
 class Multisine:
     """One period of drive, made of `lines` (multiples of the period's frequency) with complex `spectrum` [V].
 
-    The amplitude of line k is |spectrum[k]|; both have shape (n_lines,). `samples`: number per period; `sample_rate`
-    [1/s].
+    The amplitude of line k is |spectrum[k]|; both have shape (n_lines,). `samples` is the number of samples per period,
+    `sample_rate` is in 1/s.
     """
 
     lines: Lines
@@ -55,8 +57,8 @@ class Multisine:
         return waveform(self.lines, self.spectrum, self.samples)
 
     def scaled_to(self, peak: float, response: Complex | Array) -> "Multisine":
-        """The multisine scaled so that the output of a linear `response` [unit/V] at its lines has a peak of `peak`
-        units.
+        """The multisine scaled so that the output of a linear system with the `response` [unit/V] at its lines has a
+        peak of `peak` units.
         """
         made = float(np.abs(waveform(self.lines, self.spectrum * response, self.samples)).max())
         return replace(self, spectrum=self.spectrum * (peak / made))
@@ -163,14 +165,15 @@ def steady_periods(record: Array, samples: int, discard: int) -> Array:
     count = record.size // samples
     kept = record[discard * samples : count * samples]
     if count - discard < 2:
-        raise InvalidInput("periods", count, f"two or more must remain after the first {discard}, to estimate noise")
+        allowed = f"at least two must remain after the first {discard}, to estimate the noise"
+        raise InvalidInput("periods", count, allowed)
     if not np.isfinite(kept).all():
-        raise InvalidInput("record", "samples without a value", "the identification requires every sample; repeat it")
+        raise InvalidInput("record", "samples without a value", "every sample is required; repeat the measurement")
     return kept.reshape(count - discard, samples)
 
 
 def line_amplitudes(periods: Array, lines: Lines) -> Complex:
-    """Complex amplitudes at `lines`, shape (..., n_lines), of periods of shape (..., samples)."""
+    """Complex amplitudes at `lines`, shape (..., n_lines), of the samples of whole periods, shape (..., samples)."""
     return np.fft.rfft(periods, axis=-1)[..., lines] * (2.0 / periods.shape[-1])
 
 
@@ -184,7 +187,7 @@ def line_response(drive: Complex, output: Complex, frequency: Array, spacing: fl
     if drive.shape != output.shape or drive.shape[2:] != frequency.shape:
         raise InvalidInput("output", output.shape, f"the drive has the shape {drive.shape}: the shapes must agree")
     if periods < 2:
-        raise InvalidInput("periods", periods, "at least two, to estimate the noise")
+        raise InvalidInput("periods", periods, "at least two are required, to estimate the noise")
     u, y = drive.mean(axis=1), output.mean(axis=1)
     each = y / u
     response = each.mean(axis=0)
@@ -222,11 +225,11 @@ def identify_table(
 ) -> TableModel:
     """Identify the table from periods of drive [V] and table acceleration [m/s2] in steady state.
 
-    Arrays have the shape (realisations, periods, samples); two realisations and two periods at least. `date` and
-    `specimen` record the time and the specimen on the table. Raises InvalidInput.
+    Arrays have the shape (realisations, periods, samples); at least two realisations and two periods are required.
+    `date` and `specimen` record the time and the specimen on the table. Raises InvalidInput.
     """
     if drive.shape[0] < 2:
-        raise InvalidInput("realisations", drive.shape[0], "at least two, to estimate the distortion")
+        raise InvalidInput("realisations", drive.shape[0], "at least two are required, to estimate the distortion")
     spacing = sample_rate / drive.shape[-1]
     a = line_amplitudes(acceleration, lines)
     found = line_response(line_amplitudes(drive, lines), a, lines * spacing, spacing)

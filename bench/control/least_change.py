@@ -21,7 +21,7 @@ INFEASIBLE = 1e-10
 
 
 class Infeasible(Exception):
-    """Error: no vector satisfies all constraints."""
+    """Error raised if no vector satisfies all constraints."""
 
 
 def shortest(equations: tuple[Array, Array], inequalities: tuple[Array, Array]) -> Array:
@@ -48,7 +48,7 @@ def shortest(equations: tuple[Array, Array], inequalities: tuple[Array, Array]) 
     residual = dual @ multipliers - target
     if -residual[-1] < INFEASIBLE:
         raise Infeasible
-    # positive multipliers mark the active inequalities; their equations give the vector to rounding
+    # positive multipliers mark the active inequalities, whose equations determine the vector to within rounding
     active = multipliers > 0.0
     return particular + np.linalg.lstsq(free[active], needed[active], rcond=1e-12)[0]
 
@@ -80,11 +80,11 @@ class SineModes:
         return 0.5 * _transformed(weights[1:-1])[self._below : self._below + self._steps.size]
 
     def motions(self, samples: NDArray[np.intp]) -> tuple[Array, Array]:
-        """Velocity and displacement after each of `samples`, shape (m,), under each mode of unit amplitude, shape (m,
+        """Velocity and displacement at each of `samples`, shape (m,), due to each mode with unit amplitude, shape (m,
         k).
 
-        The first-order hold's sums over sines and cosines of equal steps theta, in closed form:
-        sum of sin(i theta), i < j, is (cos(theta/2) - cos((j - 1/2) theta)) / (2 sin(theta/2)), and so on.
+        Closed form of the first-order hold's sums over sines and cosines at equal steps theta: sum of sin(i theta), i <
+        j, is (cos(theta/2) - cos((j - 1/2) theta)) / (2 sin(theta/2)), and so on.
         """
         dt, theta, j = self._dt, self._steps, samples[:, None]
         half = np.sin(0.5 * theta)
@@ -105,16 +105,19 @@ def _transformed(values: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Peak:
-    """Peak pseudo-acceleration of an oscillator [m/s2], with sign, and the weight of each sample in it."""
+    """Peak pseudo-acceleration of an oscillator [m/s2], with sign, and the weight of each sample of the excitation in
+    it.
+    """
 
     value: float
     weights: Array
 
 
 def oscillator_peak(acceleration: Array, dt: float, period: float, damping: float) -> Peak:
-    """`Peak` of the oscillator of `period` [s] under `acceleration` [m/s2], shape (n,); at the nearest sample.
+    """`Peak` of the oscillator of `period` [s] under `acceleration` [m/s2], shape (n,), evaluated at the sample nearest
+    to the peak.
 
-    The recursion of `bench.analysis.response_spectrum`: z' = lambda z + a, exact for linear interpolation between
+    Uses the recursion of `bench.analysis.response_spectrum`: z' = lambda z + a, exact for linear interpolation between
     samples.
     """
     from scipy import signal
@@ -152,7 +155,9 @@ FLOOR = 0.05
 """Frequency [Hz] below which the weight is constant, since a slower sine would use up the stroke at once."""
 
 SPECTRUM = 7.0
-"""Duration [s] for which a change as large as the record's peak costs as much as doubling every oscillator's peak."""
+"""Duration [s] for which a change as large as the record's peak has the same cost as doubling every oscillator's
+peak.
+"""
 
 PASSES = 2
 """Number of iterations: each constrains the oscillators' peaks at their previous and new instants."""
@@ -175,11 +180,12 @@ class _Bound(NamedTuple):
 def fit_by_least_change(
     acceleration: Array, dt: float, reach: Reach, periods: Array, damping: float, lowest: float = 0.0
 ) -> Array:
-    """`acceleration` [m/s2], shape (n,), with the least change that keeps the table within `reach` and leaves it at
+    """`acceleration` [m/s2], shape (n,), with the smallest change that keeps the table within `reach` and leaves it at
     rest.
 
     `periods` [s] and `damping` are those of the oscillators whose peaks are preserved; the change has no content below
-    `lowest` [Hz]. Raises InvalidInput if no change between there and 2 Hz, or four times `lowest`, is sufficient.
+    `lowest` [Hz]. Raises InvalidInput if no change with frequencies between `lowest` and 2 Hz (or four times `lowest`,
+    if higher) is sufficient.
     """
 
     def peaks_of(record: Array) -> list[Peak]:

@@ -1,9 +1,9 @@
 """Phase-continuous drive waveform: a sine with harmonics that make the table's motion sinusoidal.
 
-It follows sweeps of target acceleration (`sim.excitation.Sweep`) and holds the last amplitude and frequency until the
-next command. With the phase phi, requested amplitude A, shares c_k and calibrated response H, the drive is sum over k
-of Im(A c_k / H(k omega) exp(i k phi)): a table that responds as calibrated has the acceleration A sin(phi) for the
-shares (1, 0, 0, ...).
+The oscillator follows sweeps of target acceleration (`sim.excitation.Sweep`) and holds the last amplitude and frequency
+until the next command. With the phase phi, requested amplitude A, shares c_k and calibrated response H, the drive is
+sum over k of Im(A c_k / H(k omega) exp(i k phi)): a table that responds as calibrated has the acceleration A sin(phi)
+for the shares (1, 0, 0, ...).
 """
 
 from collections import deque
@@ -48,7 +48,7 @@ class DriveCalibration:
 
     @property
     def points(self) -> list[tuple[float, complex]]:
-        """Frequencies [rad/s] with their responses."""
+        """Frequencies [rad/s], each with its response."""
         return list(zip(self.omega, self.response, strict=True))
 
 
@@ -116,7 +116,7 @@ class ShareRamp:
             self.to((1.0,), samples)
 
     def next(self, n: int) -> NDArray[np.complex128]:
-        """Shares at the next `n` samples, shape (n, HARMONICS), or (1, HARMONICS) while constant."""
+        """Shares at the next `n` samples, shape (n, HARMONICS), or (1, HARMONICS) while they are constant."""
         if not self._waiting or self._waiting[0][0] >= self._played + n:
             return self._follow(n)
         pieces = list[NDArray[np.complex128]]()

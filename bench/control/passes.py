@@ -78,7 +78,7 @@ def fitting(present: Envelope, change: Envelope, limits: Limits, margin: float) 
 
 
 CLEAR = 2.0
-"""Ratio of a response-spectrum deviation to its standard deviation due to noise above which it is significant."""
+"""Number of standard deviations due to noise above which a deviation of the response spectrum is significant."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ class Pass:
 
     @property
     def repeatable(self) -> float:
-        """Root mean square of the error, excluding its floor."""
+        """Root mean square of the error without its floor."""
         return max(self.error**2 - self.floor**2, 0.0) ** 0.5
 
     def __str__(self) -> str:
@@ -119,7 +119,7 @@ class Pass:
 
 
 class SpectrumCheck:
-    """Compares response spectra with that of a target."""
+    """Compares response spectra with the spectrum of a target."""
 
     def __init__(
         self, target: Array, sample_rate: float, band: tuple[float, float], periods: tuple[float, ...]

@@ -1,7 +1,7 @@
 """Preparation of a record as a table motion: trimming, band limitation, scaling, stroke fit.
 
 Prediction and test use the same prepared motion and are therefore comparable. The order matters: band limitation may
-remove the record's peak, so scaling follows it; the stroke applies to the scaled motion.
+remove the record's peak, so the record is scaled afterwards; the stroke limits the scaled motion.
 """
 
 from dataclasses import dataclass
@@ -21,12 +21,13 @@ ROUNDING = 1e-9
 
 
 def scaled(record: SampledRecord, length_ratio: float) -> SampledRecord:
-    """`record` for a model of lambda_L = `length_ratio`: the same accelerations, the step times lambda_L^(1/2).
+    """`record` for a model with lambda_L = `length_ratio`: the accelerations are unchanged, the step is multiplied by
+    lambda_L^(1/2).
 
     Raises InvalidInput unless the ratio is positive.
     """
     if not (isfinite(length_ratio) and length_ratio > 0.0):
-        raise InvalidInput("length_ratio", length_ratio, "model over prototype length must be a positive number")
+        raise InvalidInput("length_ratio", length_ratio, "the ratio of model to prototype length must be positive")
     return SampledRecord(record.acceleration, record.dt * sqrt(length_ratio))
 
 
@@ -93,7 +94,7 @@ class PreparedMotion:
             raise InvalidInput("band", None, "the motion of the table requires a band: specify its ends")
         check_band(self.band, sample_rate)
         wave = resampled(self.record, 1.0 / sample_rate).acceleration
-        # linear interpolation between the record's samples has slight content above the band
+        # linear interpolation between the record's samples adds slight content above the band
         within = windowed(wave, 1.0 / sample_rate, self.band)
         target = Target(within, sample_rate, self.band, round(REST / self.band[0] * sample_rate))
         if self.reach is not None:

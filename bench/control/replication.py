@@ -56,7 +56,7 @@ class ReplicationParameters(Parameters):
         "motion does not repeat",
     )
     margin: float = quantity(
-        1.1, "1", "required ratio of the limits to the greatest predicted drive and motion", ge=1, le=3
+        1.1, "1", "required ratio of the limits to the largest predicted drive and motion", ge=1, le=3
     )
     beyond: Literal["refuse", "scale"] = quantity(
         "refuse", "", "treatment of a drive beyond a limit: refuse it, or scale it down to fit"
@@ -159,7 +159,7 @@ class Replication:
         """Evaluate the pass of `drive`: measured acceleration [m/s2] and displacement [m] of the table, shape (n,).
 
         The displacement determines the remaining stroke; without it the acceleration is integrated. Raises InvalidInput
-        when samples are missing.
+        if samples are missing.
         """
         for name, values in (("acceleration", acceleration), ("displacement", displacement)):
             if values is not None and (values.shape != self._drive.shape or not np.isfinite(values).all()):
@@ -193,7 +193,7 @@ class Replication:
         self._present = Envelope.of(self._drive, acceleration, displacement, rate)
 
     def _compare(self, missing: Complex) -> None:
-        """Update noise and mean error from the second play of the best drive."""
+        """Update the noise and the mean error with the second play of the best drive."""
         difference = 0.5 * octave_mean(np.abs(missing - self._missing) ** 2, self._table.frequency)
         # two plays may agree by chance: the largest scatter so far is used
         self._noise = np.maximum(self._noise, difference)

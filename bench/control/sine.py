@@ -1,4 +1,5 @@
-"""Control of the table's acceleration to A sin(phi): amplitude and phase of the fundamental, cancellation of harmonics.
+"""Control of the table's acceleration to A sin(phi): control of the fundamental's amplitude and phase, and cancellation
+of harmonics.
 
 Harmonic k of the table responds to a change of the drive's share c_k with a gain g_k, 1 if the calibration is exact,
 and includes contributions of friction and the block's impacts. These are removed by
@@ -61,7 +62,7 @@ class SineResponse:
 
     @staticmethod
     def of(cycles: Sequence[Cycle], sine: Sine, turn: complex) -> "SineResponse":
-        """The means over two or more `cycles` of a dwell whose phase is relative to `turn` (see `Sine.turn`).
+        """The means over two or more `cycles` of a dwell, with phases relative to `turn` (see `Sine.turn`).
 
         The uncertainty follows from the scatter of the cycles, and is at least that of all harmonics together, since a
         few cycles may agree by chance.
@@ -90,7 +91,7 @@ class SineResponse:
 
     @property
     def distortion(self) -> float:
-        """Total harmonic distortion: rms of the harmonics over the fundamental."""
+        """Total harmonic distortion: rms of the harmonics divided by that of the fundamental."""
         return float(np.linalg.norm(self.achieved[1:]) / np.abs(self.achieved[0]))
 
 
@@ -109,7 +110,7 @@ NOTICED = 1.5
 """Number of standard deviations above which a harmonic is corrected; smaller harmonics are noise."""
 
 TELLING = 5.0
-"""Number of standard deviations of a step above which its secant is used."""
+"""Size of a step, in standard deviations, above which the secant of the step is used."""
 
 PLAUSIBLE = (0.5, 2.0)
 """Range of plausible magnitudes of a table's secant; a block whose motion has not settled causes values outside it."""

@@ -23,7 +23,7 @@ from sim.cycle_map import CycleMap, coefficients
 Array = NDArray[np.float64]
 
 DELAY = 2
-"""Number of cycles from a measured cycle to the one in which its correction begins."""
+"""Number of cycles from a measured cycle to the cycle in which the resulting correction begins."""
 
 BLEND = 0.5
 """Fraction of a cycle over which a correction is blended in. A full cycle would weaken it by 20 to 30 %, since
@@ -31,8 +31,8 @@ successive corrections have nearly opposite signs.
 """
 
 COST = 100.0
-"""Cost of control (squared shares) relative to that of squared deviations of y from y*: a low cost saturates the
-control on every deviation and captures less often; with a high cost capture takes longer.
+"""Cost of control (squared shares) relative to that of squared deviations of y from y*: with a low cost, every
+deviation saturates the control and fewer motions are captured; with a high cost, the capture takes longer.
 """
 
 READING, DISTURBANCE, WANDER = 3e-6, 1e-3, 1e-2
@@ -74,7 +74,8 @@ class Stabiliser:
         n, m = self._map.transition.shape[0], self._map.orbit.size
         self._state, self._orbit = np.zeros(n), np.zeros(m)
         self._begun = False
-        # controls of the cycle before the one measured next, of that cycle, and of the following one
+        # controls of three cycles: the one before the cycle measured next, the cycle measured next, and the one after
+        # it
         self._before, self._now, self._next = np.zeros(2), np.zeros(2), np.zeros(2)
 
     @property
@@ -111,7 +112,7 @@ class Stabiliser:
 
 
 def _regulator(found: CycleMap) -> Array:
-    """Feedback of deviation and last control, shape (2, n + 2), that minimises deviation and control."""
+    """Feedback gain for the deviation and the last control, shape (2, n + 2), that minimises both."""
     from scipy.linalg import solve_discrete_are
 
     (b1, b0), n = found.inputs, found.transition.shape[0]
@@ -130,7 +131,7 @@ def _regulator(found: CycleMap) -> Array:
 
 
 def _filter(found: CycleMap) -> Array:
-    """Steady gain of the Kalman predictor of deviation and y*, shape (n + m, m)."""
+    """Steady-state gain of the Kalman predictor of the deviation and y*, shape (n + m, m)."""
     from scipy.linalg import block_diag, solve_discrete_are
 
     n, m = found.transition.shape[0], found.orbit.size
@@ -147,8 +148,8 @@ QUIET, CAPTURED = 0.01, 24
 """Largest control of a captured motion, as a share, and number of successive cycles that must not exceed it."""
 
 LOST, ROUGH = 6, 0.5
-"""Number of successive cycles after which a captured motion counts as lost, if each needs at least this fraction of the
-authority.
+"""A captured motion counts as lost after this number of successive cycles whose control is at least this fraction of
+the authority.
 """
 
 MISSING = 3
@@ -165,7 +166,7 @@ GROWTH = 1.5
 
 @dataclass
 class HoldMonitor:
-    """Test for capture, and reasons to release the hold.
+    """Detects the capture of a motion and the reasons to release the hold.
 
     `patience` is the number of cycles within which the motion must be captured, `largest` [m] the largest allowed peak
     drift, and `answer` the table's fundamental before the hold, per share of the drive.

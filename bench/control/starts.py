@@ -25,13 +25,15 @@ from sim.steady import NoOrbit, Orbit, rocking_orbit
 Counts = NDArray[np.float64]
 
 TOPS = (22.0, 24.0, 26.0, 28.0)
-"""Frequencies [rad/s] of the soft ramp, at which the block rocks little and the frame is far from resonance."""
+"""Frequencies [rad/s] of the ramp before a downward sweep; at these the block rocks little and the frame is far from
+resonance.
+"""
 
 RAMPS = ((6.0, 0.0), (12.0, 0.0), (6.0, 10.0))
-"""Durations of the soft ramp and of the wait before the chirp [s]."""
+"""Durations [s] of this ramp and of the wait between the ramp and the chirp."""
 
 CHIRPS = (0.5, 1.0)
-"""Rates of the downward frequency sweep [rad/s per s]."""
+"""Rates of the chirp, the downward frequency sweep [rad/s per s]."""
 
 DIRECT_RAMPS = (8.0, 16.0)
 """Durations of a ramp at the requested frequency [s]."""
@@ -93,7 +95,9 @@ def _eased(name: str, legs: list[Leg], amplitude: float, overshoot: float) -> Ca
 
 
 DRIVE = 0.03
-"""Relative half width of the table's amplitude during a start-up, before amplitude control takes effect."""
+"""Relative half width of the distribution of the table's amplitude during a start-up, before amplitude control takes
+effect.
+"""
 
 SIEVES = ((5, 2.0), (10, 1.0))
 """For each selection round: number of draws, and number of candidates kept per requested start-up."""
@@ -105,16 +109,18 @@ SEED = 1
 """Random seed of the draws, for reproducible results."""
 
 DWELL, WINDOW = 40.0, 4.0
-"""Simulated time at the requested frequency, and the last part of it that is evaluated [s]."""
+"""Simulated time at the requested frequency, and duration of its last part, which is evaluated [s]."""
 
 TOLERANCE = 1e-7
 """Relative tolerance of the simulations."""
 
 CATCH_ANGLE = 0.35
-"""Tilt [rad] beyond which the block counts as fallen: no spring of the campaign would return it."""
+"""Tilt [rad] beyond which the block counts as fallen: no spring of the campaign could restore it."""
 
 CLOSE = 0.10
-"""Relative difference of the peaks of drift and tilt below which a motion counts as converging to the orbit."""
+"""Relative difference between the peaks of drift and tilt and those of the orbit, below which a motion counts as
+converging to the orbit.
+"""
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,9 @@ HALVINGS = 24
 """Number of bisections of that range on a logarithmic scale: the final interval is a millionth wide."""
 
 PAD = 1.5
-"""Length of the zero padding before and after, in which the filter decays, in periods of the corner per order."""
+"""Length of the zero padding before and after the record, in which the filter's response decays, in periods of the
+corner per order.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +61,7 @@ def fit_by_high_pass(acceleration: Array, dt: float, reach: Reach) -> HighPassed
 
 
 def high_passed(acceleration: Array, dt: float, corner: float) -> HighPassed:
-    """`acceleration` without its content below `corner` [Hz], ending at rest, padded before and after for the
+    """`acceleration` without its content below `corner` [Hz], ending at rest, with padding before and after for the
     filter.
     """
     lead = int(np.ceil(PAD * ORDER / (corner * dt)))
@@ -89,7 +91,7 @@ SAME = 0.01
 """Largest difference between the fitted motion and its band-limited version, as a fraction of the reach."""
 
 ROUNDING = 1e-9
-"""Fraction of its peak below which a velocity or displacement counts as zero."""
+"""Fraction of the peak velocity or displacement below which a value counts as zero."""
 
 
 NOT_BOTH = "band and stroke are incompatible: lower the band's lower end, or scale the record down"
@@ -107,8 +109,8 @@ class StrokeFit:
     """A fitted record: it ends at rest where it began, and stays within the table's reach at every sample.
 
     `record` begins `lead` [s] before the original. `before` and `after` are the table's motions under the original and
-    the fitted record. `spectrum` and `spectrum_before`, shape (n,), are pseudo-accelerations [m/s2] at `periods` [s].
-    `done` describes the fit.
+    the fitted record. `spectrum` and `spectrum_before`, shape (n,), are the pseudo-accelerations [m/s2] of both at
+    `periods` [s]. `done` describes the fit.
     """
 
     record: SampledRecord
@@ -142,7 +144,7 @@ def fit_stroke(
     """`record` modified to keep the table within `reach`; a record within `band` [Hz] stays within that band.
 
     A record that already fits and ends at rest is returned unchanged. Raises InvalidInput for a record without motion
-    or shorter than 16 samples, and, with the reason, if the method finds no fit.
+    or shorter than 16 samples, and if the method finds no fit.
     """
     original, dt = record.acceleration, record.dt
     if original.size < SHORTEST or not original.any():

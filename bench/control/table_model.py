@@ -1,4 +1,6 @@
-"""Identified model of the table: its response to the drive with uncertainty, and its inverse for corrections."""
+"""Identified model of the table: its response to the drive, with uncertainty, and the inverse of the response for
+corrections.
+"""
 
 import json
 from datetime import datetime, timedelta
@@ -36,7 +38,7 @@ Array = NDArray[np.float64]
 Values = tuple[float, ...]
 
 LONGEST_AGE = timedelta(hours=12)
-"""Default age after which a model is rejected, because coil and guides change temperature."""
+"""Default age after which a model is rejected, because the temperatures of coil and guides change."""
 
 
 class TableModel(Parameters):
@@ -53,7 +55,7 @@ class TableModel(Parameters):
     frequency: Values = quantity(..., "Hz", "frequencies of the lines, ascending", min_length=2)
     real: Values = quantity(..., "m/s2/V", "real part of the response")
     imaginary: Values = quantity(..., "m/s2/V", "imaginary part of the response")
-    uncertainty: Values = quantity(..., "m/s2/V", "standard uncertainty of the response, noise and distortion together")
+    uncertainty: Values = quantity(..., "m/s2/V", "standard uncertainty of the response due to noise and distortion")
     distortion: Values = quantity(..., "m/s2/V", "standard deviation of the response due to nonlinear distortion alone")
     coherence: Values = quantity(..., "1", "fraction of the acceleration's power explained by the drive")
     noise: Values = quantity(..., "m/s2/Hz^0.5", "spectral density of the noise in the acceleration")
@@ -145,14 +147,14 @@ class TableModel(Parameters):
 Complex = NDArray[np.complex128]
 
 REGULARISATION = 1e-3
-"""eps: lines whose response is below this fraction of the largest receive less than half the required drive."""
+"""eps: a line whose response is below this fraction of the largest receives less than half the required drive."""
 
 _TINY = 1e-12
 """Fraction of the largest power below which a line contains only rounding errors."""
 
 
 class TableInverse:
-    """Converts between drive and acceleration on the lines of a target's transform within its support.
+    """Converts between drive and acceleration at the lines of a target's transform within the target's support.
 
     Spectra are `numpy.fft.rfft` of whole records at those lines, shape (n_lines,).
     """

@@ -1,4 +1,6 @@
-"""Target motion of the table, a record within the table's band that is at rest at both ends; and the table's reach."""
+"""Target motion of the table, which is a record within the table's band with rest at both ends, and the table's
+reach.
+"""
 
 from dataclasses import dataclass, replace
 from math import isfinite
@@ -37,7 +39,7 @@ class Target:
 
     @property
     def support(self) -> tuple[float, float]:
-        """Lowest and highest frequency [Hz] compared and corrected."""
+        """Lowest and highest frequency [Hz] at which motions are compared and corrected."""
         return self.band[0] / REACH, self.band[1] * REACH
 
     @property
@@ -47,7 +49,9 @@ class Target:
 
     @property
     def window(self) -> Array:
-        """The zero-phase filter through which target and measurement are compared, shape (n // 2 + 1,): 0 to 1."""
+        """The zero-phase filter with which target and measurement are compared: values from 0 to 1, shape (n // 2 +
+        1,).
+        """
         return band_window(self.frequency, self.band)
 
     @property
@@ -117,7 +121,7 @@ def band_window(frequency: Array, band: tuple[float, float]) -> Array:
 
 
 SHARE = 0.9
-"""Fraction of stroke and limits that a record may use, since the table does not follow it exactly."""
+"""Fraction of the stroke and the limits that a record may use, since the table does not follow a record exactly."""
 
 
 @dataclass(frozen=True)

@@ -62,7 +62,7 @@ def _opened(path: Path, mode: int) -> Any:
 
 @lru_cache(maxsize=1)
 def _retry_limit() -> Any:
-    """The HDF5 library function that limits retries, which h5py does not expose; None if it cannot be found."""
+    """The function of the HDF5 library that limits retries, which h5py does not expose; None if it is not found."""
     for library in (cast(str, h5p.__file__), str(Path(h5py.__file__).parent / "hdf5.dll")):
         try:
             found = ctypes.CDLL(library).H5Pset_metadata_read_attempts

@@ -43,14 +43,17 @@ class Checksums:
             group,
             "values",
             self._values.values(),
-            description="SHA-256 of its uncompressed values; empty until closing for datasets that grow",
+            description="SHA-256 of the dataset's uncompressed values; empty until closing for datasets that grow",
         )
-        hdf5.write_texts(group, "attributes", attributes, description="SHA-256 of its attributes as JSON")
+        hdf5.write_texts(group, "attributes", attributes, description="SHA-256 of the dataset's attributes as JSON")
         hdf5.write_texts(
             group, "group", groups, description="path of each group other than this one and the views of fits"
         )
         hdf5.write_texts(
-            group, "group_attributes", groups.values(), description="SHA-256 of its attributes and links as JSON"
+            group,
+            "group_attributes",
+            groups.values(),
+            description="SHA-256 of the group's attributes and links, as JSON",
         )
 
     def reopen(self, entry: hdf5.Group) -> None:
@@ -120,7 +123,7 @@ def read_groups(entry: hdf5.Group) -> dict[str, str]:
 
 
 def read(entry: hdf5.Group) -> dict[str, tuple[str, str]]:
-    """The checksums of values and attributes by path; those of values are empty if the file was not closed."""
+    """The checksums of values and attributes by path; the checksums of values are empty if the file was not closed."""
     columns = [hdf5.read_texts(hdf5.dataset(entry, path)[:]) for path in (_DATASETS, _VALUES, _ATTRIBUTES)]
     return {path: (values, attributes) for path, values, attributes in zip(*columns, strict=True)}
 

@@ -74,7 +74,7 @@ class Copying:
             try:
                 values = stored[done : done + count]
             except (OSError, RuntimeError):
-                # narrow the search down to the first unreadable row
+                # halve the step, down to the first unreadable row
                 if count == 1:
                     break
                 step = count // 2

@@ -36,9 +36,9 @@ RAW_VALUES = tuple(
         ("run", "1", "number of armings of the rig"),
         ("sensor", "1", "number of the sensor's channel, in the order of the rig, from 0"),
         ("index", "1", "number of the measurement, counted by the sensor; it jumps where values were lost"),
-        ("time", "us", "time of the measurement on the sensor's clock"),
-        ("code", "1", "word of the sensor"),
-        ("arrival", "us", "time of its arrival on the computer's clock since the rig was armed"),
+        ("time", "us", "time of the measurement by the sensor's clock"),
+        ("code", "1", "output word of the sensor, before conversion"),
+        ("arrival", "us", "time of arrival by the computer's clock, since the rig was armed"),
     )
 )
 """Values of sensors with free-running clocks, as received, before resampling."""

@@ -40,7 +40,7 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True)
 class Field:
-    """A field. An absent number is stored as NaN, an absent switch as -1, and an absent string as empty.
+    """A field of a row. An absent number is stored as NaN, an absent switch as -1, and an absent string as empty.
 
     If `array` is true, each element of the value is a row. A `packed` field is compressed, in chunks of many rows.
     """
@@ -63,7 +63,7 @@ class Field:
         return np.dtype(np.int64 if self.kind is Kind.WHOLE and not self.optional else np.float64)
 
     def create(self, parent: hdf5.Group) -> hdf5.Dataset:
-        """Create the empty dataset of this field, usually uncompressed, so that appending works in place."""
+        """Create the empty dataset of this field, usually without compression, so that rows are appended in place."""
         if self.kind is Kind.TEXT:
             made = hdf5.grow_texts(
                 parent, self.name, TEXT_WIDTH, description=self.description, chunk=ROWS_PER_CHUNK // 4
@@ -195,7 +195,7 @@ class Packer:
         self._pool = ThreadPoolExecutor(THREADS, "record packer")
 
     def append(self, target: hdf5.Dataset, values: NDArray[Any]) -> None:
-        """Append rows; an incomplete chunk is written through h5py."""
+        """Append rows; complete chunks are compressed here, an incomplete chunk by h5py."""
         start, chunk = target.shape[0], (target.chunks or (1,))[0]
         head = min(-start % chunk, len(values))
         whole = (len(values) - head) // chunk
@@ -216,7 +216,9 @@ class Packer:
 
 
 def pack(values: NDArray[Any]) -> bytes:
-    """A chunk as filtered by `hdf5.FILTERS`: the first bytes of all values, then the second, and so on, compressed."""
+    """A chunk filtered as by `hdf5.FILTERS`: the first bytes of all values, then the second bytes, and so on,
+    compressed.
+    """
     shuffled = np.ascontiguousarray(values).view(np.uint8).reshape(-1, values.dtype.itemsize).T
     return zlib.compress(shuffled.tobytes(), hdf5.FILTERS["compression_opts"])
 
@@ -225,7 +227,7 @@ class Growing:
     """Appends rows to a dataset and hashes them, so that they need not be read again at the end of a long run."""
 
     def __init__(self, stored: hdf5.Dataset, packer: Packer | None = None) -> None:
-        """`packer` writes compressed chunks."""
+        """`packer` compresses and writes complete chunks."""
         self._stored, self.path = stored, stored.name
         self._packer = packer
         self._digest = sha256()

@@ -49,8 +49,8 @@ FILTERS: dict[str, Any] = {"shuffle": True, "compression": "gzip", "compression_
 
 def create(path: Path) -> File:
     """Create a new file; raises FileExistsError if it exists."""
-    # metadata are written in pages of disk-sector size, so a power failure does not split an item (measured in decision
-    # 10)
+    # metadata are written in pages of disk-sector size, so that a power failure cannot leave an item half written
+    # (measured in decision 10)
     return cast(File, h5py.File(path, "x", libver=VERSIONS, locking=locking(), fs_strategy="page", fs_page_size=PAGE))
 
 
@@ -77,7 +77,7 @@ def let_go(file: File) -> None:
 
 
 def open_again(path: Path) -> AbstractContextManager[File]:
-    """Open a finished file for additions. Raises OSError if this program has it open."""
+    """Open a finished file for additions. Raises OSError if this program already has the file open."""
     return cast("AbstractContextManager[File]", h5py.File(path, "r+", libver=VERSIONS, locking=locking()))
 
 
@@ -149,8 +149,8 @@ def text_type(width: int) -> np.dtype[Any]:
 def grow_texts(parent: Group, name: str, width: int, *, description: str, chunk: int) -> Dataset:
     """Create an empty, growing dataset of UTF-8 strings of at most `width` bytes.
 
-    HDF5 stores variable-length strings separately from their dataset, and a reader of a live file may see one without
-    the other; therefore all strings have a fixed length.
+    All strings have a fixed length, because HDF5 stores variable-length strings separately from their dataset and a
+    reader of a file that is being written may find one without the other.
     """
     made = parent.create_dataset(name, shape=(0,), maxshape=(None,), dtype=text_type(width), chunks=(chunk,))
     describe(made, description=description)
@@ -177,8 +177,8 @@ def write_texts(parent: Group, name: str, texts: Iterable[str], *, description: 
 
 
 def clip_text(text: str, width: int) -> bytes:
-    """The text as UTF-8 of at most `width` bytes; a longer one is cut with an ellipsis, without splitting a
-    character.
+    """The text as UTF-8 of at most `width` bytes; a longer text is cut off between two characters and ends with an
+    ellipsis.
     """
     stored = text.encode()
     if len(stored) <= width:

@@ -96,7 +96,7 @@ def reason(error: BaseException) -> str:
 
 @contextmanager
 def reading(what: str) -> Generator[None]:
-    """Convert exceptions from reading a damaged file to a DataFileError naming `what`."""
+    """Context manager that converts exceptions from reading a damaged file to a DataFileError that names `what`."""
     try:
         yield
     except DataFileError:

@@ -2,8 +2,8 @@
 
 On Windows locks are mandatory: while a reader with the usual locks of HDF5 has the file open, every write fails with
 errno 13, and HDF5 cannot repeat a flush that has failed. Therefore the writer excludes such readers: it locks one byte
-far beyond the end of the file, which every lock of the whole file overlaps. Readers without locks, such as this
-program, are not affected.
+far beyond the end of the file, and every lock of the whole file would include this byte. Readers without locks, such as
+this program, are not affected.
 """
 
 import errno
@@ -19,7 +19,9 @@ from pathlib import Path
 from bench.datafile.hdf5_reading import DataFileError
 
 HELD = 10.0
-"""Time for which another program, such as a virus scanner, may hold the file [s]; samples meanwhile wait in memory."""
+"""Time for which another program, such as a virus scanner, may hold the file [s]; during this time samples are kept in
+memory.
+"""
 PAUSE = 0.02
 """Pause between two attempts to write [s]."""
 GUARD = 2**62

@@ -51,7 +51,7 @@ def analysis_problems(file: hdf5.File, path: Path) -> Iterator[str]:
     """Problems of a re-analysis file other than wrong checksums: missing checksums, or a changed campaign file."""
     entry = hdf5.group(file, "entry")
     if GROUP not in entry:
-        yield "the file has no checksums because an older version wrote it; write it again"
+        yield "the file has no checksums because an older version wrote it; repeat the analysis to write a new file"
     source = hdf5.group(entry, "original")
     if _original(source, path) == "changed":
         yield f"the file of its campaign, {hdf5.read_text(source, 'file')}, is not the file that was analysed"
@@ -177,7 +177,7 @@ def _of_record(record: DataFile, size: int) -> Iterator[str]:
 
 
 def _of_layout(stored: hdf5.Dataset, counted: Mapping[str, int], size: int, *, closed: bool) -> Iterator[str]:
-    """Violations of the layout: missing units, wrong lengths and missing values."""
+    """Messages about violations of the layout: missing units, wrong lengths and missing values."""
     path = stored.name
     if stored.dtype.kind in "iuf" and not stored.attrs.get("units"):
         yield f"{path} has no units"

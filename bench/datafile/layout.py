@@ -102,7 +102,7 @@ def build(file: hdf5.File, skeleton: Skeleton) -> Parts:
     entry = hdf5.create_group(file, "entry", "NXentry")
     entry.attrs["default"] = "data"
     hdf5.write_text(entry, "title", skeleton.title)
-    hdf5.write_text(entry, "start_time", now(), description="wall clock at the creation of this file, ISO 8601")
+    hdf5.write_text(entry, "start_time", now(), description="wall-clock time of the creation of this file, ISO 8601")
     hdf5.write_text(entry, "program_name", "rocking-bench").attrs["version"] = software_version()
 
     metadata = hdf5.create_group(entry, "metadata", "NXcollection")
@@ -144,7 +144,11 @@ def create_ends(
         hdf5.write_text(entry, "status", Status.RUNNING, width=STATUS_WIDTH),
         hdf5.write_text(entry, "summary", "", width=SUMMARY_WIDTH, description="reason for the end of the campaign"),
         hdf5.write_text(
-            entry, "end_time", "", width=TIME_WIDTH, description="wall clock at its end, ISO 8601; empty while running"
+            entry,
+            "end_time",
+            "",
+            width=TIME_WIDTH,
+            description="wall-clock time of the end of the campaign, ISO 8601; empty while it is running",
         ),
     )
 

@@ -60,7 +60,7 @@ def open_datafile(path: Path, *, judging: bool = False) -> "DataFile":
 
 
 class DataFile(SampleReader):
-    """An open data file. Everything is read on access; `refresh` includes what a writer has added since."""
+    """An open data file. Everything is read on access; `refresh` includes the rows that a writer has added since."""
 
     def __init__(self, file: hdf5.File) -> None:
         super().__init__(hdf5.group(file, "entry"))
@@ -106,12 +106,12 @@ class DataFile(SampleReader):
 
     @property
     def wording(self) -> int:
-        """Version of the journal's sentences, see `bench.datafile.opening.WORDING`."""
+        """Version of the journal's sentences; see `bench.datafile.opening.WORDING`."""
         return int(hdf5.attribute(self._file, "wording")) if "wording" in self._file.attrs else 1
 
     @property
     def intervals(self) -> int:
-        """Version of the evaluation of uncertainties, see `bench.datafile.opening.INTERVALS`."""
+        """Version of the evaluation of uncertainties; see `bench.datafile.opening.INTERVALS`."""
         return int(hdf5.attribute(self._file, "intervals")) if "intervals" in self._file.attrs else 1
 
     @property
@@ -175,7 +175,7 @@ class DataFile(SampleReader):
 
     @cached_property
     def metadata(self) -> dict[str, str]:
-        """Metadata stored by the recorder, as strings by name."""
+        """The recorder's metadata: strings by name."""
         group = hdf5.group(self._entry, "metadata")
         return {name: hdf5.read_text(group, name) for name in hdf5.names(group)}
 

@@ -40,7 +40,7 @@ the run.
 """
 
 PATIENCE = 60.0
-"""Longest wait for the disk with the bench at rest [s]: at the end, and in `sync`."""
+"""Longest wait for the disk [s] while the bench is at rest: at the end of the campaign and in `sync`."""
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,8 @@ class Recorder:
         self._told = False
         self._closed = False
         self._committed, self._pressing, self._partial = time.monotonic(), False, False
-        # a daemon thread: a program that ends with an error does not wait for its recorder; the file remains readable
+        # a daemon thread, so that a program that ends with an error does not wait for the recorder; the file remains
+        # readable
         self._thread = threading.Thread(target=self._work, name="recorder", daemon=True)
         self._thread.start()
 
@@ -205,7 +206,7 @@ class Recorder:
         try:
             work()
         except Exception as error:
-            # any failure must end the run: an unrecorded campaign is worthless
+            # any failure must end the run, because an unrecorded campaign is worthless
             told = in_use(error) if is_held(error) else reason(error)
             failure = DataFileError(
                 f"{self.path} cannot be written any further ({told}): check the disk, then start a new run"

@@ -61,7 +61,9 @@ def add_lost_events(entry: hdf5.Group, lines: Sequence[Row]) -> tuple[int, int]:
 def _beyond(
     table: hdf5.Group, rows: Sequence[Row], compared: Sequence[str] | None = None
 ) -> list[tuple[hdf5.Dataset, NDArray[Any]]]:
-    """Every dataset of a table, with the rows to add; the preceding rows must equal those of the table."""
+    """Every dataset of a table with the rows to add to it. Earlier rows must equal those of the table; otherwise raises
+    DataFileError.
+    """
     new: list[tuple[hdf5.Dataset, NDArray[Any]]] = []
     for name in table:
         stored = hdf5.dataset(table, name)
@@ -72,7 +74,7 @@ def _beyond(
             raise DataFileError(f"the journal has no {name} for {table.name}: it is damaged") from error
         if compared is None or name in compared:
             told = values[: len(known)]
-            # JSON has only finite numbers
+            # JSON has no NaN or infinity: a number that is absent from the journal counts as equal
             same = (told == known[: len(told)]) | ((told != told) if told.dtype.kind == "f" else False)
             if not np.all(same):
                 raise DataFileError(f"journal and file differ in {stored.name}: it is the journal of another file")
@@ -228,7 +230,7 @@ def _is_made_anew(path: str) -> bool:
 
 
 def _counted(record: DataFile, judged: Integrity) -> Mapping[str, int]:
-    """The number of rows written to the disk or, if unknown, the length of the datasets."""
+    """For every part, the number of rows written to the disk or, if that is unknown, the length of the datasets."""
     if "/entry/complete" not in judged.failing:
         return record.counted
     lengths = dict.fromkeys(record.counted, 0)

@@ -37,7 +37,7 @@ def create_plot(entry: hdf5.Group, channels: Sequence[Channel], chunk: int) -> h
         TIME,
         "<f8",
         unit="s",
-        description="bench time of each row, for plots; blocks place the rows exactly",
+        description="bench time of each row, for plots; the blocks contain the exact positions of the rows",
         chunk=chunk,
         compress=True,
     )
@@ -45,9 +45,13 @@ def create_plot(entry: hdf5.Group, channels: Sequence[Channel], chunk: int) -> h
     for channel in channels:
         hdf5.link(data, channel.name, f"/entry/instrument/{channel.name}/counts")
         factor, offset = companions(channel.name)
-        hdf5.write_numbers(data, factor, channel.scale, unit=channel.unit, description="value per count, NXdata")
+        hdf5.write_numbers(data, factor, channel.scale, unit=channel.unit, description="value per count (NXdata)")
         hdf5.write_numbers(
-            data, offset, channel.offset / channel.scale, unit="counts", description="added before scaling, NXdata"
+            data,
+            offset,
+            channel.offset / channel.scale,
+            unit="counts",
+            description="offset added to the counts before scaling (NXdata)",
         )
     return time
 
@@ -71,7 +75,7 @@ class Timeline:
         self._last = -np.inf
 
     def seconds(self, time: float, run: int, first: int, n: int) -> NDArray[np.float64]:
-        """Times [s], shape (n,), of a block from sample `first` of `run`, read at `time` [s]."""
+        """Times [s], shape (n,), of a block that begins with sample `first` of `run` and was read at `time` [s]."""
         if run != self._run:
             # whole microseconds compress better; `max` prevents overlapping runs, whatever the bench clock reads
             begin = max(time - n / self._rate, self._last + 1.0 / self._rate)
@@ -82,13 +86,13 @@ class Timeline:
 
 
 CHUNK_TIME = 0.5
-"""Duration of a chunk of samples [s]; in a real-time run, the buffered time."""
+"""Duration of a chunk of samples [s]; in a real-time run, the longest time for which samples are buffered."""
 
 
 class Samples:
     """Datasets of the counts of each channel, the drive as float32 and the time as float64, always of equal length.
 
-    `time` is the dataset for the times, with chunks of `chunk_of(sample_rate)` rows.
+    `time` is the dataset of the times, with chunks of `chunk_of(sample_rate)` rows.
     """
 
     def __init__(
@@ -176,7 +180,7 @@ def _create_channel(instrument: hdf5.Group, channel: Channel, chunk: int) -> hdf
     sensor = hdf5.create_group(instrument, channel.name, "NXsensor")
     hdf5.write_text(sensor, "measurement", channel.quantity)
     hdf5.write_text(sensor, "model", channel.device)
-    description = f"{channel.quantity} as converted: counts * scale + offset is in {channel.unit}"
+    description = f"raw counts; counts * scale + offset is the {channel.quantity} in {channel.unit}"
     counts = hdf5.grow_numbers(
         sensor, "counts", channel.storage, unit="counts", description=description, chunk=chunk, compress=True
     )

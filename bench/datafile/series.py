@@ -46,7 +46,7 @@ class Series:
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
         if copy is False:
-            raise ValueError("values of a file require a copy")
+            raise ValueError("an array of a file's values is always a copy: use copy=True or omit it")
         return np.asarray(self[:], dtype=dtype)
 
     def pieces(self, size: int = ROWS_AT_ONCE) -> Iterator[NDArray[Any]]:
@@ -57,7 +57,7 @@ class Series:
 
 @dataclass(frozen=True)
 class RecordedRun:
-    """One run, from arming to stopping: its `number` from 1, its `rows` in the file and its arrays by channel.
+    """One run, from arming to stopping: its `number`, counted from 1, its `rows` in the file and its arrays by channel.
 
     `time` is in seconds since the rig was armed; it jumps where samples are missing.
     """
@@ -111,23 +111,23 @@ class SampleReader:
         return self._channel_named(name).to_unit(self.counts(name, rows))
 
     def drive(self, rows: slice = ALL) -> NDArray[np.float32]:
-        """The drive as sent [V]."""
+        """The drive as sent to the amplifier [V]."""
         return self._cut(hdf5.dataset(self._instrument, "drive/voltage"), rows)
 
     @cached_property
     def blocks(self) -> dict[str, NDArray[Any]]:
-        """Starts of the blocks: arrays `row`, `run`, `first` (sample index in the run) and `time` at which the block
-        was read [s].
+        """Starts of the blocks, as the arrays `row`, `run`, `first` (sample index in the run) and `time` [s] at which
+        the block was read.
         """
         stored = {name: hdf5.dataset(self._instrument, f"blocks/{name}") for name in ("row", "run", "first", "time")}
         columns = {name: hdf5.read(each, slice(None)) for name, each in stored.items()}
         whole = min(self._complete("blocks"), *(len(values) for values in columns.values()))
-        # the samples of the last blocks may not be written yet
+        # the samples of the last blocks may not have been written yet
         count = int(np.searchsorted(columns["row"][:whole], self.rows))
         return {name: values[:count] for name, values in columns.items()}
 
     def time(self, rows: slice = ALL) -> NDArray[np.float64]:
-        """Seconds since the rig was armed, per row: sample index over sample rate. Runs are concatenated."""
+        """Seconds since the rig was armed, for each row: sample index divided by sample rate. Runs are concatenated."""
         index = np.arange(*rows.indices(self.rows))
         blocks = self.blocks
         block = np.searchsorted(blocks["row"], index, side="right") - 1
@@ -155,7 +155,7 @@ class SampleReader:
             )
             for channel in self.channels
         }
-        drive = Series("drive", "drive as sent", "V", self.drive, rows)
+        drive = Series("drive", "drive as sent to the amplifier", "V", self.drive, rows)
         return RecordedRun(number, rows, series, drive, Series("time", "time since arming", "s", self.time, rows))
 
     @cached_property

@@ -48,7 +48,7 @@ class _Judge:
         self._seen: set[Any] = set()
 
     def group(self, group: Any, depth: int = 0) -> None:
-        """Check a group and everything below it."""
+        """Check a group and all objects below it."""
         path = group.name or "/"
         self._note(group, path)
         if depth > DEEPEST:
@@ -85,7 +85,7 @@ class _Judge:
         """Count an object. Raises DataFileError if it is linked twice, which could be a cycle."""
         place = h5py.h5g.get_objinfo(member.id).objno
         if place in self._seen:
-            raise DataFileError(f"{path} is linked twice")
+            raise DataFileError(f"{path} is linked twice, which this program never does")
         self._seen.add(place)
         self._objects += 1
         if self._objects > MOST_OBJECTS:

@@ -45,7 +45,7 @@ class JournalWriter:
         self._written = False
 
     def add(self, time: float, kind: str, text: str, more: Mapping[str, Any]) -> None:
-        """Append one event at `time` [s], with `more` content."""
+        """Append one event at `time` [s], with `more` as additional content."""
         line = json.dumps({"time": time, "kind": kind, "text": text, **more}, ensure_ascii=False) + "\n"
         # one unbuffered call per line, so that a killed program leaves complete lines
         os.write(self._handle, line.encode())

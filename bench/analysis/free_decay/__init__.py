@@ -1,1 +1,1 @@
-"""Stiffness and damping of the frame from a free decay: the exact linear response fitted to the laser signals."""
+"""Stiffness and damping of the frame from a free decay, by a fit of the exact linear response to the laser signals."""

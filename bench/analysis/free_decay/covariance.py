@@ -43,10 +43,10 @@ PHASES = 8
 
 
 def waves(fit: Fit, size: float, ranges: tuple[float, float]) -> Array:
-    """Linearity errors of each laser, for every number of periods and both quadratures, shape (m, 2, n)."""
+    """Linearity errors of each laser, for every number of periods and both quadrature components, shape (m, 2, n)."""
     seen = fit.fitted
     errors: list[Array] = []
-    # uniformly distributed phase: each quadrature has half the power
+    # the phase is uniformly distributed, so each quadrature component has half the power
     weight = size / np.sqrt(2.0 * WAVES.size)
     for laser in range(2):
         for number in WAVES:
@@ -102,8 +102,8 @@ class Errors:
 class Uncertainty:
     """Covariances of the quantities of `modal.NAMES`, shape (n, n), by contribution.
 
-    `mass_shift`, shape (n, 2), is the sensitivity to the masses; `time_shift`, shape (n,), the shift by one standard
-    uncertainty of the timebase.
+    `mass_shift`, shape (n, 2), is the sensitivity to the masses, and `time_shift`, shape (n,), is the shift due to one
+    standard uncertainty of the timebase.
     """
 
     parts: dict[str, Array]
@@ -152,7 +152,7 @@ def _parts(fit: Fit, errors: Errors) -> dict[str, Array]:
 
 
 def _spread(moved: Array) -> Array:
-    """Covariance of independent shifts, shape (m, count)."""
+    """Covariance due to independent `moved` shifts of the values, shape (m, count)."""
     return moved.T @ moved
 
 
@@ -189,7 +189,9 @@ def _left_alone(frequency: Array, fit: Fit) -> NDArray[np.bool_]:
 
 
 def _table(fit: Fit, quiet: float) -> Array:
-    """Contribution of the table sensor's white noise through the response, by the adjoint method."""
+    """Contribution of the table sensor's white noise, which acts through the frame's response; computed by the adjoint
+    method.
+    """
     rest = fit.stretch.table[fit.stretch.time < quiet]
     if rest.size < 2:
         return np.zeros_like(fit.inverse)

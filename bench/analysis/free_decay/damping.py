@@ -20,7 +20,9 @@ from bench.analysis.free_decay.fit import COUNT, DELAYS, GAINS, OFFSETS, STATE, 
 Array = NDArray[np.float64]
 
 WINDOWS = 5
-"""Number of windows in which a mode's damping is evaluated; the amplitude falls by the same factor in each."""
+"""Number of windows in which a mode's damping is evaluated; the amplitude decreases by the same factor in each
+window.
+"""
 
 FLOOR = 0.03
 """Fraction of a mode's largest amplitude down to which the mode is evaluated."""
@@ -119,7 +121,7 @@ def _mode(fit: Fit, which: int, begin: float, omega: float) -> _Mode:
 
 
 def _stepped(extended: Fit) -> tuple[Array, Fit]:
-    """Shifts of all values to the best fit, and the fit with the residual that remains."""
+    """Shifts of all values to the best fit, and the fit with the remaining residual."""
     moved = extended.moved(extended.residual)
     left = extended.residual - np.tensordot(moved, extended.jacobian, 1)
     return moved, replace(extended, residual=np.where(extended.residual == 0.0, 0.0, left))

@@ -68,7 +68,7 @@ def pulsed_decay(signals: Array, setting: Setting, quiet: float, begin: float) -
 
 
 def released_decay(signals: Array, setting: Setting) -> Decay:
-    """The decay of a frame that was released on a locked table some time after the start of the recording.
+    """The decay of a frame on a locked table that was released some time after the start of the recording.
 
     Raises Unusable if the fit fails.
     """
@@ -101,7 +101,7 @@ def _released(stretch: Stretch) -> float:
     seen = stretch.seen[1] - np.nanmedian(stretch.seen[1][stretch.time < _HELD])
     moved = np.nan_to_num(np.abs(seen))
     if moved.max() < 10.0 * np.nanstd(stretch.seen[1][stretch.time < _HELD]):
-        raise Unusable("the frame was not released during the recording: release it sooner, or record for longer")
+        raise Unusable("the frame was not released during the recording: release it earlier, or record for longer")
     return float(stretch.time[np.argmax(moved > _SLIPPED * moved.max())])
 
 

@@ -32,14 +32,14 @@ COUNT = BENDS.stop
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """The laser signals as a function of COUNT values. `reach` [m], shape (2,), are the R_i."""
+    """The laser signals as a function of COUNT values. `reach` [m], shape (2,), contains the R_i."""
 
     stretch: Stretch
     masses: tuple[float, float]
     reach: Array
 
     def parts(self, values: Array) -> tuple[Response, Array, Array]:
-        """The response, and (z1, z2) [m] and their velocities, shape (2, n), including the delays."""
+        """The response, and (z1, z2) [m] and their velocities [m/s], shape (2, n) each, delayed like laser 1."""
         found = response(Constants(*self.masses, *values[:4].tolist()), self.stretch.step)
         # a common delay is equivalent to a delay of the table's motion, since the initial state is free
         late, rate = self.stretch.driving(float(values[DELAYS][0]))
@@ -61,7 +61,7 @@ class Shown:
         return values[GAINS][:, None] * z + values[OFFSETS][:, None] + bent * share
 
     def jacobian(self, values: Array) -> Array:
-        """Derivatives of `shown`, shape (COUNT, 2, n)."""
+        """Derivatives of `shown` with respect to the values, shape (COUNT, 2, n)."""
         found, z, speed = self.parts(values)
         n = z.shape[1]
         further = values[DELAYS][1] - values[DELAYS][0]

@@ -1,11 +1,12 @@
 """Initial estimate of the frame by Prony's method, with the measured motion of the table as input.
 
-Both lasers' signals obey one difference equation of fourth order, whose coefficients are linear:
+Both lasers' signals obey one difference equation of fourth order, which is linear in its coefficients:
 
     y(n) = sum_k a_k y(n - k) + sum_k b_k x(n - k) + const
 
-The roots of 1 - sum a_k z^-k are the modes (Marple, Digital Spectral Analysis, 1987, ch. 11, and with an input Ljung,
-System Identification, 2nd ed., sec. 7.3: ARX). Given the roots, the mode shapes are also a linear problem.
+The roots of 1 - sum a_k z^-k are the modes (Marple, Digital Spectral Analysis, 1987, ch. 11, and, for a system with an
+input, Ljung, System Identification, 2nd ed., sec. 7.3: ARX). Given the roots, the mode shapes also follow from a linear
+problem.
 """
 
 import numpy as np
@@ -90,7 +91,7 @@ def _poles(seen: Array, x: Array, step: float) -> Complex:
     turns = np.roots(np.concatenate(([1.0], -found[:ORDER]))).astype(np.complex128)
     upper = turns[turns.imag > 0.0]
     if upper.size != 2:
-        raise Unusable("the decay does not show two modes of a frame: check the lasers, or request more motion")
+        raise Unusable("the decay does not show two modes of a frame: check the lasers, or request a larger motion")
     poles = np.asarray(np.log(upper) / step, np.complex128)
     return poles[np.argsort(np.abs(poles))]
 

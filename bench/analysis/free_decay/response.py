@@ -5,9 +5,9 @@ motion relative to the table:
 
     M z'' + C z' + K z = (k_1 x + c_1 x', 0)
 
-With w = z' - (c_1 / m_1, 0) x the derivative of x is not needed. The state (z, w) has two pairs of complex modes; each
-follows q' = lambda q + beta x, which is integrated exactly for linear interpolation of x (first-order hold): Franklin,
-Powell, Workman, Digital Control of Dynamic Systems, 3rd ed., 6.3.2.
+With w = z' - (c_1 / m_1, 0) x, the derivative of x is not required. The state (z, w) has two pairs of complex modes;
+each follows q' = lambda q + beta x, which is integrated exactly for linear interpolation of x (first-order hold).
+Source: Franklin, Powell, Workman, Digital Control of Dynamic Systems, 3rd ed., 6.3.2.
 """
 
 from dataclasses import dataclass

@@ -33,7 +33,7 @@ class Stretch:
     """`time`, shape (n,) [s], evenly spaced, from the first sample; `table` [m], shape (n,), the reading of
     the table's sensor, and `seen` [m], shape (2, n), the readings of the lasers on storeys 1 and 2, NaN where invalid.
 
-    `on_table`: the lasers are fixed to the table and measure relative to it.
+    If `on_table`, the lasers are fixed to the table and measure relative to it.
     """
 
     time: Array
@@ -58,7 +58,9 @@ class Stretch:
         return course, rate, np.gradient(rate, self.step)
 
     def driving(self, delay: float) -> tuple[Array, Array]:
-        """Displacement [m] and velocity [m/s] of the table `delay` [s] earlier, to second order."""
+        """Displacement [m] and velocity [m/s] of the table, `delay` [s] before each sample, to second order in the
+        delay.
+        """
         course, rate, bent = self._course
         return course - delay * rate + 0.5 * delay**2 * bent, rate
 
@@ -78,8 +80,8 @@ def stretch_of(table: Array, seen: Array, sample_rate: float, *, on_table: bool)
         lost = float(np.mean(~np.isfinite(values)))
         if lost > MOST_LOST:
             raise Unusable(
-                f"{name} has no value for {100.0 * lost:.1f} % of the samples: check its range and its wiring, or"
-                " request less motion"
+                f"{name} has no value for {100.0 * lost:.1f} % of the samples: check its range and its wiring, "
+                "or request a smaller motion"
             )
     there = np.isfinite(table)
     index = np.arange(table.size)

@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 POOR = 0.2
 """Ratio of residual to mean amplitude above which the model does not describe the motion.
 
-Impacts that differ by 1 % cause about 0.1.
+Impacts whose restitution differs by 1 % cause a ratio of about 0.1.
 """
 
 PUSH = 0.03
@@ -60,7 +60,7 @@ class Tilt:
 def analyse_tilt(seen: Recording, specimen: Specimen, least: float) -> Tilt:
     """Analyse a recording down to the swing whose largest angle is below `least` [rad].
 
-    Raises NotRocking, with the remedy, for a recording that does not show free rocking.
+    Raises NotRocking, with a remedy, if the recording does not show free rocking.
     """
     alpha = critical_angle(specimen.block)
     seen = without_gaps(seen)
@@ -91,7 +91,7 @@ clocks.
 """
 
 _NUMBERS, _RATES, _PHASES = 24, 12, 12
-"""Numbers of equally likely values of periods, clock differences and initial delays."""
+"""Numbers of equally likely values: of periods, of clock differences and of initial delays."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +112,7 @@ class LaserErrors:
             return np.zeros(fit.values.size + 1)
         rate, phase = np.meshgrid(CLOCK / longest * _middles(-1.0, 1.0, _RATES), _middles(0.0, 1.0, _PHASES))
         delay = longest * ((rate.ravel() * fit.times[:, None] + phase.ravel()) % 1.0)
-        # a delay of the signal is equivalent to a later release
+        # a delayed signal is equivalent to a later release
         changes = _carried(fit, fit.jacobian[:, [START]] * delay)
         return np.sqrt(np.mean(changes**2, axis=1))
 
@@ -142,8 +142,8 @@ def _carried(fit: RockingFit, error: Array) -> Array:
 
 @dataclass(frozen=True)
 class Combined:
-    """A value and its standard uncertainty with its parts: `noise` and `timing` differ between tilts, `linearity` and
-    `scale` are due to the laser, and `scatter` is the excess scatter of the tilts, with Student's t.
+    """A value and the contributions to its standard uncertainty: `noise` and `timing` differ between tilts, `linearity`
+    and `scale` are due to the laser, and `scatter` is due to the excess scatter of the tilts, with Student's t.
 
     `birge` is the ratio of the tilts' scatter to the expected one; NaN for a single tilt.
     """
@@ -189,7 +189,7 @@ def combined(values: ArrayLike, noise: ArrayLike, timing: ArrayLike, linearity: 
 
 
 _TREND = -1
-"""Row of the trend, which follows the values."""
+"""Index of the trend, which follows the values."""
 
 
 SCATTERED = 2.0

@@ -64,7 +64,7 @@ class RockingFit:
 
     @property
     def motion(self) -> FreeRocking:
-        """The fitted motion, on the side of the recorded tilt."""
+        """The fitted motion, to the side of the recorded tilt."""
         return _motion(self.values, float(np.sign((self.displacement - self.values[ZERO])[0])))
 
     @property
@@ -117,9 +117,8 @@ class RockingFit:
         return seen - self.values[BEND_2] * seen**2 - self.values[BEND_3] * seen**3
 
     def _scattered(self, gain: Array) -> Array:
-        """Covariance of `gain` @ residual: contributions are correlated only within a half swing.
-
-        Cluster sum of Liang and Zeger (1986) with the usual factor for few clusters.
+        """Covariance of `gain` @ residual, with contributions that are correlated only within a half swing: the cluster
+        sum of Liang and Zeger (1986), with the usual factor for few clusters.
         """
         parts = gain * self.residual
         starts = np.flatnonzero(np.diff(self.swing, prepend=-1))
@@ -135,7 +134,7 @@ def fit_rocking(seen: Recording, swings: Swings, points: Points, alpha: float, p
     """
     size = max(round(seen.sample_rate / _RATE), 1)
     times, displacement = _thinned(seen.times, size), _thinned(seen.displacement, size)
-    # the mean over a bin is the value at its centre plus this factor times the second derivative
+    # factor on the second derivative: the mean over a bin is the value at its centre plus this product
     spread = (size**2 - 1) / (24.0 * seen.sample_rate**2)
     swing = np.searchsorted(swings.crossings, times)
     since = times - np.append(-np.inf, swings.crossings)[swing]
@@ -177,7 +176,7 @@ def _freed(seen: Recording, swings: Swings) -> float:
 
 
 def _thinned(samples: Array, size: int) -> Array:
-    """Means of `size` samples."""
+    """Means of `size` consecutive samples each."""
     return samples[: samples.size // size * size].reshape(-1, size).mean(axis=1)
 
 
@@ -195,7 +194,7 @@ def _from_points(swings: Swings, points: Points, alpha: float, p: float) -> Arra
     count = known.size if known.all() else int(np.argmin(known))
     if count < FEWEST:
         few = f"{count} impacts are large enough, but {FEWEST} are required"
-        raise NotRocking(f"{few}: tilt the block farther, or raise the laser")
+        raise NotRocking(f"{few}: tilt the block farther, or mount the laser higher")
     instants, sizes = points.impacts[:count], np.abs(points.amplitudes[:count])
     side = float(np.sign(swings.held))
     left = np.log(energy(np.minimum(sizes, 0.99 * alpha), alpha))
@@ -221,5 +220,5 @@ def _least_squares(function: Callable[[Array], Array], start: Array, lowest: Arr
 
     found: Any = least_squares(function, start, bounds=(lowest, highest), x_scale="jac", max_nfev=60)
     if not found.success:
-        raise NotRocking("no motion of a rocking block fits: check the block's base and sides and the laser")
+        raise NotRocking("no motion of a rocking block fits the signal: check the block's base and sides and the laser")
     return found

@@ -34,11 +34,11 @@ _WINDOW, _PART = 0.08, 0.45
 """Largest half width of the fit around an impact: in seconds, and as a fraction of the shorter adjacent half swing."""
 
 _TURN = 0.6
-"""Half width of the fit around a turning point, relative to half of the half swing."""
+"""Half width of the fit around a turning point, as a fraction of half the duration of the half swing."""
 
 _DEGREE = 4
 _FEWEST = 12
-"""Minimum number of samples for a point."""
+"""Minimum number of samples in the fit of a point."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ def find_points(seen: Recording, swings: Swings, zero: float) -> Points:
     impacts: list[tuple[float, float]] = []
     turns: list[tuple[float, float]] = []
     for number, crossing in enumerate(swings.crossings):
-        # the last half swing is not followed by an impact: it is at most as long as the previous one
+        # the last half swing is not followed by an impact: its duration is at most that of the previous one
         length = marks[number + 1] - crossing if number + 1 < swings.crossings.size else crossing - marks[number - 1]
         window = min(_WINDOW, _PART * float(length))
         impacts.append(_impact(times, angle, float(crossing), window))
@@ -70,7 +70,7 @@ def find_points(seen: Recording, swings: Swings, zero: float) -> Points:
 
 
 def _impact(times: Array, angle: Array, guess: float, window: float) -> tuple[float, float]:
-    """Zero crossing of a cubic whose slope and curvature change at the crossing, and its uncertainty [s]."""
+    """Zero crossing of a cubic whose slope and curvature change at the crossing, and its standard uncertainty [s]."""
     instant, uncertainty = guess, np.nan
     for _ in range(3):
         instant, uncertainty = _closer(times, angle, instant, window)
@@ -148,8 +148,8 @@ class Relation:
 
 
 def amplitude_relation(points: Points, alpha: float) -> Relation:
-    """The relation for a block with critical angle `alpha` [rad], from the turning points up to the first unknown
-    one.
+    """The amplitude relation for a block with critical angle `alpha` [rad], from the turning points up to the first
+    unknown one.
     """
     known = np.isfinite(points.amplitudes)
     count = int(np.argmin(known)) if not known.all() else known.size
@@ -163,7 +163,7 @@ def amplitude_relation(points: Points, alpha: float) -> Relation:
     slope = float(weights @ np.log(left))
     level = float(np.average(np.log(left), weights=spread**-2))
     off = (np.log(left) - level - slope * number) / spread
-    # the observed scatter replaces the noise assumed for single points
+    # the uncertainty follows from the observed scatter, not from the noise assumed for single points
     birge = float(np.sqrt(off @ off / (count - 2)))
     r = float(np.exp(0.5 * slope))
     return Relation(

@@ -15,10 +15,10 @@ REST = 1.0
 """Time at the end of a recording for which the block must be at rest [s]."""
 
 GAP = 0.005
-"""Longest gap without valid samples that is interpolated [s], with an error below 5 um."""
+"""Longest gap without valid samples [s] that is interpolated; the error of the interpolation is below 5 um."""
 
 STILL = 2e-4
-"""Largest standard deviation of the displacement at rest [m]: resolution and noise of a laser."""
+"""Largest standard deviation [m] of the displacement at rest, due to the resolution and noise of a laser."""
 
 _HELD = 0.5
 """Time at the beginning of a recording over which the held tilt is averaged [s]."""
@@ -86,7 +86,7 @@ def without_gaps(seen: Recording) -> Recording:
 def find_swings(seen: Recording, least: float) -> Swings:
     """The half swings down to the first one whose largest angle is below `least` [rad].
 
-    Raises NotRocking, with the remedy, if the block was not released or did not come to rest.
+    Raises NotRocking, with a remedy, if the block was not released or did not come to rest.
     """
     n = round(REST * seen.sample_rate)
     end = seen.displacement[-n:]
@@ -116,7 +116,7 @@ def find_swings(seen: Recording, least: float) -> Swings:
 
 
 def _crossing(angle: Array, before: int, after: int) -> float:
-    """Zero crossing of a straight line between two samples of opposite sign [samples]."""
+    """Position [samples] of the zero crossing of a straight line between two samples of opposite sign."""
     return before + (after - before) * float(angle[before] / (angle[before] - angle[after]))
 
 

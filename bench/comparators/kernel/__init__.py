@@ -1,1 +1,1 @@
-"""Compiled functions of the comparators, on the equations of `sim.kernel`."""
+"""Compiled functions of the comparators, which use the equations of `sim.kernel`."""

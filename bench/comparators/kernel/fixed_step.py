@@ -1,6 +1,6 @@
 """The classical Runge-Kutta method with a fixed step, and the paper's procedure based on it.
 
-It uses the equations of `sim.kernel.equations` and the report of `sim.kernel.rocking.run`.
+Both use the equations of `sim.kernel.equations` and the report array of `sim.kernel.rocking.run`.
 """
 
 from math import ceil, cos, sin, sqrt
@@ -26,7 +26,7 @@ from sim.kernel.steps import (
 from sim.kernel.watching import UPLIFT_MARGIN
 
 STAGES = 5
-"""Rows of scratch space of a step: four stages and the state of a stage."""
+"""Number of rows of a step's scratch space: four stages and the state of a stage."""
 
 
 @compiled("Tuple((float64, float64))(float64[::1], float64)")
@@ -65,7 +65,8 @@ def rk4(
     k: NDArray[np.float64],
     out: NDArray[np.float64],
 ) -> None:
-    """One classical step (Kutta, 1901) of length `h`; a0, a1, a2: base acceleration at its start, middle and end.
+    """One classical step (Kutta, 1901) of length `h`. a0, a1 and a2 are the base accelerations at its start, middle and
+    end.
 
     k : scratch space, shape (STAGES, 6); its first row holds the rates at the start.
     """
@@ -141,9 +142,9 @@ def run_paper(
     """Section 3.3 of the paper, literally: steps `dt` on one grid, impacts detected by theta_{i-1} theta_i < 0.
 
     parts : 1 for the harmonic procedure, with the impact at the step's end; more for the seismic one, which repeats the
-    step in this many parts, with the impact at the end of the part in which the sign changes. Other arguments as for
-    `sim.kernel.rocking.run`. The block lifts when a step begins with |m| > b g M (Eq. 9, A.3) and never returns to
-    rest. Peaks are the largest values on the grid; samples are interpolated between grid points.
+    step in this many parts, with the impact at the end of the part in which the sign changes. The other arguments are
+    those of `sim.kernel.rocking.run`. The block lifts when a step begins with |m| > b g M (Eq. 9, A.3) and never
+    returns to rest. Peaks are the largest values on the grid; samples are interpolated between grid points.
     """
     following, k, part_slope = np.zeros(6), np.zeros((STAGES, 6)), np.zeros(6)
     peaks = report[PEAKS:]

@@ -1,7 +1,7 @@
 """The classical Runge-Kutta method with a fixed step and events located to its own order.
 
-An event is located not by interpolation but by steps of other lengths from the same state, which preserves order 4. It
-uses the equations of `sim.kernel.equations` and the report of `sim.kernel.rocking.run`.
+An event is located not by interpolation but by steps of other lengths from the same state, which preserves order 4. The
+method uses the equations of `sim.kernel.equations` and the report array of `sim.kernel.rocking.run`.
 """
 
 from math import ceil
@@ -119,8 +119,9 @@ def run_located(
 ) -> None:
     """Integrate with steps of at most `dt` that end at segment ends and events: order 4 across both.
 
-    Arguments and the rest criterion as for `sim.kernel.rocking.run`; the run fails after `most_impacts`. A block that
-    touches the ground within a step is detected if the distance falls at the step's start and rises at its end.
+    The arguments and the criterion for rest are those of `sim.kernel.rocking.run`; the run fails after `most_impacts`
+    impacts. A block that touches the ground within a step is detected if the distance falls at the step's start and
+    rises at its end.
     """
     following, k, slope = np.zeros(6), np.zeros((STAGES, 6)), np.zeros(6)
     peaks = report[PEAKS:]

@@ -125,7 +125,7 @@ def test_sensors_that_disagree_are_told() -> None:
 def test_periods_are_cut_and_the_first_ones_left_out() -> None:
     record = np.arange(45.0)
     assert np.array_equal(steady_periods(record, 10, 1), record[10:40].reshape(3, 10))
-    with pytest.raises(InvalidInput, match="two or more must remain"):
+    with pytest.raises(InvalidInput, match="at least two must remain"):
         steady_periods(record, 10, 3)
     record[20] = np.nan
     with pytest.raises(InvalidInput, match="every sample"):
