@@ -92,7 +92,7 @@ class Prepared(ABC, Generic[P]):
     def __init__(self, parameters: P, configuration: "BenchConfiguration", stored: "Sources | None" = None) -> None:
         self.parameters, self.configuration, self.stored = parameters, configuration, stored
         self.progress: Progress = silent
-        """Callable that receives the progress of long computations."""
+        """Callable to which long computations report their progress."""
 
     @cached_property
     def forecast(self) -> "Forecast":
@@ -119,7 +119,7 @@ class Prepared(ABC, Generic[P]):
         """Steps of the run from the beginning; the generator returns the result."""
 
     def collected(self, steps: 'Generator["Step", "Outcome", object]') -> Plan:
-        """Yield `steps`; returns the result from the points that they publish."""
+        """Yield `steps` and return the result computed from the points that they publish."""
         from bench.engine.steps import Publish
         from bench.events import PointFinished
 

@@ -12,7 +12,7 @@ from sim.errors import RockbenchError
 from sim.extras import require
 
 _PURPOSES = {"serial": "a laser on a serial port"}
-"""Parts of a backend that need an additional extra."""
+"""Purpose of each extra that only some benches require, for the error message."""
 
 
 def require_drivers(configuration: BenchConfiguration) -> None:
@@ -22,7 +22,8 @@ def require_drivers(configuration: BenchConfiguration) -> None:
 
 
 def open_rig(configuration: BenchConfiguration, *, realtime: bool) -> Rig:
-    """Open the configured backend, behind the checks of `drivers.border`; it is not armed. The caller closes it.
+    """Open the rig of the configured backend, unarmed and wrapped in the checks of `drivers.border`. The caller closes
+    it.
 
     Raises BackendFault if the backend returns no valid rig.
     """

@@ -22,7 +22,7 @@ HELD, PAUSE = 1.0, 0.05
 _paths: set[Path] = set()
 _reserved: set[Path] = set()
 _names: dict[Path, Path] = {}
-"""Final name of every result that is or was about to be renamed, by its temporary name."""
+"""Final name of every result that has been or is about to be renamed, by temporary name."""
 
 
 @contextmanager
@@ -41,8 +41,8 @@ def unfinished(path: Path) -> Generator[Path]:
 
 @contextmanager
 def temporary_folder() -> Generator[Path]:
-    """Context manager that creates an empty folder for files of this process, and removes folder and files at the
-    end.
+    """Context manager that creates an empty folder for files of this process, and removes the folder with its files at
+    the end.
     """
     with unfinished(Path(gettempdir(), f"rockbench-{uuid4().hex}")) as folder:
         folder.mkdir(mode=0o700)
@@ -86,10 +86,10 @@ def forget_completed() -> None:
 
 
 def write_new(path: Path, write: Callable[[Path], None], *, overwrite: bool = False) -> None:
-    """Writes a file under a temporary name in the folder of `path` and renames it when it is complete.
+    """Write a file under a temporary name in the folder of `path` and renames it when it is complete.
 
-    Raises InvalidInput if `path` exists and `overwrite` is False, or when its folder does not exist; RockbenchError
-    when the disk fails.
+    Raises InvalidInput if `path` exists and `overwrite` is False, or if its folder does not exist, and RockbenchError
+    if the disk fails.
     """
     if path.exists() and not overwrite:
         raise InvalidInput("file", str(path), "the file exists and is never overwritten; choose another name")
@@ -110,8 +110,8 @@ def whole(path: Path) -> None:
 
 
 def reserve(folder: Path) -> None:
-    """Register `folder`, created for results: if the process ends without running `finally`, it is removed if still
-    empty.
+    """Register `folder`, which was created for results: if the process ends without running `finally`, the folder is
+    removed unless it contains files.
     """
     _reserved.add(folder)
 

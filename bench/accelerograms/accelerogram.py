@@ -17,8 +17,8 @@ class Accelerogram:
 
     It is not filtered, scaled or shifted, except that the offset of K-NET's recorders is removed; `header` then states
     this offset. `name` is a short name for tables and legends. `source` is the path of the file, or a note that the
-    motion is synthetic; `format` is the file format, `unit` the unit in the file, `sha256` the hash of its bytes (of
-    the samples for a synthetic motion). `header` holds the source's header values by name.
+    motion is synthetic; `format` is the file format, `unit` the unit in the file, `sha256` the hash of the file's bytes
+    (of the samples for a synthetic motion). `header` holds the source's header values by name.
     """
 
     name: str

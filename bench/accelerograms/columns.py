@@ -188,7 +188,7 @@ def _column(text: RecordText, choices: Choices, table: _Table, time: bool) -> in
         found = [int(wanted) - 1]
     if len(found) != 1 or not int(time) <= found[0] < count:
         allowed = f"it must be one of {', '.join(offered)}"
-        raise InvalidInput(item, wanted, f"{allowed}; 1 is the time" if time else allowed)
+        raise InvalidInput(item, wanted, f"{allowed}; column 1 is the time" if time else allowed)
     return found[0]
 
 

@@ -1,8 +1,8 @@
 """U.S. Geological Survey `.smc` files: 11 lines of text, 48 integers, 50 reals, comments, then samples in cm/s2.
 
 Integer 16 is the number of comment lines, 17 that of samples; real 2 is the sampling rate, 30 and 32 are the largest
-and smallest sample. Columns are 10 wide and may touch. Source: USGS National Strong-Motion Program, "SMC-format data
-files", sections 3 and 4.
+and smallest sample. Columns are 10 characters wide and may touch. Source: USGS National Strong-Motion Program,
+"SMC-format data files", sections 3 and 4.
 """
 
 import re

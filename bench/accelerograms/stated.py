@@ -51,7 +51,7 @@ def acceleration_unit(text: RecordText, index: int, stated: str) -> str:
 
 
 def not_acceleration(text: RecordText, index: int, quantity: str) -> InvalidInput:
-    """The error for a file of another quantity, which line `index` states."""
+    """The error for a file that contains another quantity, as stated in line `index`."""
     return text.refusal(
         index, f"this is a {quantity.lower()} file; use the acceleration file of the same record (PEER: .AT2)"
     )

@@ -10,7 +10,7 @@ Peaks, durations and bands of six motions were measured on the records themselve
 its database, and the pulse, ten inches of displacement within one and a half seconds, is that of Housner and Trifunac
 (Bull. Seism. Soc. Am. 57, 1967); its duration and band are estimates. Periods and amplitudes of the other pulses were
 chosen by eye from the velocity pulses of the records, not fitted. Filter frequencies and noise durations were adjusted
-so that the mean over seeds has the declared values.
+so that the means over many seeds equal the declared values.
 """
 
 from dataclasses import dataclass
@@ -128,14 +128,14 @@ FADING = 1.5
 def synthetic_record(name: str, seed: int = DEFAULT_SEED) -> Accelerogram:
     """A synthetic ground motion with the main parameters of the record `name`, one of NAMES.
 
-    The peak is exact; duration and band have the declared values in the mean over seeds. The motion begins and ends at
-    rest, with zero velocity and displacement. The same seed produces the same record on every machine, to rounding.
-    Raises InvalidInput.
+    The peak is exact; the means of duration and band over many seeds equal the declared values. The motion begins and
+    ends at rest, with zero velocity and displacement. The same seed produces the same record on every machine, to
+    rounding. Raises InvalidInput.
     """
     if name not in SHAPES:
         raise InvalidInput("synthetic record", name, f"it must be one of {', '.join(NAMES)}")
     if seed < 0:
-        raise InvalidInput("seed", seed, "it must be an integer, at least 0")
+        raise InvalidInput("seed", seed, "it must be an integer of at least 0")
     shape = SHAPES[name]
     acceleration = _motion(shape, seed, NAMES.index(name))
     rounded = np.round(acceleration / HASHED).astype("<i8")

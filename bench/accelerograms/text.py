@@ -21,7 +21,7 @@ class RecordText:
     sha256: str
 
     def where(self, index: int) -> str:
-        """Description of the line `index`, counted from 0, in an error message."""
+        """Description of the line `index`, counted from 0, for an error message."""
         return f"{self.path.name}, line {index + 1}"
 
     def refusal(self, index: int, allowed: str) -> InvalidInput:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from sim.specimen import Specimen
 
 RIGS = "rockbench.rigs"
-"""Group of entry points."""
+"""Group of the entry points of rig backends."""
 
 
 class RigSettings(Parameters):

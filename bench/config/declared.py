@@ -32,7 +32,7 @@ class Declared:
     """One field of a group of parameters.
 
     `kind` is the type of the value, or of each value if there are `many`; `constraints` are the limits of each value
-    and `lengths` those of the number of values; `optional`: the value may be absent.
+    and `lengths` those of the number of values; `optional` states whether the value may be absent.
     """
 
     name: str
@@ -45,9 +45,9 @@ class Declared:
     constraints: tuple[object, ...]
     lengths: tuple[object, ...]
     usual: tuple[float, float] | None
-    """Lowest and highest magnitude without a notice, see `sim.parameters.usual_of`."""
+    """Lowest and highest magnitude that cause no notice; see `sim.parameters.usual_of`."""
     example: Any
-    """Example of valid input for a parameter absent by default, see `sim.parameters.example_of`."""
+    """Example of valid input for a parameter that is absent by default; see `sim.parameters.example_of`."""
     formerly: str | None
     """Name in earlier versions."""
 
@@ -58,7 +58,7 @@ class Declared:
 
     @property
     def element(self) -> type[Parameters] | None:
-        """The nested group of this field, one or many, or None for values."""
+        """The nested group of this field, which has one group or a list of groups; None for a field of values."""
         return self.kind if isinstance(self.kind, type) and issubclass(self.kind, Parameters) else None
 
     @property

@@ -123,7 +123,7 @@ def read_number(text: str, unit: str = "1", *, whole: bool = False) -> float:
 
 
 def read_values(text: str, unit: str = "1", *, whole: bool = False) -> list[float]:
-    """The values of one list item, a number or a range, in the SI `unit`. Raises ValueError as `number` does."""
+    """The values of one list item, a number or a range, in the SI `unit`. Raises ValueError like `read_number`."""
     if ":" not in text:
         return [read_number(text, unit, whole=whole)]
     start, stop, count, *more = (*(part.strip() for part in text.split(":")), "", "")

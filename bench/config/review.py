@@ -53,14 +53,14 @@ class Review:
     notices: tuple[str, ...]
 
     def require(self) -> None:
-        """Raise the first refusal."""
+        """Raise the first refusal, if there is one."""
         if self.refusals:
             raise self.refusals[0]
 
 
 @dataclass(frozen=True)
 class _Reach:
-    """The largest value of a limited quantity that the bench can reach, and what determines it."""
+    """The largest value of a limited quantity that the bench can reach, and the component that determines it."""
 
     limit: str
     most: float

@@ -45,7 +45,7 @@ class Simulation(Parameters):
 
     seed: int = quantity(1, "", "random seed of the virtual bench", ge=0, lt=2**32)
     bench: VirtualBenchParameters = VirtualBenchParameters()
-    specimen: Specimen | None = quantity(None, "", "the true specimen; if absent, the same as the assumed one")
+    specimen: Specimen | None = quantity(None, "", "the true specimen; if absent, the assumed specimen")
     spring_factor: float = quantity(1.0, "1", "ratio of true to nominal stiffness of every mounted spring", gt=0, le=10)
 
     @property
@@ -140,4 +140,4 @@ class Twin(Parameters):
         gt=0,
         example=0.5,
     )
-    persistence: float = quantity(2.0, "s", "time above a limit before it trips", ge=0, le=60)
+    persistence: float = quantity(2.0, "s", "time for which a limit must be exceeded before it trips", ge=0, le=60)

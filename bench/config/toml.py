@@ -190,7 +190,7 @@ _WIRED = {
     "hardware.laser_1.port": "COM5",
     "hardware.laser_2.port": "COM6",
 }
-"""Values of the keys without a usable default."""
+"""Values, in templates, of the keys without a usable default."""
 
 _DEVICES = [
     *(f"hardware.{key}" for key in ("sample_rate", "half_stroke", "band_low", "band_high")),

@@ -1,4 +1,4 @@
-"""Validation of external values, with a one-line message for each error."""
+"""Validation of values from outside the program, with a one-line message for each error."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
@@ -55,7 +55,9 @@ def problems(
 
 
 def former_names(model: type[Parameters], data: Mapping[str, Any], parent: Path = ()) -> Iterator[tuple[Path, str]]:
-    """The keys of `data` with their name of an earlier version, which `validated` accepts, and their present names."""
+    """The keys of `data` that have the name of an earlier version, which `validated` accepts, with their present
+    names.
+    """
     for entry in declared(model):
         if entry.formerly in data and entry.name not in data:
             yield (*parent, str(entry.formerly)), dotted((*parent, entry.name))
@@ -119,7 +121,7 @@ def _parsed(model: type[P], data: Mapping[str, Any]) -> P:
 
 
 def _in_si(model: type[Parameters], data: Mapping[str, Any]) -> dict[str, Any]:
-    """The data of a file, with strings that hold numbers with units, lists or ranges converted to numbers."""
+    """The data of a file, in which strings with units, lists or ranges have been converted to numbers."""
     found = dict(data)
     for entry in declared(model):
         value = found.get(entry.name)
