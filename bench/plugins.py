@@ -55,7 +55,7 @@ def plugin_code(name: str, *, files: bool = False) -> Generator[None]:
 
 
 def plugin_generator(name: str, code: Generator[Y, S, R]) -> Generator[Y, S, R]:
-    """The plug-in's generator, with exceptions converted as by `plugin_code`."""
+    """The plug-in's generator, with its exceptions converted like those in `plugin_code`."""
     with plugin_code(name):
         return (yield from code)
 

@@ -1,8 +1,8 @@
 """Unfinished results: temporary files and folders that a process must remove, however it ends.
 
-The code that creates one removes it, or renames it when complete. The list here is needed only where no `finally` runs:
-when an interrupted process ends because its main thread does not respond, see `bench.app.cli.interrupt`. A second list
-contains the complete results, which the message of a later interrupt names.
+The code that creates such a file or folder removes it, or renames it when it is complete. The list here is needed only
+where no `finally` runs: when an interrupted process ends because its main thread does not respond, see
+`bench.app.cli.interrupt`. A second list contains the complete results, which the message of a later interrupt names.
 """
 
 import os
@@ -86,7 +86,7 @@ def forget_completed() -> None:
 
 
 def write_new(path: Path, write: Callable[[Path], None], *, overwrite: bool = False) -> None:
-    """Write a file under a temporary name in the folder of `path` and renames it when it is complete.
+    """Write a file under a temporary name in the folder of `path`, and rename it when it is complete.
 
     Raises InvalidInput if `path` exists and `overwrite` is False, or if its folder does not exist, and RockbenchError
     if the disk fails.

@@ -164,7 +164,7 @@ def _step(text: RecordText, table: _Table) -> float:
     drift = np.abs(time - time[0] - dt * np.arange(time.size))
     if wrong.size or drift.max() > max(rounding, _EQUAL * usual):
         at = int(wrong[0]) + 1 if wrong.size else int(drift.argmax())
-        problem = f"the step from the time above is not the usual one, {usual:g} s"
+        problem = f"the step from the time above differs from the usual step, {usual:g} s"
         raise text.refusal(table.first + at, f"{problem}: there is a gap, or the times have too few digits")
     # the digits of the intended step: 0.01 instead of 0.00999999999
     meant = float(f"{dt:.9g}")

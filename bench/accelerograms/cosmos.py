@@ -83,7 +83,7 @@ def _step(text: RecordText, channel: Channel) -> float:
             if values.size >= _STEP and values[_STEP - 1] > 0.0:
                 return float(values[_STEP - 1])
             raise text.refusal(index, f"real number {_STEP}, the time step, is unknown")
-    raise text.refusal(channel.first, "the real header with the time step is missing; the file is damaged")
+    raise text.refusal(channel.first, "the real numbers, with the time step, are missing; the file is damaged")
 
 
 def _channels(text: RecordText) -> list[Channel]:

@@ -2,7 +2,7 @@
 
 Variants of that line: `NPTS= 4000, DT= .01000 SEC` (1999 to today, with or without a trailing comma) and `4000 0.0100
 NPTS, DT` (Pacific Engineering and Analysis). Spectrum-compatible files have the headers of earlier processing stages
-above the valid one. Samples are in 4 to 8 columns; the last row may be partial. Source: PEER Strong Motion Database,
+above the valid header. Samples are in 4 to 8 columns; the last row may be partial. Source: PEER Strong Motion Database,
 "Data files"; PEER NGA-West2 (2013).
 """
 

@@ -6,11 +6,11 @@ Kanai (1957) and Tajimi (1960), which models the ground as an oscillator, and th
 (Dynamics of Structures, 1975), which brings velocity and displacement back to zero. The noise is modulated before
 filtering, as by Amin and Ang, J. Eng. Mech. Div. ASCE 94, 1968.
 
-Peaks, durations and bands of six motions were measured on the records themselves. For Parkfield, the peak is the one in
-its database, and the pulse, ten inches of displacement within one and a half seconds, is that of Housner and Trifunac
-(Bull. Seism. Soc. Am. 57, 1967); its duration and band are estimates. Periods and amplitudes of the other pulses were
-chosen by eye from the velocity pulses of the records, not fitted. Filter frequencies and noise durations were adjusted
-so that the means over many seeds equal the declared values.
+Peaks, durations and bands of six motions were measured on the records themselves. For Parkfield, the peak is the value
+in the record's database, and the pulse, ten inches of displacement within one and a half seconds, is that of Housner
+and Trifunac (Bull. Seism. Soc. Am. 57, 1967); its duration and band are estimates. Periods and amplitudes of the other
+pulses were chosen by eye from the velocity pulses of the records, not fitted. Filter frequencies and noise durations
+were adjusted so that the means over many seeds equal the declared values.
 """
 
 from dataclasses import dataclass

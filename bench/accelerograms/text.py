@@ -1,4 +1,4 @@
-"""Text of a record file as numbered lines, whatever the line endings."""
+"""Text of a record file as numbered lines, with any kind of line ending."""
 
 import re
 from dataclasses import dataclass

@@ -74,8 +74,8 @@ class Cycle:
 def fit_cycle(
     index: int, phase: NDArray[np.float64], values: NDArray[np.float64], highest: int = HARMONICS
 ) -> Cycle | None:
-    """Fit samples `values`, shape (n, m), at `phase` [rad] up to harmonic `highest`, or to a lower one if there are few
-    samples. Returns None if too many samples are missing (NaN).
+    """Fit samples `values`, shape (n, m), at `phase` [rad] up to the harmonic `highest`, or up to a lower harmonic if
+    there are few samples. Returns None if too many samples are missing (NaN).
     """
     finite = np.isfinite(values)
     share = 1.0
@@ -156,7 +156,7 @@ class Waves:
 def mean_waves(cycles: Sequence[Cycle], bound: Mapping[int, int] | None = None) -> Waves:
     """Mean of the cycles' coefficients. Unlike a mean of peaks, it is not biased by noise.
 
-    `bound` maps a column to the highest harmonic of its signal; the mean and the higher harmonics of such a signal are
+    `bound` maps a column to the highest harmonic of its signal; the mean and the higher harmonics of that signal are
     set to zero.
     """
     all_coefficients = np.array([cycle.coefficients for cycle in cycles])

@@ -22,8 +22,8 @@ class LaserCurve(Parameters):
     """Error of one laser [m] as a function of its reading [m] relative to mid range."""
 
     sensor: str = quantity(..., "", "description of the laser in the data file of its calibration")
-    lowest: float = quantity(..., "m", "least reading covered", usual=(1e-3, 1.0))
-    highest: float = quantity(..., "m", "greatest reading covered", usual=(1e-3, 1.0))
+    lowest: float = quantity(..., "m", "smallest reading covered", usual=(1e-3, 1.0))
+    highest: float = quantity(..., "m", "largest reading covered", usual=(1e-3, 1.0))
     rest: float = quantity(..., "m", "reading with the storey at rest", usual=(1e-6, 0.1))
     error: tuple[float, ...] = quantity(
         ...,

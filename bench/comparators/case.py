@@ -2,8 +2,8 @@
 
 START and PHASE are the periodic orbit at beta 0.64, Omega 17 rad/s to ten digits: they define the case and are taken as
 exact. END and PEAKS are its solution by heyoka in 80-bit arithmetic at tolerance 1e-19, with an integrator and
-equations independent of ours; `tests/benchmarks/reference.py` recomputes them and checks the beginning of the motion
-with mpmath at 30 digits.
+equations that are independent of this program; `tests/benchmarks/reference.py` recomputes them and checks the beginning
+of the motion with mpmath at 30 digits.
 """
 
 import numpy as np

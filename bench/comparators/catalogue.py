@@ -116,7 +116,7 @@ SOLVERS: Mapping[str, Solver] = MappingProxyType(
         )
     }
 )
-"""Solvers by name. The first is the recommended one; the others are for comparison."""
+"""Solvers by name. The first is recommended; the others are for comparison."""
 
 
 def solve(

@@ -128,7 +128,7 @@ def python_rates(p: Vector, sg: float, row: Vector, t: float, x: Vector, out: Ve
 
 
 def _python(function: Any) -> Any:
-    """The Python function behind a compiled one."""
+    """The Python function from which a function was compiled."""
     return function.py_func
 
 

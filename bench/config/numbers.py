@@ -87,7 +87,7 @@ def _registry() -> Any:
 
 
 MOST_VALUES = 10_000
-"""Largest number of values in a range; a larger one is taken as a typing error."""
+"""Largest number of values in a range; a larger number is treated as a typing error."""
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?(?![\d.])", re.ASCII)
 _WHOLE = re.compile(r"[+-]?\d+", re.ASCII)

@@ -19,7 +19,7 @@ from sim.specimen import Specimen
 
 _ESTIMATE = 2.0
 """Largest ratio of the limit on an estimated force or current to its value at the accelerometer's range; larger limits
-are taken as typing errors.
+are treated as typing errors.
 """
 _LONGEST_WAIT, _LONGEST_DEBOUNCE, _WORST_CLOCK = 60.0, 1.0, 0.1
 """Longest usual delays of the guard for a missing sensor or block and for an exceeded limit [s], given that the table

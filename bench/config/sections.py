@@ -111,7 +111,7 @@ class Twin(Parameters):
     members: int = quantity(
         39,
         "",
-        "number of random specimens that represent the uncertainty of the mounted one; the band of n "
+        "number of random specimens that represent the uncertainty of the mounted specimen; the band of n "
         "specimens covers a measurement with probability (n - 1)/(n + 1)",
         ge=0,
         le=199,

@@ -1,9 +1,9 @@
 """Smallest change of a record that keeps the table within its limits of stroke and velocity at every sample.
 
 The change is a sum of slow half sines. Its cost is the integral of its square, weighted by frequency because slow parts
-hardly affect the specimen, plus its effect on the peaks of oscillators at given periods. This is a
-least-squares problem with linear inequalities: d and v at the samples are linear in the amplitudes of the sines. Only
-samples near a limit enter the problem; the solver adds others as they exceed it.
+hardly affect the specimen, plus its effect on the peaks of oscillators at given periods. This is a least-squares
+problem with linear inequalities: displacement and velocity at the samples are linear in the amplitudes of the sines.
+Only samples near a limit enter the problem; the solver adds other samples when they exceed a limit.
 """
 
 from dataclasses import dataclass

@@ -22,9 +22,9 @@ from sim.excitation import SineProgram, Sweep
 class DriveCalibration:
     """Response of the table to the drive, `response` [m/s2 per V] at `omega` [rad/s], ascending, shape (n,).
 
-    The response is complex, with the convention exp(+i omega t). It is the measured one and therefore includes the
-    delay of the filter before the converter. Its real and imaginary parts are interpolated linearly between the points
-    and are constant outside.
+    The response is complex, with the convention exp(+i omega t). It was measured and therefore includes the delay of
+    the filter before the converter. Its real and imaginary parts are interpolated linearly between the points and are
+    constant outside.
     """
 
     omega: tuple[float, ...]

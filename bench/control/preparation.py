@@ -32,7 +32,7 @@ def scaled(record: SampledRecord, length_ratio: float) -> SampledRecord:
 
 
 def resampled(record: SampledRecord, dt: float) -> SampledRecord:
-    """`record` at a step of `dt` [s], not longer than its own, by linear interpolation.
+    """`record` linearly interpolated to a step of `dt` [s], which must not exceed the record's step.
 
     If `dt` divides the record's step, the motion is unchanged; otherwise its corners are cut off. If it does not divide
     the duration, a final sample of zero is added. Raises InvalidInput for a longer step, which would lose content or

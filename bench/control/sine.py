@@ -7,8 +7,8 @@ and includes contributions of friction and the block's impacts. These are remove
     c_k <- c_k + GAIN (r_k - y_k) / g_k,   r = (1, 0, 0, ...),
 
 at each measurement, in bounded steps, where g_k is corrected by the secant (y_k - y_k') / (c_k - c_k') of two
-measurements if the step between them exceeded the noise. c_k is the share measured in the drive, not the commanded one,
-so a measurement made before the last step has taken effect repeats the same request.
+measurements if the step between them exceeded the noise. c_k is the share measured in the drive, not the commanded
+share, so a measurement made before the last step has taken effect repeats the same request.
 """
 
 from collections.abc import Sequence

@@ -80,8 +80,8 @@ class Stabiliser:
 
     @property
     def deviation(self) -> float:
-        """Estimated deviation of y from that of the orbit, relative to the latter, at the beginning of the next
-        cycle.
+        """Norm of the estimated deviation of y from the y of the orbit, relative to the norm of the latter, at the
+        beginning of the next cycle.
         """
         return float(np.linalg.norm(self._map.outputs @ self._state) / np.linalg.norm(self._map.orbit))
 

@@ -160,7 +160,7 @@ def _columns(row_type: type[Any]) -> list[tuple[str, Any, Mapping[str, str]]]:
 
 def _is_array(hint: Any) -> bool:
     origin = get_origin(hint)
-    # NDArray is a generic type in NumPy up to 2.4 and on Python 3.11, and later an alias of one
+    # NDArray is a generic type in NumPy up to 2.4 and on Python 3.11, and an alias of a generic type later
     return np.ndarray in (origin, get_origin(getattr(origin, "__value__", None)))
 
 
@@ -216,8 +216,8 @@ class Packer:
 
 
 def pack(values: NDArray[Any]) -> bytes:
-    """A chunk filtered as by `hdf5.FILTERS`: the first bytes of all values, then the second bytes, and so on,
-    compressed.
+    """The bytes of a chunk after the filters `hdf5.FILTERS`: the first bytes of all values, then the second bytes, and
+    so on, compressed.
     """
     shuffled = np.ascontiguousarray(values).view(np.uint8).reshape(-1, values.dtype.itemsize).T
     return zlib.compress(shuffled.tobytes(), hdf5.FILTERS["compression_opts"])

@@ -68,7 +68,7 @@ def _original(source: hdf5.Group, path: Path) -> str:
 def overview(path: Path) -> dict[str, Any]:
     """Read the metadata of a file, and the number of its samples.
 
-    Raises InvalidInput for a file of another kind, DataFileError for one that cannot be read.
+    Raises InvalidInput for a file of another kind, and DataFileError for a file that cannot be read.
     """
     with open_file(path, kinds=(FORMAT, ANALYSIS)) as file:
         try:
@@ -131,7 +131,7 @@ def verify(path: Path, done: Done = lambda _done, _all: None) -> Verdict:
     """Verify the complete file of a campaign or re-analysis, piece by piece in bounded memory. `done` receives the
     number of datasets processed.
 
-    Raises InvalidInput for a file of another kind, DataFileError for one that cannot be opened.
+    Raises InvalidInput for a file of another kind, and DataFileError for a file that cannot be opened.
     """
     judging = path.is_file() and not is_let_go(path)
     with open_file(path, judging=judging, kinds=(FORMAT, ANALYSIS)) as file:

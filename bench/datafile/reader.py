@@ -198,7 +198,7 @@ class DataFile(SampleReader):
     def columns_of(self, event: type[Event]) -> dict[str, list[Any]]:
         """Recorded events of a kind that has a table: one list per column, in the order of declaration.
 
-        An absent value is None, an unknown one NaN. Empty for an older file without this table.
+        An absent value is None, an unknown value NaN. Empty for an older file without this table.
         """
         table = event_table(event)
         return {} if table is None else {field.name: values for field, values in self.growing(table.path).items()}

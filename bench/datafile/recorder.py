@@ -109,7 +109,7 @@ class Recorder:
         self._thread.start()
 
     def __call__(self, event: Event) -> None:
-        """Queue an event. Raises DataFileError if it cannot be recorded or an earlier one could not be written."""
+        """Queue an event. Raises DataFileError if it cannot be recorded or an earlier event could not be written."""
         if self._closed:
             raise DataFileError(f"{self.path} is closed: {type(event).__name__} at {event.time:.3f} s was not recorded")
         self._raise_failure()

@@ -77,7 +77,7 @@ class Timeline:
     def seconds(self, time: float, run: int, first: int, n: int) -> NDArray[np.float64]:
         """Times [s], shape (n,), of a block that begins with sample `first` of `run` and was read at `time` [s]."""
         if run != self._run:
-            # whole microseconds compress better; `max` prevents overlapping runs, whatever the bench clock reads
+            # whole microseconds compress better; `max` prevents overlapping runs even if the bench clock is wrong
             begin = max(time - n / self._rate, self._last + 1.0 / self._rate)
             self._run, self._origin = run, round(begin - first / self._rate, 6)
         times = self._origin + np.arange(first, first + n) / self._rate

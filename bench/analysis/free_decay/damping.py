@@ -34,10 +34,10 @@ _DAMPING = slice(2, 4)
 class DampingCourse:
     """Damping of one mode as a function of its amplitude.
 
-    `slope` [1/m] is the change of the damping ratio with the amplitude of the drift, `own` and `common` [1/m2] its
-    variances: independent between decays, and common to all. `amplitude` [m], shape (WINDOWS,), is the mean amplitude
-    in each window, `damping` the damping ratio in it and `uncertainty` the standard uncertainty of that ratio, without
-    the common part.
+    `slope` [1/m] is the change of the damping ratio with the amplitude of the drift, `own` and `common` [1/m2] are the
+    variances of the slope due to errors that are independent between decays and to errors common to all decays.
+    `amplitude` [m], shape (WINDOWS,), is the mean amplitude in each window, `damping` the damping ratio in it and
+    `uncertainty` the standard uncertainty of that ratio, without the common part.
     """
 
     slope: float

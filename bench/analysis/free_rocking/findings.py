@@ -145,7 +145,7 @@ class Combined:
     """A value and the contributions to its standard uncertainty: `noise` and `timing` differ between tilts, `linearity`
     and `scale` are due to the laser, and `scatter` is due to the excess scatter of the tilts, with Student's t.
 
-    `birge` is the ratio of the tilts' scatter to the expected one; NaN for a single tilt.
+    `birge` is the ratio of the tilts' scatter to the expected scatter; NaN for a single tilt.
     """
 
     value: float

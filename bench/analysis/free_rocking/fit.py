@@ -31,7 +31,7 @@ FREE = 0.9
 """Fraction of the held tilt below which the block counts as released."""
 
 FEWEST = 12
-"""Minimum number of impacts that determine the parameters."""
+"""Minimum number of impacts for a fit."""
 
 _RATE = 250.0
 """Sample rate of the fit [1/s], to which the laser's samples are averaged; it is high enough for the motion."""
@@ -79,7 +79,7 @@ class RockingFit:
 
     @property
     def impacts(self) -> int:
-        """Number of impacts within the fitted data, including the one at its end."""
+        """Number of impacts within the fitted data, including the impact at the end of the data."""
         return int(self.swing[-1]) + 1
 
     @cached_property

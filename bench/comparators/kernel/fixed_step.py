@@ -112,7 +112,7 @@ def cubic_peak(y: float, slope: float, end: float, end_slope: float, h: float, s
     s = start / h
     best = max(abs(end), abs(y + s * (a + s * (b + s * c))))
     if slope * end_slope < 0.0:
-        # the one zero of a + 2 b s + 3 c s^2 between the ends, in the form without cancellation
+        # the only zero of a + 2 b s + 3 c s^2 between the ends, in the form without cancellation
         root = sqrt(max(0.0, b * b - 3.0 * a * c))
         q = -(b + root) if b >= 0.0 else root - b
         s = q / (3.0 * c) if c != 0.0 else -1.0
@@ -141,10 +141,11 @@ def run_paper(
 ) -> None:
     """Section 3.3 of the paper, literally: steps `dt` on one grid, impacts detected by theta_{i-1} theta_i < 0.
 
-    parts : 1 for the harmonic procedure, with the impact at the step's end; more for the seismic one, which repeats the
-    step in this many parts, with the impact at the end of the part in which the sign changes. The other arguments are
-    those of `sim.kernel.rocking.run`. The block lifts when a step begins with |m| > b g M (Eq. 9, A.3) and never
-    returns to rest. Peaks are the largest values on the grid; samples are interpolated between grid points.
+    parts : 1 for the harmonic procedure, with the impact at the step's end; more for the seismic procedure, which
+    repeats the step in this number of parts, with the impact at the end of the part in which the sign changes. The
+    other arguments are those of `sim.kernel.rocking.run`. The block lifts when a step begins with |m| > b g M (Eq. 9,
+    A.3) and never returns to rest. Peaks are the largest values on the grid; samples are interpolated between grid
+    points.
     """
     following, k, part_slope = np.zeros(6), np.zeros((STAGES, 6)), np.zeros(6)
     peaks = report[PEAKS:]
