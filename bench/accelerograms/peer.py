@@ -54,7 +54,9 @@ def read(text: RecordText, choices: Choices) -> Reading:
 
 
 def _size_line(text: RecordText) -> int | None:
-    """The last header line; those of earlier processing stages may precede it."""
+    """The line with NPTS and DT: the last such line, because headers of earlier processing stages may precede the valid
+    header.
+    """
     found = [k for k, line in enumerate(text.lines[:_LONGEST_HEADER]) if _sizes(line) is not None]
     return found[-1] if found else None
 

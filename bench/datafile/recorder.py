@@ -173,8 +173,8 @@ class Recorder:
         counts, n = event.block.counts, len(event.block)
         if counts.shape != (n, self._n_channels) or event.drive.shape != (n,):
             raise DataFileError(
-                f"block at sample {event.block.first} has inputs {counts.shape} and drive {event.drive.shape};"
-                f" expected ({n}, {self._n_channels}) and ({n},)"
+                f"block at sample {event.block.first} has inputs of shape {counts.shape} and a drive of shape "
+                f"{event.drive.shape}; expected ({n}, {self._n_channels}) and ({n},)"
             )
         copy = np.array(counts.T, order="C")
         return _Block(event.time, event.run, event.block.first, copy, event.drive.astype(np.float32))

@@ -4,15 +4,15 @@ Every error of a measured signal shifts the values by the gain of the linearised
 in how the error is described:
 
 - noise: from the spectrum of the residual (Welch), because neighbouring samples are correlated (laser resolution,
-filters); each quantity has the noise at the frequencies that determine it;
-- table: the noise of the table's sensor, filtered by the frame's response while a mode rings; its
-density is measured at rest before the motion;
+filters); the noise of each quantity is that at the frequencies which determine it;
+- table: the noise of the table's sensor, filtered by the frame's response while a mode rings; the
+density of this noise is measured at rest before the motion;
 - clock: the lasers' clocks run freely, so that the delay of a laser wanders by up to one of its measuring periods;
 - linearity: sine waves over the lasers' range, of any phase and typical numbers of periods, mostly absorbed by the
 fitted curvature;
 - masses: the uncertainty of the weighing;
-- timebase: a relative error of the sample clock enters once in frequencies and dashpots, twice in stiffnesses, not in
-damping ratios.
+- timebase: a relative error of the sample clock affects frequencies and dashpots once, stiffnesses twice, and damping
+ratios not at all.
 
 Errors due to noise, table and clock are independent between decays. Those due to linearity, masses and timebase are
 common to all decays.
