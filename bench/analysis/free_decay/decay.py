@@ -68,7 +68,7 @@ def pulsed_decay(signals: Array, setting: Setting, quiet: float, begin: float) -
 
 
 def released_decay(signals: Array, setting: Setting) -> Decay:
-    """The decay of a frame on a locked table that was released some time after the start of the recording.
+    """The decay of a frame that was released, with the table locked, some time after the start of the recording.
 
     Raises Unusable if the fit fails.
     """

@@ -73,7 +73,7 @@ def analyse_tilt(seen: Recording, specimen: Specimen, least: float) -> Tilt:
     if fit.rms > POOR * mean:
         raise NotRocking(
             f"the fit of the exact motion leaves a residual of {1e3 * fit.rms:.2g} mm out of {1e3 * mean:.3g} mm: "
-            "check that the block rocks on its two edges without yawing or sliding, then repeat"
+            "check that the block rocks on its two edges without yawing or sliding, then repeat the tilt"
         )
     straight = replace(seen, displacement=fit.straightened(seen.displacement))
     points = find_points(straight, swings, 0.0)

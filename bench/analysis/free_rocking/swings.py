@@ -76,7 +76,8 @@ def without_gaps(seen: Recording) -> Recording:
     if gaps[longest] > GAP * seen.sample_rate:
         at = (known[longest - 1] + 1) / seen.sample_rate if longest > 0 else 0.0
         raise NotRocking(
-            f"the laser has no valid reading at {at:.2f} s: check that the block stays within its range, then repeat"
+            f"the laser has no valid reading at {at:.2f} s: check that the block stays within the laser's range, "
+            "then repeat the tilt"
         )
     if known.size == seen.displacement.size:
         return seen
