@@ -10,7 +10,7 @@ DEEPEST = 40
 
 
 def read_bounded(path: Path) -> bytes:
-    """Contents of a file. Raises ValueError if it is larger than LARGEST, OSError if it cannot be read."""
+    """Contents of a file. Raises ValueError if it is larger than LARGEST, and OSError if it cannot be read."""
     with path.open("rb") as file:
         content = file.read(LARGEST + 1)
     if len(content) > LARGEST:

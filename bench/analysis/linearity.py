@@ -36,7 +36,7 @@ that the exponent of the covariance doubles.
 
 SMOOTH = 1.5
 """Estimated number of waves above which a linearity error is not smooth. The estimate is 1.2 waves for a sine with 1.5
-periods over the range, and 1.9 for one with 3.
+periods over the range, and 1.9 for a sine with 3 periods.
 """
 
 ZETA_3 = 1.2020569

@@ -134,7 +134,7 @@ def fit_rocking(seen: Recording, swings: Swings, points: Points, alpha: float, p
     """
     size = max(round(seen.sample_rate / _RATE), 1)
     times, displacement = _thinned(seen.times, size), _thinned(seen.displacement, size)
-    # factor on the second derivative: the mean over a bin is the value at its centre plus this product
+    # mean over a bin = value at the centre of the bin + spread * second derivative
     spread = (size**2 - 1) / (24.0 * seen.sample_rate**2)
     swing = np.searchsorted(swings.crossings, times)
     since = times - np.append(-np.inf, swings.crossings)[swing]
