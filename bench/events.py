@@ -127,12 +127,17 @@ class SpecimenMounted(Event):
     amount: float | None = column(
         "of the action", "amount involved in the action; absent if there is none", default=None
     )
+    beta: float | None = column(
+        "1", "stiffness ratio of the mounted spring; absent for the bare frame", default=None, init=False
+    )
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "beta", self.specimen.label)
 
     @property
     def line(self) -> str:
         amount = "" if self.amount is None else f" {self.amount:g}"
-        label = self.specimen.label
-        return f"{self.work}{amount}: {'bare frame' if label is None else f'beta = {label:g}'}"
+        return f"{self.work}{amount}: {'bare frame' if self.beta is None else f'beta = {self.beta:g}'}"
 
 
 @event(table="instrument/alignments")

@@ -7,9 +7,42 @@ would have lost an instrument and would cut the output at once. These children e
 import signal
 import subprocess
 import sys
+from contextlib import suppress
+
+from sim import waiting
 
 OWN_CONSOLE = subprocess.CREATE_NO_WINDOW if sys.platform == "win32" else 0
 """Creation flag of the child: a closed console ends only the processes attached to it (Windows)."""
+
+ENDING = 2.0
+"""Longest wait for a child to end [s]."""
+
+
+class ChildProcess:
+    """A process that runs `module` with `arguments`, and communicates by its standard `input` and `output`."""
+
+    def __init__(self, module: str, *arguments: str) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", module, *arguments],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            creationflags=OWN_CONSOLE,
+        )
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self.input, self.output = self._process.stdin, self._process.stdout
+
+    def write(self, sent: bytes) -> None:
+        """Send bytes to the process. Raises OSError if it has ended."""
+        self.input.write(sent)
+        self.input.flush()
+
+    def end(self) -> None:
+        """Close the input, and wait until the process has ended; may be called repeatedly."""
+        with suppress(OSError):
+            self.input.close()
+        waiting.end(self._process, ENDING)
 
 
 def ignore_requests() -> None:

@@ -1,6 +1,5 @@
 """An open campaign for scripts and notebooks: results, samples of signals in SI units, journal and configuration."""
 
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -26,8 +25,6 @@ from sim.specimen import Specimen
 
 REST = 2.0
 """Longest time at rest that is averaged for the zero of a signal [s], unless the protocol specifies another."""
-
-_ZERO_TAKEN = f"{State.ARMED} -> {State.RUNNING}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -186,14 +183,13 @@ class Campaign:
     @cached_property
     def runs(self) -> tuple[Run, ...]:
         """The runs in the file so far, in order."""
-        mounted = [event for event in self.events if event.kind == SpecimenMounted.__name__]
+        mounted = self._file.entries_of(SpecimenMounted)
         found: list[Run] = []
         for run, start in zip(self._file.runs, self._starts(), strict=True):
             stop = start + float(run.time[-1]) + 1.0 / self.sample_rate
             # the specimen is mounted before the rig is armed; both times agree within a block
-            texts = [event.text for event in mounted if event.time < 0.5 * (start + stop)]
-            label = re.search(r"beta = (\S+)$", texts[-1]) if texts else None
-            found.append(Run(run.number, start, stop, None if label is None else float(label[1])))
+            springs = [row["beta"] for row in mounted if row["time"] < 0.5 * (start + stop)]
+            found.append(Run(run.number, start, stop, springs[-1] if springs else None))
         return tuple(found)
 
     def samples(
@@ -245,10 +241,10 @@ class Campaign:
     def _rest(self, run: Run, begin: int) -> slice:
         """Rows at rest whose mean is the zero of the run that starts at row `begin`; empty if no zero was taken."""
         half = 0.5 / self.sample_rate
-        for event in self.events:
-            taken = event.kind == StateChanged.__name__ and event.text.startswith(_ZERO_TAKEN)
-            if taken and run.start + half < event.time <= run.stop + half:
-                end = begin + round((event.time - run.start) * self.sample_rate)
+        for row in self._file.entries_of(StateChanged):
+            taken = (row["before"], row["after"]) == (State.ARMED, State.RUNNING)
+            if taken and run.start + half < row["time"] <= run.stop + half:
+                end = begin + round((row["time"] - run.start) * self.sample_rate)
                 return slice(max(begin, end - round(self.parameters.get("rest", REST) * self.sample_rate)), end)
         return slice(begin, begin)
 

@@ -15,7 +15,7 @@ from bench.datafile.declared import FORMER, part_of
 from bench.datafile.hdf5 import is_let_go
 from bench.datafile.hdf5_reading import UNREADABLE, DataFileError, reason
 from bench.datafile.structure import check_attributes, check_structure
-from bench.events import LimitExceeded, OperatorAnswered, StateChanged, Warned
+from bench.events import LimitExceeded, OperatorAnswered, SpecimenMounted, StateChanged, Warned
 from sim.errors import CauseCode, InvalidInput
 
 
@@ -162,10 +162,11 @@ def _check_format(path: Path, file: hdf5.File, kinds: tuple[str, ...]) -> None:
 
 Columns = dict[str, Any]
 
-_STATE = re.compile(r"^[^:]+ -> (?P<after>[^:]+): (?P<reason>.*)$", re.DOTALL)
+_STATE = re.compile(r"^(?P<before>[^:]+) -> (?P<after>[^:]+): (?P<reason>.*)$", re.DOTALL)
 _REQUESTED = re.compile(r"^(stop|abort|halt) was asked for")
 _OPENED = re.compile(r"^(.+?) opened(?:;|$)")
 _ANSWER = re.compile(r"\(answered by (.+)\)$")
+_SPRING = re.compile(r"beta = (\S+)$")
 _TIMING = ("delay of a block of samples", "difference of the clocks")
 _TWIN_BEHIND = "the twin did not keep up, and is off until the rig is armed again"
 
@@ -193,9 +194,15 @@ def _answered(text: str) -> Columns:
     return {"by": found.group(1) if found else "operator"}
 
 
+def _mounted(text: str) -> Columns:
+    found = _SPRING.search(text)
+    return {"beta": float(found[1]) if found else None}
+
+
 _READERS: dict[str, Callable[[str], Columns]] = {
     StateChanged.__name__: _state_changed,
     OperatorAnswered.__name__: _answered,
     LimitExceeded.__name__: lambda text: {"timing": text.startswith(_TIMING)},
+    SpecimenMounted.__name__: _mounted,
     Warned.__name__: lambda text: {"realtime": text.startswith(_TWIN_BEHIND)},
 }

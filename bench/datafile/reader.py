@@ -15,21 +15,19 @@ from bench.datafile.declared import FIXED_GROUPS, TABLES, event_table, path_of
 from bench.datafile.fields import Field, decode, field_of
 from bench.datafile.findings_tables import FINDING_TABLES, last_findings, read_fits
 from bench.datafile.hdf5_reading import UNREADABLE, DataFileError, reading, reason
-from bench.datafile.opening import open_file
+from bench.datafile.opening import columns_from, open_file
 from bench.datafile.samples import PLOT as PLOT
 from bench.datafile.samples import TIME
-from bench.datafile.series import ROWS_AT_ONCE, SampleReader
+from bench.datafile.series import SampleReader
 from bench.datafile.tables import Column, as_rows
 from bench.events import Event, SensorsAligned
 from bench.findings import FitFinished
 from drivers.optoncdt.codec import IMPLAUSIBLE, LATE, LOST, MID_RANGE, marked
-from drivers.rig import Alignment, RawValues
+from drivers.rig import Alignment
 from drivers.timebase.resampling import Marks, resampled
 from sim.errors import InvalidInput
 from sim.identified import Identified
 from sim.sweep import Done
-
-RAW = "instrument/raw_values"
 
 
 @dataclass(frozen=True)
@@ -207,6 +205,15 @@ class DataFile(SampleReader):
         """The columns of `columns_of` as one dict per row."""
         return as_rows(self.columns_of(event))
 
+    def entries_of(self, event: type[Event]) -> list[dict[str, Any]]:
+        """Rows of a journalled event with bench `time`; columns that an older file lacks are those of its sentences."""
+        entries = [entry for entry in self.events if entry.kind == event.__name__]
+        rows = self.rows_of(event) or [{}] * len(entries)
+        return [
+            {"time": entry.time, **columns_from(entry.kind, entry.text), **row}
+            for entry, row in zip(entries, rows, strict=False)
+        ]
+
     def growing(self, path: str) -> dict[Field, list[Any]]:
         """The complete rows of the table at `path` below /entry, by column as declared in the file."""
         if not hdf5.has(self._entry, path):
@@ -226,23 +233,6 @@ class DataFile(SampleReader):
     def identified(self) -> Identified | None:
         """The last identified properties of the specimen; None if the run identified none."""
         return last_findings(*(self._rows(name) for name in FINDING_TABLES))
-
-    def raw_values(self, name: str, run: int) -> RawValues:
-        """The values received in `run` from a channel's sensor with a free-running clock; empty if the channel has no
-        such sensor.
-        """
-        sensor = [channel.name for channel in self.channels].index(self._channel_named(name).name)
-        columns = ("index", "time", "code", "arrival")
-        found = {column: [np.zeros(0, np.int64)] for column in columns}
-        if hdf5.has(self._entry, RAW):
-            table = hdf5.group(self._entry, RAW)
-            for begin in range(0, (rows := self._complete("raw_values")), ROWS_AT_ONCE):
-                part = slice(begin, min(begin + ROWS_AT_ONCE, rows))
-                chosen = hdf5.read(hdf5.dataset(table, "run"), part) == run
-                chosen &= hdf5.read(hdf5.dataset(table, "sensor"), part) == sensor
-                for column in columns if chosen.any() else ():
-                    found[column].append(hdf5.read(hdf5.dataset(table, column), part)[chosen])
-        return RawValues(name, *(np.concatenate(found[column]) for column in columns))
 
     def resampled(self, name: str, run: int) -> NDArray[np.float64]:
         """Values of a serial laser at the samples of `run`, in its unit, from all values received in that run,

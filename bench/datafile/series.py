@@ -13,8 +13,10 @@ from bench.datafile import hdf5
 from bench.datafile.hdf5_reading import DataFileError, reading
 from bench.datafile.opening import counts
 from bench.datafile.samples import read_channels
-from drivers.rig import Channel, Counts
+from drivers.rig import Channel, Counts, RawValues
 from sim.errors import InvalidInput
+
+RAW = "instrument/raw_values"
 
 ROWS_AT_ONCE = 2**18
 
@@ -157,6 +159,23 @@ class SampleReader:
         }
         drive = Series("drive", "drive as sent to the amplifier", "V", self.drive, rows)
         return RecordedRun(number, rows, series, drive, Series("time", "time since arming", "s", self.time, rows))
+
+    def raw_values(self, name: str, run: int) -> RawValues:
+        """The values received in `run` from a channel's sensor with a free-running clock; empty if the channel has no
+        such sensor.
+        """
+        sensor = [channel.name for channel in self.channels].index(self._channel_named(name).name)
+        columns = ("index", "time", "code", "arrival")
+        found = {column: [np.zeros(0, np.int64)] for column in columns}
+        if hdf5.has(self._entry, RAW):
+            table = hdf5.group(self._entry, RAW)
+            for begin in range(0, (rows := self._complete("raw_values")), ROWS_AT_ONCE):
+                part = slice(begin, min(begin + ROWS_AT_ONCE, rows))
+                chosen = hdf5.read(hdf5.dataset(table, "run"), part) == run
+                chosen &= hdf5.read(hdf5.dataset(table, "sensor"), part) == sensor
+                for column in columns if chosen.any() else ():
+                    found[column].append(hdf5.read(hdf5.dataset(table, column), part)[chosen])
+        return RawValues(name, *(np.concatenate(found[column]) for column in columns))
 
     @cached_property
     def counted(self) -> Mapping[str, int]:

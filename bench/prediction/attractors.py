@@ -11,7 +11,7 @@ from bench.datafile.tables import Column, Table
 from bench.prediction.requests import AttractorRequest
 from bench.prediction.steady import predict_spectra
 from bench.progress import Progress, counting, silent
-from sim.attractor import attractor, period_of
+from sim.attractor import Attractor, attractor
 from sim.gain import Layer
 from sim.knowledge import SpecimenKnowledge
 from sim.linear import steady_peaks
@@ -34,7 +34,8 @@ CYCLES, MEMBERS = 1500, 16
 class LongTerm:
     """Long-term motion with the spring `beta` at `omega` [rad/s]. The rocking orbit there has the gain `orbit`.
 
-    If the orbit on the table is `stable`, the motion is the orbit. `gains`, shape (n,), are the gains of the peaks of
+    If the orbit on the table is `stable`, the motion is the orbit. The motion repeats after `repeats` cycles; 0 if it
+    does not repeat, or if the block falls. `gains`, shape (n,), are the gains of the peaks of
     the last cycles; it is empty if the block falls, which happens after `fallen` cycles. `low` and `high` enclose the
     greatest peaks of 95 % of the drawn specimens whose block does not fall, and `falls` is the fraction of specimens
     whose block falls; all three are NaN without drawn specimens.
@@ -45,15 +46,11 @@ class LongTerm:
     orbit: float
     stable: bool
     gains: NDArray[np.float64]
+    repeats: int
     fallen: int | None = None
     low: float = nan
     high: float = nan
     falls: float = nan
-
-    @property
-    def repeats(self) -> int:
-        """Number of cycles after which the motion repeats; 0 if it does not repeat."""
-        return 1 if self.stable else period_of(self.gains[:, None])
 
     def gain(self, of: Callable[[NDArray[np.float64]], np.float64]) -> float:
         """A statistic of the gains; NaN after a fall."""
@@ -77,18 +74,18 @@ def long_term(
     fixed = layer.orbit
     orbit, beta = table_orbit(fixed, shaker, harmonics), fixed.specimen.label or 0.0
     if orbit.stable:
-        return LongTerm(fixed.omega, beta, layer.alpha_2, True, np.array([layer.alpha_2]))
+        return LongTerm(fixed.omega, beta, layer.alpha_2, True, np.array([layer.alpha_2]), 1)
 
-    def gains(specimen: Specimen) -> tuple[NDArray[np.float64], int | None]:
+    def gains(specimen: Specimen) -> tuple[NDArray[np.float64], Attractor]:
         found = attractor(specimen, shaker, orbit, cycles)
-        return found.peaks[:, 1] / steady_peaks(specimen.bare(), fixed.omega, fixed.amplitude).drift, found.fallen
+        return found.peaks[:, 1] / steady_peaks(specimen.bare(), fixed.omega, fixed.amplitude).drift, found
 
     drawn = known.draws(fixed.specimen, members, np.random.default_rng(SEED))
-    (own, fallen), *others = in_threads(gains, [fixed.specimen, *drawn])
-    greatest = [float(each.max()) for each, fell in others if fell is None]
+    (own, motion), *others = in_threads(gains, [fixed.specimen, *drawn])
+    greatest = [float(each.max()) for each, other in others if other.fallen is None]
     low, high = np.quantile(greatest, RANGE).tolist() if greatest else (nan, nan)
     falls = 1.0 - len(greatest) / len(others) if others else nan
-    return LongTerm(fixed.omega, beta, layer.alpha_2, False, own, fallen, low, high, falls)
+    return LongTerm(fixed.omega, beta, layer.alpha_2, False, own, motion.repeats, motion.fallen, low, high, falls)
 
 
 def long_terms(

@@ -5,7 +5,6 @@ transmission times to and from the server shifts every time derived from a call,
 """
 
 import struct
-import subprocess
 import sys
 import threading
 import time
@@ -13,7 +12,7 @@ from collections import deque
 from contextlib import suppress
 from typing import IO
 
-from drivers.child import OWN_CONSOLE, ignore_requests
+from drivers.child import ChildProcess, ignore_requests
 from drivers.clock import now
 from drivers.daqmx.parameters import Daq
 from sim import waiting
@@ -24,7 +23,6 @@ _PACE = 0.01
 _GOLDEN = 0.6180339887498949
 """Phase step between two readings, whose multiples are evenly distributed over a period."""
 _IDLE = 0.02
-_ENDING = 2.0
 _MOST = 10_000
 
 Reading = tuple[float, int, float]
@@ -35,23 +33,12 @@ class ClockWatch:
     """The process that reads the sample clock of the task `name` at `rate` [1/s], from `daq.server`."""
 
     def __init__(self, daq: Daq, name: str, rate: float) -> None:
-        command = [sys.executable, "-m", "drivers.daqmx.clock_watch", name, repr(rate)]
-        self._process = subprocess.Popen(
-            command,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            creationflags=OWN_CONSOLE,
-        )
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        self._input, self._output = self._process.stdin, self._process.stdout
+        self._child = ChildProcess("drivers.daqmx.clock_watch", name, repr(rate))
         self._found: deque[Reading] = deque(maxlen=_MOST)
         self._thread = threading.Thread(target=self._collect, name="clock watch", daemon=True)
         self._thread.start()
         with suppress(OSError):
-            self._input.write(daq.model_dump_json().encode() + b"\n")
-            self._input.flush()
+            self._child.write(daq.model_dump_json().encode() + b"\n")
 
     @property
     def alive(self) -> bool:
@@ -64,14 +51,12 @@ class ClockWatch:
 
     def close(self) -> None:
         """End the process; may be called repeatedly."""
-        with suppress(OSError):
-            self._input.close()
-        waiting.end(self._process, _ENDING)
+        self._child.end()
         waiting.join(self._thread)
-        self._output.close()
+        self._child.output.close()
 
     def _collect(self) -> None:
-        while len(read := self._output.read(_READING.size)) == _READING.size:
+        while len(read := self._child.output.read(_READING.size)) == _READING.size:
             self._found.append(_READING.unpack(read))
 
 

@@ -10,7 +10,6 @@ is open.
 
 import queue
 import struct
-import subprocess
 import sys
 import threading
 import time
@@ -21,11 +20,10 @@ from typing import IO
 
 from serial import Serial
 
-from drivers.child import OWN_CONSOLE, ignore_requests
+from drivers.child import ChildProcess, ignore_requests
 from drivers.clock import now
 from drivers.errors import ConnectionLost, DeviceNotFound
 from drivers.optoncdt.port import open_port
-from sim import waiting
 
 _HEAD = struct.Struct("<dI")
 _PACE = 0.0025
@@ -33,8 +31,6 @@ _PACE = 0.0025
 
 More frequent reads coincide with an arrival more often, which improves the identification of the sensor's clock.
 """
-_ENDING = 2.0
-"""Longest wait for the process to end [s]."""
 
 
 class Line:
@@ -46,17 +42,7 @@ class Line:
 
     def __init__(self, who: str, port: str, baud: int) -> None:
         self._who = who
-        command = [sys.executable, "-m", "drivers.optoncdt.line", who, port, str(baud)]
-        self._process = subprocess.Popen(
-            command,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            creationflags=OWN_CONSOLE,
-        )
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        self._input, self._output = self._process.stdin, self._process.stdout
+        self._child = ChildProcess("drivers.optoncdt.line", who, port, str(baud))
         try:
             next(self._frames())
         except (ConnectionLost, StopIteration) as error:
@@ -70,8 +56,7 @@ class Line:
 
     def write(self, sent: bytes) -> None:
         """Send bytes to the sensor. Raises OSError if the process has ended."""
-        self._input.write(sent)
-        self._input.flush()
+        self._child.write(sent)
 
     def chunks(self) -> Iterator[tuple[bytes, float]]:
         """Received bytes and their arrival [s], until `close`. Raises ConnectionLost if the port has disappeared."""
@@ -79,19 +64,17 @@ class Line:
 
     def close(self) -> None:
         """End the process and release the port; may be called repeatedly."""
-        with suppress(OSError):
-            self._input.close()
-        waiting.end(self._process, _ENDING)
+        self._child.end()
 
     def release(self) -> None:
         """Close the pipe from the process, after the last use of `chunks`."""
         with suppress(OSError):
-            self._output.close()
+            self._child.output.close()
 
     def _frames(self) -> Iterator[tuple[bytes, float]]:
-        while len(head := self._output.read(_HEAD.size)) == _HEAD.size:
+        while len(head := self._child.output.read(_HEAD.size)) == _HEAD.size:
             arrival, size = _HEAD.unpack(head)
-            content = self._output.read(size)
+            content = self._child.output.read(size)
             if isnan(arrival):
                 raise ConnectionLost(content.decode(errors="replace"))
             yield content, arrival

@@ -15,11 +15,9 @@ import pytest
 from bench.app.ipc import client
 from bench.app.ipc.client import SessionClient
 from drivers import child
-from drivers.daqmx import clock_watch
 from drivers.daqmx.clock_watch import ClockWatch
 from drivers.daqmx.parameters import Daq
 from drivers.errors import DeviceNotFound
-from drivers.optoncdt import line
 from drivers.optoncdt.line import Line
 from tests.bench.app.ipc.experiment import order
 
@@ -38,12 +36,12 @@ def open_line(port: str) -> Opened:
         opened.close()
         opened.release()
 
-    return opened._process, close  # pyright: ignore[reportPrivateUsage]
+    return opened._child._process, close  # pyright: ignore[reportPrivateUsage]
 
 
 def watch_clock(_port: str) -> Opened:
     watch = ClockWatch(Daq(server="127.0.0.1:1"), "no task", 1000.0)
-    return watch._process, watch.close  # pyright: ignore[reportPrivateUsage]
+    return watch._child._process, watch.close  # pyright: ignore[reportPrivateUsage]
 
 
 def ignored(process: int) -> set[int]:
@@ -97,7 +95,7 @@ def begin_session(folder: Path) -> None:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="the platform is an imitation")
-@pytest.mark.parametrize(("module", "begin"), [(line, begin_line), (clock_watch, begin_watch), (client, begin_session)])
+@pytest.mark.parametrize(("module", "begin"), [(child, begin_line), (child, begin_watch), (client, begin_session)])
 def test_on_windows_a_child_is_not_attached_to_the_console(
     module: object, begin: Callable[[Path], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

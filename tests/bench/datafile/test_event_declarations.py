@@ -5,6 +5,7 @@ from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 
+import h5py  # pyright: ignore[reportMissingTypeStubs]
 import numpy as np
 import pytest
 
@@ -18,13 +19,14 @@ from bench.datafile.reader import open_datafile
 from bench.datafile.recovery import recover
 from bench.datafile.writer import journal_path
 from bench.engine.interface import EventStream
-from bench.events import Event, SensorsAligned, StepStarted, Warned, event
+from bench.events import Event, SensorsAligned, SpecimenMounted, StepStarted, Warned, event
 from bench.findings import TableIdentified
 from bench.live_values import LiveValue
 from drivers.clock import VirtualClock
-from drivers.rig import Alignment
+from drivers.rig import Alignment, OperatorTask
 from sim.errors import InvalidInput
 from sim.parameters import column
+from sim.specimen import Specimen
 from tests.bench.datafile.example import begin, block, record
 from tests.command_line import rendered
 
@@ -117,6 +119,18 @@ def test_an_event_that_the_protocol_does_not_name_is_refused(tmp_path: Path) -> 
     recorder.close("completed")
     with pytest.raises(InvalidInput, match="points"):
         begin(tmp_path / "other.h5", events=(event(table="points")(type("Points", (Tone,), {"__doc__": "x"})),))
+
+
+def test_the_mounted_spring_is_a_column_and_in_older_files_a_sentence(tmp_path: Path) -> None:
+    path, spring = tmp_path / "campaign.h5", Specimen().coupled(0.64)
+    works = ((Specimen().bare(), OperatorTask.REMOVE_BLOCK), (spring, OperatorTask.MOUNT_SPRING))
+    record(begin(path), block(0, 10), *(SpecimenMounted(*each, time=1.0) for each in works))
+    for old in (False, True):
+        if old:
+            with h5py.File(path, "r+") as file:
+                del file["entry/operator_actions/beta"]
+        with open_datafile(path) as kept:
+            assert [row["beta"] for row in kept.entries_of(SpecimenMounted)] == [None, 0.64]
 
 
 def test_the_line_of_an_event_is_that_of_journal_terminal_and_window(tmp_path: Path) -> None:
