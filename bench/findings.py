@@ -24,7 +24,7 @@ class TableIdentified(Event):
     frequency: Array = column("Hz", "frequency line of the identification")
     real: Array = column("m/s2/V", "table acceleration per drive, real part, exp(+i omega t)")
     imaginary: Array = column("m/s2/V", "table acceleration per drive, imaginary part")
-    uncertainty: Array = column("m/s2/V", "standard uncertainty of the response, from noise and distortion")
+    uncertainty: Array = column("m/s2/V", "standard uncertainty of the response due to noise and distortion")
     distortion: Array = column("m/s2/V", "standard deviation of one realisation due to nonlinear distortion alone")
     coherence: Array = column("1", "fraction of the acceleration's power that is coherent with the drive")
     noise: Array = column("m/s2/Hz^0.5", "spectral density of the noise in the acceleration")
@@ -60,7 +60,7 @@ class FitFinished(Event):
 
     `columns` holds series of equal length by name: first the axis (such as time), then the measured values and, for
     comparison, the fitted values, residuals and so on. Raises ValueError unless all names are valid in a data file.
-    Stored by `bench.datafile.declared`.
+    Stored by `bench.datafile.findings_tables`.
     """
 
     name: str
@@ -85,7 +85,9 @@ class FitFinished(Event):
 
 @event()
 class SpecimenIdentified(Event):
-    """The specimen as identified so far: findings of this and earlier runs; stored by `bench.datafile.declared`."""
+    """The specimen as identified so far: findings of this and earlier runs; stored by
+    `bench.datafile.findings_tables`.
+    """
 
     identified: Identified
 

@@ -1,4 +1,4 @@
-"""Events with running values, shown while a test lasts: of a protocol, of the gains, of the live model."""
+"""Events with running values that are shown during a test: those of a protocol, of the gains and of the live model."""
 
 from math import nan
 
@@ -18,7 +18,7 @@ class LiveValue(Event):
     label: str = column("", "description of the quantity")
     value: float = column("of the row", "present value, in the unit of the row")
     unit: str = column("", 'SI unit of the row; "1" for a pure number', default="1")
-    uncertainty: float = column("of the row", "its expanded uncertainty (k = 2); NaN if unknown", default=nan)
+    uncertainty: float = column("of the row", "expanded uncertainty of the value (k = 2); NaN if unknown", default=nan)
     predicted: float = column("of the row", "predicted value; NaN if there is none", default=nan)
 
 
@@ -48,7 +48,7 @@ class RunningGain(Event):
 
     record: str = column("", "name of the record")
     beta: float | None = column("1", "stiffness ratio of the coupling spring; absent for the bare frame")
-    seconds: float = column("s", "time into the record")
+    seconds: float = column("s", "time since the start of the record")
     drift_peak: float = column("m", "peak drift since the record began")
     alpha_2: float = column("1", "ratio of the peak drifts so far, coupled over bare")
     predicted: float = column("1", "predicted alpha_2 so far")
@@ -66,7 +66,7 @@ class TwinEstimate(Event):
     `_low` and `_high` are the ends of the model's band, `_measured` the values of the lasers. `alpha_2` is available
     once the protocol has published a gain. `residual` is the root mean square of measured minus modelled drift over the
     last second, `excess` that of the measured drift outside the band, both relative to the largest drift so far. The
-    band is formed by `members` models together with the nominal one. Values that do not exist are NaN.
+    band is formed by `members` models together with the nominal model. Values that do not exist are NaN.
 
     `trace`, shape (n, 6), is the model's motion since the previous estimate, every 10 ms, with the columns TWIN_TRACE.
     """

@@ -71,8 +71,8 @@ class SteadyPeak:
 
 @dataclass(frozen=True)
 class Gain:
-    """alpha_2 with its expanded uncertainty (k = 2), the budget of standard uncertainties, and the `shapes` of the
-    linearity errors that it is based on.
+    """alpha_2 with its expanded uncertainty (k = 2), the budget of standard uncertainties, and the linearity errors
+    (`shapes`) on which the budget is based.
     """
 
     alpha_2: float

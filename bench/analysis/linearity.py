@@ -130,7 +130,7 @@ class LinearityErrors:
     waves: float
 
     def scaled(self, factors: Sequence[float]) -> "LinearityErrors":
-        """These errors times one factor per test."""
+        """These errors multiplied by one factor per test."""
         return replace(self, moments=self.moments * np.outer(factors, factors))
 
     def draws(self, normal: Array) -> Array:

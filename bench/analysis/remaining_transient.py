@@ -60,9 +60,9 @@ def remaining_transient(series: Array, measured: int) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """Least squares of a constant and both parts of each of K modes over n cycles: `modes`, shape (K, n, 3), the
-    `inverse` of their normal equations, (K, 3, 3), the mean of the parts over the measured cycles, `share`, (K, 3), and
-    the variance of the mode's mean relative to that of white noise, `gains`, (K,).
+    """Least-squares fit of a constant and both parts of each of K modes over n cycles: `modes`, shape (K, n, 3); the
+    `inverse` of their normal matrix, (K, 3, 3); the mean of the parts over the measured cycles, `share`, (K, 3); and
+    the variance of the fitted mode's mean relative to that of white noise, `gains`, (K,).
     """
 
     modes: Array
@@ -72,7 +72,7 @@ class _Fit:
 
     @staticmethod
     def of(decays: Sequence[float] | Array, angles: Sequence[float] | Array, n: int, measured: int) -> "_Fit":
-        """The fit of every modulus with every angle [rad]."""
+        """The fit of the modes with every combination of modulus and angle [rad]."""
         modes = _modes(*np.meshgrid(decays, angles, indexing="ij"), n)
         # the imaginary part of a mode with psi = 0 or pi is zero
         normal = modes.transpose(0, 2, 1) @ modes
@@ -82,7 +82,9 @@ class _Fit:
         return _Fit(modes, inverse, share, np.einsum("ki,kij,kj->k", share, inverse, share))
 
     def fitted(self, series: Array) -> tuple[Array, Array, Array]:
-        """For each mode: sum of squares of the residuals, mean of the fitted mode over the measured cycles, `gains`."""
+        """For each mode: sum of squares of the residuals, mean of the fitted mode over the measured cycles, and
+        `gains`.
+        """
         found = np.einsum("kij,kj->ki", self.inverse, self.modes.transpose(0, 2, 1) @ series)
         residuals = series - np.einsum("kni,ki->kn", self.modes, found)
         return np.sum(residuals**2, axis=1), np.sum(self.share * found, axis=1), self.gains

@@ -12,11 +12,12 @@ errors.
 
 
 class RunningGain:
-    """alpha_2 during a test, with the budget of `gain` but for the amplitude of the table, which has no slope yet.
+    """alpha_2 during a test, with the budget of `gain` except the contribution of the table's amplitude, whose slope is
+    not yet known.
 
-    The linearity errors of the lasers, which take most of the time, are evaluated again once the readings have changed
-    by `CHANGED`; until then they are those of the earlier motion, relative to its drift, which changes the uncertainty
-    by less than a hundredth.
+    The linearity errors of the lasers, which take most of the time, are evaluated again when the readings have changed
+    by `CHANGED`. Until then those of the earlier motion, relative to its drift, are used, which changes the uncertainty
+    by less than 1 %.
     """
 
     def __init__(self, bare: SteadyPeak, sensors: SensorUncertainty, shared: SharedDraws) -> None:
@@ -25,7 +26,7 @@ class RunningGain:
         self._kept: tuple[PeakReadings, Shapes] | None = None
 
     def of(self, coupled: SteadyPeak) -> Gain:
-        """The gain of a peak."""
+        """Gain for the peak `coupled`."""
         shapes: Shapes | None = None
         if self._kept is not None and not _changed(self._kept[0], coupled.readings):
             at, kept = self._kept
@@ -45,5 +46,5 @@ def _changed(before: PeakReadings, after: PeakReadings) -> bool:
 
 
 def shared_draws() -> SharedDraws:
-    """Random draws for `gain`, made once for a running gain."""
+    """Random draws for `gain`, generated once for all values of a running gain."""
     return SharedDraws(SEED, DRAWS)

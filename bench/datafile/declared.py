@@ -1,7 +1,7 @@
 """The growing tables of the file, except the samples, and their names.
 
-The tables of events follow from their declarations, in `bench.events`, `bench.live_values`, `bench.findings`
-and, of the events of a protocol, in its own modules.
+The tables of events follow from the declarations of the events in `bench.events`, `bench.live_values`, `bench.findings`
+and the modules of a protocol.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -96,7 +96,7 @@ def event_table(kind: type[Event]) -> EventTable | None:
 
 
 def event_tables(kinds: Iterable[object]) -> dict[type[Event], EventTable]:
-    """The tables of those of `kinds` that are events with a table, in the order of their declaration."""
+    """Tables, in the order of declaration, of the members of `kinds` that are events with a table."""
     declared = (kind for kind in kinds if isinstance(kind, type) and issubclass(kind, Event))
     return {kind: table for kind in declared if (table := event_table(kind)) is not None}
 
@@ -104,15 +104,15 @@ def event_tables(kinds: Iterable[object]) -> dict[type[Event], EventTable]:
 EVENT_TABLES: Mapping[type[Event], EventTable] = event_tables(
     kind for module in (events, live_values, findings) for kind in vars(module).values()
 )
-"""Tables of events that every file has; those of a protocol's events follow."""
+"""Tables of events that every file has; the tables of a protocol's events follow them."""
 
 ENTRY_TABLES: Mapping[type[Event], EventTable] = {
     kind: table for kind, table in EVENT_TABLES.items() if kind.journalled and table.single
 }
-"""Those with exactly one row for each journal entry of their kind."""
+"""Tables with exactly one row for each journal entry of their kind."""
 
 ENTRY_PATHS = {**{kind.__name__: table.path for kind, table in ENTRY_TABLES.items()}, "PassFinished": "passes"}
-"""Tables of journal entries of earlier versions, which do not name them."""
+"""Tables of journal entries in the files of earlier versions, which do not name the tables."""
 
 TABLES: Mapping[str, tuple[Field, ...]] = {
     "instrument/blocks": BLOCKS,
@@ -134,13 +134,13 @@ FORMER = (
     *("state_changes", "operator_actions", "warnings", "exceeded_limits", "operator_requests", "operator_answers"),
     *("raw_values", "hold_cycles", "operator_notes"),
 )
-"""Names of the counters in the dataset `complete` of earlier versions, which do not name them, in this order: rows
-beyond these counts were incomplete when the disk or the writer failed.
+"""Names, in order, of the counters in the dataset `complete` in files of earlier versions, which do not name the
+counters. Rows beyond these counts were incomplete when the disk or the writer failed.
 """
 
 
 def counters(own: Iterable[str]) -> tuple[str, ...]:
-    """Names of the counters of a new file, whose protocol has its `own` tables of events."""
+    """Names of the counters of a new file; `own` are the tables of the protocol's events."""
     return (*FORMER, *(name for name in (*_PATHS, *own) if name not in FORMER))
 
 

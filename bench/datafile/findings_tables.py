@@ -33,10 +33,10 @@ FIT_COLUMNS = (
 FIT_PARAMETERS = (
     Field("name", Kind.TEXT, "", "name of the parameter"),
     Field("value", Kind.REAL, "of the row", "identified value, in the unit of the row"),
-    Field("uncertainty", Kind.REAL, "of the row", "its standard uncertainty; NaN if unknown"),
+    Field("uncertainty", Kind.REAL, "of the row", "standard uncertainty of the value; NaN if unknown"),
     Field("unit", Kind.TEXT, "", "unit of value and standard uncertainty"),
 )
-FIT_VALUES = (Field("value", Kind.REAL, "of the column", "concatenated columns, fit by fit"),)
+FIT_VALUES = (Field("value", Kind.REAL, "of the column", "values of all columns of all fits, concatenated fit by fit"),)
 FIT_TABLES = {"fits": FITS, "fit_columns": FIT_COLUMNS, "fit_parameters": FIT_PARAMETERS, "fit_values": FIT_VALUES}
 
 
@@ -73,7 +73,7 @@ def read_fits(entry: hdf5.Group, whole: int) -> list[FitFinished]:
 
 
 def add_fit_views(entry: hdf5.Group, whole: int) -> None:
-    """Create an NXdata group for each of the first `whole` fits, in a file without readers."""
+    """Create an NXdata group for each of the first `whole` fits; no program may be reading the file."""
     if not whole:
         return
     views = hdf5.create_group(entry, FIT_VIEWS, "NXcollection")
@@ -84,7 +84,7 @@ def add_fit_views(entry: hdf5.Group, whole: int) -> None:
         axis, *others = fit.columns
         view.attrs["signal"], view.attrs["axes"] = (others or [axis])[0], [axis]
         view.attrs[f"{axis}_indices"], view.attrs["title"] = 0, fit.text
-        # columns with another unit have another scale and would flatten the plot
+        # columns with a different unit have a different scale and would flatten the plot
         if alike := [each for each in others[1:] if fit.columns[each].unit == fit.columns[others[0]].unit]:
             view.attrs["auxiliary_signals"] = alike
         for each, series in fit.columns.items():
@@ -119,7 +119,7 @@ def _table(entry: hdf5.Group, name: str) -> list[dict[str, Any]]:
 FINDINGS = (
     Field("number", Kind.WHOLE, "1", "number of earlier sets of findings; the last set is valid"),
     Field("time", Kind.REAL, "s", "bench time"),
-    Field("name", Kind.TEXT, "", "the quantity, as in a specimen file"),
+    Field("name", Kind.TEXT, "", "name of the quantity, as in a specimen file"),
     Field("value", Kind.REAL, "of the row", "best estimate"),
     Field("standard_uncertainty", Kind.REAL, "of the row", "standard uncertainty (k = 1)"),
     Field("unit", Kind.TEXT, "", "SI unit of value and standard uncertainty"),
@@ -127,7 +127,7 @@ FINDINGS = (
     Field("date", Kind.TEXT, "", "date of the measurement, ISO 8601 with time zone"),
 )
 CORRELATIONS = (
-    Field("number", Kind.WHOLE, "1", "number of earlier sets of findings, as in the rows of the two findings"),
+    Field("number", Kind.WHOLE, "1", "number of earlier sets of findings, as for the two findings"),
     Field("first", Kind.TEXT, "", "name of a finding"),
     Field("second", Kind.TEXT, "", "name of another finding"),
     Field("coefficient", Kind.REAL, "1", "correlation coefficient of their errors; 0 for other pairs"),
@@ -136,7 +136,7 @@ FINDING_TABLES = {"identified": FINDINGS, "identified_correlations": CORRELATION
 
 
 def add_findings(rows: Mapping[str, Rows], time: float, identified: Identified) -> None:
-    """Append an event to its tables."""
+    """Append the findings and correlations of an event to their tables."""
     number = len(rows["identified"])
     for one in identified.correlations:
         rows["identified_correlations"].add(number, one.first, one.second, one.coefficient)
