@@ -208,7 +208,7 @@ class Protocol(Generic[P]):
     again, else None. It raises InvalidInput for parameters beyond the capabilities of the bench. Listing the protocols
     imports this object: wrap a `prepare` with heavy imports in `deferred`.
 
-    `events` names the events that it declares itself and that have a table in the data file, as "module:Event".
+    `events` names, as "module:Event", the events that the protocol declares and that have a table in the data file.
     `example` holds arguments shown in the help. `figures` and `files` name all files that a run may write in addition
     to data file and summary, with the main figure first. `positional` is the parameter that the command line accepts
     without a flag. `log_line` formats a point as one log line: the run is then displayed as a log, not as a plot.
@@ -235,7 +235,7 @@ class Protocol(Generic[P]):
 
     @property
     def event_types(self) -> "tuple[type[Event], ...]":
-        """The types of `events`, imported now."""
+        """The types of `events`, imported at this call."""
         return tuple(resolve_name(each) for each in self.events)
 
 

@@ -1,8 +1,9 @@
-"""Inverse Fourier transform of real series whose length has a large prime factor, for repeated use.
+"""Inverse Fourier transform to real series whose length has a large prime factor, fast if used repeatedly.
 
-For such a length n = a p the usual algorithm transforms series of more than twice the length, outside the processor's
-cache. With j = p l + i and k = a m + q the transform is one of length p for each q, a rotation, and one of length a for
-each i (Cooley and Tukey, 1965), of which the symmetry of the spectrum saves half.
+For such a length n = a p, the usual algorithm transforms series of more than twice the length, which do not fit in the
+processor's cache. With j = p l + i and k = a m + q, the transform consists of one transform of length p for each q, a
+rotation, and one transform of length a for each i (Cooley and Tukey, 1965). The symmetry of the spectrum halves the
+number of the first.
 """
 
 from functools import lru_cache
@@ -19,7 +20,9 @@ Complex = NDArray[np.complex128]
 
 
 def real_inverse(spectrum: Complex, n: int) -> Floats:
-    """Same as `numpy.fft.irfft`, to rounding: series, shape (n,), with this `spectrum`, shape (n // 2 + 1,)."""
+    """The series, shape (n,), with this `spectrum`, shape (n // 2 + 1,): equal to that of `numpy.fft.irfft` to within
+    rounding.
+    """
     a, p = _factors(n)
     if p <= LARGE or a == 1:
         return np.fft.irfft(spectrum, n)
@@ -32,7 +35,7 @@ def real_inverse(spectrum: Complex, n: int) -> Floats:
 
 
 def _factors(n: int) -> tuple[int, int]:
-    """n / p and p, the largest prime factor of n."""
+    """n / p and p, where p is the largest prime factor of n."""
     rest, largest = n, 1
     for factor in range(2, isqrt(n) + 1):
         while rest % factor == 0:
@@ -43,7 +46,7 @@ def _factors(n: int) -> tuple[int, int]:
 
 @lru_cache(maxsize=4)
 def _split(n: int) -> tuple[NDArray[np.intp], NDArray[np.bool_], Complex]:
-    """Places in the spectrum, which of them are mirrored, and rotations, shapes (a // 2 + 1, p)."""
+    """Indices into the spectrum, a mask of the mirrored ones, and rotations; each has the shape (a // 2 + 1, p)."""
     a, p = _factors(n)
     q = np.arange(a // 2 + 1)[:, None]
     k = a * np.arange(p) + q

@@ -87,15 +87,15 @@ class PeakReadings:
 
 @dataclass(frozen=True, eq=False)
 class Shapes:
-    """Errors of the same peaks due to the linearity of each laser, and, after a calibration, of its reference sensor,
-    which is common to both.
+    """Errors of the same peaks due to the linearity of each laser and, for calibrated lasers, due to that of the
+    calibration's reference sensor, which both lasers have in common.
     """
 
     lasers: tuple[LinearityErrors | None, LinearityErrors | None]
     common: LinearityErrors | None = None
 
     def scaled(self, factors: Sequence[float]) -> "Shapes":
-        """These errors times one factor per peak."""
+        """These errors multiplied by one factor per peak."""
         first, second, common = (None if each is None else each.scaled(factors) for each in (*self.lasers, self.common))
         return Shapes((first, second), common)
 
@@ -119,7 +119,9 @@ class SensorUncertainty:
         return self.accuracy.table_scale if self.calibration is None else self.calibration.table_uncertainty
 
     def checked_by(self, checks: Checks | None) -> "SensorUncertainty":
-        """These sensors, checked by one test of the bare frame unless they have the checks of several."""
+        """These sensors with `checks` from one test of the bare frame, unless they already have checks from several
+        tests.
+        """
         return self if self.checks or checks is None else replace(self, checks=(checks,))
 
     def drift_errors(
@@ -127,7 +129,8 @@ class SensorUncertainty:
     ) -> dict[str, Array]:
         """Errors [m] of the peaks in tests with the same lasers, by contribution; each has the shape (tests, n).
 
-        `shapes` are those of `seen`, or of motions that differ little from them.
+        `shapes` are the linearity errors of `seen`, or of motions that differ little from it; by default they are
+        computed.
         """
         found = self.shapes(seen) if shapes is None else shapes
         first, second = (self._linearity(laser, found.lasers[laser], len(seen), draws) for laser in (0, 1))
@@ -160,7 +163,9 @@ class SensorUncertainty:
         return Shapes((self._shape(0, seen), self._shape(1, seen)), self._common(seen))
 
     def _shape(self, laser: int, seen: Sequence[PeakReadings]) -> LinearityErrors | None:
-        """Errors of laser 0 or 1; of a calibrated one those beyond the covered readings, None if there are none."""
+        """Linearity errors of laser 0 or 1; for a calibrated laser, those beyond the covered readings, None if there
+        are none.
+        """
         whole = self.ranges[laser]
         limit = self.accuracy.laser_linearity * whole
         effects = [each.effect(laser) for each in seen]

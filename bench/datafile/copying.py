@@ -123,8 +123,8 @@ def renew_drive(entry: hdf5.Group) -> None:
 
 
 def renew_tables(entry: hdf5.Group, lost: Iterable[str], own: Iterable[str]) -> None:
-    """Empty every table of which a dataset is among the `lost` paths; the journal may refill it. Such tables of the
-    protocol's `own` events, whose columns only the protocol knows, are removed.
+    """Empty every table of which a dataset is among the `lost` paths; the journal may refill it. Tables of the
+    protocol's `own` events are removed instead, because their columns are declared only by the protocol.
     """
     gone = tuple(lost)
     for path in (*TABLES, *own):

@@ -48,7 +48,7 @@ class Skeleton:
     metadata: Mapping[str, str]
     tables: Mapping[str, Table]
     events: Sequence[type[Event]] = ()
-    """Events of the protocol whose tables the file has."""
+    """Events of the protocol that have a table in the file."""
 
     @property
     def own(self) -> dict[str, tuple[Field, ...]]:

@@ -272,7 +272,7 @@ class DataFile(SampleReader):
 
     @property
     def own_tables(self) -> list[str]:
-        """Paths of the tables of events that are declared by the protocol, or were by one of an earlier version."""
+        """Paths of the tables of events that the protocol, of this or of an earlier version, declares."""
         paths = map(path_of, self.counted)
         return [each for each in paths if each not in (*TABLES, "points") and hdf5.has(self._entry, each)]
 
