@@ -44,7 +44,7 @@ class Arrangement:
         return replace(self, tilt=0.0, pull=0.0)
 
     def storeys(self) -> tuple[float, float]:
-        """Displacements (u1, u2) [m] of the storeys at rest: u1 follows u2 as under a force on storey 2."""
+        """Displacements (u1, u2) [m] of the storeys at rest, where u1 is due to the force that holds storey 2."""
         f = self.specimen.frame
         return f.k2 / (f.k1 + f.k2 + self.specimen.k_c) * self.pull, self.pull
 

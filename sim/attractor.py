@@ -1,4 +1,4 @@
-"""Long-term motion on the table of a bench, to which its free motion tends: a periodic orbit, a torus, or a fall.
+"""Long-term motion of a specimen on the table of a bench: a periodic orbit, a torus, or a fall.
 
 Where the orbit of one period is unstable, disturbances grow until the motion repeats after several periods, does not
 repeat at all, or the block falls. The motion is integrated from a disturbed orbit under a drive that keeps the mean of
@@ -31,8 +31,8 @@ DISTURBANCE = 0.1
 """Relative disturbance of the block's angle at the start."""
 
 CONTROLLED, SHARE = 36, 0.5
-"""Cycles between corrections of the drive, and the fraction of the error of the table's mean harmonics that is
-corrected.
+"""Number of cycles between corrections of the drive, and the fraction of the error in the table's mean harmonics that
+each corrects.
 """
 
 REPEATED, ALIKE = 0.01, 0.05

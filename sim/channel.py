@@ -1,4 +1,4 @@
-"""An input channel and its conversion from counts to values."""
+"""Input channel, and the conversion of its counts to values."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -57,7 +57,7 @@ class Channel:
 
     @property
     def storage(self) -> type[np.int16] | type[np.int32]:
-        """The narrowest integer type that holds every valid count."""
+        """Narrowest integer type that can represent every valid count."""
         return np.int16 if self.valid[0] >= -(2**15) and self.valid[1] < 2**15 else np.int32
 
     def _converted(self, counts: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -11,7 +11,7 @@ class CauseCode(StrEnum):
 
     UNKNOWN = "unknown"
     REQUEST = "request"
-    """A person or client requested the end."""
+    """A person or a client program requested the end of the run."""
     CLIENT_LOST = "client_lost"
     DECLINED = "declined"
     """The operator declined or did not complete a task."""

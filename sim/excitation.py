@@ -23,7 +23,7 @@ ROW = 10
 
 
 class Excitation(Protocol):
-    """A base acceleration of finite duration."""
+    """Base acceleration of finite duration."""
 
     @property
     def duration(self) -> float:
@@ -48,7 +48,7 @@ class Sweep:
 
     @staticmethod
     def dwell(duration: float, amplitude: float, omega: float) -> "Sweep":
-        """A steady sine."""
+        """Return a sweep with constant amplitude and frequency."""
         return Sweep(duration, (amplitude, amplitude), (omega, omega))
 
     @property
@@ -85,7 +85,9 @@ class SineProgram:
             if not sweep.duration > 0.0:
                 raise InvalidInput("duration of a sweep", sweep.duration, "it must be a positive duration in s")
             if min(sweep.omega) <= 0.0:
-                raise InvalidInput("omega of a sweep", sweep.omega, "it must be positive rad/s")
+                raise InvalidInput(
+                    "omega of a sweep", sweep.omega, "both circular frequencies [rad/s] must be positive"
+                )
         self.sweeps = tuple(sweeps)
         self.phase = phase
 

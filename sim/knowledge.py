@@ -51,7 +51,7 @@ _WIDTH = {
 """Name of the half width of each quantity. Masses have none, because they are weighed or identified by a fit."""
 
 _OF_MASSES = "stiffness"
-"""Half width with which lists of contributions group the masses, because one fit identifies frame and masses."""
+"""Name of the half width with which lists of contributions group the masses: one fit identifies frame and masses."""
 
 
 class SpecimenKnowledge(SpecimenUncertainty):

@@ -15,7 +15,7 @@ from sim.specimen import Frame, Specimen
 
 @dataclass(frozen=True, eq=False)
 class Modes:
-    """Undamped modes of a linear system, ascending.
+    """Undamped modes of a linear system, in ascending order of the eigenvalue.
 
     `omega`, shape (n,) [rad/s]: sign(lambda) sqrt|lambda| for the eigenvalues lambda of M^-1 K. A negative element is
     minus the growth rate of a *divergent* mode, whose stiffness is negative.

@@ -41,7 +41,7 @@ STENCIL: dict[Accuracy, tuple[Floats, Floats]] = {
 """Central differences: nodes in units of the step, and their weights."""
 
 CLOSURE = 1e-12
-"""Scaled mismatch over one period at which an orbit counts as closed."""
+"""Scaled mismatch over one period below which an orbit counts as closed."""
 
 SLOW = 0.1
 """A known Jacobian is kept while each Newton step reduces the mismatch to less than this fraction."""

@@ -40,7 +40,7 @@ class Laser(Parameters):
     )
     scale_error: float = quantity(0.0, "1", "relative error of the sensitivity", gt=-0.5, lt=0.5)
     load: float = quantity(500.0, "ohm", "load resistor that converts the current to a voltage", gt=0)
-    error_current: float = quantity(0.0030, "A", "current without a valid measurement", ge=0)
+    error_current: float = quantity(0.0030, "A", "output current without a valid measurement", ge=0)
     reference: Literal["ground", "table"] = quantity(
         "ground", "", "mounting of the laser: on the ground it measures x + u, on the table u"
     )

@@ -217,7 +217,7 @@ def _followed(
     solution = follow(origin, section, parameters(specimen, omega, amplitude)[0])
     if solution is None:
         raise NoOrbit(
-            f"no rocking orbit found at omega = {omega:g} rad/s, beta = {specimen.beta:g}, amplitude = "
+            f"no rocking orbit was found at omega = {omega:g} rad/s, beta = {specimen.beta:g}, amplitude = "
             f"{amplitude:g} m/s2: provide a closer guess, or values closer to those of a known orbit"
         )
     return solution

@@ -162,7 +162,7 @@ class VirtualBench:
 
     @property
     def sights(self) -> Array:
-        """True motion of the lasers' targets in the last `run` or `coast`, see `sim.arrangement.sights`."""
+        """True motion of the lasers' targets in the last `run` or `coast`, shape (4, n): `sim.arrangement.sights`."""
         return self._seen(np.ascontiguousarray(self._samples.T))
 
     def _seen(self, states: Array) -> Array:

@@ -13,7 +13,7 @@ from sim.errors import UNKNOWN, Cause, CauseCode, Interruption, RockbenchError
 from sim.parameters import Parameters
 
 SEVERITY = ("completed", "stopped", "aborted", "halted", "failed")
-"""All statuses, in ascending severity."""
+"""All statuses, in ascending order of severity."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Ending:
 
 
 class Ended(Interruption):
-    """Raised to end the plan early."""
+    """Exception that ends the plan early, with the ending of the run."""
 
     def __init__(self, ending: Ending) -> None:
         super().__init__(ending.reason)

@@ -14,7 +14,7 @@ _KEPT = 16
 
 
 class Stalls:
-    """Context manager that runs a thread to detect stalls, during which its short sleeps end much too late.
+    """Context manager that runs a thread of short sleeps. A sleep that ends much too late reveals a stall.
 
     A slow call, a slow disk or a long computation in another thread does not delay this thread; a stopped or suspended
     process, a computer without free processors, or exhausted memory does.
@@ -36,8 +36,8 @@ class Stalls:
         waiting.join(self._thread)
 
     def since(self, instant: float) -> float:
-        """The longest stall that ended after `instant` of the machine's clock [s]; 0 if there was none."""
-        # the thread itself may not have been woken yet
+        """Longest stall [s] that ended after `instant` of the machine's clock [s]; 0 if there was none."""
+        # after a stall, the thread itself may not have woken yet
         running = now() - self._woken - _PERIOD
         found = [length for end, length in tuple(self._found) if end > instant]
         return max([*found, running if running > LONGEST else 0.0])

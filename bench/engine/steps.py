@@ -72,7 +72,7 @@ class Sweep:
 class Dwell:
     """Hold amplitude and frequency for `cycles` full cycles. Returns `Measured`, or `Fallen`.
 
-    The count of cycles continues that of the previous dwell, unless `phase` [rad] is given: then it restarts, and each
+    The count of cycles continues that of the previous dwell. If `phase` [rad] is given, the count restarts, and each
     cycle begins at this phase of the oscillator.
     """
 

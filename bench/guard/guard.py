@@ -115,8 +115,8 @@ class Guard:
     def exchange(self, volts: NDArray[np.float64]) -> Exchange:
         """Send a block of commands [V] and read as many samples.
 
-        If a command of the block is beyond the limits, none of the block is sent: the last command before it is ramped
-        to zero along the fast ramp.
+        If a command of the block is beyond the limits, none of the block is sent. Instead, the last command of the
+        previous block is ramped to zero along the fast ramp.
         """
         if self._sending and self._held is None:
             # the last exchange failed before its block was noted here: the commands of that block may not have been
@@ -227,7 +227,7 @@ class Guard:
             except RigError as another:
                 failed = f"{failed}, and the output could not be stopped ({another}): press the emergency stop"
                 raise RigError(failed) from another
-            raise RigError(f"{failed}, the output was stopped: switch the amplifier off") from error
+            raise RigError(f"{failed}; the output was stopped instead: switch the amplifier off") from error
 
     def disarm(self) -> None:
         """Stop the rig and bring its output to zero."""

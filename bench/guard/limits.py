@@ -16,8 +16,8 @@ _PERSISTENCE = "time for which the limit must be exceeded before it trips"
 
 
 DEBOUNCE = (1e-3, 0.05)
-"""Usual debounce of a limit [s]: longer than single spikes, shorter than the time from a limit to the end of the
-stroke.
+"""Usual debounce of a limit [s]: longer than a single spike, shorter than the time in which the table moves from a
+limit to the end of its stroke.
 """
 
 
@@ -129,7 +129,7 @@ def ramp_refusal(limits: Limits, ramps: Ramps) -> InvalidInput | None:
 
 @dataclass(frozen=True)
 class Violation:
-    """Exceeded limit: `quantity` reached `value` beyond `limit`, in `unit`, at this sample index since arming.
+    """Exceeded limit: `quantity` reached `value` beyond `limit`, in `unit`, at index `sample` since arming.
 
     `of_table`: the limit concerns the motion or load of the table, not a sensor, a clock or the specimen. `timing`: the
     limit concerns the arrival times of blocks, which the samples do not contain. `cuts`: exceeding the limit cuts the

@@ -39,7 +39,7 @@ _MEASURED_BY = {
 """Channels that measure a quantity directly; a limit beyond their range could never trip."""
 
 _OF_TABLE = frozenset({"displacement", "velocity", "acceleration", "force", "current"})
-"""Quantities that vanish as soon as the drive is zero."""
+"""Quantities of the table itself, which vanish once the drive is zero."""
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ MOST_SKIPPED = 4000
 """Number of skipped samples after which the heating is updated."""
 
 ROUNDING = 1e-9
-"""Relative allowance for rounding errors in a mean over this number of samples."""
+"""Relative allowance for rounding errors in a mean over `MOST_SKIPPED` samples."""
 
 
 class WatchedQuantities:
@@ -125,7 +125,7 @@ class WatchedQuantities:
 
     def _largest_heating(self, current: float) -> float:
         """Upper bound of the heating up to the end of a block whose largest current is `current` [A]: the running mean
-        of the squares cannot exceed both its initial value and the largest square since.
+        of the squares is at most the greater of its initial value and the largest square since.
         """
         before = float(self._heat[0]) / self._forget if self._forget > 0.0 else 0.0
         return sqrt(max(before, self._skipped_current**2, current**2) * (1.0 + ROUNDING))

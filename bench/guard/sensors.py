@@ -43,7 +43,7 @@ class SensorWatch:
         drive: NDArray[np.float64],
         extremes: Extremes | None = None,
     ) -> list[Violation]:
-        """Return sensor violations in counts and values, shape (n, n_channels), played with drive [V], shape (n,).
+        """Return sensor violations in counts and values, shape (n, n_channels), for the drive played [V], shape (n,).
 
         If `extremes` are given and all channels change, a block without missing samples is accepted without examining
         individual samples.

@@ -53,7 +53,7 @@ class LongTerm:
     falls: float = nan
 
     def gain(self, of: Callable[[NDArray[np.float64]], np.float64]) -> float:
-        """A statistic of the gains; NaN after a fall."""
+        """Statistic `of` the gains; NaN if the block falls."""
         return float(of(self.gains)) if self.gains.size else nan
 
 
@@ -110,7 +110,7 @@ def long_terms(
 
 
 def attractors_table(found: Sequence[LongTerm]) -> Table:
-    """One row per long-term motion."""
+    """Table with one row per long-term motion."""
 
     def numbers(values: Sequence[float], unit: str, description: str) -> Column:
         return Column(np.array(values, dtype=np.float64), unit, description)

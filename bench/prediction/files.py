@@ -40,7 +40,7 @@ def plain(values: NDArray[Any]) -> list[Any]:
 
 
 def write_csv(path: Path, table: Table) -> None:
-    """Write a table as CSV: one header line, names ending in the unit, full precision, empty cells for absent values.
+    """Write a table as CSV: one line of names that end in the unit, full precision, empty cells for absent values.
 
     Raises InvalidInput if `path` exists, RockbenchError when the disk fails.
     """

@@ -81,7 +81,7 @@ def histories(specimen: Specimen, request: HistoryRequest, progress: Progress = 
 
 
 def history_table(made: Sequence[History]) -> Table:
-    """All histories, concatenated: one row per sample."""
+    """Table of all histories, concatenated, with one row per sample."""
     columns = _points([history for history in made for _ in history.values[TIME]])
     for name, (unit, description) in QUANTITIES.items():
         joined = np.concatenate([history.values[name] for history in made]) if made else np.empty(0)
@@ -92,12 +92,12 @@ def history_table(made: Sequence[History]) -> Table:
 def runs_table(made: Sequence[History]) -> Table:
     """Table with one row per history: how it ended, and the largest magnitudes of its samples."""
     columns = _points(made)
-    columns["status"] = Column(np.array([history.status for history in made], np.str_), "", "ending of the motion")
+    columns["status"] = Column(np.array([history.status for history in made], np.str_), "", "how the motion ended")
     columns["end_time_s"] = Column(
-        np.array([history.end_time for history in made], np.float64), "s", "time of the ending"
+        np.array([history.end_time for history in made], np.float64), "s", "time at which the motion ended"
     )
     columns["impacts"] = Column(
-        np.array([history.impacts for history in made], np.int64), "1", "impacts up to the ending"
+        np.array([history.impacts for history in made], np.int64), "1", "number of impacts until the end"
     )
     for name in ("u1_m", "drift_m", "theta_rad", "bare_u1_m", "bare_drift_m"):
         unit, description = QUANTITIES[name]
@@ -178,7 +178,7 @@ def _in_order(
 
 
 def _filled(samples: NDArray[np.float64] | None, n: int) -> NDArray[np.float64]:
-    """The samples, padded with NaN to `n` rows."""
+    """Pad the samples with NaN to `n` rows."""
     filled = np.full((n, 6), np.nan)
     if samples is not None:
         filled[: len(samples)] = samples

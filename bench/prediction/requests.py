@@ -26,7 +26,7 @@ def _stiffnesses(default: tuple[float, ...], least: int = 1) -> Any:
 
 
 class ModesRequest(Parameters):
-    """Frequencies and shapes of the linearised system."""
+    """Natural frequencies and mode shapes of the linearised system."""
 
     beta: tuple[Stiffness, ...] = _stiffnesses((0.25, 0.40, 0.64, 0.97))
 
@@ -45,7 +45,7 @@ class OrbitsRequest(Parameters):
 
 
 class SineRequest(OrbitsRequest):
-    """Parameters of every prediction of a response to a sine."""
+    """Common parameters of the predictions of a response to a sine."""
 
     solver: SolverName = quantity(
         "taylor", "", "solver; all but taylor are for comparison and simulate 120 s for a steady motion"
@@ -61,7 +61,7 @@ class SineRequest(OrbitsRequest):
 
 
 class GainRequest(SineRequest):
-    """Parameters of every prediction of a steady gain."""
+    """Common parameters of the predictions of steady gains."""
 
     members: int = quantity(
         0,
@@ -154,7 +154,7 @@ class HistoryRequest(SineRequest):
 
 
 class RecordsRequest(Parameters):
-    """Parameters of every prediction of a response to earthquake records."""
+    """Common parameters of the predictions of a response to earthquake records."""
 
     peak_factor: float = quantity(
         1.2, "1", "peak of each filtered record, relative to the uplift acceleration g/lambda", gt=0, le=1000

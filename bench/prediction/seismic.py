@@ -1,4 +1,4 @@
-"""Gain coefficients under earthquake records against stiffness and lower band edge, and their tables."""
+"""Gain coefficients under earthquake records, against stiffness and against the lower end of the band, as tables."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -159,7 +159,7 @@ GAINS: Columns = {
         "s",
         "time of overturning since the start of the motion; absent if it did not overturn",
     ),
-    "impacts": (np.int64, "1", "impacts of the block"),
+    "impacts": (np.int64, "1", "number of impacts of the block"),
     "u1_max_m": (np.float64, "m", "greatest |u1|; absent if the run ended early"),
     "drift_max_m": (np.float64, "m", "greatest |u2 - u1|; absent if the run ended early"),
     "theta_max_rad": (np.float64, "rad", "greatest |theta|; absent if the run ended early"),

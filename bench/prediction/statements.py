@@ -1,7 +1,7 @@
 """The paper's statements as checks of the model: 1 to 7 on harmonic motion, 8 on earthquake records.
 
-The claims are those of sections 3.3.1, 4.2, 4.3, 5.1 and 5.2. Steady motions are rocking orbits, continued along the
-frequency of each section, without simulating transients.
+The claims are those of sections 3.3.1, 4.2, 4.3, 5.1 and 5.2 of the paper. Steady motions are rocking orbits, computed
+by continuation over frequency at constant stiffness, without simulating transients.
 """
 
 from collections.abc import Mapping, Sequence
@@ -190,13 +190,13 @@ def _phases(points: Mapping[str, Layer]) -> Statement:
     apart = {name: abs(lead_of_u1(layer)) for name, layer in points.items()}
     ratio = {name: layer.orbit.peaks.theta / layer.orbit.peaks.u1 for name, layer in points.items()}
     at_a = Check(
-        f"at A, u₁ and ϑ move within {ALMOST:g}° of counter-phase",
+        f"at A, u₁ and ϑ are within {ALMOST:g}° of counter-phase",
         f"{apart['A']:.1f}° from counter-phase",
         apart["A"] <= ALMOST,
         {"A": apart["A"]},
     )
     at_c = Check(
-        f"at C, u₁ and ϑ move within {ALMOST:g}° of being in phase",
+        f"at C, u₁ and ϑ are within {ALMOST:g}° of being in phase",
         f"{180.0 - apart['C']:.1f}° from being in phase, {apart['C']:.1f}° from counter-phase",
         180.0 - apart["C"] <= ALMOST,
         {"C": apart["C"]},
@@ -225,7 +225,7 @@ def _peaks(omegas: Floats, gains: Mapping[float, Floats]) -> Statement:
     beyond = {beta: float(omegas[np.nanargmax(gains[beta])]) for beta in SECTIONS[1:]}
     none = Check(
         f"at β {SECTIONS[1]:g} and {SECTIONS[2]:g} there is no peak from {LOW:g} to {PAPER_HIGH:g} rad/s",
-        "none; the largest gains lie at " + _listed(beyond, "{:.2f}") + " rad/s"
+        "none; the largest gains are at " + _listed(beyond, "{:.2f}") + " rad/s"
         if not any(interior.values())
         else f"peaks inside: {_listed(interior, '{:.0f}')}",
         not any(interior.values()),

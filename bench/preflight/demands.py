@@ -173,7 +173,7 @@ TOLERANCE = 1e-7
 @dataclass(frozen=True)
 class Travel:
     """Largest magnitudes of the displacement at either laser and of the drift [m], and the time [s] at which the block
-    `toppled`, where it is evaluated.
+    `toppled`; None if it did not topple, or if this is not evaluated.
     """
 
     storey_1: float

@@ -190,7 +190,7 @@ def margins_table(margins: Sequence[Margin]) -> Table:
     assumed, likely = "for the nominal specimen", "that 95 % of the specimens stay below, given the uncertainty"
     return {
         "quantity": texts([each.bound.name for each in margins], "limited quantity"),
-        "margin": numbers([each.margin for each in margins], "1", f"1 - demand / limit, {assumed}; NaN: not predicted"),
+        "margin": numbers([each.margin for each in margins], "1", f"1 - demand / limit, {assumed}; NaN if unpredicted"),
         "margin_95": numbers([each.likely for each in margins], "1", f"1 - demand / limit, for a demand {likely}"),
         "demand": numbers([each.demand.value for each in margins], "SI", f"largest predicted value {assumed}"),
         "demand_95": numbers([each.demand.likely for each in margins], "SI", f"largest predicted value {likely}"),
@@ -210,7 +210,9 @@ def drive_table(stages: Sequence[Stage]) -> Table:
     chances = [nan if stage.chance is None else stage.chance for stage, _ in rows]
     return {
         "stage": Column(np.array([stage.name for stage, _ in rows], dtype=np.str_), "", "part of the run"),
-        "chance": Column(np.array(chances), "1", "estimated probability that the start succeeds; NaN: not a start"),
+        "chance": Column(
+            np.array(chances), "1", "estimated probability that the start succeeds; NaN if it is no start"
+        ),
         "duration": Column(np.array([leg.duration for _, leg in rows]), "s", "duration of the leg"),
         "amplitude": Column(
             np.array([leg.amplitude for _, leg in rows]), "m/s2", "table acceleration at the end of the leg"

@@ -50,7 +50,7 @@ class Found:
 
 
 class Comparison:
-    """A subscriber that collects the events of a replay and compares the drive block by block."""
+    """Subscriber that collects the events of a replay and compares the drive block by block."""
 
     def __init__(self, record: DataFile, course: RecordedCourse) -> None:
         self._record, self._course = record, course

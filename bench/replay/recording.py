@@ -154,7 +154,8 @@ def _configuration(record: DataFile) -> BenchConfiguration:
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         if first["loc"] == ("backend",):
-            raise InvalidInput("backend", first["input"], f"{first['msg']}; {record.title} was made with it") from error
+            allowed = f"{first['msg']}; {record.title} was recorded with this backend"
+            raise InvalidInput("backend", first["input"], allowed) from error
         allowed = "its configuration was written by another version of this software: replay it with that version"
         raise InvalidInput("record", record.title, allowed) from error
     # files of versions without a twin have no table of its estimates

@@ -100,8 +100,8 @@ class Replayed:
     `ended` states where and why the recording broke off before the end of the plan: an error of the rig, or the end of
     a killed program, neither of which recorded data can reproduce. `in_place` lists violations that the samples do not
     contain and that abort requests replace. `played` of `rows` samples were requested. `same_wording` is False for a
-    file written with other message texts, which are not compared; `same_intervals` is False for a file with another
-    evaluation of uncertainties, likewise. `returned` is the result of the plan, or None if the recording broke off.
+    file with other message texts, and `same_intervals` for one with another evaluation of uncertainties; neither is
+    then compared. `returned` is the result of the plan, or None if the recording broke off.
     """
 
     status: str

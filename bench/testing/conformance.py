@@ -6,10 +6,10 @@ The tests of a backend derive a class from `RigConformance` and provide a `make_
         @pytest.fixture
         def make_rig(self) -> Iterator[RigFactory]: ...
 
-Every call of the factory opens a new rig that is not armed; the fixture closes them. A server or an instrument behind
-the rig must run before the factory is returned and until the last rig is closed. The tests drive a rig with at most
-`drive` volts for a fraction of a second and open about twenty rigs in total, so that they can run on hardware and in
-real time. Lengths are defined as times at the rig's sample rate.
+Every call of the factory opens a new rig that is not armed; the fixture closes all of them. A server or an instrument
+behind the rig must run before the factory is returned and until the last rig is closed. The tests drive a rig with at
+most `drive` volts for a fraction of a second and open about twenty rigs in total, so that they can run on hardware and
+in real time. Numbers of samples follow from durations and the rig's sample rate.
 
 `pytest.register_assert_rewrite("bench.testing.conformance")` in a conftest.py shows the values of a failed assertion.
 """

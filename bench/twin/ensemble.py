@@ -1,4 +1,4 @@
-"""Ensemble of specimens drawn within their uncertainty, under one table motion, and the gain of each."""
+"""Ensemble of specimens drawn within their uncertainty, under the same table motion, and the gain of each."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -25,11 +25,11 @@ class Members:
     scales: Array
 
     def bare(self) -> "Members":
-        """The same frames without block and spring."""
+        """Return the members without block and spring."""
         return Members([specimen.bare() for specimen in self.specimens], self.scales)
 
     def first(self, n: int) -> "Members":
-        """The first `n` members."""
+        """Return the first `n` members."""
         return Members(self.specimens[:n], self.scales[:n])
 
 

@@ -198,7 +198,7 @@ class Estimator:
         return len(self._ensemble) - 1
 
     def shed(self) -> None:
-        """Drop half of the members, which makes their band narrower."""
+        """Drop half of the members, which narrows their band."""
         self._ensemble.keep(1 + self.members // 2)
 
     def take(self, time: float, end: int, signals: Array, measured: Measured | None) -> TwinEstimate | None:

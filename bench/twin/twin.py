@@ -32,7 +32,7 @@ _BEGINS = {
     OperatorTask.TILT_BLOCK: "the block is released from a tilt",
     OperatorTask.PULL_FRAME: "the frame is released from a deflection",
 }
-"""Reason why the model does not apply, by the operator action after which it does not."""
+"""Operator actions after which the model does not apply, and the reason for each."""
 
 _MOUNTED = (OperatorTask.HOLD_BLOCK, OperatorTask.TILT_BLOCK, OperatorTask.PULL_FRAME)
 _ENDS = {

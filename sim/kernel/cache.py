@@ -80,7 +80,7 @@ class KernelCache:
         self.release()
         _say(
             f"the kernel is compiled in memory, which takes about ten seconds at every start: {why};"
-            " set NUMBA_CACHE_DIR to a folder that only you can write"
+            " set NUMBA_CACHE_DIR to a folder to which only you can write"
         )
 
     def release(self) -> None:
@@ -110,7 +110,7 @@ def _stamp(folder: Path) -> list[tuple[str, int, int]]:
 
 def _places(sources: Path) -> list[Path]:
     places = [sources / "__pycache__"]
-    with suppress(RuntimeError):  # a user without a home
+    with suppress(RuntimeError):  # a user without a home folder
         home = Path.home()
         if sys.platform == "win32":
             user = Path(os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local")

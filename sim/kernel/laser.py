@@ -12,7 +12,7 @@ from sim.kernel.compiled import compiled
 
 RANGE, GAIN, LINEARITY, WAVES, WAVE_PHASE, STEPS, LOAD, ERROR_CURRENT = range(8)
 """Indices of the constants: measuring range [m], sensitivity relative to nominal [1], linearity error [1], number of
-its periods in the range [1] and their phase [rad], steps of the output [1], load [ohm], error current [A].
+its periods in the range [1] and their phase [rad], number of steps of the output [1], load [ohm], error current [A].
 """
 
 

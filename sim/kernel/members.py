@@ -110,7 +110,7 @@ def advance_members(
                     continue
                 this = segments[i]
                 if not this[0] - tau[lane] > 1e-14 * this[0]:
-                    # compensated sum: a record has tens of thousands of equal segments
+                    # compensated sum, because a record has tens of thousands of equal segments
                     gained = this[0] - begin[lane, 1]
                     end = begin[lane, 0] + gained
                     begin[lane, 1] = (end - begin[lane, 0]) - gained
@@ -282,7 +282,7 @@ def advance_members(
                 tau[lane] = row[0, lane] if event == NO_EVENT and h == remaining else tau[lane] + h
                 now = begin[lane, 0] + tau[lane]
                 if event == NO_EVENT and sg * state[4] < 0.0:
-                    event = IMPACT  # the end of the step is just past the root, because of rounding
+                    event = IMPACT  # due to rounding, the end of the step is just past the root
                 known[lane] = 0
                 if event == IMPACT:
                     reports[j, IMPACTS] += 1.0

@@ -205,13 +205,13 @@ def advance(
                 status = OVERTURNED_A if sg > 0.0 else OVERTURNED_B
                 break
             elif event == UPLIFT:
-                # theta starts from zero angle and zero velocity: two known roots
+                # angle and velocity are zero at the start of the motion: two known roots
                 known = 2
                 sg = direction
                 x[4] = x[5] = 0.0
         if status != COMPLETED:
             break
-        # compensated sum: a record has tens of thousands of equal segments
+        # compensated sum, because a record has tens of thousands of equal segments
         gained = row[0] - lost
         now = begin + gained
         lost = (now - begin) - gained

@@ -143,7 +143,7 @@ def impact(mode: int, y: Array, request: float, noise: float, p: Plant, work: Ar
 
 @compiled(INT(INT, ROW, FLOAT, FLOAT, PLANT, GRID))
 def passed(mode: int, y: Array, request: float, noise: float, p: Plant, work: Array) -> int:
-    """Event that has been passed by a step that ends in the state `y`."""
+    """Event passed by a step that ends in the state `y`."""
     if mode == REST:
         return _UPLIFT if p.mass > 0.0 and margin(_UPLIFT, mode, y, request, noise, p, work) < 0.0 else _NONE
     if mode == FALLEN:
@@ -157,7 +157,7 @@ def passed(mode: int, y: Array, request: float, noise: float, p: Plant, work: Ar
 def substep(
     mode: int, y: Array, h: float, held: float, request: float, noise: float, p: Plant, work: Array
 ) -> tuple[int, float]:
-    """Advance `y` by `h`, including all events. Returns the mode and the amplifier's output."""
+    """Advance `y` by the time `h`, including all events. Returns the mode and the amplifier's output."""
     left = h
     for bounce in range(_BOUNCES + 1):
         last = bounce == _BOUNCES
