@@ -19,14 +19,14 @@ UNREAD = 700
 
 _AT_ZERO = "The output is at zero and the rig is stopped until you answer."
 _ARMING = (
-    "Before arming: every safety input. Then, at rest: that every sensor measures and the storeys are "
+    "Before arming, every safety input must be good. Then, at rest, every sensor must measure and the storeys must be "
     "still. The table moves only after these checks."
 )
-_NOT_CHECKED = "No sensor detects whether this task is done: check before you answer. {what}"
+_NOT_CHECKED = "No sensor detects whether this task is done, so make sure before you answer. {what}"
 UNKNOWN_TASK = (
     f"An operator task. {_AT_ZERO}",
-    "Every safety input, whenever the rig is armed. No sensor detects whether this task is done: check before you "
-    "answer.",
+    "The safety inputs are checked whenever the rig is armed. No sensor detects whether this task is done, so make "
+    "sure before you answer.",
 )
 TASKS = {
     OperatorTask.MOUNT_SPRING: (f"The next points require this spring between frame and block. {_AT_ZERO}", _ARMING),
@@ -54,7 +54,7 @@ TASKS = {
     ),
     OperatorTask.WATCH_BLOCK: (
         f"Laser 2 measures the rocking of the block. {_AT_ZERO}",
-        "Before arming: every safety input. Then, at rest: that the laser measures. The guard does not "
+        "Before arming, every safety input must be good. Then, at rest, the laser must measure. The guard does not "
         "monitor the drift while the laser points at the block. The table is not driven.",
     ),
     OperatorTask.WATCH_STOREYS: (
@@ -64,14 +64,14 @@ TASKS = {
     OperatorTask.TILT_BLOCK: (
         f"The block must start from this tilt, without a push. {_AT_ZERO} The output stays at zero during the "
         "recording.",
-        "Before arming: every safety input. Afterwards, in the recording: that the block was released and "
-        "rocked. The table does not move.",
+        "Before arming, every safety input must be good. Afterwards, the recording must show that the block was "
+        "released and rocked. The table does not move.",
     ),
     OperatorTask.PULL_FRAME: (
         f"The frame must start from this displacement, without a push. {_AT_ZERO} The output stays at zero "
         "during the recording.",
-        "Before arming: every safety input. Afterwards, in the recording: that the frame was released. The "
-        "table does not move.",
+        "Before arming, every safety input must be good. Afterwards, the recording must show that the frame was "
+        "released. The table does not move.",
     ),
 }
 """Reason for each operator task, and the checks after it."""

@@ -22,7 +22,7 @@ ELSEWHERE = "a run is under way on this computer: {run}; attach to watch or stop
 ATTACHING_WHY = "waiting for the session: {run}"
 PLANNING_LATE = "no message for {age:.0f} s: the computer is busy; nothing is armed"
 ATTACHED_RUN = "{owner}'s run: {run}."
-ATTACHED_READ_ONLY = "STOP works here; questions and Ramp out are handled by {owner}."
+ATTACHED_READ_ONLY = "STOP works here; {owner} answers questions and controls the ramp-out."
 ATTACHED_CONTROLS = "Its window was lost; answer its questions in this window."
 OWNERS = {"window": "another window", "terminal": "a terminal"}
 UNNAMED = "operator at the window"
@@ -106,7 +106,7 @@ LEAVE_WINDOW, STAY = "Close the window", "Stay"
 LEAVE_RAMPS_OUT = "This window controls a run. If you close it, the output ramps out and the run ends."
 LEAVE_GOES_ON = "A run is under way. It continues without this window; a window opened later can stop it."
 
-RAMP_OUT = "Ramp out and keep"
+RAMP_OUT = "Ramp out, keep data"
 RAMP_OUT_TIP = "Ends the run gently: the output ramps out and the data are kept (Ctrl+E)."
 TRACES = (
     ("drive", "V", 1.0),
