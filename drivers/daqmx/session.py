@@ -155,7 +155,7 @@ class DaqSession:
             if self._state is not _State.RUNNING:
                 # reading a stopped task would restart it
                 self._tasks.inputs.stop()
-                raise RigError("read is refused: the session was stopped meanwhile")
+                raise RigError("read was interrupted: the session was stopped")
             self._reset_watchdog()
             self._beat()
         return counts
@@ -246,9 +246,7 @@ class DaqSession:
 
     @contextmanager
     def _resting_on_failure(self) -> Generator[None]:
-        """Context manager that stops the bench before an error leaves its body, and adds a failure of the stop to
-        it.
-        """
+        """Context manager that stops the bench before an error leaves its body, and notes a failure of the stop on it."""
         try:
             yield
         except BaseException as error:

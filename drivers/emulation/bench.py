@@ -202,7 +202,7 @@ class EmulatedBench:
 
 
 class Storey:
-    """A `Sight` of one of the lasers' targets."""
+    """Target of one of the lasers, as a `Sight`."""
 
     def __init__(self, bench: EmulatedBench, storey: int) -> None:
         self._bench, self._storey = bench, storey

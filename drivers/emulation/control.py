@@ -141,7 +141,8 @@ def ask(address: str, command: str, /, *, patience: float = _PATIENCE, **argumen
             line = _line(connection, deadline)
     except TimeoutError:
         raise DeviceTimeout(
-            f"the emulated laboratory at {address} did not reply to {command} within {patience:g} s"
+            f"the emulated laboratory at {address} did not reply to {command} within {patience:g} s; check that it is"
+            " running"
         ) from None
     except OSError as error:
         raise ConnectionLost(

@@ -25,7 +25,7 @@ class PulseRelay:
 
     @property
     def closed(self) -> bool:
-        """Whether the last rising edge is recent enough."""
+        """Whether the last rising edge was less than `timeout` ago."""
         return time.monotonic() < self._until
 
     def level(self, high: bool) -> None:

@@ -1,7 +1,7 @@
 """Gains of drawn specimens under drawn motions of the table, within their uncertainties.
 
-The bare frame is linear: where a draw has the known frame and the measured motion, except for its scale, its peaks are
-those of one run times the scale.
+The bare frame is linear. If a draw differs from the known frame and the measured motion only by the scale of the
+motion, its peaks are those of a single run, multiplied by the scale.
 """
 
 from collections.abc import Callable
@@ -25,7 +25,7 @@ from sim.sweep import in_threads
 Array = NDArray[np.float64]
 
 CHUNK = 10
-"""Draws computed one after another in the memory of one thread."""
+"""Number of successive draws that one thread computes with the same memory."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ def predict_draws(
 
 
 class _Runs:
-    """Runs of both tests, in memory for one thread."""
+    """Simulated runs of both tests; their memory may be used by one thread only."""
 
     def __init__(self, bare: BaseMotion, coupled: BaseMotion) -> None:
         self._coupled = RecordRuns(coupled.acceleration.size, coupled.dt)
@@ -96,7 +96,7 @@ class _Runs:
         self._bare = self._coupled if alike else RecordRuns(bare.acceleration.size, bare.dt)
 
     def bare(self, specimen: Specimen, acceleration: Array) -> Peaks:
-        """Peaks of the frame without block."""
+        """Peaks of the bare frame."""
         return self._bare.run(specimen.bare(), acceleration, tolerance=TOLERANCE).peaks
 
     def gains(self, specimen: Specimen, acceleration: Array, bare: Callable[[], Peaks]) -> tuple[float, float, float]:

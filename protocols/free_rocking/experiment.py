@@ -22,8 +22,8 @@ from sim.free_rocking import FreeRocking, critical_angle, frequency_parameter
 from sim.parameters import Parameters
 
 LOWEST_CUTOFF = 1.25 / AFTER
-"""Cutoff [Hz] of a fourth-order Butterworth low-pass that leaves 5 % of the kink due to an impact, about 2 um, at
-`AFTER` seconds after the impact.
+"""Cutoff [Hz] of a fourth-order Butterworth low-pass that leaves 5 % of the kink due to an impact, about 2 um, `AFTER`
+seconds after the impact.
 """
 
 _MEETS = (
