@@ -246,7 +246,7 @@ class DaqSession:
 
     @contextmanager
     def _resting_on_failure(self) -> Generator[None]:
-        """Context manager that stops the bench before an error leaves its body, and notes a failure of the stop on it."""
+        """Context manager that stops the bench before an error leaves its body; notes failures of the stop on it."""
         try:
             yield
         except BaseException as error:
