@@ -1,4 +1,4 @@
-"""Runs under many records of one length and step, as in a Monte Carlo simulation, in memory that is used again."""
+"""Runs under many records of the same length and time step, as in a Monte Carlo simulation, in reused memory."""
 
 from math import pi
 
@@ -11,21 +11,22 @@ from sim.rocking import MOST_IMPACTS, REST_ANGLE, TOLERANCE, Motion, check_optio
 from sim.specimen import Specimen
 
 BLOCK = 2000
-"""Segments integrated in one call: their table stays in the processor's cache."""
+"""Number of segments integrated in one call: few enough for their table to remain in the processor's cache."""
 
 
 class RecordRuns:
-    """Integrates specimens from rest under records of `samples` accelerations every `dt` [s], and watches their peaks.
+    """Integrates specimens from rest under records of `samples` accelerations at intervals of `dt` [s], and finds the
+    peaks.
 
-    The result is that of `sim.rocking.simulate` under a `SampledRecord`, bit for bit, without a new table of segments
-    for each record. An object serves one thread.
+    The results are bit-identical to those of `sim.rocking.simulate` under a `SampledRecord`, but no new table of
+    segments is made for each record. An object may be used by one thread only.
     """
 
     def __init__(self, samples: int, dt: float) -> None:
         from sim.kernel import rocking as kernel
 
         if samples < 2 or not dt > 0.0:
-            raise InvalidInput("record", (samples, dt), "it must have at least two samples and a positive step")
+            raise InvalidInput("record", (samples, dt), "it must have at least two samples and a positive time step")
         self._segments = np.zeros((min(samples - 1, BLOCK), ROW))
         self._segments[:, 0] = dt
         self._count, self._dt = samples - 1, dt
@@ -42,7 +43,7 @@ class RecordRuns:
     ) -> Motion:
         """Motion under `acceleration` [m/s2], shape (samples,); the other arguments are those of `simulate`.
 
-        Raises InvalidInput for another length, or numbers that are not finite.
+        Raises InvalidInput for an acceleration of another length or with numbers that are not finite.
         """
         from sim.kernel import rocking as kernel
 

@@ -131,8 +131,8 @@ def simulate(
     requests no peaks. `overturning_angle` [rad] is the |theta| that ends the run. A run that overturns or fails is a
     result, not an error. Samples and peaks do not affect the motion, and take time only when requested.
 
-    Raises InvalidInput, before anything is integrated, for values outside their range. Source: Eq. (8), (9), (A.1) and
-    (A.3) of the paper; coming to rest is described in `sim.kernel.rocking.run`.
+    Raises InvalidInput, before anything is integrated, for values outside their ranges. Source: Eq. (8), (9), (A.1) and
+    (A.3) of the paper; `sim.kernel.rocking.run` states when the block comes to rest.
     """
     check_options(tolerance, overturning_angle)
     run = _Run(specimen, Drive(excitation), state or State(), sample_times, peaks_from, tolerance, overturning_angle)

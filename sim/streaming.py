@@ -33,10 +33,10 @@ class Stream:
     output of a converter. In each interval, `divisions` states are evaluated, at the ends of equal parts. The intervals
     may be far longer than those of the required states, because the motion within them is a polynomial. With 0, no
     states are evaluated. `peaks_from` [s] is the start of the window of the running peaks, or None for no peaks. The
-    other arguments are those of `sim.rocking.simulate`, and the motion is bit-identical to that which it returns for a
+    other arguments are those of `sim.rocking.simulate`, and the motion is bit-identical to its motion under a
     `SampledRecord`.
 
-    Raises InvalidInput for values outside their range.
+    Raises InvalidInput for values outside their ranges.
     """
 
     def __init__(

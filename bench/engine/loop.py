@@ -153,7 +153,7 @@ class AtRest:
         self._loop.output.machine.go(State.RUNNING, "storeys at rest, signals tared")
 
     def acquire(self, step: AcquireAtRest) -> RestSamples:
-        """Acquire samples. A violation ends the acquisition but not the plan, since the table is not driven."""
+        """Acquire samples. A violation ends the acquisition but not the plan, because the table is not driven."""
         output = self._loop.output
         self._loop.begin("acquisition with the output at zero")
         counts: list[Counts] = []
@@ -182,7 +182,7 @@ class AtRest:
                 return values
             waited += step.rest
             if waited >= step.patience:
-                self._stream.publish(Warned(f"the storeys are still moving after {waited:g} s; tared anyway"))
+                self._stream.publish(Warned(f"the storeys are still moving after {waited:g} s; signals tared anyway"))
                 return values
 
     def _blocks(self, duration: float) -> int:

@@ -102,7 +102,8 @@ class Guard:
     def arm(self) -> None:
         """Arm the rig with zeros queued. Raises RigError while a safety input is open."""
         if opened := self._opened():
-            raise SafetyInputOpen(f"arming is refused: {', '.join(opened)} open; close it, then begin again", opened)
+            closing = "close every safety input, then start again"
+            raise SafetyInputOpen(f"arming is refused: {', '.join(opened)} open; {closing}", opened)
         self._ramp_samples, self._ramp_done, self._ramp_from = None, 0, 1.0
         self._command, self._sent, self._held, self._expected = 0.0, 0.0, None, 0
         self._sending, self._owed, self._zeros = False, 0, 0
@@ -113,7 +114,7 @@ class Guard:
         self._rig.write(self._waiting)
 
     def exchange(self, volts: NDArray[np.float64]) -> Exchange:
-        """Send a block of commands [V] and read as many samples.
+        """Send a block of commands [V] and read the same number of samples.
 
         If a command of the block is beyond the limits, none of the block is sent. Instead, the last command of the
         previous block is ramped to zero along the fast ramp.

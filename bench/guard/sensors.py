@@ -106,7 +106,7 @@ class SensorWatch:
 _SETTLED = 20.0
 """Time before two clocks are compared [s], long compared with the delay of a block."""
 _STRETCH = 5.0
-"""Length [s] of the two windows, at the start and at present, of which the earliest blocks are compared."""
+"""Length [s] of the windows at the start and at present; the least delayed block of each is compared."""
 
 
 class TimeWatch:

@@ -35,10 +35,10 @@ class LongTerm:
     """Long-term motion with the spring `beta` at `omega` [rad/s]. The rocking orbit there has the gain `orbit`.
 
     If the orbit on the table is `stable`, the motion is the orbit. The motion repeats after `repeats` cycles; 0 if it
-    does not repeat, or if the block falls. `gains`, shape (n,), are the gains of the peaks of
-    the last cycles; it is empty if the block falls, which happens after `fallen` cycles. `low` and `high` enclose the
-    greatest peaks of 95 % of the drawn specimens whose block does not fall, and `falls` is the fraction of specimens
-    whose block falls; all three are NaN without drawn specimens.
+    does not repeat, or if the block falls. `gains`, shape (n,), are the gains of the peaks of the last cycles; it is
+    empty if the block falls, which happens after `fallen` cycles. `low` and `high` enclose the greatest peaks of 95 %
+    of the drawn specimens whose block does not fall, and `falls` is the fraction of specimens whose block falls; all
+    three are NaN without drawn specimens.
     """
 
     omega: float

@@ -35,7 +35,7 @@ def rows_of(table: Table) -> list[dict[str, Any]]:
 
 def plain(values: NDArray[Any]) -> list[Any]:
     """Values of an array, shape (n,), as Python objects; None where a value is absent (NaN)."""
-    # NaN is the one value that differs from itself
+    # NaN is the only value that is not equal to itself
     return [None if value != value else value for value in values.tolist()]
 
 

@@ -41,7 +41,7 @@ class Timed:
     status: str
 
     def as_row(self) -> dict[str, float | str | bool | None]:
-        """Columns of the table of steady motions that are determined by the simulation."""
+        """Values, by column, that the simulation contributes to a row of the table of steady motions."""
         return {
             "alpha_1": self.alpha_1,
             "alpha_2": self.alpha_2,

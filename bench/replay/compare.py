@@ -61,7 +61,7 @@ class Comparison:
         paths = (*(table.path for table in EVENT_TABLES.values()), *record.own_tables)
         self._own: dict[str, list[Mapping[str, Any]]] = {path: [] for path in paths}
         self._entries = {path: kind for kind, path in ENTRY_PATHS.items()}
-        """Kind of the journal entries of a table that has one row for each."""
+        """Kind of the journal entries for each table, by path, that has one row per entry."""
 
     def __call__(self, event: Event) -> None:
         if isinstance(event, Acquired):

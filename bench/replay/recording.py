@@ -138,7 +138,7 @@ def _stretches(blocks: dict[str, NDArray[Any]], ends: NDArray[np.int64], chosen:
 
 
 def former_keys(record: DataFile) -> str:
-    """Notice that lists keys of the recorded configuration under their names of an earlier version; empty if none."""
+    """Notice of keys that have names of an earlier version in the recorded configuration; empty if there are none."""
     stored = json.loads(record.metadata.get("configuration", "{}"))
     found = [f"{dotted(old)} (now {new})" for old, new in former_names(BenchConfiguration, stored)]
     return f"the file uses former names of keys: {', '.join(found)}" if found else ""
@@ -232,7 +232,7 @@ class RecordedCourse:
                 self._opened[run] = int(ends[entry.blocks - 1]), entry.columns["subject"].split(", ")
 
     def rows_of(self, path: str) -> Sequence[Mapping[str, Any]] | None:
-        """Rows of the table of a reproducible event at `path`; None if the file has no such table."""
+        """Rows of the table at `path`, which is that of a reproducible event; None if the file has no such table."""
         for kind, table in ENTRY_TABLES.items():
             if table.path == path:
                 return self._rows.get(kind.__name__)

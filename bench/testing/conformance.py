@@ -206,7 +206,7 @@ class RigConformance:
     def test_close_is_allowed_in_every_state_any_number_of_times_and_leaves_nothing_behind(
         self, make_rig: RigFactory
     ) -> None:
-        # opening and closing a first rig loads libraries, some of whose resources are never released: count these here
+        # a first rig loads libraries, some of whose resources are never released; `before` must include these
         make_rig().close()
         before = held()
         for state in (armed, playing, halted, starved):
