@@ -6,7 +6,6 @@ A number in a page is either the output of a block (`tests.pages.execute`) or pa
 
 import json
 import re
-import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -14,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from tests.pages.blocks import ROOT
-from tests.pages.execute import collection, process
+from tests.pages.execute import collection, command_here
 
 CORNERS = (0.5, 1.0, 1.5, 2.0)
 """Lower ends of the table's band in the table of docs/predict.md [Hz]."""
@@ -56,7 +55,7 @@ class Claim:
 def rockbench(*arguments: str) -> dict[str, Any]:
     """The JSON object that a command prints. Raises RuntimeError with its last line when it fails."""
     with tempfile.TemporaryDirectory() as folder:
-        done = process([sys.executable, "-m", "bench", *arguments, "--json"], Path(folder))
+        done = command_here([*arguments, "--json"], Path(folder))
     if done.returncode != 0:
         raise RuntimeError(done.stderr.strip().splitlines()[-1])
     return json.loads(done.stdout)

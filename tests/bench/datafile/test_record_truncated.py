@@ -98,7 +98,7 @@ def hold(written: Written, path: Path, counted: int) -> int:
     return found.rows
 
 
-@pytest.mark.parametrize("number", [14, pytest.param(200, marks=(pytest.mark.soak, pytest.mark.timeout(1200)))])
+@pytest.mark.parametrize("number", [8, pytest.param(200, marks=(pytest.mark.soak, pytest.mark.timeout(1200)))])
 def test_of_a_closed_file_cut_anywhere_the_beginning_is_kept(written: Written, tmp_path: Path, number: int) -> None:
     rng, whole = np.random.default_rng(number), len(written.closed)
     # one length in each of so many stretches, and where the file begins

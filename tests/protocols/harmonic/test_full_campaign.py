@@ -1,4 +1,4 @@
-"""The campaign of the paper (section 4.3) on the virtual bench: four points in every run, all twelve in a long one."""
+"""The campaign of the paper (section 4.3) on the virtual bench: two points in every run, all twelve in a long one."""
 
 import json
 from pathlib import Path
@@ -23,7 +23,8 @@ class Asked(NamedTuple):
         return [(omega, beta) for beta in self.betas for omega in self.omegas]
 
 
-CORNERS = Asked((15.0, 20.0), (0.25, 0.97))
+# one orbit that is stable, and one that is not
+FEW = Asked((15.0, 20.0), (0.97,))
 WHOLE = Asked((12.5, 15.0, 17.5, 20.0), (0.25, 0.64, 0.97))
 
 
@@ -36,7 +37,7 @@ class Campaign(NamedTuple):
 
 @pytest.fixture(
     scope="module",
-    params=[CORNERS, pytest.param(WHOLE, marks=pytest.mark.soak)],
+    params=[FEW, pytest.param(WHOLE, marks=pytest.mark.soak)],
     ids=lambda asked: f"{len(asked.points)} points",
 )
 def campaign(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Campaign:

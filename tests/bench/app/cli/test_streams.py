@@ -31,8 +31,16 @@ class Broken(StringIO):
         return super().write(text)
 
 
-@pytest.mark.parametrize("number", [errno.EPIPE, errno.ENOSPC, errno.EIO])
-@pytest.mark.parametrize("after", [0, 3, 8])
+# every error and every moment once; all nine pairs with the mark soak
+QUICK = ((0, errno.EPIPE), (3, errno.ENOSPC), (8, errno.EIO))
+PAIRS = [
+    pytest.param(after, number, marks=() if (after, number) in QUICK else pytest.mark.soak)
+    for after in (0, 3, 8)
+    for number in (errno.EPIPE, errno.ENOSPC, errno.EIO)
+]
+
+
+@pytest.mark.parametrize(("after", "number"), PAIRS)
 def test_a_run_goes_on_without_its_display(
     number: int, after: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
