@@ -5,8 +5,8 @@ raise, causes a BackendFault, which names the backend.
 """
 
 import re
-from collections.abc import Generator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping
+from contextlib import suppress
 from math import isfinite
 from typing import Any, NoReturn, Self, TypeGuard, cast
 
@@ -162,17 +162,8 @@ class CheckedRig:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    @contextmanager
-    def _calls(self, call: str) -> Generator[None]:
-        """Context manager that converts exceptions that a rig must not raise into BackendFault."""
-        try:
-            yield
-        except RockbenchError:
-            raise
-        except MemoryError:
-            raise
-        except Exception as error:
-            raise BackendFault(self.backend, f"failed in {call} ({_told(error)})") from error
+    def _calls(self, call: str) -> "_Calls":
+        return _Calls(self.backend, call)
 
     def _refuse(self, what: str) -> NoReturn:
         raise BackendFault(self.backend, what)
@@ -248,6 +239,8 @@ class CheckedRig:
             return ()
         with self._calls("raw values"):
             given: Any = method()
+        if given == ():
+            return ()
         names = [channel.name for channel in self.channels]
         if type(given) is not tuple or not all(_is_raw(each, names) for each in cast("tuple[Any, ...]", given)):
             self._refuse(f"returned {given!a:.80} as raw values of its sensors")
@@ -262,6 +255,25 @@ class CheckedRig:
             if low[column] < span.min or high[column] > span.max:
                 told = f"from {low[column]} to {high[column]} of {channel.name}, which are stored in {span.bits} bits"
                 self._refuse(f"returned counts {told}")
+
+
+class _Calls:
+    """Context manager that converts exceptions that a rig must not raise into BackendFault.
+
+    A class, because a generator would take several times as long, and every block needs it six times.
+    """
+
+    __slots__ = ("_backend", "_call")
+
+    def __init__(self, backend: str, call: str) -> None:
+        self._backend, self._call = backend, call
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        if isinstance(error, Exception) and not isinstance(error, RockbenchError | MemoryError):
+            raise BackendFault(self._backend, f"failed in {self._call} ({_told(error)})") from error
 
 
 _RAW = ("index", "time", "code", "arrival")

@@ -1,7 +1,7 @@
 """State and drive of a rig: permitted calls and samples, and the lead required when a block is read."""
 
-from collections.abc import Callable, Generator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
 from enum import Enum
 from typing import Self
 
@@ -75,14 +75,23 @@ def require_block(n: int) -> None:
         raise InvalidInput("samples to read", n, "it must be at least 1")
 
 
-@contextmanager
-def ending_by(stop: Callable[[], None]) -> Generator[None]:
+def ending_by(stop: Callable[[], None]) -> AbstractContextManager[None]:
     """Context manager that stops the rig if a RigError is raised in its body."""
-    try:
-        yield
-    except RigError:
-        stop()
-        raise
+    return _EndingBy(stop)
+
+
+class _EndingBy(AbstractContextManager[None]):
+    __slots__ = ("_stop",)
+
+    def __init__(self, stop: Callable[[], None]) -> None:
+        self._stop = stop
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        if isinstance(error, RigError):
+            self._stop()
 
 
 class RigState(Enum):

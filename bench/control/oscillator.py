@@ -6,6 +6,7 @@ sum over k of Im(A c_k / H(k omega) exp(i k phi)): a table that responds as cali
 for the shares (1, 0, 0, ...).
 """
 
+from cmath import exp
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -115,6 +116,10 @@ class ShareRamp:
         if self._waiting or not np.array_equal(self._to, _pure()):
             self.to((1.0,), samples)
 
+    def constant(self, n: int) -> bool:
+        """Whether the shares are constant over the next `n` samples."""
+        return self._done >= self._length and (not self._waiting or self._waiting[0][0] >= self._played + n)
+
     def next(self, n: int) -> NDArray[np.complex128]:
         """Shares at the next `n` samples, shape (n, HARMONICS), or (1, HARMONICS) while they are constant."""
         if not self._waiting or self._waiting[0][0] >= self._played + n:
@@ -158,6 +163,8 @@ class Oscillator:
         self._rate = sample_rate
         self._calibration: DriveCalibration | None = None
         self._constant: tuple[object, list[tuple[int, NDArray[np.complex128]]]] = (None, [])
+        self._turns: tuple[object, NDArray[np.complex128]] = (None, np.empty((0, 0), dtype=np.complex128))
+        """The harmonics of a held sine over a block, relative to its beginning, and what they were computed for."""
         self.reset()
 
     def reset(self) -> None:
@@ -233,21 +240,35 @@ class Oscillator:
         return volts
 
     def _held(self, n: int) -> Array:
-        step = self._omega / self._rate
-        phase: Array = self._phase + step * np.arange(1, n + 1, dtype=np.float64)
-        self._phase = (self._phase + step * n) % tau
+        step, first = self._omega / self._rate, self._phase
+        self._phase = (first + step * n) % tau
         if self._amplitude == 0.0:
             return np.zeros(n)
-        return self._drive(np.array(self._amplitude), np.array(self._omega), phase)
+        amplitude, omega = np.array(self._amplitude), np.array(self._omega)
+        if not self._shares.constant(n):
+            return self._drive(amplitude, omega, first + step * np.arange(1, n + 1, dtype=np.float64))
+        factors = self._factors(self._calibrated, amplitude, omega, self._shares.next(n))
+        orders = tuple(k for k, _ in factors)
+        if self._turns[0] != (step, n, orders):
+            angles = np.outer(orders, step * np.arange(1, n + 1, dtype=np.float64))
+            self._turns = (step, n, orders), np.exp(1j * angles)
+        begin = np.array([factor[0] * exp(1j * k * first) for k, factor in factors])
+        volts = np.asarray(begin @ self._turns[1], dtype=np.complex128)
+        return np.ascontiguousarray(volts.imag)
+
+    @property
+    def _calibrated(self) -> DriveCalibration:
+        if self._calibration is None:
+            raise RuntimeError("the drive must be calibrated before the oscillator moves the table")
+        return self._calibration
 
     def _drive(self, amplitude: Array, omega: Array, phase: Array) -> Array:
         """Drive [V] at `phase` [rad], shape (n,); `amplitude` and `omega` have that shape or are scalars."""
-        if self._calibration is None:
-            raise RuntimeError("the drive must be calibrated before the oscillator moves the table")
+        calibration = self._calibrated
         shares = self._shares.next(phase.size)
         power = turn = np.exp(1j * phase)
         volts, order = np.zeros(phase.size), 1
-        for k, factor in self._factors(self._calibration, amplitude, omega, shares):
+        for k, factor in self._factors(calibration, amplitude, omega, shares):
             for _ in range(k - order):
                 power = power * turn
             order = k

@@ -11,6 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from enum import StrEnum
 from hashlib import sha256
+from itertools import chain
 from types import NoneType, UnionType
 from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
@@ -212,15 +213,18 @@ class Packer:
         self._pool.shutdown(wait=False, cancel_futures=True)
 
     def _packed(self, chunks: NDArray[Any]) -> Iterator[bytes]:
-        return map(pack, chunks) if len(chunks) == 1 else self._pool.map(pack, chunks)
+        if len(chunks) < THREADS:
+            return iter(pack(chunks))
+        return chain.from_iterable(self._pool.map(pack, np.array_split(chunks, THREADS)))
 
 
-def pack(values: NDArray[Any]) -> bytes:
-    """The bytes of a chunk after the filters `hdf5.FILTERS`: the first bytes of all values, then the second bytes, and
-    so on, compressed.
+def pack(chunks: NDArray[Any]) -> list[bytes]:
+    """The bytes of chunks, shape (n, rows), after the filters `hdf5.FILTERS`: of each chunk the first bytes of all
+    values, then the second bytes, and so on, compressed.
     """
-    shuffled = np.ascontiguousarray(values).view(np.uint8).reshape(-1, values.dtype.itemsize).T
-    return zlib.compress(shuffled.tobytes(), hdf5.FILTERS["compression_opts"])
+    n, size = len(chunks), chunks.dtype.itemsize
+    shuffled = np.ascontiguousarray(chunks).view(np.uint8).reshape(n, -1, size).transpose(0, 2, 1)
+    return [zlib.compress(each, hdf5.FILTERS["compression_opts"]) for each in np.ascontiguousarray(shuffled)]
 
 
 class Growing:
@@ -258,6 +262,7 @@ class Rows:
     def __init__(self, parent: hdf5.Group, name: str, fields: Sequence[Field]) -> None:
         group = hdf5.create_group(parent, name, "NXcollection")
         self._columns = [(field, Growing(field.create(group))) for field in fields]
+        self._fields, self._texts = tuple(fields), tuple(field.kind is Kind.TEXT for field in fields)
         self._pending: list[tuple[Any, ...]] = []
         self._written = 0
 
@@ -277,7 +282,13 @@ class Rows:
     def add(self, *values: Any) -> None:
         """Append one row: one value per field, in order; None for an absent value."""
         self._pending.append(
-            tuple(field.encode(value) for (field, _), value in zip(self._columns, values, strict=True))
+            tuple(
+                [
+                    # numbers are stored as they are
+                    value if type(value) in (float, int) and not text else field.encode(value)
+                    for field, text, value in zip(self._fields, self._texts, values, strict=True)
+                ]
+            )
         )
 
     def extend(self, *columns: NDArray[Any]) -> None:

@@ -31,6 +31,9 @@ PERIOD = 0.5
 PAUSE = 0.05
 """Shortest time between two writes of events [s], so that many events are written at once on a slow disk."""
 
+COLLECT = 0.02
+"""Time during which blocks are collected before they are taken from the queue [s]; other events are taken at once."""
+
 BATCH = 100
 """Number of chunks written at once when samples arrive faster than real time."""
 
@@ -96,6 +99,7 @@ class Recorder:
             path, Skeleton(title, tuple(channels), sample_rate, point_type, metadata, tables or {}, events)
         )
         self._queue: queue.Queue[_Block | Event | _Sync] = queue.Queue(BACKLOG)
+        self._wanted = threading.Event()
         self._end: _End | None = None
         self._hold_up = hold_up
         self._failure: DataFileError | None = None
@@ -161,7 +165,10 @@ class Recorder:
 
     def _put(self, item: _Block | Event | _Sync, patience: float) -> bool:
         """Queue an item if space becomes free within `patience` seconds."""
-        return waiting.put(self._queue, item, patience)
+        queued = waiting.put(self._queue, item, patience)
+        if not isinstance(item, _Block) or self._queue.qsize() > BATCH:
+            self._wanted.set()
+        return queued
 
     def _fall_behind(self, how: str) -> None:
         """Note that the disk is too slow: pending data are still written if it recovers, new data are ignored."""
@@ -191,14 +198,26 @@ class Recorder:
     def _work(self) -> None:
         """Thread function: record until the end; after a failure, only drain the queue."""
         while self._end is None or not self._queue.empty():
-            try:
-                item = self._queue.get(timeout=PAUSE if self._pressing else PERIOD)
-            except queue.Empty:
-                item = None
+            item = self._next()
             self._attempt(partial(self._take, item))
             if isinstance(item, _Sync):
                 item.done.set()
         self._attempt(partial(self._writer.finish, self._end.status, self._end.summary))
+
+    def _next(self) -> _Block | Event | _Sync | None:
+        """The next item; None if there is none for a while.
+
+        Blocks are collected for a moment before they are taken, since waking this thread for each of them would delay
+        the loop, which may run a hundred times faster than real time.
+        """
+        with suppress(queue.Empty):
+            return self._queue.get_nowait()
+        if not self._pressing:
+            self._wanted.wait(COLLECT)
+            self._wanted.clear()
+        with suppress(queue.Empty):
+            return self._queue.get(timeout=PAUSE if self._pressing else PERIOD)
+        return None
 
     def _attempt(self, work: Callable[[], None]) -> None:
         if self._failure is not None:

@@ -212,7 +212,16 @@ class Output:
         self.stalled = self._stall()
         self.read = exchange.block.first + len(exchange.block)
         self.drive = exchange.drive
-        self._stream.publish(Acquired(self._run, exchange.block, exchange.drive, exchange.signals, exchange.magnitudes))
+        self._stream.publish(
+            Acquired(
+                self._run,
+                exchange.block,
+                exchange.drive,
+                exchange.signals,
+                exchange.magnitudes,
+                time=self._stream.now(),
+            )
+        )
         self._alignments.publish_values(self._run)
         if self.stalled:
             self._stream.publish(Warned(in_words(self.stalled), realtime=True))
