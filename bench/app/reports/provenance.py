@@ -71,7 +71,7 @@ def _file(campaign: Campaign) -> dict[str, str]:
         "protocol": campaign.protocol or "not stated",
         "operator": metadata.get("operator") or "not stated",
         "notes": metadata.get("notes") or "none",
-        "begun": moment(record.start_time),
+        "started": moment(record.start_time),
         "ended": moment(record.end_time) or "none: the file is being written, or its writer was killed",
         "status": typeset(": ".join(filter(None, (record.status, record.summary)))),
         "samples": f"{record.rows} of each channel at {record.sample_rate:g} samples/s",

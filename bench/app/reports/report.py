@@ -189,7 +189,7 @@ def _margins(campaign: Campaign) -> Iterator[Table]:
     ]
     columns = [
         Column("quantity", words=True),
-        Column("foreseen"),
+        Column("demand"),
         Column("limit"),
         Column("unit", words=True),
         Column("margin", "%"),
@@ -259,13 +259,13 @@ def _summary(campaign: Campaign) -> list[Part]:
     record = campaign.record
     tested = _tested(campaign)
     betas = listed([f"{beta:g}" for beta in _betas(campaign)]) if tested else ""
-    springs = f", bare and coupled by springs of β = {betas}" if betas else ""
+    springs = f", bare and coupled (β = {betas})" if betas else ""
     what = listed(tested) or f"{campaign.protocol or 'an experiment'} (no gain measured)"
     backend = str(campaign.devices.get("backend", "not stated"))
     ended = f"ended {moment(record.end_time)}" if record.end_time else "not ended"
     parts: list[Part] = [
         *damage_notice(campaign),
-        f"Tested: {what} on a two-storey frame with a rocking block{springs}. Bench: {backend}. Started "
+        f"Tests: {what} on a two-storey frame with a rocking block{springs}. Bench: {backend}. Started "
         f"{moment(record.start_time)}, {ended}; status: {record.status}.{_people(campaign)}",
     ]
     if backend == "simulated":

@@ -175,7 +175,7 @@ def test_a_damaged_file_is_reported_and_says_so_first(
     assert warning.startswith("rockbench: warning:")
     assert "/entry/points/alpha_2" in warning
     text = unescape((tmp_path / "r.html").read_text(encoding="utf-8"))
-    assert text.index("DAMAGED OR CHANGED") < text.index("Tested:")
+    assert text.index("DAMAGED OR CHANGED") < text.index("Tests:")
     assert "/entry/points/alpha_2 was changed" in text
     # what the file does not have is one line, not a section
     assert "The file contains no harmonic test." in text
