@@ -112,7 +112,7 @@ class EmulatedLaser:
         self._thread = threading.Thread(target=self._serve, name=f"emulated {identity.name}", daemon=True)
 
     def start(self) -> None:
-        """Start to serve the line."""
+        """Start serving the line."""
         self._thread.start()
 
     def close(self) -> None:
