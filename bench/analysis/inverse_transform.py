@@ -3,7 +3,7 @@
 For such a length n = a p, the usual algorithm transforms series of more than twice the length, which do not fit in the
 processor's cache. With j = p l + i and k = a m + q, the transform consists of one transform of length p for each q, a
 rotation, and one transform of length a for each i (Cooley and Tukey, 1965). The symmetry of the spectrum halves the
-number of the first.
+work.
 """
 
 from functools import lru_cache
