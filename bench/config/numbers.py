@@ -23,7 +23,7 @@ from typing import Any, cast
 def converted(digits: str, typed: str, unit: str) -> float:
     """Convert the decimal number `digits` from the unit `typed` to the declared `unit` ("1" for a pure number).
 
-    Raises ValueError naming both if the unit is unknown or has another dimension.
+    Raises ValueError that names both units if the typed unit is unknown or has another dimension.
     """
     if unit == "":
         raise ValueError(f"it has no unit: remove {typed!r}")
