@@ -14,7 +14,7 @@ from sim.errors import InvalidInput
 from sim.parameters import COUPLING, Parameters, quantity
 
 SLOWEST, FASTEST = 1e-3, 1e5
-"""Plausible natural frequencies [rad/s] of a frame on a shake table; values beyond them result from typing errors."""
+"""Plausible natural frequencies [rad/s] of a frame on a shake table; values outside this range are typing errors."""
 
 
 DAMPING = (0.001, 0.15)

@@ -81,7 +81,7 @@ def zero(like: NDArray[np.float64]) -> float:
 
 
 def fma(x: float, y: float, z: float) -> float:
-    """X y + z with one rounding."""
+    """Return x * y + z with one rounding."""
     return x * y + z
 
 
