@@ -18,7 +18,7 @@ def budget_figure(
     expanded: Sequence[float],
     quantity: str = "expanded uncertainty of α₂",
 ) -> "Figure":
-    """Each bar is divided in proportion to the contributions' shares of the variance. `budgets` are standard
+    """Horizontal bars, each divided in proportion to the contributions to the variance. `budgets` are standard
     uncertainties by contribution, `expanded` the lengths of the bars [%].
     """
     total = {name: sum(budget.get(name, 0.0) ** 2 for budget in budgets) for budget in budgets for name in budget}

@@ -133,7 +133,7 @@ COMMANDS = {
     "file recover": (
         "file:recover",
         "Rebuild a file after a crash or a full disk, or upgrade one of an older version.",
-        "campaign.h5 --out mended.h5",
+        "campaign.h5 --out recovered.h5",
     ),
     "file bundle": (
         "support:bundle",

@@ -46,7 +46,7 @@ def doctor(
             "good": not bad,
             "checks": [dict(zip(("item", "health", "found", "remedy"), row, strict=True)) for row in rows],
         },
-        lambda: text_table([TextColumn(name, "") for name in ("check", "health", "found", "remedy")], rows),
+        lambda: text_table([TextColumn(name, words=True) for name in ("check", "health", "found", "remedy")], rows),
         as_json=as_json,
     )
     return 1 if bad else 0

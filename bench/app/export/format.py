@@ -1,4 +1,4 @@
-"""Contents of an export, independent of its format, and the export formats, which are entry points of the group
+"""Contents of an export, independent of the format, and the export formats: entry points of the group
 `rockbench.exports`.
 """
 

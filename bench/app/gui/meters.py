@@ -28,7 +28,7 @@ WARNED = 0.9
 LEAST_ROW, LARGEST_ROW = 30, 52
 """Height of a meter [px]."""
 HIDDEN = ("drive_voltage", "drive_slew")
-"""Limits of the command: a command beyond them is refused, and nothing is measured against them."""
+"""Limits without a meter: they apply to the command, which is checked before output, not to a measured signal."""
 
 
 @dataclass

@@ -221,7 +221,7 @@ def opengl(cards: Path = Path("/dev/dri")) -> Finding:
         )
     if sys.platform == "linux" and not cards.is_dir():
         return Finding(
-            "OpenGL", Health.NOTICE, "no graphics card", "let the window render in software: LIBGL_ALWAYS_SOFTWARE=1"
+            "OpenGL", Health.NOTICE, "no graphics card", "render the window in software: set LIBGL_ALWAYS_SOFTWARE=1"
         )
     return Finding("OpenGL", Health.GOOD, "graphics card found")
 
