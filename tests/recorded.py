@@ -25,14 +25,19 @@ def recorded(
     operator: Operator | None = None,
     subscribers: Sequence[Subscriber] = (),
     first: Sequence[Event] = (),
+    events: Sequence[type[Event]] = (),
 ) -> Ending:
-    """Carry out `plan` on `rig` and leave the file at `path`; `first` is said before."""
+    """Carry out `plan` on `rig` and leave the file at `path`; `first` is said before.
+
+    `events` are those of the protocol.
+    """
     recorder = Recorder(
         path,
         channels=rig.channels,
         sample_rate=rig.sample_rate,
         point_type=point_type,
         metadata={"configuration": configuration.model_dump_json(), **(metadata or {})},
+        events=events,
         hold_up=60.0,
     )
     stream, requests = EventStream(rig.clock, [recorder, *subscribers]), requests or Requests()

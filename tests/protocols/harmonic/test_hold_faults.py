@@ -83,7 +83,8 @@ def faulty(campaign: HarmonicCampaign, tmp_path: Path) -> Faulty:
                 points.append(event.point)
 
         configuration = BenchConfiguration()
-        ending = recorded(tmp_path / "run.h5", campaign.plan(), rig, configuration, HarmonicPoint, subscribers=[watch])
+        path, plan = tmp_path / "run.h5", campaign.plan()
+        ending = recorded(path, plan, rig, configuration, HarmonicPoint, subscribers=[watch], events=(HoldCycle,))
         return Run(ending, points, events)
 
     return run
