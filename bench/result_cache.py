@@ -35,7 +35,7 @@ def cached(kind: str, inputs: object, compute: Callable[[], Any]) -> Any:
     folder = _folder()
     if folder is None:
         return compute()
-    text = json.dumps([kind, inputs, _stamp()], sort_keys=True)
+    text = json.dumps([kind, inputs, stamp()], sort_keys=True)
     path = folder / f"{kind}-{sha256(text.encode()).hexdigest()}.json"
     with suppress(OSError, ValueError, KeyError, TypeError):
         stored = json.loads(path.read_text(encoding="utf-8"))
@@ -83,7 +83,7 @@ def _prune(folder: Path) -> None:
 
 
 @lru_cache(maxsize=1)
-def _stamp() -> list[object]:
+def stamp() -> list[object]:
     """Everything that affects a result apart from its inputs."""
     from sim.kernel.compiled import processor
 

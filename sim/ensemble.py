@@ -36,6 +36,7 @@ def steady_gains(
     members: Sequence[Sequence[Specimen]],
     bare_amplitude: float | None = None,
     done: Done | None = None,
+    scheduler: str | None = None,
 ) -> Floats:
     """alpha_1 and alpha_2 of m specimens on the branches of n orbits, shape (n, m, 2), computed on all processors.
 
@@ -45,22 +46,23 @@ def steady_gains(
     completed.
     """
     every = [(orbit, specimen) for orbit, own in zip(orbits, members, strict=True) for specimen in own]
-    parts = max(processors(), len(every) // CHUNK)
+    parts = max(processors(scheduler), len(every) // CHUNK)
     bounds = np.linspace(0, len(every), parts + 1).astype(int).tolist()
     chunks = [every[first:last] for first, last in pairwise(bounds) if last > first]
     if not chunks:
         return np.empty((len(orbits), 0, 2))
-    peaks = np.concatenate(sweep(_peaks, chunks, done=done))
+    peaks = np.concatenate(sweep(_peaks, chunks, scheduler, done=done))
     bare = np.array([_bare(specimen, orbit, bare_amplitude) for orbit, specimen in every])
     return (peaks / bare).reshape(len(orbits), -1, 2)
 
 
-def record_gains(members: Sequence[Specimen], record: SampledRecord) -> Floats:
+def record_gains(members: Sequence[Specimen], record: SampledRecord, scheduler: str | None = None) -> Floats:
     """alpha_1 and alpha_2 of n specimens under `record`, started from rest, shape (n, 2), computed on all processors.
 
     NaN where the block overturns or the run fails.
     """
-    runs = simulate_many([*members, *(specimen.bare() for specimen in members)], record, tolerance=RUN_TOLERANCE)
+    every = [*members, *(specimen.bare() for specimen in members)]
+    runs = simulate_many(every, record, tolerance=RUN_TOLERANCE, scheduler=scheduler)
     peaks = np.array([(run.peaks.u1, run.peaks.drift) for run in runs]).reshape(2, -1, 2)
     stood = np.array([run.status is Status.COMPLETED for run in runs[: len(members)]], dtype=np.bool_)
     return np.where(stood[:, None], peaks[0] / peaks[1], np.nan)

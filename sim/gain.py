@@ -110,7 +110,10 @@ def gain_spectrum(
 
 
 def seismic_curve(
-    specimen: Specimen, record: SampledRecord, betas: Sequence[float] | NDArray[np.float64]
+    specimen: Specimen,
+    record: SampledRecord,
+    betas: Sequence[float] | NDArray[np.float64],
+    scheduler: str | None = None,
 ) -> list[SeismicGain]:
     """Gain coefficients under `record`, from rest, at each stiffness ratio of `betas`, on all processors.
 
@@ -124,7 +127,7 @@ def seismic_curve(
         )
     coupled = [specimen.coupled(float(beta)) for beta in betas]
     curve: list[SeismicGain] = []
-    for member, motion in zip(coupled, simulate_many(coupled, record), strict=True):
+    for member, motion in zip(coupled, simulate_many(coupled, record, scheduler=scheduler), strict=True):
         known = motion.status is Status.COMPLETED
         alpha_1 = motion.peaks.u1 / bare.peaks.u1 if known else None
         alpha_2 = motion.peaks.drift / bare.peaks.drift if known else None

@@ -1,28 +1,25 @@
 """Maps of the gain coefficients over frequency and stiffness: both steady motions, their existence and stability.
 
-Continuation over frequency gives the first row, at constant stiffness. From there, the columns of a strip are continued
-over stiffness together, and each row is predicted from the previous ones. No transient has to be integrated.
+The rocking orbits are continued over the grid by `sim.map_rows`; no transient has to be integrated.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import tau
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sim.errors import InvalidInput
 from sim.linear import frame_matrices
-from sim.return_map import MOST_KNOWN, Solution, Solutions, extrapolated, follow, newton, parameters
+from sim.map_rows import Continuation, rows_at_once, rows_of_orbits
 from sim.specimen import Specimen
-from sim.steady import NoOrbit, branch_solutions, check_steady, resting_rates
-from sim.sweep import Done, processors, sweep
+from sim.steady import check_steady, resting_rates
+from sim.sweep import Done
 
 Floats = NDArray[np.float64]
-
-STRIPS = 2
-"""Number of strips of columns per processor: enough to balance the load, but few enough to keep each strip wide."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,95 +96,68 @@ def gain_map(
     """
     rows, row_of = np.unique(np.asarray(betas, dtype=np.float64), return_inverse=True)
     columns, column_of = np.unique(np.asarray(omegas, dtype=np.float64), return_inverse=True)
-    if not (rows.size and columns.size):
-        raise InvalidInput("grid", (rows.size, columns.size), "the map needs at least one stiffness and one frequency")
-    for omega in columns:
-        check_steady(specimen.coupled(float(rows[0])), float(omega), amplitude)
-    coupled = [specimen.coupled(float(beta)) for beta in rows]
+    gone = 0
 
-    first = _first_row(coupled[0], columns, amplitude)
-    parts = np.array_split(np.arange(columns.size), min(columns.size, STRIPS * processors(scheduler)))
-    strips = [_Strip(coupled, columns[part], amplitude, _rows(first, part)) for part in parts]
-    followed = sweep(_follow_strip, strips, scheduler, done=done)
-    sections, peaks, jacobians = (np.concatenate(layer, axis=1) for layer in zip(*followed, strict=True))
+    def counted(finished: int, tasks: int) -> None:
+        size = min(rows_at_once(columns.size), rows.size - gone)
+        if done is not None:
+            done(gone * tasks + finished * size, rows.size * tasks)
 
-    multipliers = np.full((*sections.shape[:2], 6), np.nan, dtype=np.complex128)
-    exists = np.isfinite(sections[:, :, 0])
-    multipliers[exists] = np.linalg.eigvals(jacobians[exists])
-    bare = _linear_peaks(specimen, [0.0], columns, amplitude if bare_amplitude is None else bare_amplitude)[0][0]
-    resting_peaks, resting_multipliers = _resting(coupled, columns, amplitude)
+    blocks = list[GainMap]()
+    for block, after in gain_map_blocks(specimen, rows, columns, amplitude, bare_amplitude, scheduler, counted):
+        blocks.append(block)
+        gone = after.rows
     place = np.ix_(row_of, column_of)
+
+    def whole(values: Callable[[GainMap], NDArray[Any]]) -> NDArray[Any]:
+        return np.concatenate([values(block) for block in blocks])[place]
+
+    bare = blocks[0].rocking.bare[column_of]
     return GainMap(
         specimen=specimen,
         betas=rows[row_of],
         omegas=columns[column_of],
         amplitude=amplitude,
-        rocking=LayerMap(peaks[place], bare[column_of], multipliers[place]),
-        resting=LayerMap(resting_peaks[place], bare[column_of], resting_multipliers[place]),
-        sections=sections[place],
+        rocking=LayerMap(whole(lambda b: b.rocking.peaks), bare, whole(lambda b: b.rocking.multipliers)),
+        resting=LayerMap(whole(lambda b: b.resting.peaks), bare, whole(lambda b: b.resting.multipliers)),
+        sections=whole(lambda b: b.sections),
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Strip:
-    """Columns that are continued together from the solutions of the first row."""
+def gain_map_blocks(
+    specimen: Specimen,
+    betas: Floats,
+    omegas: Floats,
+    amplitude: float,
+    bare_amplitude: float | None = None,
+    scheduler: str | None = None,
+    done: Done | None = None,
+    after: Continuation | None = None,
+) -> Generator[tuple[GainMap, Continuation], None, None]:
+    """Same as `gain_map`, in blocks of `rows_at_once` stiffnesses; both axes must be ascending.
 
-    specimens: list[Specimen]
-    omegas: Floats
-    amplitude: float
-    first: Solutions
-
-
-def _follow_strip(strip: _Strip) -> tuple[Floats, Floats, Floats]:
-    """Sections, shape (n, m, 6), peaks, (n, m, 3), and Jacobians, (n, m, 6, 6), of n specimens and m columns."""
-    rows = [strip.first]
-    betas = [specimen.beta or 0.0 for specimen in strip.specimens]
-    for i, specimen in enumerate(strip.specimens[1:], start=1):
-        q = parameters(specimen, strip.omegas, strip.amplitude)
-        near = slice(max(0, i - MOST_KNOWN), i)
-        guess = extrapolated(betas[near], [row.section for row in rows[near]], betas[i])
-        slope = extrapolated(betas[near], [row.jacobian for row in rows[near]], betas[i])
-        row = newton(q, guess, slope, accuracy=2)
-        before = parameters(strip.specimens[i - 1], strip.omegas, strip.amplitude)
-        for j in np.flatnonzero(~row.found).tolist():
-            # continue from the previous row in shorter steps, or from a neighbour in this row
-            starts = [(rows[-1], before, j), (row, q, j - 1), (row, q, min(j + 1, len(q) - 1))]
-            known = ((at, origin[k], k) for at, origin, k in starts if k >= 0 and at.found[k])
-            found = next(filter(None, (follow(origin, at.section[k], q[j]) for at, origin, k in known)), None)
-            if found is not None:
-                row.put(j, found)
-        rows.append(row)
-    return (
-        np.stack([row.section for row in rows]),
-        np.stack([row.peaks for row in rows]),
-        np.stack([row.jacobian for row in rows]),
-    )
-
-
-def _first_row(specimen: Specimen, omegas: Floats, amplitude: float) -> Solutions:
-    """First row, from which all columns start; where continuation along it fails, points are computed separately."""
-    places = [float(omega) for omega in omegas]
-    try:
-        branch = branch_solutions(specimen, places, amplitude)
-    except NoOrbit:
-        branch = {omega: solution for omega in places if (solution := _alone(specimen, omega, amplitude))}
-    n = len(places)
-    row = Solutions(np.full((n, 6), np.nan), np.full((n, 6, 6), np.nan), np.full((n, 3), np.nan), np.zeros(n, np.bool_))
-    for i, omega in enumerate(places):
-        if omega in branch:
-            row.put(i, branch[omega])
-    return row
-
-
-def _alone(specimen: Specimen, omega: float, amplitude: float) -> Solution | None:
-    try:
-        return branch_solutions(specimen, [omega], amplitude)[omega]
-    except NoOrbit:
-        return None
-
-
-def _rows(solutions: Solutions, part: NDArray[np.intp]) -> Solutions:
-    return Solutions(solutions.section[part], solutions.jacobian[part], solutions.peaks[part], solutions.found[part])
+    Each block is returned with the state from which the next one continues. As `after`, it lets a map continue in
+    another process, with identical digits. `done` counts the parts of each block.
+    """
+    if not (betas.size and omegas.size):
+        raise InvalidInput("grid", (betas.size, omegas.size), "the map needs at least one stiffness and one frequency")
+    for omega in omegas:
+        check_steady(specimen.coupled(float(betas[0])), float(omega), amplitude)
+    coupled = [specimen.coupled(float(beta)) for beta in betas]
+    bare = _linear_peaks(specimen, [0.0], omegas, amplitude if bare_amplitude is None else bare_amplitude)[0][0]
+    for rows, state in rows_of_orbits(coupled, omegas, amplitude, scheduler, done, after):
+        part = slice(state.rows - len(rows.sections), state.rows)
+        resting_peaks, resting_multipliers = _resting(coupled[part], omegas, amplitude)
+        block = GainMap(
+            specimen=specimen,
+            betas=betas[part],
+            omegas=omegas,
+            amplitude=amplitude,
+            rocking=LayerMap(rows.peaks, bare, rows.multipliers),
+            resting=LayerMap(resting_peaks, bare, resting_multipliers),
+            sections=rows.sections,
+        )
+        yield block, state
 
 
 def _linear_peaks(

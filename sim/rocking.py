@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from sim.errors import InvalidInput
 from sim.excitation import ROW, Excitation
 from sim.specimen import Specimen
-from sim.sweep import in_threads, processors
+from sim.sweep import processors, sweep
 
 TOLERANCE = 1e-10
 """Default relative tolerance of a step. The error over 120 s of steady rocking is of the same order."""
@@ -147,11 +147,12 @@ def simulate_many(
     peaks_from: float | Sequence[float] | None = 0.0,
     tolerance: float = TOLERANCE,
     overturning_angle: float = pi / 2,
+    scheduler: str | None = None,
 ) -> list[Motion]:
     """Call `simulate` for many runs, on all processors, and return the results in order.
 
     A single specimen, excitation, state or window applies to all runs. Everything is checked before the first run
-    starts.
+    starts. `scheduler` is that of `sim.sweep.sweep`.
 
     Raises InvalidInput if the sequences differ in length or a run is refused.
     """
@@ -182,10 +183,10 @@ def simulate_many(
     alike: dict[int, list[int]] = {}
     for i, run in enumerate(prepared):
         alike.setdefault(run.order, []).append(i)
-    share = -(-runs // processors())
+    share = -(-runs // processors(scheduler))
     size = min(share, max(SMALLEST_PART, min(-(-share // 4), LARGEST_PART)))
     parts = [places[i : i + size] for places in alike.values() for i in range(0, len(places), size)]
-    motions = in_threads(lambda part: _side_by_side([prepared[i] for i in part]), parts)
+    motions = sweep(_side_by_side, [[prepared[i] for i in part] for part in parts], scheduler)
     ordered = dict(zip(chain(*parts), chain(*motions), strict=True))
     return [ordered[i] for i in range(runs)]
 

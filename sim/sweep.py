@@ -108,8 +108,29 @@ def _distributed(
     return [result for group in gathered for result in group]
 
 
+_kept: dict[str, Any] = {}
+"""Open connections by the address of their scheduler."""
+
+
+@contextmanager
+def connection(scheduler: str | None) -> Generator[None, None, None]:
+    """Context manager that keeps the connection to a `scheduler` open for several sweeps; no effect for None."""
+    if scheduler is None or scheduler in _kept:
+        yield
+        return
+    with _connected(scheduler) as client:
+        _kept[scheduler] = client
+        try:
+            yield
+        finally:
+            del _kept[scheduler]
+
+
 @contextmanager
 def _connected(scheduler: str) -> Generator[Any, None, None]:
+    if scheduler in _kept:
+        yield _kept[scheduler]
+        return
     require("distributed", f"scheduler = {scheduler!r}")
     # `Any`, because this is an optional dependency without type annotations
     distributed: Any = import_module("distributed")

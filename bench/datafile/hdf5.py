@@ -167,11 +167,28 @@ def write_text(parent: Group, name: str, text: str, *, width: int = 0, descripti
     return made
 
 
+MANY = 50_000
+"""Number of strings of an array that are written at once."""
+
+
 def write_texts(parent: Group, name: str, texts: Iterable[str], *, description: str) -> Dataset:
     """Create a dataset with all its strings."""
     stored = [text.encode() for text in texts]
     kind = text_type(max([1, *map(len, stored)]))
     made = parent.create_dataset(name, data=np.array(stored, dtype=kind), dtype=kind)
+    describe(made, description=description)
+    return made
+
+
+def write_text_array(parent: Group, name: str, texts: NDArray[np.str_], *, description: str) -> Dataset:
+    """Same as `write_texts` in parts, because objects of strings need far more memory than an array of them."""
+    if len(texts) <= MANY:
+        return write_texts(parent, name, texts.tolist(), description=description)
+    parts = [slice(first, first + MANY) for first in range(0, len(texts), MANY)]
+    kind = text_type(max(1, *(np.char.encode(texts[part], "utf-8").dtype.itemsize for part in parts)))
+    made = parent.create_dataset(name, shape=texts.shape, dtype=kind)
+    for part in parts:
+        made[part] = np.char.encode(texts[part], "utf-8").astype(kind)
     describe(made, description=description)
     return made
 

@@ -50,7 +50,7 @@ def write(parent: "hdf5.Group", name: str, table: Table) -> None:
     for key, column in table.items():
         kind = column.values.dtype.kind
         if kind == "U":
-            hdf5.write_texts(group, key, column.values.tolist(), description=column.description)
+            hdf5.write_text_array(group, key, column.values, description=column.description)
             continue
         values = column.values.astype(np.int8) if kind == "b" else column.values
         stored = hdf5.write_numbers(group, key, values, unit=column.unit or "1", description=column.description)

@@ -46,6 +46,7 @@ def bands(
     known: SpecimenKnowledge,
     members: int = 0,
     done: Done | None = None,
+    scheduler: str | None = None,
 ) -> Bands:
     """Band around each `alpha_2`, shape (n,), of the motions `orbits`.
 
@@ -61,11 +62,17 @@ def bands(
     # pad to equal numbers of members: a quantity may be exact for one spring and uncertain for another
     most = max(map(len, of.values()), default=0)
     own = [of[orbit.specimen] + [orbit.specimen] * (most - len(of[orbit.specimen])) for orbit in orbits]
-    gains = steady_gains(orbits, own, done=done)[:, :, 1]
+    gains = steady_gains(orbits, own, done=done, scheduler=scheduler)[:, :, 1]
     return _drawn(gains) if members else _first_order(best, gains)
 
 
-def record_bands(specimens: Sequence[Specimen], record: SampledRecord, known: SpecimenKnowledge, members: int) -> Bands:
+def record_bands(
+    specimens: Sequence[Specimen],
+    record: SampledRecord,
+    known: SpecimenKnowledge,
+    members: int,
+    scheduler: str | None = None,
+) -> Bands:
     """Bands of alpha_2 of n `specimens` under `record`, started from rest, by Monte Carlo simulation with `members`
     draws for each specimen.
 
@@ -73,7 +80,7 @@ def record_bands(specimens: Sequence[Specimen], record: SampledRecord, known: Sp
     parameters.
     """
     drawn = [_members(specimen, known, members) for specimen in specimens]
-    gains = record_gains([one for own in drawn for one in own], record)[:, 1]
+    gains = record_gains([one for own in drawn for one in own], record, scheduler)[:, 1]
     return _drawn(gains.reshape(len(specimens), members))
 
 

@@ -16,6 +16,9 @@ from sim.knowledge import SpecimenKnowledge
 from sim.parameters import Parameters
 from sim.specimen import Specimen
 
+BLOCK = 10_000
+"""Number of rows of a CSV file written at once."""
+
 FORMAT, FORMAT_VERSION = "rocking-bench prediction", 1
 
 
@@ -44,13 +47,16 @@ def write_csv(path: Path, table: Table) -> None:
 
     Raises InvalidInput if `path` exists, RockbenchError when the disk fails.
     """
-    cells = [[csv_cell(_text(value)) for value in plain(column.values)] for column in table.values()]
+    rows = max((len(column.values) for column in table.values()), default=0)
 
     def write(unfinished: Path) -> None:
         with unfinished.open("w", encoding="utf-8", newline="") as file:
             writer = csv.writer(file, lineterminator="\n")
             writer.writerow(table)
-            writer.writerows(zip(*cells, strict=True))
+            # in blocks: cells of text need far more memory than the numbers
+            for first in range(0, rows, BLOCK):
+                block = (plain(column.values[first : first + BLOCK]) for column in table.values())
+                writer.writerows(zip(*([csv_cell(_text(value)) for value in each] for each in block), strict=True))
 
     write_new(path, write)
 

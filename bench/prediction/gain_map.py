@@ -1,61 +1,119 @@
 """Gain map: all steady motions over frequency and stiffness, as in Fig. 4 of the paper."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.datafile.tables import Table
+from bench.datafile.tables import Column, Table
+from bench.prediction.map_store import MapStore
 from bench.prediction.requests import MapRequest
 from bench.prediction.steady import amplitude_of, band_columns, table_of
 from bench.progress import Progress, counting, silent
 from sim.knowledge import SpecimenKnowledge
-from sim.maps import GainMap, LayerMap, gain_map
+from sim.map_rows import rows_at_once
+from sim.maps import GainMap, LayerMap, gain_map_blocks
 from sim.rocking import Peaks, State
 from sim.specimen import Specimen
 from sim.steady import Orbit, resting_level
+from sim.sweep import Done, connection
 
 IMPACTS: dict[Literal["rocking", "resting"], int] = {"rocking": 2, "resting": 0}
 """Impacts per period of the drive, by branch."""
 
 
 def map_table(
-    specimen: Specimen, request: MapRequest, known: SpecimenKnowledge | None = None, progress: Progress = silent
+    specimen: Specimen,
+    request: MapRequest,
+    known: SpecimenKnowledge | None = None,
+    progress: Progress = silent,
+    store: Callable[[], MapStore] | None = None,
 ) -> Table:
     """Table with one row for each branch that exists at each point, sorted by stiffness, then frequency.
 
-    If the uncertainties of the specimen are given as `known`, additional columns contain the band of alpha_2. Raises
-    SchedulerUnavailable if the requested scheduler does not respond.
+    If the uncertainties of the specimen are given as `known`, additional columns contain the band of alpha_2. A map of
+    several blocks is kept in the `store`, if there is one, and continues where that ends. Raises SchedulerUnavailable
+    if the requested scheduler does not respond.
     """
     betas, omegas = np.sort(request.beta), np.sort(request.omega)
     amplitude = amplitude_of(specimen, request)
-    made = gain_map(
-        specimen,
-        betas,
-        omegas,
-        amplitude,
-        scheduler=request.scheduler,
-        done=counting(progress, "computing the gain map"),
-    )
+    kept = store() if store is not None and betas.size > rows_at_once(omegas.size) else None
+    steps = _Steps(progress, betas.size, rows_at_once(omegas.size), 1 + request.outcomes + (known is not None))
+    after = None if kept is None else kept.after
+    steps.rows = 0 if after is None else after.rows
+    tables = list[Table]()
+    map_done = steps.done(0, "computing the gain map")
+    with connection(request.scheduler):
+        for made, then in gain_map_blocks(
+            specimen, betas, omegas, amplitude, scheduler=request.scheduler, done=map_done, after=after
+        ):
+            table = _block(made, request, known, steps)
+            if kept is None:
+                tables.append(table)
+            else:
+                kept.append(table, then)
+            steps.rows = then.rows
+    return _joined(tables) if kept is None else kept.table()
+
+
+class _Steps:
+    """Progress of a map over its blocks, each of which has the same number of steps. With one block, each step is a
+    phase; with several, the map is.
+    """
+
+    def __init__(self, progress: Progress, total: int, size: int, count: int) -> None:
+        self._progress, self._total, self._size, self._count = progress, total, size, count
+        self.rows = 0
+        """Completed rows of the map."""
+
+    def done(self, step: int, phase: str) -> Done:
+        """Function that counts the completed parts of `step` of the present block."""
+        if self._total <= self._size:
+            return counting(self._progress, phase)
+        name = "computing the gain map"
+        if step == 0:
+            self._progress(name)
+
+        def completed(parts: int, of: int) -> None:
+            size = min(self._size, self._total - self.rows)
+            share = (step + parts / max(of, 1)) * size
+            self._progress(name, int(self._count * self.rows + share), self._count * self._total)
+
+        return completed
+
+
+def _block(made: GainMap, request: MapRequest, known: SpecimenKnowledge | None, steps: _Steps) -> Table:
+    """Rows of a block of the map."""
     parts = [
-        _columns(name, layer, omegas, betas, amplitude)
+        _columns(name, layer, made.omegas, made.betas, made.amplitude)
         for name, layer in zip(IMPACTS, (made.rocking, made.resting), strict=True)
     ]
     if request.outcomes:
         from sim.outcomes import outcome_map
 
-        came = outcome_map(made, scheduler=request.scheduler, done=counting(progress, "simulating from rest"))
+        came = outcome_map(made, scheduler=request.scheduler, done=steps.done(1, "simulating from rest"))
         for part, layer in zip(parts, (made.rocking, made.resting), strict=True):
             part |= {"outcome": came.outcome[layer.exists], "outcome_time_s": came.time[layer.exists]}
     if known is not None:
-        done = counting(progress, "computing the uncertainty band")
+        done = steps.done(1 + request.outcomes, "computing the uncertainty band")
         for part, name in zip(parts, IMPACTS, strict=True):
-            part |= band_columns(_orbits(made, name), part["alpha_2"], known, request.members, done)
+            orbits = _orbits(made, name)
+            part |= band_columns(orbits, part["alpha_2"], known, request.members, done, request.scheduler)
     whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     # stable sort: at each point the rocking branch remains first
     order = np.lexsort((whole["omega_rad_s"], whole["beta"]))
     return table_of({name: values[order] for name, values in whole.items()})
+
+
+def _joined(tables: list[Table]) -> Table:
+    """One table of the rows of several."""
+    if len(tables) == 1:
+        return tables[0]
+    return {
+        name: Column(np.concatenate([table[name].values for table in tables]), each.unit, each.description)
+        for name, each in tables[0].items()
+    }
 
 
 def grids(table: Mapping[str, NDArray[Any]], request: MapRequest, layer: str, name: str) -> NDArray[np.float64]:

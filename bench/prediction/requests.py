@@ -70,6 +70,9 @@ class GainRequest(SineRequest):
         ge=0,
         le=100_000,
     )
+    scheduler: str | None = quantity(
+        None, "", "address of a dask.distributed scheduler that distributes the work, such as tcp://10.0.0.5:8786"
+    )
 
 
 class SteadyRequest(GainRequest):
@@ -92,9 +95,6 @@ class MapRequest(GainRequest):
     )
     band: bool = quantity(
         False, "", "also compute the band of alpha_2 at every point (half a minute for the default map, to first order)"
-    )
-    scheduler: str | None = quantity(
-        None, "", "address of a dask.distributed scheduler that distributes the work, such as tcp://10.0.0.5:8786"
     )
 
 
@@ -174,6 +174,9 @@ class RecordsRequest(Parameters):
         "length scale, model over prototype: time scales with its square root, acceleration is unchanged",
         gt=0,
         le=1,
+    )
+    scheduler: str | None = quantity(
+        None, "", "address of a dask.distributed scheduler that distributes the work, such as tcp://10.0.0.5:8786"
     )
 
 

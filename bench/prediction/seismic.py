@@ -21,6 +21,7 @@ from sim.errors import InvalidInput
 from sim.gain import SeismicGain, seismic_curve
 from sim.knowledge import SpecimenKnowledge
 from sim.specimen import Specimen
+from sim.sweep import connection
 
 Band = tuple[float, float] | None
 
@@ -67,16 +68,18 @@ def seismic_curves(
     reach = None if request.stroke_fit == "none" else Reach.of(configuration)
     method = Method.HIGH_PASS if request.stroke_fit == "high-pass" else Method.LEAST_CHANGE
     curves: list[SeismicCurve] = []
-    for record in records:
-        progress("simulating the records", len(curves), len(records))
-        curves.append(_curve(specimen, record, request, betas, band, reach, method))
-    if known is None or not request.members:
-        return curves
-    coupled = [specimen.coupled(beta) for beta in betas]
-    banded: list[SeismicCurve] = []
-    for curve in curves:
-        progress("computing the uncertainty bands", len(banded), len(curves))
-        banded.append(replace(curve, bands=record_bands(coupled, curve.prepared.record, known, request.members)))
+    with connection(request.scheduler):
+        for record in records:
+            progress("simulating the records", len(curves), len(records))
+            curves.append(_curve(specimen, record, request, betas, band, reach, method))
+        if known is None or not request.members:
+            return curves
+        coupled = [specimen.coupled(beta) for beta in betas]
+        banded: list[SeismicCurve] = []
+        for curve in curves:
+            progress("computing the uncertainty bands", len(banded), len(curves))
+            found = record_bands(coupled, curve.prepared.record, known, request.members, request.scheduler)
+            banded.append(replace(curve, bands=found))
     return banded
 
 
@@ -100,9 +103,10 @@ def band_study(
         raise InvalidInput("--corner", max(request.corner), f"it must be below the band's upper end, {band[1]:g} Hz")
     bands = [(record, (corner, band[1])) for record in records for corner in sorted(request.corner)]
     curves: list[SeismicCurve] = []
-    for record, limited in bands:
-        progress("simulating the records", len(curves), len(bands))
-        curves.append(_curve(specimen, record, request, betas, limited))
+    with connection(request.scheduler):
+        for record, limited in bands:
+            progress("simulating the records", len(curves), len(bands))
+            curves.append(_curve(specimen, record, request, betas, limited))
     return curves
 
 
@@ -128,7 +132,7 @@ def _curve(
         )
     except InvalidInput as refused:
         raise InvalidInput(f"{refused.item} of {record.name}", refused.value, refused.allowed) from None
-    return SeismicCurve(record, prepared, seismic_curve(specimen, prepared.record, betas))
+    return SeismicCurve(record, prepared, seismic_curve(specimen, prepared.record, betas, request.scheduler))
 
 
 DIGITS = 9

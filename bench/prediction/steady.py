@@ -210,6 +210,7 @@ def steady_table(
     known: SpecimenKnowledge | None = None,
     members: int = 0,
     progress: Progress = silent,
+    scheduler: str | None = None,
 ) -> Table:
     """Table with one row for each branch of each prediction, rounded to the significant digits.
 
@@ -237,6 +238,7 @@ def steady_table(
             known,
             members,
             counting(progress, "computing the uncertainty band"),
+            scheduler,
         )
     return table_of(columns)
 
@@ -247,9 +249,10 @@ def band_columns(
     known: SpecimenKnowledge,
     members: int,
     done: Done | None = None,
+    scheduler: str | None = None,
 ) -> dict[str, NDArray[np.float64]]:
     """Columns for a band of alpha_2, by name."""
-    found = bands(orbits, alpha_2, known, members, done)
+    found = bands(orbits, alpha_2, known, members, done, scheduler)
     return {
         "alpha_2_uncertainty": found.uncertainty,
         "alpha_2_low": found.low,

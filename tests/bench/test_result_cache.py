@@ -36,7 +36,7 @@ def test_other_inputs_another_kind_another_program_compute_again(monkeypatch: py
     cached("kind", [1.5], compute)
     cached("kind", [1.5000000000000002], compute)
     cached("other", [1.5], compute)
-    monkeypatch.setattr(module, "_stamp", lambda: ["another source"])
+    monkeypatch.setattr(module, "stamp", lambda: ["another source"])
     cached("kind", [1.5], compute)
     assert compute.times == 4
 
@@ -44,7 +44,7 @@ def test_other_inputs_another_kind_another_program_compute_again(monkeypatch: py
 def test_the_stamp_follows_the_sources_the_libraries_and_the_processor(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    stamp = module._stamp.__wrapped__
+    stamp = module.stamp.__wrapped__
     before = stamp()
     assert before == stamp()
     monkeypatch.setattr(module, "software", lambda: {"numpy": "0"})

@@ -11,12 +11,18 @@ from typing import Any
 import numpy as np
 import pytest
 
+from sim.ensemble import record_gains, steady_gains
 from sim.errors import InvalidInput
+from sim.excitation import SampledRecord
 from sim.extras import MissingExtra
-from sim.maps import STRIPS, gain_map
+from sim.gain import seismic_curve
+from sim.knowledge import SpecimenKnowledge
+from sim.map_rows import STRIPS
+from sim.maps import gain_map
 from sim.outcomes import outcome_map
 from sim.specimen import Specimen
-from sim.sweep import SchedulerUnavailable, in_threads, processors, sweep
+from sim.steady import rocking_orbit
+from sim.sweep import SchedulerUnavailable, connection, in_threads, processors, sweep
 from tests.sim.runs import A_S
 
 
@@ -93,7 +99,7 @@ def test_a_map_is_divided_for_the_cluster_s_processors(cluster: Any, monkeypatch
         strips.append(len(items))
         return sweep(function, items, scheduler, done=done)
 
-    monkeypatch.setattr("sim.maps.sweep", counted)
+    monkeypatch.setattr("sim.map_rows.sweep", counted)
     # this machine's own number is another one
     monkeypatch.setattr("os.cpu_count", lambda: 64)
     address, omegas = str(cluster.scheduler_address), np.linspace(14.0, 20.0, 12)
@@ -111,6 +117,31 @@ def test_a_map_and_its_outcomes_are_the_same_on_workers(cluster: Any) -> None:
     first, second = outcome_map(here), outcome_map(there, scheduler=address)
     assert (first.outcome == second.outcome).all()
     assert np.array_equal(first.time, second.time)
+
+
+def test_bands_scatters_and_seismic_curves_are_the_same_on_workers(cluster: Any) -> None:
+    address, specimen = str(cluster.scheduler_address), Specimen(beta=0.4)
+    orbit = rocking_orbit(specimen, 16.0, A_S)
+    members = SpecimenKnowledge().draws(specimen, 30, np.random.default_rng(1))
+    here, there = (steady_gains([orbit], [members], scheduler=each) for each in (None, address))
+    assert np.array_equal(here, there, equal_nan=True)
+    t = np.arange(0.0, 4.0, 0.01)
+    record = SampledRecord(2.2 * np.sin(16.0 * t) * np.sin(np.pi * t / 4.0), 0.01)
+    with connection(address):
+        here, there = (record_gains(members, record, each) for each in (None, address))
+        assert np.array_equal(here, there, equal_nan=True)
+        curves = [seismic_curve(Specimen(), record, [0.25, 0.64, 0.97], each) for each in (None, address)]
+    gains = [[(gain.alpha_1, gain.alpha_2) for gain in curve] for curve in curves]
+    assert gains[0] == gains[1]
+
+
+def test_sweeps_share_a_connection(cluster: Any) -> None:
+    address = str(cluster.scheduler_address)
+    with connection(address), connection(address):
+        before = len(cluster.scheduler.clients)
+        assert sweep(inverse, [1, 2], address) == [1.0, 0.5]
+        assert processors(address) == 2
+        assert len(cluster.scheduler.clients) == before
 
 
 def test_an_interrupt_drops_what_has_not_begun_and_waits_for_nothing() -> None:

@@ -101,7 +101,8 @@ FIGURES = (".png", ".pdf", ".svg")
 class Result:
     """A result in every form of output; each form is created only when requested.
 
-    CSV contains the first of the `tables`, JSON `content` and `metadata`. `write` replaces the HDF5 file of --out.
+    CSV contains the first of the `tables`, JSON `content` and `metadata`. `write` replaces the HDF5 file of --out;
+    `close` is called when all files have been written.
     """
 
     title: str
@@ -111,6 +112,7 @@ class Result:
     metadata: Mapping[str, Any]
     tables: "Mapping[str, Table]"
     write: Callable[[Path], None] | None = None
+    close: Callable[[], None] = lambda: None
 
 
 def check_files(options: "ResultOptions") -> None:
@@ -176,6 +178,7 @@ def _write(result: Result, options: "ResultOptions", progress: Progress) -> None
 
         write_figure(options.plot, figure)
     print_result(lambda: {**result.content(), **result.metadata}, result.text, as_json=options.json)
+    result.close()
 
 
 def columns_text(table: "Table", headings: Mapping[str, str]) -> str:

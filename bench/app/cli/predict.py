@@ -33,9 +33,12 @@ from bench.prediction.requests import (
 )
 from bench.progress import silent
 from sim.errors import InvalidInput
+from sim.extras import require
+from sim.parameters import Parameters
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from pathlib import Path
 
     from bench.accelerograms.accelerogram import Accelerogram
     from bench.config.model import BenchConfiguration
@@ -69,6 +72,8 @@ class Subject:
     known: "SpecimenKnowledge"
     configuration: "BenchConfiguration"
     records: "tuple[Accelerogram, ...]" = ()
+    unfinished: "Path | None" = None
+    """Folder for an unfinished result, from which it continues."""
 
 
 def _sine(
@@ -97,6 +102,7 @@ def _sine(
         if specimen.label is not None and typed.get("beta") is None and not isinstance(request, MapRequest):
             request = request.model_copy(update={"beta": (specimen.label,)})
         check_files(options)
+        _check_scheduler(request)
         if options.plot is not None and drawable is not None and isinstance(request, SineRequest):
             points = len(request.omega) * len(request.beta)
             if points > drawable:
@@ -104,11 +110,23 @@ def _sine(
                 raise InvalidInput("--plot", f"{points} points", allowed)
         warn_of_unusual(request, specimen)
         make = resolve_name(f"bench.app.cli.predict_sine:{function}")
-        subject = Subject(specimen, known, BenchConfiguration())
+        subject = Subject(specimen, known, BenchConfiguration(), unfinished=_unfinished(options))
         return deliver(lambda: make(request, subject, progress), options, progress)
 
     command.__doc__ = f"{documentation}\n\n{_EXIT_CODES}"
     return with_flags(request_type, f"Parameters of {function.removeprefix('gain_')}", command)
+
+
+def _check_scheduler(request: Parameters) -> None:
+    """Raise MissingExtra if the request names a scheduler and its client is not installed."""
+    if getattr(request, "scheduler", None) is not None:
+        require("distributed", "--scheduler")
+
+
+def _unfinished(options: ResultOptions) -> "Path | None":
+    """Folder for an unfinished result, beside the first file of the result; None without files."""
+    path = options.out or options.csv
+    return None if path is None else path.with_name(f".{path.name}.unfinished")
 
 
 def _under_records(
@@ -133,6 +151,7 @@ def _under_records(
         assumed = configuration.specimen
         specimen = specimen_from(chosen.specimen, chosen.distance, chosen.restitution_factor, assumed, known)
         check_files(options)
+        _check_scheduler(request)
         progress("reading the records")
         records = records_from(files)
         if options.plot is not None and len(records) > drawable:

@@ -2,6 +2,8 @@
 
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,7 +29,6 @@ from bench.prediction.requests import (
 from bench.prediction.steady import modes_table, predict_points, predict_spectra, steady_table
 from bench.progress import Progress, counting
 from sim.errors import RockbenchError
-from sim.extras import require
 from sim.gain import GainPrediction
 from sim.loading import load_model
 from sim.shaker import Shaker
@@ -233,17 +234,33 @@ def _shaker(request: OnTableRequest, subject: Subject) -> Shaker:
 def gain_map(request: MapRequest, subject: Subject, progress: Progress) -> Result:
     """Gain maps."""
     from bench.prediction.gain_map import grids, map_table, resting_margin
+    from bench.prediction.map_store import MapStore
 
-    if request.scheduler is not None:
-        require("distributed", "--scheduler")
     load_model(progress)
+    stores = list[MapStore]()
     if request.solver == "taylor":
         known = subject.known if request.band or request.members else None
-        table = map_table(subject.specimen, request, known, progress)
+
+        def store() -> MapStore:
+            inputs = provenance(request.model_copy(update={"scheduler": None}), subject.specimen, known)
+            kept = MapStore(unfinished, inputs)
+            if kept.after is not None:
+                print(f"rockbench: the map continues at row {kept.after.rows + 1} ({unfinished})", file=sys.stderr)
+            stores.append(kept)
+            return kept
+
+        unfinished = subject.unfinished or Path()
+        try:
+            table = map_table(subject.specimen, request, known, progress, None if subject.unfinished is None else store)
+        except (KeyboardInterrupt, RockbenchError, OSError):
+            if stores and stores[0].after is not None:
+                rows = f"{stores[0].after.rows} of {len(request.beta)} rows are complete"
+                print(f"rockbench: {rows}; the same command continues the map", file=sys.stderr)
+            raise
         _print_lost(len(request.omega) * len(request.beta) - int((table["layer"].values == "rocking").sum()))
     else:
         spectra = predict_spectra(subject.specimen, request, progress)
-        table = _table(request, subject, spectra, progress, request.scheduler)
+        table = _table(request, subject, spectra, progress)
 
     def figure() -> "Figure":
         from bench.figures.map_figure import Layer, map_figure
@@ -257,19 +274,17 @@ def gain_map(request: MapRequest, subject: Subject, progress: Progress) -> Resul
         axes = np.sort(request.omega), np.sort(request.beta)
         return map_figure(*axes, layer("rocking"), layer("resting"), resting_margin(subject.specimen, request))
 
-    return _result("gain maps", request, subject, table, lambda: extremes(table), figure)
+    found = _result("gain maps", request, subject, table, lambda: extremes(table), figure)
+    return replace(found, close=stores[0].remove) if stores else found
 
 
-def _table(
-    request: GainRequest,
-    subject: Subject,
-    predictions: list[GainPrediction],
-    progress: Progress,
-    scheduler: str | None = None,
-) -> Table:
+def _table(request: GainRequest, subject: Subject, predictions: list[GainPrediction], progress: Progress) -> Table:
     _print_lost(sum(prediction.rocking is None for prediction in predictions))
+    scheduler = request.scheduler
     if request.solver == "taylor":
-        return steady_table(predictions, known=subject.known, members=request.members, progress=progress)
+        return steady_table(
+            predictions, known=subject.known, members=request.members, progress=progress, scheduler=scheduler
+        )
     from bench.prediction.steady import timed_gains
 
     timed = timed_gains(subject.specimen, request, predictions, scheduler, counting(progress, "simulating in time"))
@@ -323,8 +338,8 @@ def extremes(table: "Table") -> str:
         table[name].values for name in ("omega_rad_s", "beta", "layer", "alpha_2", "stable")
     )
     stiffnesses = np.unique(beta)
-    each = [(value, beta == value) for value in stiffnesses]
-    groups = each if len(each) <= MOST_SPECTRA else [(None, np.full(beta.size, True))]
+    separate = len(stiffnesses) <= MOST_SPECTRA
+    groups = [(value, beta == value) for value in stiffnesses] if separate else [(None, np.full(beta.size, True))]
     where = (TextColumn("at omega", "rad/s"), TextColumn("beta"))
     group = (TextColumn("beta"), TextColumn("branch"), TextColumn("points"), TextColumn("unstable"))
     columns = (*group, TextColumn("least alpha_2"), *where, TextColumn("greatest"), *where)

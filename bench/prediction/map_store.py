@@ -1,0 +1,114 @@
+"""Rows of a large map, kept in a folder until the map is complete, so that it continues after a crash.
+
+Every column is a file to which blocks of rows are appended. A state file, replaced after each block, has the number of
+rows of these files and the state from which the map continues. Longer files are from an interrupted block and are cut.
+"""
+
+import json
+import os
+import shutil
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+from zipfile import BadZipFile
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.datafile.tables import Column, Table
+from bench.result_cache import stamp
+from bench.unfinished import replace
+from sim.errors import InvalidInput
+from sim.map_rows import Continuation
+
+STATE, OWN = "state.npz", "unfinished-map"
+"""Names of the state and of an empty file that marks the folder as one that may be removed."""
+
+TEXT = "<U16"
+"""Type of the columns of texts."""
+
+
+class MapStore:
+    """Rows of the map defined by `inputs`, JSON content, in `folder`, which is created with the first block.
+
+    Rows of a map with other inputs, or of another version of the program, are discarded.
+    """
+
+    def __init__(self, folder: Path, inputs: object) -> None:
+        self.folder = folder
+        self._key = sha256(json.dumps([inputs, stamp()], sort_keys=True).encode()).hexdigest()
+        self._columns: dict[str, dict[str, str]] = {}
+        self._rows = 0
+        self.after: Continuation | None = None
+        """State from which the map continues; None at its beginning."""
+        self._load()
+
+    def append(self, table: Table, after: Continuation) -> None:
+        """Append the rows of a block, and note the state `after` it. Raises OSError."""
+        if not self._columns:
+            if self.folder.exists() and not (self.folder / OWN).exists():
+                raise InvalidInput("folder", str(self.folder), "it is not of an unfinished map; rename or remove it")
+            self.remove()
+            self.folder.mkdir()
+            (self.folder / OWN).touch()
+            self._columns = {
+                name: {
+                    "type": TEXT if each.values.dtype.kind == "U" else each.values.dtype.str,
+                    "unit": each.unit,
+                    "description": each.description,
+                }
+                for name, each in table.items()
+            }
+        count = 0
+        for name, each in table.items():
+            kind = np.dtype(self._columns[name]["type"])
+            count = len(each.values)
+            with self._path(name).open("r+b" if self._rows else "wb") as file:
+                file.seek(self._rows * kind.itemsize)
+                file.write(np.ascontiguousarray(each.values, dtype=kind).tobytes())
+                file.truncate()
+                file.flush()
+                os.fsync(file.fileno())
+        self._rows += count
+        self.after = after
+        about = json.dumps([self._key, self._rows, after.rows, self._columns])
+        temporary = self.folder / f".{STATE}"
+        with temporary.open("wb") as file:
+            np.savez(file, about=np.array(about), sections=after.sections, jacobians=after.jacobians)
+            file.flush()
+            os.fsync(file.fileno())
+        replace(temporary, self.folder / STATE)
+
+    def table(self) -> Table:
+        """All rows; their values are read from the files as they are used."""
+        return {
+            name: Column(self._values(name, each["type"]), each["unit"], each["description"])
+            for name, each in self._columns.items()
+        }
+
+    def remove(self) -> None:
+        """Remove the folder of a map whose results have been written."""
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    def _values(self, name: str, kind: str) -> NDArray[Any]:
+        if not self._rows:
+            return np.empty(0, kind)
+        return np.memmap(self._path(name), dtype=kind, mode="r", shape=(self._rows,))
+
+    def _path(self, name: str) -> Path:
+        return self.folder / f"{name}.bin"
+
+    def _load(self) -> None:
+        """Read the state of an unfinished map with the same inputs."""
+        try:
+            with np.load(self.folder / STATE, allow_pickle=False) as stored:
+                key, rows, done, columns = json.loads(str(stored["about"]))
+                after = Continuation(done, stored["sections"], stored["jacobians"])
+            sizes = {
+                name: self._path(name).stat().st_size >= rows * np.dtype(each["type"]).itemsize
+                for name, each in columns.items()
+            }
+        except (OSError, ValueError, KeyError, TypeError, EOFError, BadZipFile):
+            return
+        if key == self._key and all(sizes.values()):
+            self._rows, self._columns, self.after = rows, columns, after
