@@ -78,7 +78,7 @@ class History:
 class Spectra:
     """Pseudo-accelerations [m/s2] at `periods` [s], one array for each history.
 
-    `own` are the natural periods [s] of the frame, drawn as marks.
+    `own` contains the natural periods [s] of the frame, drawn as marks.
     """
 
     periods: Array

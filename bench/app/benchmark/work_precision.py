@@ -151,7 +151,7 @@ GAIN_COLUMNS = (
 
 
 def steady_by_time() -> Section:
-    """Gains from 120 s runs that start on the exact orbit, for the fast solvers, each at its own accuracy."""
+    """Gains from 120 s runs that start on the exact orbit, for the fast solvers, each with its default settings."""
     rows: list[dict[str, Cell]] = []
     for omega, beta in POINTS:
         specimen = Specimen(beta=beta)

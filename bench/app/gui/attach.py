@@ -1,4 +1,4 @@
-"""Detection of runs started by other windows and terminals on this machine, and attachment to them."""
+"""Detection of runs started by other windows and terminals on this computer, and attachment to them."""
 
 from PySide6.QtCore import QObject, QTimer
 

@@ -50,7 +50,7 @@ DELIBERATE = 0.7
 
 
 class Controller(QObject):
-    """The only user of the connection to the session; it lives in the window's thread."""
+    """The only user of the connection to the session; it runs in the window's thread."""
 
     changed = Signal()
     """Emitted when the state, a time or the connection has changed."""
@@ -95,7 +95,7 @@ class Controller(QObject):
         """Whether this window controls the run: whether it may answer questions and ramp out. STOP is always effective.
         """
         self.elsewhere: RunningSession | None = None
-        """A session under way on this machine to which this window is not attached."""
+        """A session under way on this computer to which this window is not attached."""
         self.held = ""
         """Reason why only the queue may start a run; empty if there is none."""
         self.lost = (0, 0)

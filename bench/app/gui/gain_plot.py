@@ -150,7 +150,7 @@ class GainPlot(pg.PlotWidget):
 
     def add_all(self, points: Sequence[Mapping[str, Any]], run: int = 0, name: str = "") -> None:
         """Draw the points of a run, called `name` in the legend. Points of a quantity other than that of the axis are
-        not drawn; the legend says so.
+        not drawn; the legend states this.
         """
         before = len(self._marks)
         self._draw([(point, run) for point in points])

@@ -165,7 +165,7 @@ class SessionClient(ClientConnection):
 
     def __init__(self, assignment: PlanCheck, heard: Callable[[], None] = lambda: None) -> None:
         self._checks_plan = not isinstance(assignment, Run)
-        # an existing summary belongs to another run
+        # an existing summary is from another run
         summary = assignment.out / SUMMARY
         super().__init__(None if self._checks_plan or summary.exists() else assignment.out, heard)
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115 - closed with the process

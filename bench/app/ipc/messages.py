@@ -176,9 +176,9 @@ class SafetyInputs:
 class Traces:
     """Signals of one block: `low` and `high` have shape (n_bins, n_signals), extremes in bins of `step` seconds.
 
-    The first bin begins at bench time `begin` [s]; the signals are `bench.app.ipc.messages.TRACES`. `read` is the
-    time [s] of the machine's clock (`drivers.clock.now`) when the block had been read, `origin` the bench time of the
-    run's first sample [s]. `magnitudes` are those of `bench.events.Acquired`.
+    The first bin begins at bench time `begin` [s]; the signals are `bench.app.ipc.messages.TRACES`. `read` is the time
+    [s] of the computer's clock (`drivers.clock.now`) when the block had been read, `origin` the bench time of the run's
+    first sample [s]. `magnitudes` are those of `bench.events.Acquired`.
     """
 
     run: int

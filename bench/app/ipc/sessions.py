@@ -1,7 +1,7 @@
-"""Sessions under way on this machine: each announces itself in a folder of this user, for windows that attach to it.
+"""Sessions under way on this computer: each is announced in a folder of this user, for windows that attach to it.
 
-An announcement is a file that only this user can read, with the address and key of the session. It is locked for as
-long as the session lives; an unlocked announcement is from a process that ended abruptly, and is removed.
+An announcement is a file that only this user can read, with the address and key of the session. It is locked while the
+session runs; an unlocked announcement is from a process that ended abruptly, and is removed.
 """
 
 import json

@@ -18,7 +18,7 @@ from bench.provenance import software
 
 OLDEST = (3, 11)
 RESOLUTION = 1e-4
-"""Coarsest acceptable step of the machine's clock [s]."""
+"""Coarsest acceptable step of the computer's clock [s]."""
 LATE = 0.005
 """Largest acceptable delay of a sleep of 1 ms, given the length of a block of samples [s]."""
 SPEED = 20e6
@@ -233,5 +233,5 @@ def device_server(address: str) -> Finding:
         with socket.create_connection((host, int(port)), timeout=2.0):
             return Finding("device server", Health.GOOD, f"{address} answers")
     except (OSError, ValueError, OverflowError) as error:
-        remedy = "start the device server on that machine, and open its port in the firewall"
+        remedy = "start the device server on that computer, and open its port in the firewall"
         return Finding("device server", Health.BAD, f"{address} does not respond ({error})", remedy)
