@@ -156,3 +156,16 @@ def result_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.delenv("ROCKBENCH_RESULT_CACHE", raising=False)
     monkeypatch.setattr(compiled, "cache_folder", lambda: tmp_path)
     return tmp_path / "results"
+
+
+@pytest.fixture(scope="module")
+def shared_results(tmp_path_factory: pytest.TempPathFactory) -> Generator[None]:
+    """Planned starts, travels and long-term motions are computed once for all modules with this fixture, whatever the
+    process; for modules that replace no part of these calculations.
+    """
+    folder = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        folder = folder.parent
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("bench.result_cache._folder", lambda: folder / "shared_results")
+        yield

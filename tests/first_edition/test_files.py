@@ -13,6 +13,8 @@ import pytest
 
 from tests.first_edition.command import DATA, Rockbench, differences
 
+pytestmark = pytest.mark.usefixtures("shared_results")
+
 NAMES = sorted(path.name.removesuffix(".h5.xz") for path in DATA.glob("*.h5.xz"))
 LONGEST = {"harmonic_springs"}
 QUICK = {"check", "free_rocking", "identify"}

@@ -14,6 +14,8 @@ import pytest
 from tests.first_edition import inventory
 from tests.first_edition.command import DATA, EXCEPTED, Rockbench, differences
 
+pytestmark = pytest.mark.usefixtures("shared_results")
+
 COMMANDS = {words[-1]: words[1:] for words in map(shlex.split, (DATA / "commands.txt").read_text("utf-8").splitlines())}
 QUICK = {
     "coupling_stiffness",

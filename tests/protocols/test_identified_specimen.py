@@ -14,6 +14,8 @@ from bench.config.result_files import write_specimen
 from sim.identified import Finding, Identified
 from sim.specimen import Frame
 
+pytestmark = pytest.mark.usefixtures("shared_results")
+
 FACTORS = {"k1": 1.05, "k2": 1.05, "xi1": 1.3, "xi2": 1.3}
 RESTITUTION, SPRING = 0.992, 0.9
 """All that is assumed is off as far as it may be, each to the side on which they add up at this point."""

@@ -31,6 +31,8 @@ from sim.linear import steady_response
 from sim.specimen import Specimen
 from tests.protocols.harmonic.scripted import AMPLITUDE, BETA, OMEGA, PARAMETERS, Script
 
+pytestmark = pytest.mark.usefixtures("shared_results")
+
 CONFIGURATION = BenchConfiguration()
 SHORT = HarmonicParameters(omega=(OMEGA,), beta=(BETA,))
 

@@ -8,6 +8,8 @@ import pytest
 
 from bench.app.cli.main import main
 
+pytestmark = pytest.mark.usefixtures("shared_results")
+
 UNSTABLE = ((12.5, 0.64), (15.0, 0.97))
 """Neimark-Sacker windows: beta 0.64 below 13.10 rad/s, beta 0.97 from 14.35 to 15.43 rad/s."""
 

@@ -19,6 +19,8 @@ from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, Point
 from sim.specimen import Specimen
 from tests.recorded import recorded
 
+pytestmark = pytest.mark.usefixtures("shared_results")
+
 Array = NDArray[np.float64]
 
 PARAMETERS = HarmonicParameters(

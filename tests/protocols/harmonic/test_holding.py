@@ -11,6 +11,8 @@ from bench.app.cli.main import main
 from bench.datafile.reader import open_datafile
 from protocols.harmonic.holding import HoldCycle
 
+pytestmark = pytest.mark.usefixtures("shared_results")
+
 QUICK = ["--settle-limit", "30", "--ramp-time", "4", "--harmonics", "5", "--starts", "2"]
 
 

@@ -12,6 +12,8 @@ from bench.app.cli.main import main
 from sim.gain import predict_gain
 from sim.specimen import Specimen
 
+pytestmark = pytest.mark.usefixtures("shared_results")
+
 OMEGA, BETA = 16.0, 0.4
 
 
