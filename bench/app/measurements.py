@@ -132,7 +132,7 @@ class Campaign:
 
     @property
     def protocol(self) -> str:
-        """Name of the protocol; empty if the file does not have it."""
+        """Name of the protocol; empty if the file does not state it."""
         return self._contents.protocol
 
     @property

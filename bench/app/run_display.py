@@ -41,7 +41,7 @@ class Row:
 
     @staticmethod
     def finished(point: Mapping[str, Any]) -> "Row":
-        """Row of a finished point; missing values are shown as absent."""
+        """Row of a finished point; missing values are shown as `ABSENT`."""
         value, predicted = point.get("alpha_2"), point.get("alpha_2_predicted")
         agrees, starts = point.get("agrees"), point.get("starts_tried")
         unstable = point.get("predicted_stable") is False

@@ -30,7 +30,7 @@ def once(run: Callable[[], T]) -> tuple[float, T]:
 
 
 def timed(run: Callable[[], T], repetitions: int) -> Timing[T]:
-    """Times of `repetitions` runs after an untimed one."""
+    """Times of `repetitions` runs, which follow an untimed run."""
     run()
     return in_turn({"": (run, repetitions)})[""]
 

@@ -112,7 +112,7 @@ def _version(name: str) -> str:
 
 MARKDOWN, JSON, FIGURE = "benchmark.md", "benchmark.json", "work_precision.png"
 RESULTS = (MARKDOWN, JSON, FIGURE)
-"""The files of a benchmark."""
+"""Names of the result files."""
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,7 @@ _objects: TextIO | None = None
 
 
 def reply_in_json(stream: TextIO | None) -> None:
-    """Set the stream on which `report_error` prints its object; None: no object."""
+    """Set the stream on which `report_error` prints its object; with None, it prints no object."""
     global _objects
     _objects = stream
 

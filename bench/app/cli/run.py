@@ -1,4 +1,4 @@
-"""`rockbench run <protocol>`: checks everything, runs the session, reports how it ended."""
+"""`rockbench run <protocol>`: checks the inputs and the plan, runs the session, reports how the session ended."""
 
 import sys
 from collections.abc import Callable, Mapping

@@ -37,7 +37,7 @@ class StopButton(QPushButton):
         self.setToolTip(f"{texts.STOP_TIP.format(after=DELIBERATE)}\n{texts.GUARD}")
         # a filter handles its keys: the space bar must not press it by accident, and a click must not move the focus
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        # on press, not on release
+        # acts on press, not on release
         self.pressed.connect(controller.press_stop)
 
     def holds(self, place: QPoint) -> bool:

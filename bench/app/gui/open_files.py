@@ -40,7 +40,7 @@ from sim.errors import RockbenchError
 
 DRIVE = "drive"
 CHUNK = 1_000_000
-"""Rows read at a time: an hour of samples does not fit into memory."""
+"""Number of rows read at a time, because an hour of samples does not fit into memory."""
 
 
 @dataclass(frozen=True, eq=False)

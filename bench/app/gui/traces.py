@@ -28,7 +28,7 @@ AHEAD = 0.5
 STALE = 2.0
 """Age of the newest sample above which the traces are marked as not live [s]."""
 HEADROOM, WIDE, LEAST = 1.15, 2.0, 1e-3
-"""Axis range relative to the largest value, ratio above which the range is reduced, and its minimum in displayed
+"""Axis range relative to the largest value, ratio above which the range is reduced, and minimum range in displayed
 units.
 """
 
@@ -123,7 +123,7 @@ class TracePlot(QWidget):
 
     @property
     def moment(self) -> float:
-        """Bench time [s] for a picture of one instant: one block behind the newest sample, so that it advances
+        """Bench time [s] of the instant that the picture shows: one block behind the newest sample, so that it advances
         evenly.
         """
         return self.ring.newest - max(self._length - self.age, 0.0)

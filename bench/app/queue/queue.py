@@ -128,7 +128,7 @@ class Queue:
         self._set(index, test, stage=Stage.WAITING if test.stage is Stage.SKIPPED else Stage.SKIPPED)
 
     def repeat(self, index: int, times: int = 1) -> None:
-        """Insert copies below a test of any status; each is pending and has its own folder."""
+        """Insert copies below a test of any status; each copy is pending and has a separate folder."""
         if not 1 <= times <= MOST_COPIES:
             raise InvalidInput("times", times, f"an integer from 1 to {MOST_COPIES}")
         original, folders = self._tests[index], {test.out for test in self._tests}

@@ -25,7 +25,7 @@ from sim.loading import load_model
 from sim.specimen import Specimen
 
 Named = tuple[str, Statement]
-"""Number and statement."""
+"""Number of a statement, and the statement."""
 
 
 def verdicts_table(named: Sequence[Named]) -> Table:

@@ -106,7 +106,7 @@ MOST_LISTED = 40
 GRAVE = ("Warned", "LimitExceeded")
 ENDINGS = ("-> aborting", "-> halted")
 SHORT = 60
-"""Seconds per minute."""
+"""Number of seconds per minute."""
 
 
 def limits_section(campaign: Campaign) -> Section:
