@@ -39,18 +39,8 @@ from bench.figures.style import BLUE, GREY, VERMILLION, new_figure, set_grid, wr
 from bench.figures.text_table import TextColumn, text_table
 from bench.protocol import Plan, Prepared, Result, Sources
 from drivers.rig import OperatorTask
-from protocols.check.lines import (
-    Sines,
-    allowed_delay,
-    delay_lines,
-    drive_lines,
-    expected_drive,
-    input_lines,
-    resting_lines,
-    safety_lines,
-    scale_lines,
-    table_delay_lines,
-)
+from protocols.check.comparison import Sines, allowed_delay, delay_lines, scale_lines, table_delay_lines
+from protocols.check.lines import drive_lines, expected_drive, input_lines, resting_lines, safety_lines
 from protocols.check.protocol import MARKS, CheckParameters, allowed_range, number
 from protocols.common.calibrate import CHANGE_TIME, SETTLING, Unmeasurable, calibrate_drive, need_cycles, probed_drive
 from sim.errors import InvalidInput

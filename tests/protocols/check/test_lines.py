@@ -12,18 +12,8 @@ from bench.engine.steps import RestSamples
 from drivers.hardware.parameters import Hardware, Lasers
 from drivers.optoncdt.codec import IMPLAUSIBLE, LATE, LOST, MEANINGS
 from drivers.rig import Channel
-from protocols.check.lines import (
-    Sines,
-    allowed_delay,
-    dead_time,
-    delay_lines,
-    drive_lines,
-    input_lines,
-    resting_lines,
-    scale_lines,
-    signed_scale,
-    table_delay_lines,
-)
+from protocols.check.comparison import Sines, allowed_delay, delay_lines, scale_lines, signed_scale, table_delay_lines
+from protocols.check.lines import dead_time, drive_lines, input_lines, resting_lines
 from protocols.check.protocol import CheckParameters
 from sim.specimen import Frame, Specimen
 

@@ -1,0 +1,230 @@
+"""Check lines: comparison of the sensors under a common motion."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import inf, isinf
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.analysis.check_line import CheckLine, judged, stated
+from bench.analysis.gain import COVERAGE
+from bench.config.model import BenchConfiguration
+from drivers.timebase.common_motion import CommonMotion, common_motion
+from protocols.check.protocol import CheckParameters
+from sim.channel import STOREYS, TABLE_ACCELERATION, TABLE_DISPLACEMENT
+from sim.linear import steady_response
+from sim.specimen import Specimen
+
+Amplitudes = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class Sines:
+    """Complex amplitudes c at `omega` [rad/s], shape (n,) each, with signal = Re(c exp(-i omega t)).
+
+    The four sensors measure a common motion. Amplitudes are displacements [m]; the accelerometer's are computed as
+    acceleration / -omega^2. `drive` is in volts, `acceleration` in m/s2.
+    """
+
+    omega: NDArray[np.float64]
+    drive: NDArray[np.complex128]
+    acceleration: NDArray[np.complex128]
+    displacement: NDArray[np.complex128]
+    storey_1: NDArray[np.complex128]
+    storey_2: NDArray[np.complex128]
+
+    @property
+    def accelerometer(self) -> NDArray[np.complex128]:
+        """Table displacement from the accelerometer [m]: x'' = -omega^2 x."""
+        return -self.acceleration / self.omega**2
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """A compared sensor: field of its amplitudes in `Sines`, and configuration keys of its polarity and scale."""
+
+    signal: str
+    polarity: str
+    scale: str
+
+
+TABLE = {
+    name: Sensor(signal, f"hardware.{name}.sensitivity", f"hardware.{name}.sensitivity")
+    for name, signal in ((TABLE_DISPLACEMENT, "displacement"), (TABLE_ACCELERATION, "accelerometer"))
+}
+
+LASERS = {
+    name: Sensor(signal, f"hardware.{name}.polarity", f"hardware.{name}.measuring_range and hardware.lasers.load")
+    for name, signal in zip(STOREYS, ("storey_1", "storey_2"), strict=True)
+}
+
+SENSORS = TABLE | LASERS
+
+_SIGN = "reverse the sign of {}, or the sensor: its signal is opposite to {}"
+
+_SCALE = "check {} and the calibration: the scale differs from that of {}"
+
+_OWN_LATENCY = "the laser's internal latency is too long: raise its measuring rate, and disable its averaging"
+
+_SKEW = (
+    "the two sensors show the same motion at different times: connect both to inputs of one module, or "
+    "see the input delays in the bench description"
+)
+
+
+def table_delay_lines(
+    sines: Sines, parameters: CheckParameters, sample_rate: float, *, lasers: bool, most: float = inf
+) -> Iterator[CheckLine]:
+    """Delay of the accelerometer against the table's displacement sensor, and of each laser on the ground against the
+    accelerometer, at most `most` [s]. Together with `delay_lines`, every pair of channels is compared.
+
+    An acceleration that follows each step of the held output lags by half a sample.
+    """
+    if parameters.delay_tolerance is None:
+        return
+    lowest, highest = -parameters.delay_tolerance, parameters.delay_tolerance + 0.5 / sample_rate
+    pair = _delay_between(sines.omega, sines.displacement, sines.accelerometer)
+    storeys = dict(zip(STOREYS, (sines.storey_1, sines.storey_2), strict=True)) if lasers else {}
+    against = {name: _delay_between(sines.omega, sines.accelerometer, seen) for name, seen in storeys.items()}
+    middle = float(np.mean([one.delay for one in against.values()])) if against else np.nan
+    # the lasers lag behind the correct sensor by their latency, the smaller of the two differences
+    alone = TABLE_ACCELERATION if abs(middle + pair.delay) < abs(middle) else TABLE_DISPLACEMENT
+    odd = f"{alone} differs from the lasers: " if lasers else ""
+    yield judged(
+        TABLE_ACCELERATION,
+        f"delay against {TABLE_DISPLACEMENT}",
+        pair.delay,
+        (lowest, highest),
+        "s",
+        f"{odd}{_SKEW}",
+        expected=0.0,
+        uncertainty=COVERAGE * pair.uncertainty,
+    )
+    for name, one in against.items():
+        what, expanded = f"delay against {TABLE_ACCELERATION}", COVERAGE * one.uncertainty
+        if isinf(most):
+            yield stated(name, what, one.delay, "s", uncertainty=expanded)
+            continue
+        allowed = -most - 0.5 / sample_rate, most
+        remedy = "compare the other delay lines, which show whether the accelerometer or this laser differs"
+        yield judged(name, what, one.delay, allowed, "s", remedy, expected=0.0, uncertainty=expanded)
+
+
+def _delay_between(omega: NDArray[np.float64], first: Amplitudes, second: Amplitudes) -> CommonMotion:
+    # the cycles' amplitudes rotate with exp(-i omega t)
+    return common_motion(omega, first.conj(), second.conj())
+
+
+def scale_lines(sines: Sines, parameters: CheckParameters, *, lasers: bool) -> Iterator[CheckLine]:
+    """Two lines for each sensor except the reference.
+
+    The reference is the table's displacement sensor, or the accelerometer if it differs from that sensor and the lasers
+    agree with it. `lasers` mounted on the ground are compared as well.
+    """
+    sensors = SENSORS if lasers else TABLE
+    seen: dict[str, Amplitudes] = {name: getattr(sines, sensor.signal) for name, sensor in sensors.items()}
+    tolerance = parameters.scale_tolerance
+    allowed = 1.0 - tolerance, 1.0 + tolerance
+    reference = _reference(sines.omega, seen, tolerance)
+    for name in seen:
+        if name == reference:
+            continue
+        scale, uncertainty = signed_scale(sines.omega, seen[name], seen[reference])
+        sign = 1.0 if scale > 0.0 else -1.0
+        remedy = _SIGN.format(SENSORS[name].polarity, reference)
+        yield judged(name, f"polarity against {reference}", sign, (1.0, 1.0), "1", remedy, expected=1.0)
+        remedy, expanded = _SCALE.format(SENSORS[name].scale, reference), COVERAGE * uncertainty
+        what = f"scale against {reference}"
+        yield judged(name, what, abs(scale), allowed, "1", remedy, expected=1.0, uncertainty=expanded)
+    if lasers:
+        scale, uncertainty = signed_scale(sines.omega, sines.storey_2, sines.storey_1)
+        yield judged(
+            "lasers",
+            f"scale of {STOREYS[1]} against {STOREYS[0]}",
+            abs(scale),
+            allowed,
+            "1",
+            "the drift is their difference: check the measuring range and the load resistor of the laser with "
+            "the wrong scale",
+            expected=1.0,
+            uncertainty=COVERAGE * uncertainty,
+        )
+
+
+def delay_lines(sines: Sines, parameters: CheckParameters, configuration: BenchConfiguration) -> Iterator[CheckLine]:
+    """One line for each laser, one for their difference, and the setting that compensates the common delay.
+
+    A delay is positive where the laser lags behind the table's displacement.
+    """
+    most = allowed_delay(configuration.known_specimen, parameters.highest_omega, parameters.u1_error)
+    hardware = configuration.hardware.lasers
+    settable = configuration.backend == "hardware" and hardware.connection == "serial"
+    found: list[tuple[float, float]] = []
+    for name, amplitudes in zip(STOREYS, (sines.storey_1, sines.storey_2), strict=True):
+        motion = _delay_between(sines.omega, sines.displacement, amplitudes)
+        found.append((motion.delay, motion.uncertainty))
+        remedy = "set hardware.lasers.delay to the value in the last line" if settable else _OWN_LATENCY
+        yield judged(
+            name,
+            "delay against table_displacement",
+            motion.delay,
+            (-most, most),
+            "s",
+            remedy,
+            expected=0.0,
+            uncertainty=COVERAGE * motion.uncertainty,
+        )
+    (first, u_1), (second, u_2) = found
+    between = COVERAGE * configuration.analysis.laser_timing
+    yield judged(
+        "lasers",
+        f"delay of {STOREYS[1]} against {STOREYS[0]}",
+        second - first,
+        (-between, between),
+        "s",
+        "set both lasers to the same rate, averaging and output; check that neither of them loses values",
+        expected=0.0,
+        uncertainty=COVERAGE * float(np.hypot(u_1, u_2)),
+    )
+    if settable:
+        value, expanded = hardware.delay - 0.5 * (first + second), 0.5 * COVERAGE * float(np.hypot(u_1, u_2))
+        yield stated("lasers", "correct value of hardware.lasers.delay", value, "s", uncertainty=expanded)
+
+
+def signed_scale(omega: NDArray[np.float64], amplitudes: Amplitudes, reference: Amplitudes) -> tuple[float, float]:
+    """Scale of a sensor relative to another, negative for opposite polarity, and its standard uncertainty.
+
+    The magnitude is extrapolated to zero frequency with a term in omega^2: a mass on a compliant clamp moves more than
+    the table, by the fraction (omega / omega_clamp)^2.
+    """
+    ratio = amplitudes / reference
+    basis = np.column_stack((np.ones(omega.size), omega**2))
+    magnitude = np.abs(ratio)
+    covariance = np.linalg.inv(basis.T @ basis)
+    solution = covariance @ (basis.T @ magnitude)
+    residual = magnitude - basis @ solution
+    spread = float(residual @ residual) / (omega.size - 2)
+    # at the lowest frequency, delays rotate the ratio by less than a right angle
+    sign = 1.0 if ratio[np.argmin(omega)].real >= 0.0 else -1.0
+    return sign * float(solution[0]), float(np.sqrt(spread * covariance[0, 0]))
+
+
+def allowed_delay(specimen: Specimen, omega: float, error: float) -> float:
+    """Delay [s] of a laser on the ground that changes u1 = laser - x of the bare frame by the relative `error`.
+
+    A small delay d rotates the phasor of the laser by omega d, so the error of u1 is omega d |u1 + x|. The drift is the
+    difference between two lasers, so a common delay does not change its amplitude.
+    """
+    u1, _ = steady_response(specimen.bare(), omega, 1.0)
+    return error * abs(u1) / (omega * abs(u1 - 1.0 / omega**2))
+
+
+def _reference(omega: NDArray[np.float64], seen: dict[str, Amplitudes], tolerance: float) -> str:
+    table, other = TABLE_DISPLACEMENT, TABLE_ACCELERATION
+    scale, _ = signed_scale(omega, seen[other], seen[table])
+    lasers = [signed_scale(omega, seen[name], seen[table])[0] for name in STOREYS if name in seen]
+    if abs(scale - 1.0) <= tolerance or not lasers:
+        return table
+    middle = float(np.mean(lasers))
+    return other if abs(middle - scale) < abs(middle - 1.0) else table
