@@ -4,15 +4,14 @@ A backend may belong to another package. An invalid rig, channel, block or Boole
 raise, causes a BackendFault, which names the backend.
 """
 
-import re
 from collections.abc import Mapping
 from contextlib import suppress
-from math import isfinite
-from typing import Any, NoReturn, Self, TypeGuard, cast
+from typing import Any, NoReturn, Self, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.border_values import RAW, is_alignment, is_count, is_good, is_number, is_raw, is_text, wrong_with
 from drivers.clock import Clock, VirtualClock, WallClock
 from drivers.errors import BackendFault
 from drivers.rig import Alignment, Block, Channel, OperatorTask, RawValues, Rig
@@ -25,7 +24,6 @@ LONGEST_LEAD = 10.0
 """Longest lead [s]; the guard's commands take effect after this delay."""
 HIGHEST_VOLTAGE = 100.0
 """Largest drive range [V]."""
-_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
 class CheckedClock:
@@ -42,7 +40,7 @@ class CheckedClock:
         except Exception as error:
             self.fault = f"its clock cannot be read ({_told(error)})"
             return self._last
-        if _is_number(given):
+        if is_number(given):
             self._last = float(given)
         else:
             self.fault = f"its clock returned {given!r}"
@@ -99,7 +97,7 @@ class CheckedRig:
         """Clock alignments, since `arm()`, of the sensors that have their own clocks."""
         given = self._given("alignments")
         names = [channel.name for channel in self.channels]
-        if type(given) is not tuple or not all(_is_alignment(each, names) for each in cast("tuple[Any, ...]", given)):
+        if type(given) is not tuple or not all(is_alignment(each, names) for each in cast("tuple[Any, ...]", given)):
             self._refuse(f"returned {given!a:.80} as alignments of its sensors")
         return cast("tuple[Alignment, ...]", given)
 
@@ -110,7 +108,7 @@ class CheckedRig:
         found: dict[str, bool] | None = None
         if isinstance(given, Mapping):
             with suppress(Exception):
-                found = {str(name): _is_good(good) for name, good in cast("Mapping[Any, Any]", given).items()}
+                found = {str(name): is_good(good) for name, good in cast("Mapping[Any, Any]", given).items()}
         if found is None:
             return self._inputs | self._while_armed or {f"safety inputs of the backend {self.backend}": False}
         named = self._while_armed if self._armed else self._inputs
@@ -177,13 +175,13 @@ class CheckedRig:
 
     def _number(self, name: str, highest: float) -> float:
         value, item = self._given(name), name.replace("_", " ")
-        if not _is_number(value) or not 0.0 < value <= highest:
+        if not is_number(value) or not 0.0 < value <= highest:
             self._refuse(f"has a {item} of {value!a}: it must be a number above 0 and at most {highest:g}")
         return float(value)
 
     def _checked_lead(self, lead: object, rate: float) -> int:
         most = int(LONGEST_LEAD * rate)
-        if not _is_count(lead) or not 0 <= lead <= most:
+        if not is_count(lead) or not 0 <= lead <= most:
             self._refuse(f"has a lead of {lead!a} samples: it must be an integer from 0 to {most}")
         return int(lead)
 
@@ -194,7 +192,7 @@ class CheckedRig:
         known: set[str] = set()
         for number, channel in enumerate(channels):
             with self._calls("channels"):
-                wrong = _wrong_with(channel) or ("its name is repeated" if channel.name in known else "")
+                wrong = wrong_with(channel) or ("its name is repeated" if channel.name in known else "")
             if wrong:
                 self._refuse(f"has an invalid channel, number {number}: {wrong}")
             known.add(channel.name)
@@ -202,7 +200,7 @@ class CheckedRig:
 
     def _checked_description(self, given: Any) -> dict[str, str]:
         pairs = cast("Mapping[Any, Any]", given).items() if isinstance(given, Mapping) else [(None, None)]
-        if not all(_is_text(text) for pair in pairs for text in pair):
+        if not all(is_text(text) for pair in pairs for text in pair):
             self._refuse(f"has a description {given!a:.80}: it must map strings to strings")
         return dict(pairs)
 
@@ -219,7 +217,7 @@ class CheckedRig:
             self._refuse(f"returned {type(given).__name__} instead of a block")
         first: object = given.first
         counts: Any = given.counts
-        if not _is_count(first) or first < 0:
+        if not is_count(first) or first < 0:
             self._refuse(f"returned a block whose first sample is {first!a}")
         if not isinstance(counts, np.ndarray):
             self._refuse(f"returned a block of {type(counts).__name__} instead of an array of counts")
@@ -242,10 +240,10 @@ class CheckedRig:
         if given == ():
             return ()
         names = [channel.name for channel in self.channels]
-        if type(given) is not tuple or not all(_is_raw(each, names) for each in cast("tuple[Any, ...]", given)):
+        if type(given) is not tuple or not all(is_raw(each, names) for each in cast("tuple[Any, ...]", given)):
             self._refuse(f"returned {given!a:.80} as raw values of its sensors")
         raw = cast("tuple[RawValues, ...]", given)
-        return tuple(RawValues(each.sensor, *(np.array(getattr(each, name)) for name in _RAW)) for each in raw)
+        return tuple(RawValues(each.sensor, *(np.array(getattr(each, name)) for name in RAW)) for each in raw)
 
     def _require_storable(self, counts: NDArray[Any]) -> None:
         """Refuse counts outside the range of their channel's storage type, which the file would alter."""
@@ -276,101 +274,9 @@ class _Calls:
             raise BackendFault(self._backend, f"failed in {self._call} ({_told(error)})") from error
 
 
-_RAW = ("index", "time", "code", "arrival")
 _CALLS = ("interlocks", "arm", "write", "read", "stop", "halt", "close", "perform")
 
 
 def _told(error: BaseException) -> str:
     said = " ".join(str(error).split())
     return f"{type(error).__name__}: {said}" if said else type(error).__name__
-
-
-def _is_number(value: object) -> TypeGuard[float]:
-    if isinstance(value, bool | np.bool_) or not isinstance(value, int | float | np.integer | np.floating):
-        return False
-    try:
-        return isfinite(cast(float, value))
-    except OverflowError:
-        return False
-
-
-def _is_count(value: object) -> TypeGuard[int]:
-    return isinstance(value, int | np.integer) and not isinstance(value, bool)
-
-
-def _is_good(value: object) -> bool:
-    """Whether a safety input is good; any value that is not a Boolean counts as open."""
-    return isinstance(value, bool | np.bool_) and bool(cast(bool, value))
-
-
-def _is_text(value: object, *, printable: bool = False) -> bool:
-    if not isinstance(value, str):
-        return False
-    try:
-        value.encode()
-    except UnicodeEncodeError:
-        return False
-    return not printable or value.isprintable()
-
-
-def _is_alignment(value: Any, sensors: list[str]) -> bool:
-    if not isinstance(value, Alignment) or value.sensor not in sensors:
-        return False
-    # offset and rate are NaN while unknown, as in a run that ends before its first block
-    line = (value.offset, value.rate)
-    known = all(map(_is_number, line)) or all(each != each for each in line)
-    return (
-        known
-        and (_is_number(value.residual) or value.residual != value.residual)
-        and _is_number(value.delay)
-        and all(map(_is_count, (value.values, value.lost, value.late, value.implausible)))
-    )
-
-
-def _is_raw(value: Any, sensors: list[str]) -> bool:
-    if not isinstance(value, RawValues) or value.sensor not in sensors:
-        return False
-    columns: list[Any] = [getattr(value, name) for name in _RAW]
-    return all(
-        type(each) is np.ndarray and each.dtype == np.int64 and each.ndim == 1 and len(each) == len(columns[0])
-        for each in columns
-    )
-
-
-def _wrong_with(channel: Any) -> str:
-    """Defect of a channel; empty for a valid one."""
-    if not isinstance(channel, Channel):
-        return f"{type(channel).__name__} is not a channel"
-    if not (_is_text(channel.name) and _NAME.fullmatch(channel.name)):
-        return f"its name is {channel.name!a}"
-    for item, text in (("unit", channel.unit), ("quantity", channel.quantity)):
-        if not _is_text(text, printable=True) or not text:
-            return f"the {item} of {channel.name} is {text!a}"
-    if not _is_text(channel.device):
-        return f"the device of {channel.name} is {channel.device!a}"
-    if not _is_number(channel.scale) or channel.scale == 0.0:
-        return f"the scale of {channel.name} is {channel.scale!a}"
-    if not _is_number(channel.offset):
-        return f"the offset of {channel.name} is {channel.offset!a}"
-    higher: Any = channel.higher
-    if type(higher) is not tuple or not all(map(_is_number, cast("tuple[Any, ...]", higher))):
-        return f"the higher terms of {channel.name} are {higher!a}"
-    return _wrong_with_counts(channel)
-
-
-def _wrong_with_counts(channel: Channel) -> str:
-    valid, faults, span = cast(Any, channel.valid), cast(Any, channel.faults), np.iinfo(np.int32)
-    if (
-        type(valid) is not tuple
-        or len(cast("tuple[Any, ...]", valid)) != 2
-        or not all(map(_is_count, cast("tuple[Any, ...]", valid)))
-        or not span.min <= valid[0] < valid[1] <= span.max
-    ):
-        return f"the valid counts of {channel.name} are {valid!a}"
-    if not isinstance(faults, Mapping) or not all(
-        _is_count(count) and _is_text(text, printable=True) for count, text in cast("Mapping[Any, Any]", faults).items()
-    ):
-        return f"the faults of {channel.name} are {faults!a}"
-    with np.errstate(all="ignore"):
-        limits = channel.limits
-    return "" if all(map(isfinite, limits)) else f"the values of {channel.name} range from {limits[0]} to {limits[1]}"

@@ -11,10 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.ensemble import simulate_many
 from sim.errors import InvalidInput
 from sim.excitation import SampledRecord
 from sim.linear import steady_peaks
-from sim.rocking import Motion, Peaks, Status, simulate, simulate_many
+from sim.rocking import Motion, Peaks, Status, simulate
 from sim.specimen import Specimen
 from sim.steady import NoOrbit, Orbit, resting_state, rocking_branch, rocking_orbit
 

@@ -3,11 +3,8 @@
 Front end to `sim.kernel.rocking` with named types, checks and threads.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
-from importlib import import_module
-from itertools import chain
 from math import ceil, log, log10, nan, pi
 from typing import Literal
 
@@ -17,7 +14,6 @@ from numpy.typing import ArrayLike, NDArray
 from sim.errors import InvalidInput
 from sim.excitation import ROW, Excitation
 from sim.specimen import Specimen
-from sim.sweep import processors, sweep
 
 TOLERANCE = 1e-10
 """Default relative tolerance of a step. The error over 120 s of steady rocking is of the same order."""
@@ -135,60 +131,10 @@ def simulate(
     (A.3) of the paper; `sim.kernel.rocking.run` states when the block comes to rest.
     """
     check_options(tolerance, overturning_angle)
-    run = _Run(specimen, Drive(excitation), state or State(), sample_times, peaks_from, tolerance, overturning_angle)
+    run = RockingRun(
+        specimen, Drive(excitation), state or State(), sample_times, peaks_from, tolerance, overturning_angle
+    )
     return run.motion()
-
-
-def simulate_many(
-    specimens: Specimen | Sequence[Specimen],
-    excitations: Excitation | Sequence[Excitation],
-    *,
-    states: State | Sequence[State] | None = None,
-    peaks_from: float | Sequence[float] | None = 0.0,
-    tolerance: float = TOLERANCE,
-    overturning_angle: float = pi / 2,
-    scheduler: str | None = None,
-) -> list[Motion]:
-    """Call `simulate` for many runs, on all processors, and return the results in order.
-
-    A single specimen, excitation, state or window applies to all runs. Everything is checked before the first run
-    starts. `scheduler` is that of `sim.sweep.sweep`.
-
-    Raises InvalidInput if the sequences differ in length or a run is refused.
-    """
-    import_module("sim.kernel.members")  # compile it once, before the threads start
-
-    several = [len(item) for item in (specimens, excitations, states, peaks_from) if isinstance(item, Sequence)]
-    runs = several[0] if several else 1
-    if any(length != runs for length in several):
-        raise InvalidInput("simulate_many", several, "the sequences must have the same length")
-
-    models = list(specimens) if isinstance(specimens, Sequence) else [specimens]
-    drives = [Drive(item) for item in (excitations if isinstance(excitations, Sequence) else [excitations])]
-    check_options(tolerance, overturning_angle)
-
-    prepared = [
-        _Run(
-            models[i % len(models)],
-            drives[i % len(drives)],
-            (states[i] if isinstance(states, Sequence) else states) or State(),
-            None,
-            peaks_from[i] if isinstance(peaks_from, Sequence) else peaks_from,
-            tolerance,
-            overturning_angle,
-        )
-        for i in range(runs)
-    ]
-    # group runs of equal order in batches that occupy every processor and finish within a second
-    alike: dict[int, list[int]] = {}
-    for i, run in enumerate(prepared):
-        alike.setdefault(run.order, []).append(i)
-    share = -(-runs // processors(scheduler))
-    size = min(share, max(SMALLEST_PART, min(-(-share // 4), LARGEST_PART)))
-    parts = [places[i : i + size] for places in alike.values() for i in range(0, len(places), size)]
-    motions = sweep(_side_by_side, [[prepared[i] for i in part] for part in parts], scheduler)
-    ordered = dict(zip(chain(*parts), chain(*motions), strict=True))
-    return [ordered[i] for i in range(runs)]
 
 
 def series_order(tolerance: float, segment: float) -> int:
@@ -267,7 +213,7 @@ class Drive:
 
 
 @dataclass(frozen=True, eq=False)
-class _Run:
+class RockingRun:
     """Run whose arguments are checked on construction."""
 
     specimen: Specimen
@@ -313,39 +259,6 @@ class _Run:
             report,
         )
         return motion_of(report, x, None if self.sample_times is None else samples, watched=self.peaks_from is not None)
-
-
-def _side_by_side(runs: list[_Run]) -> list[Motion]:
-    """Results of several runs, computed together, bit-identical to those of `_Run.motion`. The runs have no samples,
-    and equal order, tolerance and overturning angle.
-    """
-    from sim.kernel import members as kernel
-
-    drives = list({id(run.drive): run.drive for run in runs}.values())
-    ends = np.cumsum([len(drive.segments) for drive in drives])
-    span = {id(drive): (end - len(drive.segments), end) for drive, end in zip(drives, ends, strict=True)}
-    models = list({id(run.specimen): run.specimen for run in runs}.values())
-    place = {id(specimen): i for i, specimen in enumerate(models)}
-    states = np.array([run.state.as_array() for run in runs])
-    reports = np.zeros((len(runs), kernel.REPORT))
-    kernel.advance_members(
-        np.array([specimen.packed() for specimen in models]),
-        np.array([place[id(run.specimen)] for run in runs]),
-        np.concatenate([drive.segments for drive in drives]),
-        np.array([span[id(run.drive)] for run in runs]),
-        states,
-        runs[0].order,
-        runs[0].tolerance,
-        runs[0].overturning_angle,
-        REST_ANGLE,
-        np.array([np.inf if run.peaks_from is None else run.peaks_from for run in runs]),
-        MOST_IMPACTS,
-        reports,
-    )
-    return [
-        motion_of(report, x, None, watched=run.peaks_from is not None)
-        for run, x, report in zip(runs, states, reports, strict=True)
-    ]
 
 
 def checked_times(sample_times: ArrayLike | None, duration: float) -> NDArray[np.float64]:

@@ -62,7 +62,7 @@ LISTED = {
     "bench/app/support/doctor.py time.sleep": SHORT,
     "bench/app/support/doctor.py subprocess.run": CHILD,
     "bench/app/cli/closing.py threading.Event().wait": THREAD,
-    "bench/datafile/fields.py self._pool.shutdown": NOT_LONG,
+    "bench/datafile/rows.py self._pool.shutdown": NOT_LONG,
     "bench/datafile/opening.py time.sleep": SHORT,
     "bench/datafile/recorder.py self._queue.get": THREAD,
     "bench/datafile/held.py time.sleep": THREAD,

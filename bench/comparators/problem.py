@@ -8,14 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sim.errors import InvalidInput
 from sim.excitation import Excitation
-from sim.rocking import (
-    TOLERANCE,
-    Drive,
-    State,
-    check_options,
-    check_state,
-    checked_times,
-)
+from sim.rocking import TOLERANCE, Drive, State, check_options, check_state, checked_times
 from sim.specimen import Specimen
 
 

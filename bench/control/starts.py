@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 
 from bench.control.oscillator import Leg, program
 from bench.result_cache import cached
+from sim.ensemble import simulate_many
 from sim.knowledge import SpecimenKnowledge
-from sim.rocking import Motion, Status, simulate_many
+from sim.rocking import Motion, Status
 from sim.specimen import Specimen
 from sim.steady import NoOrbit, Orbit, rocking_orbit
 

@@ -8,10 +8,11 @@ from numpy.typing import NDArray
 
 from bench.datafile import hdf5
 from bench.datafile.declared import TABLES, part_of
-from bench.datafile.fields import Kind, rows_of
+from bench.datafile.fields import Kind
 from bench.datafile.hdf5 import Dataset, Group
 from bench.datafile.hdf5_reading import UNREADABLE, DataFileError, reason
 from bench.datafile.opening import intact_rows, is_within
+from bench.datafile.rows import rows_of
 from bench.datafile.samples import create_drive, read_channel, read_channels
 
 BYTES_AT_ONCE = 2**22

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from bench.datafile import hdf5
-from bench.datafile.fields import Field, Kind, Rows, decode
+from bench.datafile.fields import Field, Kind, decode
+from bench.datafile.rows import Rows
 from bench.findings import FitFinished, FittedParameter, Series
 from sim.identified import Correlation, Finding, Identified
 

@@ -13,8 +13,9 @@ import numpy as np
 from bench.datafile import hdf5, tables
 from bench.datafile.checksums import Checksums
 from bench.datafile.declared import FIXED_ENTRIES, FIXED_GROUPS, FIXED_INSTRUMENTS, TABLES, counters, event_tables
-from bench.datafile.fields import Field, Growing, Rows, fields_of, rows_of
+from bench.datafile.fields import Field, fields_of
 from bench.datafile.opening import FORMAT, FORMAT_VERSION, INTERVALS, WORDING
+from bench.datafile.rows import Growing, Rows, rows_of
 from bench.datafile.samples import Samples, chunk_of, companions, create_plot
 from bench.datafile.tables import Table
 from bench.events import Event

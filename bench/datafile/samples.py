@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.datafile import hdf5
-from bench.datafile.fields import Growing, Packer
 from bench.datafile.hdf5_reading import reading
+from bench.datafile.rows import Growing, Packer
 from drivers.rig import Channel, Counts
 
 PLOT, TIME = "data", "time"

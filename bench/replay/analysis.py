@@ -10,12 +10,13 @@ from typing import Any
 from bench.config.model import BenchConfiguration
 from bench.datafile import hdf5
 from bench.datafile.checksums import Checksums
-from bench.datafile.fields import Rows, fields_of
+from bench.datafile.fields import fields_of
 from bench.datafile.hdf5_reading import DataFileError, reason
 from bench.datafile.inspection import file_hash
 from bench.datafile.layout import now, software_version
 from bench.datafile.opening import ANALYSIS, ANALYSIS_VERSION
 from bench.datafile.reader import DataFile
+from bench.datafile.rows import Rows
 from bench.engine.steps import Outcome, Plan, Step
 from bench.events import Subscriber
 from bench.protocol import Follower, Prepared, each_step

@@ -18,7 +18,8 @@ from drivers.daqmx.inputs import InputScaling
 from drivers.daqmx.output import put_to_zero
 from drivers.daqmx.parameters import AnalogInput, Daq, device_name
 from drivers.daqmx.safety import EnableLine, reset_chassis
-from drivers.daqmx.tasks import Tasks, chassis_of, clear_stale, description_of
+from drivers.daqmx.stale import clear_stale
+from drivers.daqmx.tasks import Tasks, chassis_of, description_of
 from drivers.errors import ConnectionLost, RigError
 from sim.errors import InvalidInput
 

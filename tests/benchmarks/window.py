@@ -33,7 +33,8 @@ from bench.app.catalogue import all_protocols
 from bench.app.gui.controller import Controller
 from bench.app.gui.palette import LIGHT, dress
 from bench.app.gui.window import Window
-from bench.app.ipc.messages import Reduction, Traces
+from bench.app.ipc.broadcast import Reduction
+from bench.app.ipc.messages import Traces
 from bench.config.model import BenchConfiguration
 from bench.config.sections import Simulation
 from bench.events import Acquired

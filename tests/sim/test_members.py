@@ -5,10 +5,11 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from sim.ensemble import simulate_many
 from sim.excitation import Excitation, SampledRecord, SineProgram, Sweep
 from sim.kernel.lanes import fma, get, get2, put, put2, some, zero
 from sim.kernel.taylor import WORK_ROWS, forcing_coefficients, resting_coefficients, rocking_coefficients
-from sim.rocking import Motion, State, Status, simulate, simulate_many
+from sim.rocking import Motion, State, Status, simulate
 from sim.specimen import Specimen
 
 RNG = np.random.default_rng(7)

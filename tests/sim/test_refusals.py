@@ -5,9 +5,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from sim.ensemble import simulate_many
 from sim.excitation import SampledRecord, SineProgram, Sweep
 from sim.kernel import rocking as kernel
-from sim.rocking import State, simulate, simulate_many
+from sim.rocking import State, simulate
 from sim.specimen import Block, Frame, Specimen
 
 NAN, INF = float("nan"), float("inf")

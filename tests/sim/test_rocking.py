@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from scipy.integrate import quad
 from scipy.linalg import expm
 
+from sim.ensemble import simulate_many
 from sim.errors import InvalidInput
 from sim.excitation import Excitation, SampledRecord, SineProgram, Sweep
 from sim.kernel import equations
 from sim.kernel import rocking as kernel
 from sim.linear import frame_matrices
-from sim.rocking import REST_ANGLE, Mode, State, Status, simulate, simulate_many
+from sim.rocking import REST_ANGLE, Mode, State, Status, simulate
 from sim.specimen import Block, Specimen
 from tests.sim.oracle import amplitude_after, printed_rates, quarter_period, reference_motion, uplift_moment
 from tests.sim.runs import A_S, kernel_run

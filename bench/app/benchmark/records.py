@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from bench.app.benchmark.section import Cell, Column, Section, Target, Timing, once, timed
 from bench.comparators.catalogue import solve
+from sim.ensemble import simulate_many
 from sim.excitation import SampledRecord, SineProgram, Sweep
 from sim.linear import frame_matrices
 from sim.maps import GainMap, gain_map
-from sim.rocking import Motion, State, simulate, simulate_many
+from sim.rocking import Motion, State, simulate
 from sim.specimen import Block, Specimen
 
 OMEGAS, BETAS = (12.0, 21.0), (0.1, 1.2)

@@ -15,10 +15,11 @@ from bench.app.benchmark.section import Cell, Column, Section, Target, in_turn, 
 from bench.comparators.case import AMPLITUDE, OMEGA, PHASE, SPECIMEN, START
 from bench.comparators.catalogue import solve
 from bench.unfinished import temporary_folder
+from sim.ensemble import simulate_many
 from sim.errors import RockbenchError
 from sim.excitation import SampledRecord, SineProgram, Sweep
 from sim.maps import gain_map
-from sim.rocking import simulate, simulate_many
+from sim.rocking import simulate
 from sim.specimen import Specimen
 from sim.streaming import Stream
 

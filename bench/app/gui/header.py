@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from typing import cast
 
-from PySide6.QtCore import QEvent, QObject, QPoint, QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen, QPolygonF
+from PySide6.QtCore import QEvent, QObject, QPoint, Qt
+from PySide6.QtGui import QKeyEvent, QMouseEvent
 from PySide6.QtWidgets import (
     QApplication,
     QGridLayout,
@@ -21,8 +21,7 @@ from bench.app.formatting import clock
 from bench.app.gui import texts
 from bench.app.gui.controller import DELIBERATE, Controller
 from bench.app.gui.palette import Theme
-from bench.app.gui.status import Shape
-from bench.app.gui.widgets import ElidingLabel, give_key, set_level, typeset
+from bench.app.gui.widgets import ElidingLabel, Lamp, give_key, set_level, typeset
 
 KEY = Qt.Key.Key_F12
 
@@ -87,62 +86,12 @@ class StopFilter(QObject):
 
 STALE = 2.0
 """Age above which the safety inputs are unknown [s]."""
-SIDE, HEIGHT, LOW = 56, 96, 72
+HEIGHT, LOW = 96, 72
 """Side of the lamp, height of the header, and its height in a small window [px]. The height is fixed, so that text
 never moves STOP.
 """
 ROOMY, MEDIUM = (1150, 600), 700
 """Window size below which the header is low, and width below which it shows no times [px]."""
-
-
-class Lamp(QWidget):
-    """A status lamp; each state has its own shape and colour."""
-
-    def __init__(self, theme: Theme) -> None:
-        super().__init__()
-        self._theme = theme
-        self.shape: Shape = "ring"
-        self._level = "calm"
-        self._on_red = False
-        self.setFixedSize(SIDE, SIDE)
-
-    def show_as(self, shape: Shape, level: str, *, on_red: bool) -> None:
-        """Change shape and colour; on a red background the colour is white."""
-        if (shape, level, on_red) != (self.shape, self._level, self._on_red):
-            self.shape, self._level, self._on_red = shape, level, on_red
-            self.update()
-
-    def use_theme(self, theme: Theme) -> None:
-        """Use the colours of another theme."""
-        self._theme = theme
-        self.update()
-
-    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002 - the signature is Qt's
-        """Draw the shape."""
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        colour = QColor("white" if self._on_red else str(getattr(self._theme, self._level)))
-        painter.setPen(QPen(colour, 6))
-        painter.setBrush(colour if self.shape not in ("ring", "cross") else Qt.BrushStyle.NoBrush)
-        box = QRectF(6, 6, SIDE - 12, SIDE - 12)
-        if self.shape in ("ring", "disc"):
-            painter.drawEllipse(box)
-        elif self.shape == "cross":
-            painter.drawLine(box.topLeft(), box.bottomRight())
-            painter.drawLine(box.topRight(), box.bottomLeft())
-        else:
-            painter.drawPolygon(_corners(self.shape, box))
-        painter.end()
-
-
-def _corners(shape: Shape, box: QRectF) -> QPolygonF:
-    if shape == "octagon":
-        places = ((0.3, 0), (0.7, 0), (1, 0.3), (1, 0.7), (0.7, 1), (0.3, 1), (0, 0.7), (0, 0.3))
-    elif shape == "triangle":
-        places = ((0.5, 0), (1, 1), (0, 1))
-    else:
-        places = ((0, 0), (1, 0), (1, 1), (0, 1))
-    return QPolygonF([QPointF(box.x() + x * box.width(), box.y() + y * box.height()) for x, y in places])
 
 
 class Header(QWidget):

@@ -1,5 +1,5 @@
 # pyright: reportUnknownMemberType=false
-"""Shared parts of the pages: keys of buttons, levels of labels, axes of plots, the file dialog."""
+"""Shared parts of the pages: lamp, keys of buttons, levels of labels, axes of plots, the file dialog."""
 
 import re
 from collections.abc import Callable
@@ -7,15 +7,86 @@ from math import floor, log10
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtCore import QEvent, QObject, Qt
-from PySide6.QtGui import QKeySequence, QPainter, QPaintEvent, QResizeEvent, QShortcut
-from PySide6.QtWidgets import QAbstractButton, QFileDialog, QFrame, QLabel, QScrollArea, QSizePolicy, QWidget
+from PySide6.QtCore import QEvent, QObject, QPointF, QRectF, Qt
+from PySide6.QtGui import (
+    QColor,
+    QKeySequence,
+    QPainter,
+    QPaintEvent,
+    QPen,
+    QPolygonF,
+    QResizeEvent,
+    QShortcut,
+)
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QFileDialog,
+    QFrame,
+    QLabel,
+    QScrollArea,
+    QSizePolicy,
+    QWidget,
+)
 
 from bench.app.gui import texts
 from bench.app.gui.controller import Controller
 from bench.app.gui.palette import Theme
+from bench.app.gui.status import Shape
 from bench.document import typography
 from bench.document.typography import unit_text as unit_text
+
+SIDE = 56
+"""Width and height of a lamp [px]."""
+
+
+class Lamp(QWidget):
+    """A status lamp; each state has its own shape and colour."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self.shape: Shape = "ring"
+        self._level = "calm"
+        self._on_red = False
+        self.setFixedSize(SIDE, SIDE)
+
+    def show_as(self, shape: Shape, level: str, *, on_red: bool) -> None:
+        """Change shape and colour; on a red background the colour is white."""
+        if (shape, level, on_red) != (self.shape, self._level, self._on_red):
+            self.shape, self._level, self._on_red = shape, level, on_red
+            self.update()
+
+    def use_theme(self, theme: Theme) -> None:
+        """Use the colours of another theme."""
+        self._theme = theme
+        self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002 - the signature is Qt's
+        """Draw the shape."""
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        colour = QColor("white" if self._on_red else str(getattr(self._theme, self._level)))
+        painter.setPen(QPen(colour, 6))
+        painter.setBrush(colour if self.shape not in ("ring", "cross") else Qt.BrushStyle.NoBrush)
+        box = QRectF(6, 6, SIDE - 12, SIDE - 12)
+        if self.shape in ("ring", "disc"):
+            painter.drawEllipse(box)
+        elif self.shape == "cross":
+            painter.drawLine(box.topLeft(), box.bottomRight())
+            painter.drawLine(box.topRight(), box.bottomLeft())
+        else:
+            painter.drawPolygon(_corners(self.shape, box))
+        painter.end()
+
+
+def _corners(shape: Shape, box: QRectF) -> QPolygonF:
+    if shape == "octagon":
+        places = ((0.3, 0), (0.7, 0), (1, 0.3), (1, 0.7), (0.7, 1), (0.3, 1), (0, 0.7), (0, 0.3))
+    elif shape == "triangle":
+        places = ((0.5, 0), (1, 1), (0, 1))
+    else:
+        places = ((0, 0), (1, 0), (1, 1), (0, 1))
+    return QPolygonF([QPointF(box.x() + x * box.width(), box.y() + y * box.height()) for x, y in places])
 
 
 def set_level(label: QLabel, level: str) -> None:

@@ -6,9 +6,53 @@ import threading
 from collections import deque
 from collections.abc import Hashable
 
-from bench.app.ipc.messages import FromSession, Opened, Preparing, Published, Question, SafetyInputs, Traces
-from bench.events import Event, PointFinished, StepStarted
+import numpy as np
+
+from bench.analysis.signals import ACCELERATION, DISPLACEMENT, DRIFT, SIGNALS, U1
+from bench.app.ipc.messages import (
+    BIN,
+    FromSession,
+    Opened,
+    Preparing,
+    Published,
+    Question,
+    SafetyInputs,
+    Traces,
+    extremes,
+)
+from bench.events import Acquired, Event, PointFinished, StepStarted
 from bench.live_values import Estimate, LiveValue, RunningGain, TwinEstimate
+from drivers.clock import now
+
+
+class Reduction:
+    """Turns the blocks of a rig into traces."""
+
+    def __init__(self, sample_rate: float) -> None:
+        self._rate = sample_rate
+        self._width = max(round(BIN * sample_rate), 1)
+        self._run, self._origin = 0, 0.0
+
+    def __call__(self, event: Acquired) -> Traces:
+        """The traces of a block."""
+        signals = event.signals
+        if event.run != self._run:
+            # samples are equally spaced, unlike the times at which blocks are read
+            self._run, self._origin = event.run, event.time - (event.block.first + len(signals)) / self._rate
+        chosen = np.column_stack(
+            (
+                event.drive,
+                signals[:, [ACCELERATION, DISPLACEMENT, U1]],
+                signals[:, U1] + signals[:, DRIFT],
+                signals[:, DRIFT],
+                signals[:, len(SIGNALS) :],
+            )
+        )
+        low, high = extremes(chosen, self._width)
+        begin = self._origin + event.block.first / self._rate
+        step = self._width / self._rate
+        return Traces(event.run, begin, step, low, high, now(), self._origin, event.magnitudes())
+
 
 EVENTS, TRACES = 5000, 64
 """Capacity in messages, and in blocks of traces (0.1 s each)."""

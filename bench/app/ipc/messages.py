@@ -9,12 +9,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.analysis.signals import ACCELERATION, DISPLACEMENT, DRIFT, SIGNALS, U1, Further
+from bench.analysis.signals import Further
 from bench.config.model import BenchConfiguration
 from bench.datafile.tables import Column, Table
-from bench.events import Acquired, Event, State
+from bench.events import Event, State
 from bench.preflight.margins import Margin
-from drivers.clock import now
 from sim.errors import UNKNOWN, Cause
 from sim.parameters import Parameters
 
@@ -279,32 +278,3 @@ def extremes(values: NDArray[np.float64], width: int) -> tuple[NDArray[np.float3
     low = np.fmin.reduceat(values, starts, axis=0)
     high = np.fmax.reduceat(values, starts, axis=0)
     return low.astype(np.float32), high.astype(np.float32)
-
-
-class Reduction:
-    """Turns the blocks of a rig into traces."""
-
-    def __init__(self, sample_rate: float) -> None:
-        self._rate = sample_rate
-        self._width = max(round(BIN * sample_rate), 1)
-        self._run, self._origin = 0, 0.0
-
-    def __call__(self, event: Acquired) -> Traces:
-        """The traces of a block."""
-        signals = event.signals
-        if event.run != self._run:
-            # samples are equally spaced, unlike the times at which blocks are read
-            self._run, self._origin = event.run, event.time - (event.block.first + len(signals)) / self._rate
-        chosen = np.column_stack(
-            (
-                event.drive,
-                signals[:, [ACCELERATION, DISPLACEMENT, U1]],
-                signals[:, U1] + signals[:, DRIFT],
-                signals[:, DRIFT],
-                signals[:, len(SIGNALS) :],
-            )
-        )
-        low, high = extremes(chosen, self._width)
-        begin = self._origin + event.block.first / self._rate
-        step = self._width / self._rate
-        return Traces(event.run, begin, step, low, high, now(), self._origin, event.magnitudes())

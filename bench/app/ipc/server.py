@@ -12,7 +12,7 @@ from queue import Empty, SimpleQueue
 from typing import Any
 
 from bench.analysis.signals import further_of
-from bench.app.ipc.broadcast import Broadcast, SendQueue
+from bench.app.ipc.broadcast import Broadcast, Reduction, SendQueue
 from bench.app.ipc.messages import (
     BEAT,
     PATIENCE,
@@ -30,7 +30,6 @@ from bench.app.ipc.messages import (
     Preparing,
     Published,
     Question,
-    Reduction,
     Refused,
     SafetyInputs,
     receive,

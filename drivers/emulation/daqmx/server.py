@@ -19,7 +19,8 @@ from drivers.emulation.daqmx.device import DeviceModel
 from drivers.emulation.daqmx.driver import Driver
 from drivers.emulation.daqmx.errors import DaqmxFailure, NotEmulated, SessionExists, SessionMissing
 from drivers.emulation.daqmx.lines import Wires
-from drivers.emulation.daqmx.service.channels import ChannelAttributeService, ChannelService
+from drivers.emulation.daqmx.service.attributes import ChannelAttributeService
+from drivers.emulation.daqmx.service.channels import ChannelService
 from drivers.emulation.daqmx.service.lines import LineService, WatchdogService
 from drivers.emulation.daqmx.service.samples import ReadingService, WritingService
 from drivers.emulation.daqmx.service.system import SystemService

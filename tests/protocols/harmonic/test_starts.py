@@ -12,10 +12,11 @@ from bench.control.starts import CATCH_ANGLE, RATING, TOPS, Start, candidates, p
 from bench.engine.steps import Publish
 from bench.events import StepStarted
 from protocols.harmonic.protocol import PointStatus
+from sim.ensemble import simulate_many
 from sim.excitation import SineProgram, Sweep
 from sim.gain import predict_gain
 from sim.knowledge import SpecimenKnowledge
-from sim.rocking import Motion, simulate, simulate_many
+from sim.rocking import Motion, simulate
 from sim.specimen import Specimen
 from sim.steady import Orbit, rocking_orbit
 from tests.protocols.harmonic.scripted import BETA, OMEGA, Script, cycle

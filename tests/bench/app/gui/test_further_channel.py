@@ -10,7 +10,8 @@ from scipy.io import loadmat
 from bench.analysis.signals import SIGNALS, further_of
 from bench.app.cli.main import main
 from bench.app.gui.window import Window
-from bench.app.ipc.messages import TRACES, Opened, Reduction
+from bench.app.ipc.broadcast import Reduction
+from bench.app.ipc.messages import TRACES, Opened
 from bench.config.model import BenchConfiguration
 from bench.config.toml import read_configuration
 from bench.control.oscillator import DriveCalibration, Leg

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from bench.analysis.signals import SignalMap
-from bench.app.ipc.messages import BIN, TRACES, Reduction
+from bench.app.ipc.broadcast import Reduction
+from bench.app.ipc.messages import BIN, TRACES
 from bench.events import Acquired
 from drivers.rig import Block, Channel
 

@@ -1,0 +1,166 @@
+"""Tables that grow during the run: rows are buffered in memory and written together."""
+
+import zlib
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from hashlib import sha256
+from itertools import chain
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.datafile import hdf5
+from bench.datafile.fields import ROWS_PER_PACKED_CHUNK, Field, Kind
+
+THREADS = 2
+
+
+class Packer:
+    """Appends to compressed datasets; the compression runs in threads that start on demand."""
+
+    def __init__(self) -> None:
+        self._pool = ThreadPoolExecutor(THREADS, "record packer")
+
+    def append(self, target: hdf5.Dataset, values: NDArray[Any]) -> None:
+        """Append rows; complete chunks are compressed here, an incomplete chunk by h5py."""
+        start, chunk = target.shape[0], (target.chunks or (1,))[0]
+        head = min(-start % chunk, len(values))
+        whole = (len(values) - head) // chunk
+        body, tail = values[head : head + whole * chunk], values[head + whole * chunk :]
+        if head:
+            hdf5.append(target, values[:head])
+        if whole:
+            hdf5.append_chunks(target, self._packed(body.reshape(whole, chunk)), whole, chunk)
+        if len(tail):
+            hdf5.append(target, tail)
+
+    def close(self) -> None:
+        """End the threads without waiting for them."""
+        self._pool.shutdown(wait=False, cancel_futures=True)
+
+    def _packed(self, chunks: NDArray[Any]) -> Iterator[bytes]:
+        if len(chunks) < THREADS:
+            return iter(pack(chunks))
+        return chain.from_iterable(self._pool.map(pack, np.array_split(chunks, THREADS)))
+
+
+def pack(chunks: NDArray[Any]) -> list[bytes]:
+    """The bytes of chunks, shape (n, rows), after the filters `hdf5.FILTERS`: of each chunk the first bytes of all
+    values, then the second bytes, and so on, compressed.
+    """
+    n, size = len(chunks), chunks.dtype.itemsize
+    shuffled = np.ascontiguousarray(chunks).view(np.uint8).reshape(n, -1, size).transpose(0, 2, 1)
+    return [zlib.compress(each, hdf5.FILTERS["compression_opts"]) for each in np.ascontiguousarray(shuffled)]
+
+
+class Growing:
+    """Appends rows to a dataset and hashes them, so that they need not be read again at the end of a long run."""
+
+    def __init__(self, stored: hdf5.Dataset, packer: Packer | None = None) -> None:
+        """`packer` compresses and writes complete chunks."""
+        self._stored, self.path = stored, stored.name
+        self._packer = packer
+        self._digest = sha256()
+
+    def reopen(self, file: hdf5.File) -> None:
+        """Append to the dataset of the reopened file from now on."""
+        self._stored = hdf5.dataset(file, self.path)
+
+    @property
+    def checksum(self) -> str:
+        """SHA-256 of the rows so far."""
+        return self._digest.hexdigest()
+
+    def append(self, values: NDArray[Any]) -> None:
+        """Add rows at the end."""
+        kept = np.ascontiguousarray(values, dtype=self._stored.dtype)
+        if self._packer is None:
+            hdf5.append(self._stored, kept)
+        else:
+            self._packer.append(self._stored, kept)
+        # hashed through a view of bytes, because strings have no buffer
+        self._digest.update(kept.view(np.uint8).data)
+
+
+class Rows:
+    """A group with one dataset per field."""
+
+    def __init__(self, parent: hdf5.Group, name: str, fields: Sequence[Field]) -> None:
+        group = hdf5.create_group(parent, name, "NXcollection")
+        self._columns = [(field, Growing(field.create(group))) for field in fields]
+        self._fields, self._texts = tuple(fields), tuple(field.kind is Kind.TEXT for field in fields)
+        self._pending: list[tuple[Any, ...]] = []
+        self._written = 0
+
+    def __len__(self) -> int:
+        return self._written + len(self._pending)
+
+    @property
+    def written(self) -> int:
+        """Number of rows passed to the file."""
+        return self._written
+
+    @property
+    def grown(self) -> list[Growing]:
+        """Growing datasets of the group."""
+        return [stored for _, stored in self._columns]
+
+    def add(self, *values: Any) -> None:
+        """Append one row: one value per field, in order; None for an absent value."""
+        self._pending.append(
+            tuple(
+                [
+                    # numbers are stored as they are
+                    value if type(value) in (float, int) and not text else field.encode(value)
+                    for field, text, value in zip(self._fields, self._texts, values, strict=True)
+                ]
+            )
+        )
+
+    def extend(self, *columns: NDArray[Any]) -> None:
+        """Append many rows: one column per field, in order, all of equal length and without absent values."""
+        self._pending += zip(*(column.tolist() for column in columns), strict=True)
+
+    def write(self, *, partial: bool = True) -> None:  # noqa: ARG002 - uncompressed rows are appended in place
+        """Write the buffered rows to the file; an incomplete chunk of packed fields is written only if `partial`."""
+        if not self._pending:
+            return
+        for (field, stored), values in zip(self._columns, zip(*self._pending, strict=True), strict=True):
+            stored.append(np.array(values, dtype=field.dtype))
+        self._written += len(self._pending)
+        self._pending.clear()
+
+
+class PackedRows(Rows):
+    """Rows of packed numbers, appended as arrays."""
+
+    def __init__(self, parent: hdf5.Group, name: str, fields: Sequence[Field]) -> None:
+        super().__init__(parent, name, fields)
+        self._arrays: list[tuple[NDArray[Any], ...]] = []
+        self._waiting = 0
+
+    def __len__(self) -> int:
+        return self._written + self._waiting
+
+    def extend(self, *columns: NDArray[Any]) -> None:
+        self._arrays.append(columns)
+        self._waiting += len(columns[0])
+
+    def write(self, *, partial: bool = True) -> None:
+        # rewriting a compressed chunk leaves its first copy as unused space
+        end = len(self) if partial else len(self) // ROWS_PER_PACKED_CHUNK * ROWS_PER_PACKED_CHUNK
+        count = end - self._written
+        if count <= 0:
+            return
+        columns = [np.concatenate(parts) for parts in zip(*self._arrays, strict=True)]
+        for (_, stored), values in zip(self._columns, columns, strict=True):
+            stored.append(values[:count])
+        self._written = end
+        self._waiting -= count
+        self._arrays = [tuple(values[count:] for values in columns)] if self._waiting else []
+
+
+def rows_of(parent: hdf5.Group, name: str, fields: Sequence[Field]) -> Rows:
+    """Create a table of these fields."""
+    return (PackedRows if all(field.packed for field in fields) else Rows)(parent, name, fields)
