@@ -18,6 +18,7 @@ from bench.app.export.format import TableColumn, content_of
 from bench.config.model import BenchConfiguration
 from bench.datafile.reader import DataFile, JournalEntry, open_datafile
 from bench.document.campaign import Campaign as Contents
+from bench.document.typography import counted
 from bench.events import SpecimenMounted, State, StateChanged
 from bench.results import FILE
 from sim.errors import InvalidInput
@@ -107,7 +108,7 @@ class Campaign:
         self.close()
 
     def __repr__(self) -> str:
-        return f"<Campaign {self.path}: {self.protocol}, {self.status}, {len(self._file.points)} points>"
+        return f"<Campaign {self.path}: {self.protocol}, {self.status}, {counted(len(self._file.points), 'point')}>"
 
     def close(self) -> None:
         """Close the file; may be called repeatedly."""

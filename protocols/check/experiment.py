@@ -206,8 +206,8 @@ def _progress(omegas: list[float], index: int, parameters: CheckParameters) -> P
 
 _COLUMNS = (
     TextColumn("verdict", words=True),
-    TextColumn("of", words=True),
-    TextColumn("what", words=True),
+    TextColumn("signal", words=True),
+    TextColumn("quantity", words=True),
     TextColumn("measured"),
     TextColumn("U (k=2)"),
     TextColumn("expected"),

@@ -9,6 +9,7 @@ from bench.app.catalogue import format_names
 from bench.app.cli.interrupt import interrupted_text, report_interrupt
 from bench.app.cli.options import CampaignFile, Handed, Json, switch
 from bench.app.cli.output import print_error, print_result, print_warning
+from bench.document.typography import counted
 from bench.progress import counting, silent
 
 if TYPE_CHECKING:
@@ -99,7 +100,7 @@ def recover(
         "events_from_journal": found.from_journal,
         "points_from_journal": found.points_from_journal,
     }
-    given = f"{found.from_journal} events and {found.points_from_journal} points from the journal"
+    given = f"{counted(found.from_journal, 'event')} and {counted(found.points_from_journal, 'point')} from the journal"
     text = f"{found.target}: {found.rows} samples per channel, {given}"
     print_result(lambda: content, lambda: text, as_json=as_json)
     if as_json:

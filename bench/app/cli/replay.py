@@ -11,6 +11,7 @@ from bench.app.cli.interrupt import report_interrupt
 from bench.app.cli.options import CampaignFile, Handed, Json
 from bench.app.cli.output import print_error, print_result, print_warning
 from bench.app.formatting import one_line
+from bench.document.typography import counted
 from bench.progress import silent
 from sim.errors import InvalidInput
 
@@ -101,6 +102,11 @@ def _clock(speed: str) -> "Clock":
     return PacedClock(factor)
 
 
+def _counted(count: int, plural: str) -> str:
+    singular = f"{plural[:-3]}y" if plural.endswith("ies") else plural.removesuffix("s")
+    return counted(count, singular, plural)
+
+
 def _text(replayed: "Replayed", table: str) -> str:
     lines = [table.rstrip(), "", f"The replay was {replayed.status}: {replayed.reason}"]
     if replayed.ended is not None:
@@ -109,7 +115,7 @@ def _text(replayed: "Replayed", table: str) -> str:
         f"Not reproducible from the samples, therefore replaced by a requested abort: {reason}"
         for reason in replayed.in_place
     ]
-    compared = ", ".join(f"{count} {part}" for part, count in replayed.found.compared.items() if count)
+    compared = ", ".join(_counted(count, part) for part, count in replayed.found.compared.items() if count)
     if not replayed.same_wording:
         lines.append("The file is from an older version; the wording of its messages was not compared")
     if not replayed.same_intervals:

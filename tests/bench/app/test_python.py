@@ -247,7 +247,7 @@ def test_a_run_is_that_of_the_command_line(campaign: bench.Campaign, tmp_path: P
     assert campaign.points["alpha_2"].unit == "1"
     assert campaign.parameters["omega"] == [20.0]
     assert campaign.specimen == bench.Specimen()
-    assert "harmonic, completed, 1 points" in repr(campaign)
+    assert "harmonic, completed, 1 point>" in repr(campaign)
 
 
 @pytest.mark.parametrize(

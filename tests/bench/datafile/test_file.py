@@ -262,7 +262,7 @@ def test_events_that_the_file_lost_come_from_the_journal(tmp_path: Path, capsys:
     recorder.close("completed")
     journal_path(old).write_bytes(journal_path(path).read_bytes() + b'{"time": 2.0, "ki')
     assert main(["file", "recover", str(old)]) == 0
-    assert "2 events and 1 points from the journal" in capsys.readouterr().out
+    assert "2 events and 1 point from the journal" in capsys.readouterr().out
     with bench.datafile.open(tmp_path / "old-recovered.h5") as record, bench.datafile.open(path) as written:
         assert record.events == written.events
         assert record.points == written.points
