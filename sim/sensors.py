@@ -195,12 +195,11 @@ class Converter(Parameters):
 
     def counts(self, volts: Array, random: Generator) -> NDArray[np.int16]:
         """Convert the voltages of all channels to counts, same shape (n, n_channels)."""
-        noisy = random.standard_normal(volts.shape)
-        noisy *= self.noise
-        noisy += volts
-        noisy /= self.lsb
-        np.rint(noisy, out=noisy)
-        lowest, highest = self.codes
-        np.maximum(noisy, lowest, out=noisy)
+        from sim.kernel.filter import digitise
+
+        normal = random.standard_normal(volts.shape).reshape(len(volts), -1)
         # each channel is contiguous in memory, as the following steps require
-        return np.minimum(noisy, highest, out=noisy).astype(np.int16, order="F")
+        by_channel = np.ascontiguousarray(volts.reshape(normal.shape).T)
+        found = np.empty(by_channel.shape, dtype=np.int16)
+        digitise(by_channel, normal, self.noise, self.lsb, *self.codes, found)
+        return found.T.reshape(volts.shape, order="A")

@@ -35,6 +35,7 @@ class FallWatch:
         self._threshold = 0.5 * k_c * frame.h1 * sin(FALLEN_TILT) / (frame.k1 + k_c)
         self._span = PERIODS * 2.0 * pi / frame.natural_frequencies[0] * sample_rate
         self._sums: deque[tuple[int, int, float]] = deque()
+        self._total = self._seen = 0
 
     @property
     def threshold(self) -> float:
@@ -51,11 +52,12 @@ class FallWatch:
             valid = np.isfinite(u1)
             seen, summed = int(np.count_nonzero(valid)), float(u1[valid].sum())
         self._sums.append((u1.size, seen, summed))
-        total, seen, summed = (sum(column) for column in zip(*self._sums, strict=True))
-        if total < self._span:
+        self._total, self._seen = self._total + u1.size, self._seen + seen
+        if self._total < self._span:
             return False
-        while total - self._sums[0][0] >= self._span:
-            size, *_ = self._sums.popleft()
-            total -= size
+        seen, summed = self._seen, sum(each for _, _, each in self._sums)
+        while self._total - self._sums[0][0] >= self._span:
+            size, valid_samples, _ = self._sums.popleft()
+            self._total, self._seen = self._total - size, self._seen - valid_samples
         # missing samples are handled by the guard; they give no information about the block
-        return 2 * seen > total and abs(summed / seen) > self._threshold
+        return 2 * seen > self._total and abs(summed / seen) > self._threshold

@@ -1,4 +1,6 @@
-"""Recursive filters: a cascade of second-order sections for several channels, and an exponential mean."""
+"""Recursive filters: a cascade of second-order sections for several channels, and an exponential mean; the converter
+behind them.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,3 +32,25 @@ def exponential_mean(values: NDArray[np.float64], forget: float, state: NDArray[
     for i in range(values.size):
         values[i] = (1.0 - forget) * values[i] + state[0]
         state[0] = forget * values[i]
+
+
+@compiled("void(float64[:,::1], float64[:,::1], float64, float64, int64, int64, int16[:,::1])")
+def digitise(
+    volts: NDArray[np.float64],
+    normal: NDArray[np.float64],
+    noise: float,
+    lsb: float,
+    lowest: int,
+    highest: int,
+    counts: NDArray[np.int16],
+) -> None:
+    """Write the counts of `volts`, shape (channels, n), to `counts`, same shape: rounded to even, between the `lowest`
+    and the `highest`.
+
+    normal : shape (n, channels), standard normal numbers of the input noise.
+    noise, lsb : standard deviation of the noise [V] and voltage of one count [V].
+    """
+    for channel in range(volts.shape[0]):
+        for i in range(volts.shape[1]):
+            nearest = np.rint((normal[i, channel] * noise + volts[channel, i]) / lsb)
+            counts[channel, i] = int(min(max(nearest, float(lowest)), float(highest)))

@@ -168,3 +168,17 @@ def test_converter_noise_is_that_stated() -> None:
     converter = Converter(noise=0.01)
     counts = converter.counts(np.zeros(40_000), np.random.default_rng(1))
     assert counts.std() * converter.lsb == pytest.approx(0.01, rel=0.02)
+
+
+@pytest.mark.parametrize("bits", [8, 14, 16])
+def test_counts_are_those_of_the_array_formula_bit_for_bit(bits: int) -> None:
+    converter = Converter(bits=bits, noise=0.0 if bits == 8 else 0.0004)
+    volts = np.random.default_rng(2).uniform(-11.0, 11.0, (4, 3000))
+    # halves between two counts are rounded to the even one
+    volts[0] = (np.arange(3000) - 1500.5) * converter.lsb
+    lowest, highest = converter.codes
+    noise = converter.noise * np.random.default_rng(1).standard_normal((3000, 4))
+    expected = np.clip(np.rint((noise + volts.T) / converter.lsb), lowest, highest).astype(np.int16)
+    found = converter.counts(volts.T, np.random.default_rng(1))
+    np.testing.assert_array_equal(found, expected)
+    assert found.flags.f_contiguous

@@ -1,5 +1,6 @@
 """The process of the command `rockbench`: its signals, its streams, its progress display and its exit code."""
 
+import gc
 import os
 import signal
 import sys
@@ -14,6 +15,9 @@ if TYPE_CHECKING:
     from rich.progress import Progress as Bar
     from rich.progress import TaskID
 
+YOUNG = 50_000
+"""Number of new objects after which Python searches for unreachable ones, which takes a few milliseconds."""
+
 
 def run() -> None:
     """Entry point of the console script."""
@@ -22,6 +26,8 @@ def run() -> None:
     # read when numpy is imported: BLAS threads busy-wait for longer than these small matrices take, and the last digits
     # of a product would depend on the number of threads
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # the imports create some 250 000 lasting objects, through which the collector would search hundreds of times
+    gc.set_threshold(YOUNG, *gc.get_threshold()[1:])
     from bench.app.cli.interrupt import Interrupts, handle_signals, leave, report_interrupt
 
     interrupts = Interrupts()
