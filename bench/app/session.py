@@ -12,6 +12,7 @@ from bench.app.preflight import compile_run
 from bench.app.support.awake import awake
 from bench.config.model import BenchConfiguration
 from bench.datafile.recorder import PATIENCE, Recorder
+from bench.datafile.samples import CHUNK_TIME, VIRTUAL_CHUNK_TIME
 from bench.engine.engine import configured_engine
 from bench.engine.interface import Ending, EventStream, Operator, Requests
 from bench.events import Subscriber, Warned
@@ -88,7 +89,8 @@ def run_session(
     rig = open_rig(configuration, realtime=realtime)
     held = ExitStack()
     try:
-        if not isinstance(rig.clock, VirtualClock):
+        virtual = isinstance(rig.clock, VirtualClock)
+        if not virtual:
             held.enter_context(awake())
         # opening takes a long time: an end requested meanwhile leaves neither folder nor file
         if requests.strongest is not None:
@@ -103,7 +105,8 @@ def run_session(
             metadata=metadata | {"devices": json.dumps(rig.description)},
             tables=tables,
             # virtual time does not advance while waiting for the disk
-            hold_up=PATIENCE if isinstance(rig.clock, VirtualClock) else 0.0,
+            hold_up=PATIENCE if virtual else 0.0,
+            chunk_time=VIRTUAL_CHUNK_TIME if virtual else CHUNK_TIME,
         )
         stream = EventStream(rig.clock, [recorder, *subscribers])
         status, reason = "failed", "the program failed"
@@ -114,7 +117,7 @@ def run_session(
             for warning in (*strange, *preflight.warnings):
                 stream.publish(Warned(warning))
             # in virtual time the bench waits while the model computes
-            patient = isinstance(rig.clock, VirtualClock)
+            patient = virtual
             with live_twin(stream, rig, configuration, requests, patient=patient):
                 ending = engine.run(plugin_generator(name, prepared.plan()))
             ending = ending.then(_closing(rig))

@@ -6,7 +6,6 @@ sum over k of Im(A c_k / H(k omega) exp(i k phi)): a table that responds as cali
 for the shares (1, 0, 0, ...).
 """
 
-from cmath import exp
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,7 +14,7 @@ from math import tau
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.analysis.cycles import HARMONICS
+from bench.control.share_ramp import ShareRamp
 from sim.excitation import SineProgram, Sweep
 
 
@@ -84,76 +83,27 @@ def program(legs: Sequence[Leg], phase: float = 0.0) -> SineProgram:
 Array = NDArray[np.float64]
 
 
-class ShareRamp:
-    """Shares of the harmonics, fundamental first: initially a pure sine, (1, 0, 0, ...); changes follow a
-    smoothstep.
+_Factors = list[tuple[int, NDArray[np.complex128]]]
+"""Orders of harmonics and their complex amplitudes [V]."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Turns:
+    """The K harmonics of a held sine over a block of `n` samples: their amplitudes `begin` and i times their `orders`,
+    shape (K,), and their course `ahead` from the beginning of the block, shape (K, n); for the same `factors`.
     """
 
-    def __init__(self) -> None:
-        self._from = self._to = _pure()
-        self._length, self._done = 1, 1
-        self._waiting: deque[tuple[int, tuple[complex, ...], int]] = deque()
-        self._played = 0
+    factors: _Factors
+    n: int
+    begin: NDArray[np.complex128]
+    orders: NDArray[np.complex128]
+    ahead: NDArray[np.complex128]
 
-    def to(self, shares: tuple[complex, ...], samples: int, wait: int = 0) -> None:
-        """Change to `shares` within `samples` samples, beginning after `wait` samples; other harmonics go to zero.
-
-        A change that is due later than this one is cancelled.
-        """
-        due = self._played + wait
-        while self._waiting and self._waiting[-1][0] >= due:
-            self._waiting.pop()
-        if wait > 0:
-            self._waiting.append((due, shares, samples))
-            return
-        target = np.zeros(HARMONICS, dtype=np.complex128)
-        target[: len(shares)] = shares
-        self._from, self._to = self._at(np.array([self._done]))[0], target
-        self._length, self._done = max(samples, 1), 0
-
-    def to_pure(self, samples: int) -> None:
-        """Change to a pure sine within the next `samples` samples."""
-        if self._waiting or not np.array_equal(self._to, _pure()):
-            self.to((1.0,), samples)
-
-    def constant(self, n: int) -> bool:
-        """Whether the shares are constant over the next `n` samples."""
-        return self._done >= self._length and (not self._waiting or self._waiting[0][0] >= self._played + n)
-
-    def next(self, n: int) -> NDArray[np.complex128]:
-        """Shares at the next `n` samples, shape (n, HARMONICS), or (1, HARMONICS) while they are constant."""
-        if not self._waiting or self._waiting[0][0] >= self._played + n:
-            return self._follow(n)
-        pieces = list[NDArray[np.complex128]]()
-        while n > 0:
-            here = min(n, self._waiting[0][0] - self._played) if self._waiting else n
-            if here > 0:
-                pieces.append(np.broadcast_to(self._follow(here), (here, HARMONICS)))
-                n -= here
-            if self._waiting and self._waiting[0][0] == self._played:
-                _, shares, samples = self._waiting.popleft()
-                waiting, self._waiting = self._waiting, deque()
-                self.to(shares, samples)
-                self._waiting = waiting
-        return np.concatenate(pieces)
-
-    def _follow(self, n: int) -> NDArray[np.complex128]:
-        self._played += n
-        if self._done >= self._length:
-            return self._to[None, :]
-        found = self._at(self._done + np.arange(1, n + 1))
-        self._done += n
-        return found
-
-    def _at(self, done: NDArray[np.int_]) -> NDArray[np.complex128]:
-        x = np.minimum(done / self._length, 1.0)[:, None]
-        return self._from + (self._to - self._from) * (x * x * (3.0 - 2.0 * x))
-
-
-def _pure() -> NDArray[np.complex128]:
-    shares = np.zeros(HARMONICS, dtype=np.complex128)
-    shares[0] = 1.0
-    return shares
+    @staticmethod
+    def of(factors: _Factors, step: float, n: int) -> "_Turns":
+        orders = np.array([1j * k for k, _ in factors], dtype=np.complex128)
+        begin = np.array([factor[0] for _, factor in factors], dtype=np.complex128)
+        return _Turns(factors, n, begin, orders, np.exp(np.outer(orders, step * np.arange(1, n + 1))))
 
 
 class Oscillator:
@@ -162,9 +112,8 @@ class Oscillator:
     def __init__(self, sample_rate: float) -> None:
         self._rate = sample_rate
         self._calibration: DriveCalibration | None = None
-        self._constant: tuple[object, list[tuple[int, NDArray[np.complex128]]]] = (None, [])
-        self._turns: tuple[object, NDArray[np.complex128]] = (None, np.empty((0, 0), dtype=np.complex128))
-        """The harmonics of a held sine over a block, relative to its beginning, and what they were computed for."""
+        self._constant: tuple[object, _Factors] = (None, [])
+        self._turns = _Turns.of([], 0.0, 0)
         self.reset()
 
     def reset(self) -> None:
@@ -248,12 +197,9 @@ class Oscillator:
         if not self._shares.constant(n):
             return self._drive(amplitude, omega, first + step * np.arange(1, n + 1, dtype=np.float64))
         factors = self._factors(self._calibrated, amplitude, omega, self._shares.next(n))
-        orders = tuple(k for k, _ in factors)
-        if self._turns[0] != (step, n, orders):
-            angles = np.outer(orders, step * np.arange(1, n + 1, dtype=np.float64))
-            self._turns = (step, n, orders), np.exp(1j * angles)
-        begin = np.array([factor[0] * exp(1j * k * first) for k, factor in factors])
-        volts = np.asarray(begin @ self._turns[1], dtype=np.complex128)
+        if self._turns.factors is not factors or self._turns.n != n:
+            self._turns = _Turns.of(factors, step, n)
+        volts = np.asarray(self._turns.begin * np.exp(first * self._turns.orders) @ self._turns.ahead, np.complex128)
         return np.ascontiguousarray(volts.imag)
 
     @property
@@ -277,7 +223,7 @@ class Oscillator:
 
     def _factors(
         self, calibration: DriveCalibration, amplitude: Array, omega: Array, shares: NDArray[np.complex128]
-    ) -> list[tuple[int, NDArray[np.complex128]]]:
+    ) -> _Factors:
         """Orders of the driven harmonics, ascending, and their complex amplitudes [V], shape (n,); computed once, with
         the shape (1,), where amplitude, frequency and shares are constant.
         """

@@ -16,7 +16,7 @@ from bench.datafile.declared import FIXED_ENTRIES, FIXED_GROUPS, FIXED_INSTRUMEN
 from bench.datafile.fields import Field, fields_of
 from bench.datafile.opening import FORMAT, FORMAT_VERSION, INTERVALS, WORDING
 from bench.datafile.rows import Growing, Rows, rows_of
-from bench.datafile.samples import Samples, chunk_of, companions, create_plot
+from bench.datafile.samples import CHUNK_TIME, Samples, chunk_of, companions, create_plot
 from bench.datafile.tables import Table
 from bench.events import Event
 from drivers.rig import Channel
@@ -50,6 +50,8 @@ class Skeleton:
     tables: Mapping[str, Table]
     events: Sequence[type[Event]] = ()
     """Events of the protocol that have a table in the file."""
+    chunk_time: float = CHUNK_TIME
+    """Duration of a chunk of samples [s]."""
 
     @property
     def own(self) -> dict[str, tuple[Field, ...]]:
@@ -120,8 +122,8 @@ def build(file: hdf5.File, skeleton: Skeleton) -> Parts:
     hdf5.write_numbers(
         instrument, "sample_rate", skeleton.sample_rate, unit="Hz", description="samples per second of every channel"
     )
-    time = create_plot(entry, skeleton.channels, chunk_of(skeleton.sample_rate))
-    samples = Samples(instrument, skeleton.channels, skeleton.sample_rate, time)
+    chunk = chunk_of(skeleton.sample_rate, skeleton.chunk_time)
+    samples = Samples(instrument, skeleton.channels, chunk, create_plot(entry, skeleton.channels, chunk))
     rows = dict[str, Rows]()
     for path, fields in {**TABLES, **skeleton.own, "points": fields_of(skeleton.point_type)}.items():
         folder, _, name = path.rpartition("/")

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from bench.datafile.hdf5_reading import DataFileError, reason
 from bench.datafile.held import in_use, is_held
 from bench.datafile.layout import Skeleton, Status
+from bench.datafile.samples import CHUNK_TIME
 from bench.datafile.tables import Table
 from bench.datafile.writer import DataFileWriter
 from bench.events import Acquired, Event, PointFinished, Progress, StateChanged, ValuesReceived
@@ -71,7 +72,8 @@ class Recorder:
 
     Samples are on the disk within a second, journalled events almost at once. The next call after a disk error raises
     DataFileError, once; later data are not recorded, and earlier data stay readable. A disk that is too slow causes the
-    same error: a call waits for it at most `hold_up` seconds, which is non-zero only in virtual time.
+    same error: a call waits for it at most `hold_up` seconds, which is non-zero only in virtual time. `chunk_time` is
+    the duration of a chunk of samples [s].
 
     `metadata` is stored as strings under /entry/metadata, `tables` (such as {"prediction": ...}) under /entry. `events`
     are those of the protocol whose tables the file needs. Raises InvalidInput, without creating a file, if `path`
@@ -90,13 +92,14 @@ class Recorder:
         events: Sequence[type[Event]] = (),
         title: str = "rocking-bench campaign",
         hold_up: float = 0.0,
+        chunk_time: float = CHUNK_TIME,
     ) -> None:
         self.path = path
         self._point_type = point_type
         self._n_channels = len(channels)
         self._numbers = {channel.name: number for number, channel in enumerate(channels)}
         self._writer = DataFileWriter(
-            path, Skeleton(title, tuple(channels), sample_rate, point_type, metadata, tables or {}, events)
+            path, Skeleton(title, tuple(channels), sample_rate, point_type, metadata, tables or {}, events, chunk_time)
         )
         self._queue: queue.Queue[_Block | Event | _Sync] = queue.Queue(BACKLOG)
         self._wanted = threading.Event()

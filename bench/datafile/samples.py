@@ -88,17 +88,18 @@ class Timeline:
 CHUNK_TIME = 0.5
 """Duration of a chunk of samples [s]; in a real-time run, the longest time for which samples are buffered."""
 
+VIRTUAL_CHUNK_TIME = 2.0
+"""The same in virtual time, which runs a hundred times faster: larger chunks take half the time to compress."""
+
 
 class Samples:
     """Datasets of the counts of each channel, the drive as float32 and the time as float64, always of equal length.
 
-    `time` is the dataset of the times, with chunks of `chunk_of(sample_rate)` rows.
+    `time` is the dataset of the times, with chunks of `chunk` rows.
     """
 
-    def __init__(
-        self, instrument: hdf5.Group, channels: Sequence[Channel], sample_rate: float, time: hdf5.Dataset
-    ) -> None:
-        self.chunk = chunk_of(sample_rate)
+    def __init__(self, instrument: hdf5.Group, channels: Sequence[Channel], chunk: int, time: hdf5.Dataset) -> None:
+        self.chunk = chunk
         stored = [_create_channel(instrument, channel, self.chunk) for channel in channels]
         stored += [create_drive(instrument, self.chunk), time]
         self._packer = Packer()
@@ -144,9 +145,9 @@ class Samples:
         self._packer.close()
 
 
-def chunk_of(sample_rate: float) -> int:
-    """Number of rows in a chunk of the samples."""
-    return max(1, round(CHUNK_TIME * sample_rate))
+def chunk_of(sample_rate: float, duration: float = CHUNK_TIME) -> int:
+    """Number of rows in a chunk of the samples of `duration` [s]."""
+    return max(1, round(duration * sample_rate))
 
 
 def read_channels(instrument: hdf5.Group) -> tuple[Channel, ...]:

@@ -31,7 +31,7 @@ from protocols.harmonic.holding import SLOW, hold, prepared, too_late
 from protocols.harmonic.judgement import Conditions, judge, predicted_fields
 from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, PointStatus
 from protocols.harmonic.settling import Held, Report, Settled, checked, linear_frame, settle_and_measure
-from sim.gain import predict_gain
+from sim.gain import Layer, predict_gain
 from sim.specimen import Specimen
 from sim.steady import Orbit, resting_level
 
@@ -88,6 +88,7 @@ class HarmonicPlan:
         self._amplitude = parameters.amplitude_factor * self._specimen.uplift_acceleration
         self._pace = Pace(parameters.omega, 1 + len(parameters.beta))
         self._bare: dict[float, Settled] = {}
+        self._aimed: dict[tuple[float, float], Layer | None] = {}
         self._points: list[HarmonicPoint] = []
         self._draws = shared_draws()
 
@@ -210,7 +211,7 @@ class HarmonicPlan:
 
     def _overturned(self, specimen: Specimen, omega: float, falls: int, chance: float) -> HarmonicPoint:
         bare = self._bare[omega].peak
-        layer = predict_gain(specimen, omega, self._amplitude, bare.amplitude).rocking
+        layer = self._aimed_at(specimen, omega)
         kind = "stable" if layer and layer.stable else "unstable"
         return HarmonicPoint(
             omega_rad_s=omega,
@@ -224,8 +225,16 @@ class HarmonicPlan:
             reason=f"the block fell in all {falls} starts; the predicted orbit is {kind}",
         )
 
+    def _aimed_at(self, specimen: Specimen, omega: float) -> Layer | None:
+        """The predicted rocking branch at the nominal amplitude, computed once per point."""
+        key = specimen.k_c, omega
+        if key not in self._aimed:
+            bare = self._bare[omega].peak.amplitude
+            self._aimed[key] = predict_gain(specimen, omega, self._amplitude, bare).rocking
+        return self._aimed[key]
+
     def _orbit(self, specimen: Specimen, omega: float) -> Orbit | None:
-        layer = predict_gain(specimen, omega, self._amplitude).rocking
+        layer = self._aimed_at(specimen, omega)
         return layer.orbit if layer else None
 
     def _prepared(self, orbit: Orbit | None) -> StabiliserDesign | None:
@@ -280,7 +289,7 @@ class HarmonicPlan:
         running: RunningGain | None = None
         if specimen is not None and bare is not None:
             running = RunningGain(bare, self._sensors, self._draws)
-            layer = predict_gain(specimen, omega, self._amplitude, bare.amplitude).rocking
+            layer = self._aimed_at(specimen, omega)
             predicted = layer.alpha_2 if layer else predicted
 
         def report(cycles: list[Cycle]) -> Generator[Step, Outcome, None]:
