@@ -25,7 +25,8 @@ from bench.progress import Progress, counting, silent
 from bench.result_cache import cached
 from protocols.common.calibrate import CHANGE_TIME, MEASURED, PROBE, SETTLING, harmonic_frequencies
 from protocols.harmonic.holding import PATIENCE, SLOW, too_late
-from protocols.harmonic.plan import BARE_CHANGE, Pace, spring_calibration
+from protocols.harmonic.pace import Pace
+from protocols.harmonic.plan import BARE_CHANGE, spring_calibration
 from protocols.harmonic.protocol import HarmonicParameters
 from sim.channel import STOREYS
 from sim.gain import predict_gain

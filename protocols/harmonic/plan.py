@@ -8,7 +8,6 @@
 """
 
 from collections.abc import Generator, Mapping, Sequence
-from math import tau
 
 import numpy as np
 
@@ -22,13 +21,14 @@ from bench.control.sine import Sine
 from bench.control.stabiliser import GROWTH, StabiliserDesign
 from bench.control.starts import Start
 from bench.engine.steps import Arm, Calibrate, Fallen, OperatorAction, Outcome, Publish, RampOut, Step, Sweep
-from bench.events import PointFinished, Progress, StepStarted, Warned
+from bench.events import PointFinished, StepStarted, Warned
 from bench.live_values import Estimate
 from drivers.rig import OperatorTask, RigError
 from protocols.common.calibrate import calibrate_drive, harmonic_frequencies
 from protocols.harmonic.free_prediction import with_free_prediction
 from protocols.harmonic.holding import SLOW, hold, prepared, too_late
 from protocols.harmonic.judgement import Conditions, judge, predicted_fields
+from protocols.harmonic.pace import Pace
 from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, PointStatus
 from protocols.harmonic.settling import Held, Report, Settled, checked, linear_frame, settle_and_measure
 from sim.gain import Layer, predict_gain
@@ -44,34 +44,6 @@ BARE_CHANGE = 4.0
 NO_BLOCK = "storey 1 has a permanent offset although the block was removed: check lasers and specimen"
 
 FALLEN_REQUEST = "The block has fallen: set it upright again."
-
-OVERHEAD = 30.0
-"""Duration of a test in addition to its cycles [s]: rest, start, ramps."""
-
-CYCLES = 220
-"""Typical number of cycles of a test, including settling."""
-
-
-class Pace:
-    """Progress, computed from the expected durations of the finished and the remaining tests on the bench."""
-
-    def __init__(self, omegas: tuple[float, ...], tests_per_omega: int) -> None:
-        self._total = tests_per_omega * sum(self._expected(omega) for omega in omegas)
-        self._finished = 0.0
-
-    @staticmethod
-    def _expected(omega: float) -> float:
-        return OVERHEAD + CYCLES * tau / omega
-
-    def finished(self, omega: float) -> None:
-        """Count a finished test at `omega` [rad/s]."""
-        self._finished += self._expected(omega)
-
-    def progress(self, activity: str, omega: float | None = None, cycles: int = 0) -> Progress:
-        """Progress of the campaign after `cycles` cycles of a test at `omega` [rad/s]."""
-        within = 0.0 if omega is None else min(cycles / CYCLES, 0.95) * self._expected(omega)
-        gone = min(self._finished + within, self._total)
-        return Progress(gone / self._total, self._total - gone, activity)
 
 
 class HarmonicPlan:
