@@ -21,6 +21,8 @@ from sim.errors import Cause, InvalidInput
 from tests.bench.app.gui.conftest import PROTOCOLS, ScriptedClient
 from tests.bench.app.ipc.experiment import bench
 
+pytestmark = pytest.mark.usefixtures("without_plots")
+
 FINE = PlanChecked((), None, (), 60.0, 1e6, 1e9, "hash", {})
 
 
