@@ -13,7 +13,7 @@ import tempfile
 from pathlib import Path
 
 from bench.config.model import BenchConfiguration
-from bench.config.toml import as_toml
+from bench.config.template import as_toml
 from tests.emulated import emulated
 
 SHORT = (

@@ -14,7 +14,8 @@ from bench.app.catalogue import all_backends, load_protocol
 from bench.app.cli.main import main
 from bench.config.backend import RIGS, RigSettings, backend_names
 from bench.config.model import BenchConfiguration
-from bench.config.toml import as_toml, problems_of, read_configuration
+from bench.config.template import as_toml
+from bench.config.toml import problems_of, read_configuration
 from bench.datafile.reader import open_datafile
 from bench.events import State
 from bench.rigs import open_rig
@@ -151,7 +152,7 @@ def test_the_plan_of_a_plug_in_runs_on_a_loop_back_rig() -> None:
 
 
 def test_its_table_is_shown_in_the_window(file: Path, qtbot: QtBot) -> None:
-    from bench.app.gui.setup_page import ConfigurationTree
+    from bench.app.gui.form import ConfigurationTree
 
     tree = ConfigurationTree()
     qtbot.addWidget(tree)
@@ -194,7 +195,7 @@ def test_a_backend_that_is_missing_or_fails_to_load_is_named_and_hinders_nothing
 
 
 def test_a_file_of_a_backend_that_is_gone_says_so(file: Path) -> None:
-    from bench.replay.recording import _configuration  # type: ignore[attr-defined]
+    from bench.replay.recording import _configuration
 
     stored = read_configuration(file).model_dump_json().replace("linear-table", "old-table")
     recorded = SimpleNamespace(title="a run", metadata={"configuration": stored})

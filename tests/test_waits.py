@@ -65,6 +65,7 @@ LISTED = {
     "bench/datafile/rows.py self._pool.shutdown": NOT_LONG,
     "bench/datafile/opening.py time.sleep": SHORT,
     "bench/datafile/recorder.py self._queue.get": THREAD,
+    "bench/datafile/recorder.py self._wanted.wait": THREAD,
     "bench/datafile/held.py time.sleep": THREAD,
     "bench/engine/stalls.py self._over.wait": THREAD,
     "bench/figures/text_table.py captured.get": NOT_LONG,

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from bench.datafile import hdf5
+from bench.datafile.access import is_let_go
 from bench.datafile.checksums import GROUP, added, integrity
 from bench.datafile.declared import part_of
 from bench.datafile.fields import decode
-from bench.datafile.hdf5 import is_let_go
 from bench.datafile.hdf5_reading import UNREADABLE, DataFileError, reason
 from bench.datafile.layout import Status
 from bench.datafile.opening import ANALYSIS, FORMAT, intact_rows, is_within, open_file

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from bench.datafile import hdf5
+from bench.datafile.access import is_let_go
 from bench.datafile.declared import FORMER, part_of
-from bench.datafile.hdf5 import is_let_go
 from bench.datafile.hdf5_reading import UNREADABLE, DataFileError, reason
 from bench.datafile.structure import check_attributes, check_structure
 from bench.events import LimitExceeded, OperatorAnswered, SpecimenMounted, StateChanged, Warned

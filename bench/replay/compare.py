@@ -15,7 +15,7 @@ from bench.datafile.hdf5 import clip_text
 from bench.datafile.reader import DataFile
 from bench.events import Acquired, Event, PointFinished, SensorsAligned
 from bench.live_values import TwinEstimate
-from bench.replay.recording import RecordedCourse
+from bench.replay.course import RecordedCourse
 
 ROUNDING = 1e-9
 """Largest relative difference of results that is attributed to rounding on another processor or by another library."""

@@ -12,7 +12,8 @@ from bench.engine.steps import Plan
 from bench.events import Acquired, Event, OperatorAnswered, OperatorAsked, Subscriber, Warned
 from bench.provenance import revision, software
 from bench.replay.compare import DRIVE, ENDING, Comparison, Difference, Found
-from bench.replay.recording import DataFileRecording, RecordedCourse
+from bench.replay.course import RecordedCourse
+from bench.replay.recording import DataFileRecording
 from bench.twin.live import live_twin
 from drivers.clock import Clock, now
 from drivers.replay import ReplayRig

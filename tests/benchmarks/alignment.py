@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from bench.config.model import BenchConfiguration
-from bench.config.toml import as_toml
+from bench.config.template import as_toml
 from drivers.emulation.control import ask
 from drivers.hardware.rig import HardwareRig
 from drivers.rig import Alignment

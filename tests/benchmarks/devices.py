@@ -13,7 +13,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from bench.config.toml import as_toml
+from bench.config.template import as_toml
 from sim.errors import InvalidInput
 from tests.emulated import emulated
 from tests.lateness import Lateness

@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 from bench.config.model import BenchConfiguration
-from bench.config.toml import as_toml
+from bench.config.template import as_toml
 from tests.benchmarks.faults import BLOCKS, LEADS, matrix, reaction_table, report
 from tests.dry_run import SHORT, hurried
 from tests.emulated import emulated

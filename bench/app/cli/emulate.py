@@ -182,7 +182,7 @@ def _with_lead(configuration: "BenchConfiguration", lead: str | None) -> "BenchC
 
 def _hand_out(configuration: "BenchConfiguration", laboratory: "Laboratory", path: Path | None) -> None:
     """Print or write the configuration of a client, and print instructions on standard error. Raises InvalidInput."""
-    from bench.config.toml import as_toml
+    from bench.config.template import as_toml
 
     hardware = laboratory.hardware
     changed = {"backend": "hardware", "hardware": hardware}

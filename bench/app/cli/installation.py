@@ -35,7 +35,7 @@ def init(
 
     An existing file is never overwritten.
     """
-    from bench.config.toml import write_template
+    from bench.config.template import write_template
 
     if minimal and hardware:
         raise InvalidInput("--minimal", "--hardware", "use only one of them")

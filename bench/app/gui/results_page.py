@@ -27,7 +27,8 @@ from bench.app.gui.controller import Controller
 from bench.app.gui.figure_view import FigureView
 from bench.app.gui.gain_plot import GainPlot
 from bench.app.gui.gains import Difference, compare, kind_of
-from bench.app.gui.open_files import FileList, HistoryView, Place, read_file
+from bench.app.gui.history_view import HistoryView
+from bench.app.gui.open_files import FileList, Place, read_file
 from bench.app.gui.outputs import Outputs
 from bench.app.gui.palette import Theme
 from bench.app.gui.point_table import every_field, rows_of

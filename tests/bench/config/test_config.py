@@ -10,7 +10,8 @@ from bench.app.cli.main import main
 from bench.config.declared import at, keys
 from bench.config.model import BenchConfiguration
 from bench.config.review import review
-from bench.config.toml import Kind, as_toml, problems_of, read_configuration, write_template
+from bench.config.template import as_toml, write_template
+from bench.config.toml import Kind, problems_of, read_configuration
 from bench.config.validation import problems, validated
 from drivers.hardware.parameters import Daq, Hardware, Laser1, Laser2, Lasers, TableForce
 from protocols.harmonic.protocol import HarmonicParameters

@@ -11,7 +11,8 @@ from bench.app.cli.inputs import configuration_from
 from bench.app.cli.main import main
 from bench.config.model import BenchConfiguration
 from bench.config.result_files import read_specimen, write_specimen
-from bench.config.toml import as_toml, problems_of, read_configuration
+from bench.config.template import as_toml
+from bench.config.toml import problems_of, read_configuration
 from sim.errors import InvalidInput
 from sim.identified import Correlation, Finding, Identified
 from sim.specimen import Specimen

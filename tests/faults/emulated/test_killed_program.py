@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from bench.config.model import BenchConfiguration
-from bench.config.toml import as_toml
+from bench.config.template import as_toml
 from bench.datafile.reader import open_datafile
 from bench.results import FILE
 from drivers.emulation.control import ask

@@ -14,7 +14,8 @@ from bench.app.catalogue import load_protocol
 from bench.app.cli.main import main
 from bench.config.model import BenchConfiguration
 from bench.config.result_files import read_calibration, write_calibration
-from bench.config.toml import as_toml, read_configuration
+from bench.config.template import as_toml
+from bench.config.toml import read_configuration
 from bench.datafile.reader import open_datafile
 from drivers.rig import Channel
 from protocols.laser_calibration.fit import Pass, calibration, fit_curve

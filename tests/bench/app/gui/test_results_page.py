@@ -14,7 +14,7 @@ from scipy.io import loadmat
 from bench.app.gui import texts
 from bench.app.gui.controller import Controller
 from bench.app.gui.gains import compare
-from bench.app.gui.open_files import read_stretch
+from bench.app.gui.history_view import read_stretch
 from bench.app.gui.outputs import free
 from bench.app.gui.palette import LIGHT
 from bench.app.gui.results_page import ResultsPage
@@ -196,7 +196,7 @@ def test_a_stretch_has_the_extremes_of_its_samples(
     files: tuple[Path, Path], begin: float, end: float, parts: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Against the counts as they were made."""
-    monkeypatch.setattr("bench.app.gui.open_files.CHUNK", 300)
+    monkeypatch.setattr("bench.app.gui.history_view.CHUNK", 300)
     found = read_stretch(files[0], 2, "laser_1", begin, end, parts)
     first, last = max(round(begin * RATE), 0), min(round(end * RATE) + 1, N)
     expected = 1e-6 * _counts(2)[first:last, 1]

@@ -1,0 +1,114 @@
+"""Read-only tree of a configuration."""
+
+from typing import cast
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import (
+    QHeaderView,
+    QTreeWidget,
+    QTreeWidgetItem,
+)
+
+from bench.app.formatting import ABSENT, as_typed
+from bench.app.gui import texts
+from bench.app.gui.widgets import (
+    typeset,
+    unit_text,
+)
+from bench.config.declared import Declared, declared, summary
+from bench.config.model import BenchConfiguration
+from sim.parameters import Parameters
+
+
+class ConfigurationTree(QTreeWidget):
+    """Read-only view of a configuration. Values that differ from their defaults are bold and their groups expanded."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setColumnCount(len(texts.CONFIGURATION_TITLES))
+        self.setHeaderLabels(texts.CONFIGURATION_TITLES)
+        self.setAccessibleName(texts.NAMES["configuration"])
+        self.setAlternatingRowColors(True)
+        self.header().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+
+    def use(self, configuration: BenchConfiguration) -> None:
+        """Show a configuration, without the tables of other backends."""
+        self.clear()
+        unused = {"simulation", "hardware", "rig"} - {configuration.table}
+        values, groups = list[QTreeWidgetItem](), list[QTreeWidgetItem]()
+        for of in declared(BenchConfiguration):
+            if of.name not in unused:
+                line = _line(of, getattr(configuration, of.name))
+                (groups if line.childCount() else values).append(line)
+        self.addTopLevelItems([*values, *groups])
+        for item in self._all():
+            if item.childCount():
+                item.setExpanded(item.parent() is None or item.data(0, Qt.ItemDataRole.UserRole) is True)
+
+    def value(self, *path: str) -> str:
+        """Value of a key, with its unit. Raises KeyError for an unknown key."""
+        items = [self.topLevelItem(k) for k in range(self.topLevelItemCount())]
+        found: QTreeWidgetItem | None = None
+        for key in path:
+            found = next((item for item in items if item is not None and item.text(0) == key), None)
+            if found is None:
+                raise KeyError(".".join(path))
+            items = [found.child(k) for k in range(found.childCount())]
+        return "" if found is None else f"{found.text(1)} {found.text(2)}".strip()
+
+    def _all(self) -> list[QTreeWidgetItem]:
+        waiting = [self.topLevelItem(k) for k in range(self.topLevelItemCount())]
+        found: list[QTreeWidgetItem] = []
+        while waiting:
+            item = waiting.pop()
+            if item is not None:
+                found.append(item)
+                waiting += [item.child(k) for k in range(item.childCount())]
+        return found
+
+
+def _line(of: Declared, value: object) -> QTreeWidgetItem:
+    """Add a key with all keys below it; the first column of its item stores whether any of their values differs from
+    the default.
+    """
+    changed = value != of.default
+    item = QTreeWidgetItem([of.name, "", ""])
+    if isinstance(value, Parameters):
+        _fill(item, value)
+        tip = of.description or summary(type(value))
+    elif groups := _groups(value):
+        for number, each in enumerate(groups):
+            below = QTreeWidgetItem([str(number + 1), "", ""])
+            _fill(below, each)
+            item.addChild(below)
+        tip = of.description
+    else:
+        item.setText(1, _words(value))
+        item.setText(2, "" if of.unit == "1" or value is None else unit_text(of.unit))
+        tip = f"{of.description}\n{texts.MUST_BE.format(allowed=typeset(of.allowed_in_unit))}"
+    for column in range(3):
+        item.setToolTip(column, tip[:1].upper() + tip[1:])
+    item.setData(0, Qt.ItemDataRole.UserRole, changed)
+    font = item.font(1)
+    font.setBold(changed)
+    item.setFont(1, font)
+    return item
+
+
+def _fill(item: QTreeWidgetItem, group: Parameters) -> None:
+    for of in declared(type(group)):
+        item.addChild(_line(of, getattr(group, of.name)))
+
+
+def _groups(value: object) -> list[Parameters]:
+    """The parameter groups that a value contains; empty for a value without any."""
+    several = cast(tuple[object, ...], value) if isinstance(value, tuple) else ()
+    return [each for each in several if isinstance(each, Parameters)]
+
+
+def _words(value: object) -> str:
+    if value is None:
+        return ABSENT
+    if isinstance(value, tuple):
+        return " ".join(as_typed(each) for each in cast(tuple[object, ...], value)) or ABSENT
+    return as_typed(getattr(value, "value", value))
