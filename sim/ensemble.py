@@ -173,11 +173,11 @@ def record_gains(members: Sequence[Specimen], record: SampledRecord, scheduler: 
 def _peaks(chunk: Sequence[_Member]) -> Floats:
     """Peaks of u1 and drift [m], shape (n, 2)."""
     peaks = np.full((len(chunk), 2), np.nan)
-    rocking = [i for i, (orbit, _) in enumerate(chunk) if orbit.layer == "rocking"]
+    rocking = [i for i, (orbit, _) in enumerate(chunk) if orbit.branch == "rocking"]
     if rocking:
         peaks[rocking] = _rocking([chunk[i] for i in rocking])
     for i, (orbit, specimen) in enumerate(chunk):
-        if orbit.layer == "resting" and orbit.amplitude < resting_level(specimen, orbit.omega):
+        if orbit.branch == "resting" and orbit.amplitude < resting_level(specimen, orbit.omega):
             found = steady_peaks(specimen, orbit.omega, orbit.amplitude, resting=True)
             peaks[i] = found.u1, found.drift
     return peaks

@@ -21,7 +21,7 @@ from sim.steady import NoOrbit, Orbit, resting_state, rocking_branch, rocking_or
 
 
 @dataclass(frozen=True, eq=False)
-class Layer:
+class Branch:
     """Steady motion and its gain coefficients."""
 
     orbit: Orbit
@@ -51,14 +51,14 @@ class GainPrediction:
     beta: float
     amplitude: float
     bare: Peaks
-    rocking: Layer | None
-    resting: Layer | None
+    rocking: Branch | None
+    resting: Branch | None
 
     @property
-    def layers(self) -> dict[str, Layer]:
+    def branches(self) -> dict[str, Branch]:
         """Branches of steady motion that exist, by name: "rocking", "resting"."""
         named = {"rocking": self.rocking, "resting": self.resting}
-        return {name: layer for name, layer in named.items() if layer is not None}
+        return {name: branch for name, branch in named.items() if branch is not None}
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,16 +146,16 @@ def _prediction(
 ) -> GainPrediction:
     bare = steady_peaks(specimen, omega, amplitude if bare_amplitude is None else bare_amplitude)
 
-    def layer(orbit: Orbit | None) -> Layer | None:
+    def branch(orbit: Orbit | None) -> Branch | None:
         if orbit is None:
             return None
-        return Layer(orbit, alpha_1=orbit.peaks.u1 / bare.u1, alpha_2=orbit.peaks.drift / bare.drift)
+        return Branch(orbit, alpha_1=orbit.peaks.u1 / bare.u1, alpha_2=orbit.peaks.drift / bare.drift)
 
     return GainPrediction(
         omega=omega,
         beta=specimen.label or 0.0,
         amplitude=amplitude,
         bare=bare,
-        rocking=layer(rocking),
-        resting=layer(resting),
+        rocking=branch(rocking),
+        resting=branch(resting),
     )

@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class LayerMap:
+class BranchMap:
     """Branch of steady motion over the grid of n stiffnesses by m frequencies; NaN where it does not exist.
 
     `peaks`, shape (n, m, 3): |u1|, |u2 - u1| [m], |theta| [rad]. `bare`, shape (m, 3): the same without block.
@@ -74,8 +74,8 @@ class GainMap:
     betas: Floats
     omegas: Floats
     amplitude: float
-    rocking: LayerMap
-    resting: LayerMap
+    rocking: BranchMap
+    resting: BranchMap
     sections: Floats
 
 
@@ -118,8 +118,8 @@ def gain_map(
         betas=rows[row_of],
         omegas=columns[column_of],
         amplitude=amplitude,
-        rocking=LayerMap(whole(lambda b: b.rocking.peaks), bare, whole(lambda b: b.rocking.multipliers)),
-        resting=LayerMap(whole(lambda b: b.resting.peaks), bare, whole(lambda b: b.resting.multipliers)),
+        rocking=BranchMap(whole(lambda b: b.rocking.peaks), bare, whole(lambda b: b.rocking.multipliers)),
+        resting=BranchMap(whole(lambda b: b.resting.peaks), bare, whole(lambda b: b.resting.multipliers)),
         sections=whole(lambda b: b.sections),
     )
 
@@ -153,8 +153,8 @@ def gain_map_blocks(
             betas=betas[part],
             omegas=omegas,
             amplitude=amplitude,
-            rocking=LayerMap(rows.peaks, bare, rows.multipliers),
-            resting=LayerMap(resting_peaks, bare, resting_multipliers),
+            rocking=BranchMap(rows.peaks, bare, rows.multipliers),
+            resting=BranchMap(resting_peaks, bare, resting_multipliers),
             sections=rows.sections,
         )
         yield block, state

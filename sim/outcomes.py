@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from sim.errors import InvalidInput
 from sim.excitation import SineProgram, Sweep
-from sim.maps import GainMap, LayerMap
+from sim.maps import BranchMap, GainMap
 from sim.rocking import Mode, Motion, Peaks, Status, simulate
 from sim.specimen import Specimen
 from sim.steady import NoOrbit, check_steady, resting_state, rocking_orbit
@@ -174,8 +174,8 @@ def _reached_in(cell: _Cell) -> Reached:
     return reached(*cell)
 
 
-def _cell_peaks(layer: LayerMap, i: int, j: int) -> Peaks | None:
-    return Peaks(*(float(peak) for peak in layer.peaks[i, j])) if layer.stable[i, j] else None
+def _cell_peaks(branch: BranchMap, i: int, j: int) -> Peaks | None:
+    return Peaks(*(float(peak) for peak in branch.peaks[i, j])) if branch.stable[i, j] else None
 
 
 def _steady(specimen: Specimen, omega: float, amplitude: float) -> Steady:

@@ -61,7 +61,7 @@ def sensitivities(
     specimen: Specimen,
     omega: float,
     amplitude: float,
-    layer: Literal["rocking", "resting"] = "rocking",
+    branch: Literal["rocking", "resting"] = "rocking",
     orbit: Orbit | None = None,
 ) -> dict[str, Sensitivity]:
     """Derivatives of alpha_1 and alpha_2 with respect to all parameters of `parameter_values`.
@@ -73,7 +73,7 @@ def sensitivities(
     Raises InvalidInput as `rocking_orbit` does, and NoOrbit if the branch does not exist.
     """
     if orbit is None:
-        known = rocking_orbit if layer == "rocking" else resting_state
+        known = rocking_orbit if branch == "rocking" else resting_state
         orbit = known(specimen, omega, amplitude)
     if orbit is None:
         raise NoOrbit(f"no resting motion at omega = {omega:g} rad/s: the block lifts; lower the amplitude")
@@ -82,7 +82,7 @@ def sensitivities(
     nodes = STENCIL[4][0].tolist()
     moved = [_moved(specimen, values, name, node * step) for name, step in steps.items() for node in nodes]
     each = np.array(list(steps.values()))
-    if orbit.layer == "rocking":
+    if orbit.branch == "rocking":
         slopes = _along_branch(orbit, moved, each)
     else:
         slopes = _slopes(np.array([_linear(point, resting=True) for point in moved]), each)

@@ -52,7 +52,7 @@ class Orbit:
     specimen: Specimen
     omega: float
     amplitude: float
-    layer: Literal["rocking", "resting"]
+    branch: Literal["rocking", "resting"]
     phase: float
     start: State
     peaks: Peaks
@@ -112,7 +112,7 @@ def rocking_orbit(specimen: Specimen, omega: float, amplitude: float, guess: Orb
     requested parameters.
     """
     check_steady(specimen, omega, amplitude)
-    if guess is not None and guess.layer == "rocking":
+    if guess is not None and guess.branch == "rocking":
         origin, section = parameters(guess.specimen, guess.omega, guess.amplitude)[0], guess.section
     else:
         origin, section = _seed()
@@ -165,7 +165,7 @@ def resting_state(specimen: Specimen, omega: float, amplitude: float) -> Orbit |
         specimen=specimen,
         omega=omega,
         amplitude=amplitude,
-        layer="resting",
+        branch="resting",
         phase=0.0,
         start=State(u1=u1.imag, u2=u2.imag, v1=omega * u1.real, v2=omega * u2.real),
         peaks=steady_peaks(specimen, omega, amplitude, resting=True),
@@ -229,7 +229,7 @@ def _orbit(specimen: Specimen, omega: float, amplitude: float, solution: Solutio
         specimen=specimen,
         omega=omega,
         amplitude=amplitude,
-        layer="rocking",
+        branch="rocking",
         phase=phase % tau,
         start=State(u1=u1, u2=u2, v1=v1, v2=v2, theta=0.0, omega=velocity),
         peaks=Peaks(*(float(peak) for peak in solution.peaks)),

@@ -7,7 +7,7 @@ import numpy as np
 from bench.config.numbers import spaced
 from bench.datafile.tables import arrays
 from bench.document.document import Part, Picture, Section
-from bench.figures.map_figure import Layer, MapPoint, map_figure
+from bench.figures.map_figure import BranchGrid, MapPoint, map_figure
 from bench.prediction.gain_map import grids, map_table, resting_margin
 from bench.prediction.requests import MapRequest
 from sim.specimen import Specimen
@@ -29,11 +29,11 @@ def map_section(specimen: Specimen, amplitude_factor: float, measured: Sequence[
     )
     columns = arrays(map_table(specimen, request))
 
-    def layer(name: str) -> Layer:
+    def grid_of(name: str) -> BranchGrid:
         gains = {gain: grids(columns, request, name, gain) for gain in ("alpha_1", "alpha_2")}
-        return Layer(gains, grids(columns, request, name, "floquet_modulus"))
+        return BranchGrid(gains, grids(columns, request, name, "floquet_modulus"))
 
-    rocking, resting = layer("rocking"), layer("resting")
+    rocking, resting = grid_of("rocking"), grid_of("resting")
     axes = np.array(request.omega), np.array(request.beta)
     figure = map_figure(*axes, rocking, resting, resting_margin(specimen, request), measured)
     lost = int(np.isnan(rocking.multiplier).sum())

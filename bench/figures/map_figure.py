@@ -49,7 +49,7 @@ SYMBOLS = {"alpha_1": r"$\alpha_1$", "alpha_2": r"$\alpha_2$"}
 
 
 @dataclass(frozen=True, eq=False)
-class Layer:
+class BranchGrid:
     """Branch of steady motion over the grid of n stiffnesses by m frequencies; NaN where it does not exist.
 
     `gains`: alpha_1 and alpha_2 by name, each shape (n, m). `multiplier`: greatest |Floquet multiplier|, shape (n, m).
@@ -70,42 +70,42 @@ class MapPoint:
 
     omega: float
     beta: float
-    layer: str
+    branch: str
     alpha_2: float | None
 
 
 def map_figure(
     omegas: Floats,
     betas: Floats,
-    rocking: Layer,
-    resting: Layer,
+    rocking: BranchGrid,
+    resting: BranchGrid,
     resting_margin: Floats,
     measured: Sequence[MapPoint] = (),
 ) -> "Figure":
     """Surfaces (a), map of the rocking motion (b) and map of the resting motion (c), for alpha_1 and alpha_2.
 
     `omegas` [rad/s], shape (m,), and `betas`, shape (n,), are ascending. `resting_margin`, shape (n, m), is positive
-    where the block may rest. `measured` points are drawn in the maps of alpha_2, each on its layer.
+    where the block may rest. `measured` points are drawn in the maps of alpha_2, each on its branch.
     """
-    layers = [("b", "block rocking", rocking)]
+    branches = [("b", "block rocking", rocking)]
     if resting.exists:
-        layers.append(("c", "block resting", resting))
-    figure = new_figure(7.6, 3.4 + 3.3 * len(layers) + 0.6)
+        branches.append(("c", "block resting", resting))
+    figure = new_figure(7.6, 3.4 + 3.3 * len(branches) + 0.6)
     # prevent overlapping tick labels at the ends of neighbouring axes
     layout: Any = figure.get_layout_engine()
     layout.set(w_pad=0.08)
-    grid = figure.add_gridspec(1 + len(layers), 2, height_ratios=(1.15, *(1.0 for _ in layers)))
+    grid = figure.add_gridspec(1 + len(branches), 2, height_ratios=(1.15, *(1.0 for _ in branches)))
     for column, (name, symbol) in enumerate(SYMBOLS.items()):
         surface: Any = figure.add_subplot(grid[0, column], projection="3d", computed_zorder=False)
         _draw_surface(surface, omegas, betas, rocking.gains[name])
         if name == "alpha_2":
-            _draw_on_surface(surface, [point for point in measured if point.layer != "resting"])
+            _draw_on_surface(surface, [point for point in measured if point.branch != "resting"])
         surface.set_title(f"(a)  {symbol}, block rocking", fontsize=10, loc="left")
-        for row, (letter, words, layer) in enumerate(layers, start=1):
+        for row, (letter, words, branch) in enumerate(branches, start=1):
             panel = figure.add_subplot(grid[row, column])
-            _draw_map(panel, omegas, betas, layer, name, resting_margin)
+            _draw_map(panel, omegas, betas, branch, name, resting_margin)
             if name == "alpha_2":
-                _draw_measured(panel, [point for point in measured if (point.layer == "resting") == (letter == "c")])
+                _draw_measured(panel, [point for point in measured if (point.branch == "resting") == (letter == "c")])
             panel.set_title(f"({letter})  {symbol}, {words}", fontsize=10, loc="left")
             panel.set_xlabel(r"$\Omega$  [rad/s]")
             if column == 0:
@@ -176,14 +176,16 @@ def _draw_on_surface(panel: Any, points: Sequence[MapPoint]) -> None:
             panel.plot([point.omega], [point.beta], [height], marker=FOUND, zorder=6, **{**MARK, "markersize": 4})
 
 
-def _draw_map(panel: "Axes", omegas: Floats, betas: Floats, layer: Layer, name: str, resting_margin: Floats) -> None:
-    gain = np.ma.masked_invalid(layer.gains[name])
+def _draw_map(
+    panel: "Axes", omegas: Floats, betas: Floats, branch: BranchGrid, name: str, resting_margin: Floats
+) -> None:
+    gain = np.ma.masked_invalid(branch.gains[name])
     panel.contourf(omegas, betas, gain, levels=[0.0, 1.0, np.inf], colors=[GAINING, LOSING])
-    levels = levels_for(layer.gains[name], LEVELS)
+    levels = levels_for(branch.gains[name], LEVELS)
     widths = [1.8 if level == 1.0 else 0.7 for level in levels]
     lines = panel.contour(omegas, betas, gain, levels=levels, colors=BLACK, linewidths=widths)
     panel.clabel(lines, fmt="%g", fontsize=7, inline_spacing=3)
-    unstable = np.ma.masked_invalid(layer.multiplier)
+    unstable = np.ma.masked_invalid(branch.multiplier)
     if (unstable > 1.0).any():
         # hatched rather than coloured, so that the gain stays legible
         hatched = panel.contourf(omegas, betas, unstable, levels=[1.0, np.inf], colors="none", hatches=["////"])
@@ -195,12 +197,12 @@ def _draw_map(panel: "Axes", omegas: Floats, betas: Floats, layer: Layer, name: 
             omegas, betas, resting_margin, levels=[0.0], colors=GREEN, linewidths=1.6, linestyles=[(0, (6, 1.5))]
         )
     # break the line where the least gain jumps from one valley to another
-    least = least_over_omega(omegas, layer.gains[name])
+    least = least_over_omega(omegas, branch.gains[name])
     jumps = np.flatnonzero(np.abs(np.diff(least)) > JUMP * (omegas[-1] - omegas[0])) + 1
     panel.plot(
         np.insert(least, jumps, np.nan), np.insert(betas, jumps, np.nan), color=PURPLE, linewidth=1.8, linestyle="-."
     )
-    if np.isnan(layer.multiplier).mean() > 0.5:
+    if np.isnan(branch.multiplier).mean() > 0.5:
         panel.text(0.04, 0.94, "block cannot rest elsewhere", transform=panel.transAxes, fontsize=8, va="top")
     panel.set_xlim(float(omegas[0]), float(omegas[-1]))
     panel.set_ylim(float(betas[0]), float(betas[-1]))

@@ -47,7 +47,7 @@ FLOOR, CEILING = 0.01, 20.0
 """Limits beyond which predicted gains do not extend the axis: no bench can distinguish them from 0 or a resonance."""
 
 Prediction = Mapping[str, NDArray[Any]]
-"""Arrays of equal length: omega [rad/s], beta, alpha_2, stable (Booleans), layer ("rocking" or "resting"), and
+"""Arrays of equal length: omega [rad/s], beta, alpha_2, stable (Booleans), layer (branch: "rocking" or "resting"), and
 optionally the band of alpha_2: alpha_2_low, alpha_2_high.
 """
 
@@ -87,8 +87,8 @@ def _of_beta(prediction: Prediction, beta: float) -> dict[str, NDArray[Any]]:
 
 
 def _draw_prediction(panel: "Axes", prediction: Mapping[str, NDArray[Any]]) -> None:
-    for layer, colour, dash, width in (("rocking", BLUE, "-", 1.8), ("resting", GREEN, (0, (6, 1.5)), 1.4)):
-        rows = prediction["layer"] == layer
+    for branch, colour, dash, width in (("rocking", BLUE, "-", 1.8), ("resting", GREEN, (0, (6, 1.5)), 1.4)):
+        rows = prediction["layer"] == branch
         omega, gain = prediction["omega"][rows], prediction["alpha_2"][rows].astype(np.float64)
         stable = prediction["stable"][rows].astype(np.bool_)
         if not omega.size:
@@ -113,7 +113,7 @@ def _draw_prediction(panel: "Axes", prediction: Mapping[str, NDArray[Any]]) -> N
             linestyle=dash,
             linewidth=width,
             marker="." if omega.size == 1 else None,
-            label=f"predicted, block {layer}",
+            label=f"predicted, block {branch}",
         )
         if not stable.all():
             panel.plot(
@@ -122,7 +122,7 @@ def _draw_prediction(panel: "Axes", prediction: Mapping[str, NDArray[Any]]) -> N
                 color=colour,
                 linestyle=(0, (2, 2)),
                 linewidth=0.9,
-                label=f"predicted, block {layer}, unstable",
+                label=f"predicted, block {branch}, unstable",
             )
 
 

@@ -12,7 +12,7 @@ from bench.prediction.requests import AttractorRequest
 from bench.prediction.steady import predict_spectra
 from bench.progress import Progress, counting, silent
 from sim.attractor import Attractor, attractor
-from sim.gain import Layer
+from sim.gain import Branch
 from sim.knowledge import SpecimenKnowledge
 from sim.linear import steady_peaks
 from sim.shaker import Shaker
@@ -58,7 +58,7 @@ class LongTerm:
 
 
 def long_term(
-    layer: Layer,
+    branch: Branch,
     known: SpecimenKnowledge,
     shaker: Shaker,
     harmonics: int,
@@ -66,15 +66,15 @@ def long_term(
     cycles: int = CYCLES,
     members: int = MEMBERS,
 ) -> LongTerm:
-    """Long-term motion near the rocking orbit of `layer` after `cycles` cycles, also of `members` draws from `known`.
+    """Long-term motion near the rocking orbit of `branch` after `cycles` cycles, also of `members` draws from `known`.
 
     The amplitude of the table's acceleration and its harmonics up to number `harmonics` are held at those of the orbit.
     Raises NoOrbit if there is no such orbit on the table.
     """
-    fixed = layer.orbit
+    fixed = branch.orbit
     orbit, beta = table_orbit(fixed, shaker, harmonics), fixed.specimen.label or 0.0
     if orbit.stable:
-        return LongTerm(fixed.omega, beta, layer.alpha_2, True, np.array([layer.alpha_2]), 1)
+        return LongTerm(fixed.omega, beta, branch.alpha_2, True, np.array([branch.alpha_2]), 1)
 
     def gains(specimen: Specimen) -> tuple[NDArray[np.float64], Attractor]:
         found = attractor(specimen, shaker, orbit, cycles)
@@ -85,7 +85,7 @@ def long_term(
     greatest = [float(each.max()) for each, other in others if other.fallen is None]
     low, high = np.quantile(greatest, RANGE).tolist() if greatest else (nan, nan)
     falls = 1.0 - len(greatest) / len(others) if others else nan
-    return LongTerm(fixed.omega, beta, layer.alpha_2, False, own, motion.repeats, motion.fallen, low, high, falls)
+    return LongTerm(fixed.omega, beta, branch.alpha_2, False, own, motion.repeats, motion.fallen, low, high, falls)
 
 
 def long_terms(
@@ -96,13 +96,13 @@ def long_terms(
     progress: Progress = silent,
 ) -> list[LongTerm]:
     """Long-term motions at all requested points at which there is a rocking orbit on the table."""
-    layers = [each.rocking for each in predict_spectra(specimen, request, progress) if each.rocking is not None]
+    branches = [each.rocking for each in predict_spectra(specimen, request, progress) if each.rocking is not None]
     done = counting(progress, "simulating the long-term motions")
     found: list[LongTerm] = []
-    for layer in layers:
-        done(len(found), len(layers))
+    for branch in branches:
+        done(len(found), len(branches))
         try:
-            motion = long_term(layer, known, shaker, request.harmonics, cycles=request.cycles, members=request.members)
+            motion = long_term(branch, known, shaker, request.harmonics, cycles=request.cycles, members=request.members)
         except NoOrbit:
             continue
         found.append(motion)

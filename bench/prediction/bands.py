@@ -10,7 +10,7 @@ from bench.analysis.gain import COVERAGE
 from sim.ensemble import record_gains, steady_gains
 from sim.errors import InvalidInput
 from sim.excitation import SampledRecord
-from sim.gain import Layer
+from sim.gain import Branch
 from sim.knowledge import SPRING, SpecimenKnowledge
 from sim.sensitivity import Sensitivity, budget, sensitivities
 from sim.specimen import Specimen
@@ -110,16 +110,16 @@ def _drawn(gains: Floats) -> Bands:
     return Bands(size, low, high, share)
 
 
-def expanded_uncertainty(layer: Layer, known: SpecimenKnowledge) -> float | None:
+def expanded_uncertainty(branch: Branch, known: SpecimenKnowledge) -> float | None:
     """Expanded uncertainty (k = 2) of the predicted alpha_2 of a steady motion, to first order.
 
     Computed from the sensitivities of the steady motion and the covariance of its inputs. The uncertainty of a spring
     is that of its k_C, so that beta = k_C / k1 is anticorrelated with k1. None if the motion cannot be differentiated.
     """
-    orbit = layer.orbit
+    orbit = branch.orbit
     specimen = orbit.specimen
     try:
-        slopes = sensitivities(specimen, orbit.omega, orbit.amplitude, orbit.layer, orbit)
+        slopes = sensitivities(specimen, orbit.omega, orbit.amplitude, orbit.branch, orbit)
     except (NoOrbit, InvalidInput):
         return None
     beta, k1 = slopes["beta"], slopes["k1"]

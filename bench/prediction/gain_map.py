@@ -13,7 +13,7 @@ from bench.prediction.steady import amplitude_of, band_columns, table_of
 from bench.progress import Progress, counting, silent
 from sim.knowledge import SpecimenKnowledge
 from sim.map_rows import rows_at_once
-from sim.maps import GainMap, LayerMap, gain_map_blocks
+from sim.maps import BranchMap, GainMap, gain_map_blocks
 from sim.rocking import Peaks, State
 from sim.specimen import Specimen
 from sim.steady import Orbit, resting_level
@@ -86,15 +86,15 @@ class _Steps:
 def _block(made: GainMap, request: MapRequest, known: SpecimenKnowledge | None, steps: _Steps) -> Table:
     """Rows of a block of the map."""
     parts = [
-        _columns(name, layer, made.omegas, made.betas, made.amplitude)
-        for name, layer in zip(IMPACTS, (made.rocking, made.resting), strict=True)
+        _columns(name, branch, made.omegas, made.betas, made.amplitude)
+        for name, branch in zip(IMPACTS, (made.rocking, made.resting), strict=True)
     ]
     if request.outcomes:
         from sim.outcomes import outcome_map
 
         came = outcome_map(made, scheduler=request.scheduler, done=steps.done(1, "simulating from rest"))
-        for part, layer in zip(parts, (made.rocking, made.resting), strict=True):
-            part |= {"outcome": came.outcome[layer.exists], "outcome_time_s": came.time[layer.exists]}
+        for part, branch in zip(parts, (made.rocking, made.resting), strict=True):
+            part |= {"outcome": came.outcome[branch.exists], "outcome_time_s": came.time[branch.exists]}
     if known is not None:
         done = steps.done(1 + request.outcomes, "computing the uncertainty band")
         for part, name in zip(parts, IMPACTS, strict=True):
@@ -116,11 +116,11 @@ def _joined(tables: list[Table]) -> Table:
     }
 
 
-def grids(table: Mapping[str, NDArray[Any]], request: MapRequest, layer: str, name: str) -> NDArray[np.float64]:
+def grids(table: Mapping[str, NDArray[Any]], request: MapRequest, branch: str, name: str) -> NDArray[np.float64]:
     """Column `name` of a branch over the grid, shape (n_beta, n_omega), both ascending; NaN where there is no row."""
     betas, omegas = np.sort(request.beta), np.sort(request.omega)
     grid = np.full((betas.size, omegas.size), np.nan)
-    rows = table["layer"] == layer
+    rows = table["layer"] == branch
     i = np.searchsorted(betas, table["beta"][rows])
     j = np.searchsorted(omegas, table["omega_rad_s"][rows])
     grid[i, j] = table[name][rows]
@@ -144,22 +144,22 @@ def resting_margin(specimen: Specimen, request: MapRequest) -> NDArray[np.float6
 
 def _orbits(made: GainMap, name: Literal["rocking", "resting"]) -> list[Orbit]:
     """Motions of one branch, in the row order of its columns."""
-    layer = made.rocking if name == "rocking" else made.resting
+    branch = made.rocking if name == "rocking" else made.resting
     specimens = [made.specimen.coupled(float(beta)) for beta in made.betas]
     orbits: list[Orbit] = []
-    for i, j in np.argwhere(layer.exists).tolist():
+    for i, j in np.argwhere(branch.exists).tolist():
         phase, u1, u2, v1, v2, velocity = np.nan_to_num(made.sections[i, j]).tolist()
         orbits.append(
             Orbit(
                 specimen=specimens[i],
                 omega=float(made.omegas[j]),
                 amplitude=made.amplitude,
-                layer=name,
+                branch=name,
                 phase=phase,
                 start=State(u1, u2, v1, v2, 0.0, velocity),
-                peaks=Peaks(*layer.peaks[i, j].tolist()),
+                peaks=Peaks(*branch.peaks[i, j].tolist()),
                 impacts=IMPACTS[name],
-                multipliers=layer.multipliers[i, j],
+                multipliers=branch.multipliers[i, j],
             )
         )
     return orbits
@@ -167,29 +167,29 @@ def _orbits(made: GainMap, name: Literal["rocking", "resting"]) -> list[Orbit]:
 
 def _columns(
     name: Literal["rocking", "resting"],
-    layer: LayerMap,
+    branch: BranchMap,
     omegas: NDArray[np.float64],
     betas: NDArray[np.float64],
     amplitude: float,
 ) -> dict[str, NDArray[Any]]:
-    here = layer.exists
+    here = branch.exists
     n = int(here.sum())
     i, j = np.nonzero(here)
-    multipliers = layer.multipliers[here]
+    multipliers = branch.multipliers[here]
     leading = multipliers[np.arange(n), np.abs(multipliers).argmax(axis=1)] if n else np.empty(0, np.complex128)
     return {
         "omega_rad_s": omegas[j],
         "beta": betas[i],
         "amplitude_m_s2": np.full(n, amplitude),
         "layer": np.full(n, name),
-        "stable": layer.stable[here],
-        "alpha_1": layer.alpha_1[here],
-        "alpha_2": layer.alpha_2[here],
-        "u1_max_m": layer.peaks[here, 0],
-        "drift_max_m": layer.peaks[here, 1],
-        "theta_max_rad": layer.peaks[here, 2],
-        "bare_u1_max_m": layer.bare[j, 0],
-        "bare_drift_max_m": layer.bare[j, 1],
+        "stable": branch.stable[here],
+        "alpha_1": branch.alpha_1[here],
+        "alpha_2": branch.alpha_2[here],
+        "u1_max_m": branch.peaks[here, 0],
+        "drift_max_m": branch.peaks[here, 1],
+        "theta_max_rad": branch.peaks[here, 2],
+        "bare_u1_max_m": branch.bare[j, 0],
+        "bare_drift_max_m": branch.bare[j, 1],
         "impacts_per_period": np.full(n, IMPACTS[name]),
         "floquet_modulus": np.abs(leading),
         "floquet_argument_rad": np.abs(np.angle(leading)),

@@ -74,7 +74,7 @@ def histories(specimen: Specimen, request: HistoryRequest, progress: Progress = 
             begun += 1
             if request.steady:
                 prediction = predict_gain(coupled, omega, amplitude)
-                made += [_steady(layer.orbit, request) for layer in prediction.layers.values()]
+                made += [_steady(branch.orbit, request) for branch in prediction.branches.values()]
             else:
                 made.append(_from_rest(coupled, omega, amplitude, request))
     return made
@@ -155,7 +155,7 @@ def _steady(orbit: Orbit, request: HistoryRequest) -> History:
     return History(
         omega=orbit.omega,
         beta=orbit.specimen.label or 0.0,
-        motion=orbit.layer,
+        motion=orbit.branch,
         status="steady" if orbit.stable else "steady, unstable",
         end_time=periods * orbit.period,
         impacts=periods * orbit.impacts,

@@ -35,13 +35,13 @@ def multipliers_table(
     multiplier on fixed ground and on the table; NaN where no orbit was found on the table.
     """
     found = predict_spectra(specimen, request, progress)
-    layers = [(each.beta, each.omega, each.rocking) for each in found if each.rocking is not None]
+    branches = [(each.beta, each.omega, each.rocking) for each in found if each.rocking is not None]
     on_table = in_threads(
-        lambda layer: _slowest(layer[2].orbit, "table", shaker, request.harmonics),
-        layers,
+        lambda branch: _slowest(branch[2].orbit, "table", shaker, request.harmonics),
+        branches,
         counting(progress, "computing the orbits on the table"),
     )
-    fixed = [layer.orbit.slowest for _, _, layer in layers]
+    fixed = [branch.orbit.slowest for _, _, branch in branches]
 
     def numbers(values: Sequence[float], unit: str, description: str) -> Column:
         return Column(np.array(values, dtype=np.float64), unit, description)
@@ -49,9 +49,9 @@ def multipliers_table(
     moduli = "greatest |Floquet multiplier|: fraction of a disturbance that remains after a period,"
     angles = "argument of that multiplier: 0 fold, pi flip, between them Neimark-Sacker,"
     return {
-        "beta": numbers([beta for beta, _, _ in layers], "1", "stiffness ratio k_C/k1 of the coupling spring"),
-        "omega_rad_s": numbers([omega for _, omega, _ in layers], "rad/s", "circular frequency of the base motion"),
-        "alpha_2": numbers([layer.alpha_2 for _, _, layer in layers], "1", "gain of the peak drift on the orbit"),
+        "beta": numbers([beta for beta, _, _ in branches], "1", "stiffness ratio k_C/k1 of the coupling spring"),
+        "omega_rad_s": numbers([omega for _, omega, _ in branches], "rad/s", "circular frequency of the base motion"),
+        "alpha_2": numbers([branch.alpha_2 for _, _, branch in branches], "1", "gain of the peak drift on the orbit"),
         "modulus": numbers([abs(each) for each in fixed], "1", f"{moduli} on fixed ground"),
         "argument_rad": numbers([float(np.angle(each)) for each in fixed], "rad", f"{angles} on fixed ground"),
         "table_modulus": numbers([abs(each) for each in on_table], "1", f"{moduli} on the table"),
@@ -81,8 +81,8 @@ def boundaries_table(
         coupled, slowest = specimen.coupled(beta), UNKNOWN
         while high - low > BOUNDARY:
             middle = 0.5 * (low + high)
-            layer = predict_gain(coupled, middle, amplitude).rocking
-            slowest = UNKNOWN if layer is None else _slowest(layer.orbit, ground, shaker, request.harmonics)
+            branch = predict_gain(coupled, middle, amplitude).rocking
+            slowest = UNKNOWN if branch is None else _slowest(branch.orbit, ground, shaker, request.harmonics)
             if np.isnan(slowest):
                 return nan, UNKNOWN
             if (abs(slowest) < 1.0) == stable:

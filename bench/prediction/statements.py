@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from bench.prediction.seismic import SeismicCurve
 from sim.errors import RockbenchError
-from sim.gain import Layer, gain_spectrum, predict_gain
+from sim.gain import Branch, gain_spectrum, predict_gain
 from sim.linear import bare_modes
 from sim.specimen import Specimen
 
@@ -113,9 +113,9 @@ def harmonic_statements(specimen: Specimen, amplitude: float) -> list[Statement]
     ]
 
 
-def lead_of_u1(layer: Layer) -> float:
+def lead_of_u1(branch: Branch) -> float:
     """Phase [degrees] by which u1 leads theta, at the drive frequency and in the paper's positive directions."""
-    table = layer.orbit.samples(720)
+    table = branch.orbit.samples(720)
     wave = np.exp(-1j * table[:, 0])
     return float(np.degrees(np.angle((table[:, 1] @ wave) / (table[:, 3] @ wave))))
 
@@ -126,13 +126,13 @@ def _section(specimen: Specimen, beta: float, omegas: Floats, amplitude: float) 
     return np.array([np.nan if each.rocking is None else each.rocking.alpha_2 for each in spectrum])
 
 
-def _rocking(specimen: Specimen, omega: float, amplitude: float) -> Layer:
-    layer = predict_gain(specimen.coupled(POINTS_BETA), omega, amplitude).rocking
-    if layer is None:
+def _rocking(specimen: Specimen, omega: float, amplitude: float) -> Branch:
+    branch = predict_gain(specimen.coupled(POINTS_BETA), omega, amplitude).rocking
+    if branch is None:
         raise RockbenchError(
             f"no rocking motion at {omega:g} rad/s and beta {POINTS_BETA:g}: the statements cannot be checked"
         )
-    return layer
+    return branch
 
 
 def _bare_frequencies(specimen: Specimen) -> Statement:
@@ -165,7 +165,7 @@ def _best_reduction(omegas: Floats, gains: Mapping[float, Floats]) -> Statement:
     return Statement(3, "Best reduction of the drift", [check])
 
 
-def _points(specimen: Specimen, amplitude: float, points: Mapping[str, Layer]) -> Statement:
+def _points(specimen: Specimen, amplitude: float, points: Mapping[str, Branch]) -> Statement:
     a, b, c = (points[name].alpha_2 for name in "ABC")
     order = Check("α₂(A) < α₂(B) < 1", f"α₂ is {a:.4f} at A and {b:.4f} at B", a < b < 1.0, {"A": a, "B": b})
     omegas = np.linspace(16.5, 19.0, 251)
@@ -181,14 +181,14 @@ def _points(specimen: Specimen, amplitude: float, points: Mapping[str, Layer]) -
     return Statement(4, "Points A, B and C of the gain map", [order, near])
 
 
-def _phases(points: Mapping[str, Layer]) -> Statement:
+def _phases(points: Mapping[str, Branch]) -> Statement:
     """Check the phase between u1 and theta.
 
     u1 > 0 is a displacement towards the block, and theta > 0 a rotation of the block towards the frame: equal signs
     are opposite motions.
     """
-    apart = {name: abs(lead_of_u1(layer)) for name, layer in points.items()}
-    ratio = {name: layer.orbit.peaks.theta / layer.orbit.peaks.u1 for name, layer in points.items()}
+    apart = {name: abs(lead_of_u1(branch)) for name, branch in points.items()}
+    ratio = {name: branch.orbit.peaks.theta / branch.orbit.peaks.u1 for name, branch in points.items()}
     at_a = Check(
         f"at A, u₁ and ϑ are within {ALMOST:g}° of counter-phase",
         f"{apart['A']:.1f}° from counter-phase",

@@ -220,7 +220,7 @@ def steady_table(
     """
     rows: list[Row] = []
     for k, prediction in enumerate(predictions):
-        for name in prediction.layers:
+        for name in prediction.branches:
             row = _row(prediction, name)
             if timed is not None:
                 run = timed[k] if name == "rocking" else None
@@ -231,9 +231,9 @@ def steady_table(
         return table_of({})
     columns: dict[str, NDArray[Any]] = {name: np.array([row[name] for row in rows]) for name in names}
     if known is not None:
-        layers = [layer for prediction in predictions for layer in prediction.layers.values()]
+        branches = [branch for prediction in predictions for branch in prediction.branches.values()]
         columns |= band_columns(
-            [layer.orbit for layer in layers],
+            [branch.orbit for branch in branches],
             columns["alpha_2"],
             known,
             members,
@@ -305,22 +305,22 @@ def rounded(values: NDArray[np.float64], digits: int) -> NDArray[np.float64]:
 
 
 def _row(prediction: GainPrediction, name: str) -> Row:
-    layer, bare = prediction.layers[name], prediction.bare
-    peaks = layer.orbit.peaks
+    branch, bare = prediction.branches[name], prediction.bare
+    peaks = branch.orbit.peaks
     return {
         "omega_rad_s": prediction.omega,
         "beta": prediction.beta,
         "amplitude_m_s2": prediction.amplitude,
         "layer": name,
-        "stable": layer.stable,
-        "alpha_1": layer.alpha_1,
-        "alpha_2": layer.alpha_2,
+        "stable": branch.stable,
+        "alpha_1": branch.alpha_1,
+        "alpha_2": branch.alpha_2,
         "u1_max_m": peaks.u1,
         "drift_max_m": peaks.drift,
         "theta_max_rad": peaks.theta,
         "bare_u1_max_m": bare.u1,
         "bare_drift_max_m": bare.drift,
-        "impacts_per_period": layer.orbit.impacts,
-        "floquet_modulus": layer.multiplier,
-        "floquet_argument_rad": float(np.angle(layer.orbit.slowest)),
+        "impacts_per_period": branch.orbit.impacts,
+        "floquet_modulus": branch.multiplier,
+        "floquet_argument_rad": float(np.angle(branch.orbit.slowest)),
     }

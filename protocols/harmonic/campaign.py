@@ -71,8 +71,8 @@ class HarmonicCampaign(Prepared[HarmonicParameters]):
         for beta in p.beta:
             coupled = self._specimen.coupled(beta)
             for omega in p.omega:
-                layer = predict_gain(coupled, omega, amplitude).rocking
-                orbit = layer.orbit if layer else None
+                branch = predict_gain(coupled, omega, amplitude).rocking
+                orbit = branch.orbit if branch else None
                 planned = plan_starts(coupled, omega, amplitude, orbit, p.starts, self.configuration.known)
                 found[beta, omega] = tuple(planned)
                 done(len(found), len(p.beta) * len(p.omega))
@@ -184,27 +184,27 @@ def gain_spectra(parameters: HarmonicParameters, specimen: Specimen, known: Spec
     low, high = max(min(parameters.omega) - MARGIN, STEP), max(parameters.omega) + MARGIN
     omegas = np.linspace(low, high, round((high - low) / STEP) + 1)
     rows = [
-        (prediction.omega, beta, layer, name)
+        (prediction.omega, beta, branch, name)
         for beta in parameters.beta
         for prediction in gain_spectrum(specimen.coupled(beta), omegas, amplitude)
-        for name, layer in prediction.layers.items()
+        for name, branch in prediction.branches.items()
     ]
     if not rows:
         raise InvalidInput("specimen", "as configured", "no steady motion exists at the frequencies of the campaign")
-    omega, beta, layers, names = (list(column) for column in zip(*rows, strict=True))
-    alpha_2 = np.array([layer.alpha_2 for layer in layers])
-    band = bands([layer.orbit for layer in layers], alpha_2, known)
+    omega, beta, branches, names = (list(column) for column in zip(*rows, strict=True))
+    alpha_2 = np.array([branch.alpha_2 for branch in branches])
+    band = bands([branch.orbit for branch in branches], alpha_2, known)
     return {
         "omega": Column(np.array(omega), "rad/s", "circular frequency of the base motion"),
         "beta": Column(np.array(beta), "1", "stiffness ratio of the coupling spring"),
-        "alpha_1": Column(np.array([layer.alpha_1 for layer in layers]), "1", "gain of the peak of u1"),
+        "alpha_1": Column(np.array([branch.alpha_1 for branch in branches]), "1", "gain of the peak of u1"),
         "alpha_2": Column(alpha_2, "1", "gain of the peak drift"),
         "alpha_2_uncertainty": Column(
             band.uncertainty, "1", "expanded uncertainty of alpha_2 (k = 2) due to the specimen"
         ),
         "alpha_2_low": Column(band.low, "1", "lower bound of the band of alpha_2"),
         "alpha_2_high": Column(band.high, "1", "upper bound of the band of alpha_2"),
-        "stable": Column(np.array([layer.stable for layer in layers]), "1", "whether the motion is stable"),
+        "stable": Column(np.array([branch.stable for branch in branches]), "1", "whether the motion is stable"),
         "layer": Column(np.array(names), "", "branch: rocking, or resting if the block never lifts"),
     }
 

@@ -107,8 +107,8 @@ def _slow(parameters: HarmonicParameters, specimen: Specimen, omega: float) -> b
     """Whether a hold is expected, because disturbances of the rocking orbit at `omega` [rad/s] hardly decay, or
     grow.
     """
-    layer = predict_gain(specimen, omega, parameters.amplitude_factor * specimen.uplift_acceleration).rocking
-    return layer is not None and layer.multiplier > SLOW
+    branch = predict_gain(specimen, omega, parameters.amplitude_factor * specimen.uplift_acceleration).rocking
+    return branch is not None and branch.multiplier > SLOW
 
 
 def _bare_calibration(parameters: HarmonicParameters, specimen: Specimen, response: TableResponse | None) -> Trial:

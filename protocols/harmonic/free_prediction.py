@@ -56,9 +56,9 @@ def _predicted(
     inputs = [each.model_dump(mode="json") for each in (specimen, known, shaker)]
 
     def compute() -> dict[str, Any] | None:
-        layer = predict_gain(specimen, omega, amplitude).rocking
+        branch = predict_gain(specimen, omega, amplitude).rocking
         try:
-            return None if layer is None else _numbers(long_term(layer, known, shaker, harmonics, members=MEMBERS))
+            return None if branch is None else _numbers(long_term(branch, known, shaker, harmonics, members=MEMBERS))
         except NoOrbit:
             return None
 

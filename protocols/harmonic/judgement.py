@@ -11,7 +11,7 @@ from bench.analysis.sensor_accuracy import SensorUncertainty
 from bench.prediction.bands import expanded_uncertainty
 from protocols.harmonic.protocol import HarmonicPoint, PointStatus
 from protocols.harmonic.settling import Held, Settled
-from sim.gain import Layer, predict_gain
+from sim.gain import Branch, predict_gain
 from sim.knowledge import SpecimenKnowledge
 from sim.shaker import Shaker
 from sim.specimen import Specimen
@@ -51,9 +51,9 @@ class Conditions:
     shaker: Shaker | None = None
     harmonics: int = 1
 
-    def layers(self, peak: SteadyPeak) -> dict[str, Layer]:
+    def branches(self, peak: SteadyPeak) -> dict[str, Branch]:
         """Predicted branches at the measured amplitudes of the table."""
-        return predict_gain(self.specimen, self.omega, peak.amplitude, self.reference.peak.amplitude).layers
+        return predict_gain(self.specimen, self.omega, peak.amplitude, self.reference.peak.amplitude).branches
 
     def slope(self, name: str, peak: SteadyPeak) -> float:
         """d ln alpha_2 / d ln amplitude of a branch, with both tests at the same amplitude; 0 at the end of the branch.
@@ -62,22 +62,22 @@ class Conditions:
         not depend on the amplitude.
         """
         around = (peak.amplitude * (1.0 - AMPLITUDE_STEP), peak.amplitude * (1.0 + AMPLITUDE_STEP))
-        less, more = (predict_gain(self.specimen, self.omega, each).layers.get(name) for each in around)
+        less, more = (predict_gain(self.specimen, self.omega, each).branches.get(name) for each in around)
         if less is None or more is None:
             return 0.0
         return log(more.alpha_2 / less.alpha_2) / log(around[1] / around[0])
 
-    def branch(self, name: str, layer: Layer | None, peak: SteadyPeak) -> "_Branch":
-        """The branch `name` at the amplitude of `peak`; `layer` is None if it does not exist."""
-        return _Branch(self, layer, self.slope(name, peak), predicted_fields(name, layer, self.known))
+    def comparison(self, name: str, branch: Branch | None, peak: SteadyPeak) -> "_Comparison":
+        """The branch `name` at the amplitude of `peak`; `branch` is None if it does not exist."""
+        return _Comparison(self, branch, self.slope(name, peak), predicted_fields(name, branch, self.known))
 
 
 @dataclass(frozen=True)
-class _Branch:
+class _Comparison:
     """Predicted branch with which gains are compared; for `slope` see `Conditions.slope`."""
 
     conditions: Conditions
-    layer: Layer | None
+    branch: Branch | None
     slope: float
     predicted: dict[str, Any]
 
@@ -85,12 +85,12 @@ class _Branch:
         """Gain of a peak, and whether it agrees with the predicted gain: the two differ by no more than their combined
         expanded uncertainty (|E_n| <= 1, ISO 13528). None if there is no prediction or the reference was not steady.
         """
-        reference, layer = self.conditions.reference, self.layer
+        reference, branch = self.conditions.reference, self.branch
         measured = gain(peak, reference.peak, self.conditions.sensors, self.slope)
         uncertainty = self.predicted["alpha_2_predicted_uncertainty"]
-        if layer is None or uncertainty is None or not reference.steadiness.steady:
+        if branch is None or uncertainty is None or not reference.steadiness.steady:
             return measured, None
-        return measured, abs(measured.alpha_2 - layer.alpha_2) <= hypot(measured.uncertainty, uncertainty)
+        return measured, abs(measured.alpha_2 - branch.alpha_2) <= hypot(measured.uncertainty, uncertainty)
 
     def fields(self, peak: SteadyPeak, measured: Gain, agrees: bool | None, table: Settled | Held) -> dict[str, Any]:
         """Fields of a measured motion: its gain, the comparison with the prediction, and the errors of the table."""
@@ -117,29 +117,29 @@ def judge(settled: Settled, conditions: Conditions, starts: int, held: Held | No
     addition.
     """
     peak, bare, shaker = settled.peak, conditions.reference.peak, conditions.shaker
-    layers = conditions.layers(peak)
+    branches = conditions.branches(peak)
     steady = settled.steadiness.steady
-    name = _nearest(layers, peak) if steady else _ROCKING
+    name = _nearest(branches, peak) if steady else _ROCKING
     status = (PointStatus.STEADY if name == _ROCKING else PointStatus.RESTING) if steady else PointStatus.MODULATED
-    branch = conditions.branch(name, layers.get(name), peak)
-    measured, agrees = branch.compare(peak)
+    comparison = conditions.comparison(name, branches.get(name), peak)
+    measured, agrees = comparison.compare(peak)
     agrees = agrees if steady else None
     on_table = None
-    if shaker is not None and _ROCKING in layers and not (steady and layers[name].stable):
-        on_table = _table_multiplier(layers[_ROCKING], shaker, conditions.harmonics)
+    if shaker is not None and _ROCKING in branches and not (steady and branches[name].stable):
+        on_table = _table_multiplier(branches[_ROCKING], shaker, conditions.harmonics)
     orbit: dict[str, Any] = {}
     if settled.orbit is not None:
-        gained, same = branch.compare(settled.orbit)
+        gained, same = comparison.compare(settled.orbit)
         orbit = {"alpha_2_orbit": gained.alpha_2, "alpha_2_orbit_uncertainty": gained.uncertainty, "orbit_agrees": same}
     remarks = (
-        *_remarks(settled, conditions.reference, name, layers, agrees, on_table, orbit),
+        *_remarks(settled, conditions.reference, name, branches, agrees, on_table, orbit),
         *conditions.sensors.rough(measured.shapes),
     )
     point = HarmonicPoint(
         omega_rad_s=conditions.omega,
         beta=conditions.specimen.label or 0.0,
         status=status,
-        **branch.fields(peak, measured, agrees, settled),
+        **comparison.fields(peak, measured, agrees, settled),
         bare_drift_peak_m=bare.drift,
         bare_amplitude_m_s2=bare.amplitude,
         **_free_fields(settled.motion, bare.drift),
@@ -160,18 +160,18 @@ def _held_point(free: HarmonicPoint, held: Held, conditions: Conditions) -> Harm
         released = f"the hold of the motion on its orbit was released after {held.cycles} cycles"
         text = f"{released if held.cycles else 'the motion could not be held on its orbit'}: {held.reason}"
         return _remarked(free, text)
-    layers = conditions.layers(peak)
-    if _nearest(layers, peak) != _ROCKING or _ROCKING not in layers:
+    branches = conditions.branches(peak)
+    if _nearest(branches, peak) != _ROCKING or _ROCKING not in branches:
         return _remarked(free, "the held motion is not the rocking orbit")
-    branch = conditions.branch(_ROCKING, layers[_ROCKING], peak)
-    measured, agrees = branch.compare(peak)
+    comparison = conditions.comparison(_ROCKING, branches[_ROCKING], peak)
+    measured, agrees = comparison.compare(peak)
     remarks = [f"free: {free.reason}"] if free.reason else []
     remarks.append(f"held after {held.captured} cycles with a control of {100.0 * held.control:.2g} % of the amplitude")
     remarks += [*_amplitude_remark(held), *([DIFFERS] if agrees is False else [])]
     return free.model_copy(
         update={
             "status": PointStatus.HELD,
-            **branch.fields(peak, measured, agrees, held),
+            **comparison.fields(peak, measured, agrees, held),
             **_rate_fields(held.rate),
             "control_share": held.control,
             "captured_cycles": held.captured,
@@ -185,10 +185,10 @@ def _remarked(point: HarmonicPoint, remark: str) -> HarmonicPoint:
     return point.model_copy(update={"reason": "; ".join(filter(None, (point.reason, remark)))})
 
 
-def _table_multiplier(layer: Layer, shaker: Shaker, harmonics: int) -> float | None:
+def _table_multiplier(branch: Branch, shaker: Shaker, harmonics: int) -> float | None:
     """Modulus of the slowest multiplier on the table; None if no orbit is found."""
     try:
-        return abs(table_orbit(layer.orbit, shaker, harmonics).slowest)
+        return abs(table_orbit(branch.orbit, shaker, harmonics).slowest)
     except NoOrbit:
         return None
 
@@ -217,24 +217,24 @@ def _rate_fields(rate: Rate | None) -> dict[str, Any]:
     }
 
 
-def predicted_fields(name: str, layer: Layer | None, known: SpecimenKnowledge) -> dict[str, Any]:
+def predicted_fields(name: str, branch: Branch | None, known: SpecimenKnowledge) -> dict[str, Any]:
     """Prediction fields of a point for the branch `name`; the predicted values are None if it does not exist."""
     return {
-        "layer": name if layer else "none",
-        "alpha_2_predicted": layer.alpha_2 if layer else None,
-        "alpha_2_predicted_uncertainty": expanded_uncertainty(layer, known) if layer else None,
-        "predicted_stable": layer.stable if layer else None,
+        "layer": name if branch else "none",
+        "alpha_2_predicted": branch.alpha_2 if branch else None,
+        "alpha_2_predicted_uncertainty": expanded_uncertainty(branch, known) if branch else None,
+        "predicted_stable": branch.stable if branch else None,
     }
 
 
-def _nearest(layers: dict[str, Layer], peak: SteadyPeak) -> str:
+def _nearest(branches: dict[str, Branch], peak: SteadyPeak) -> str:
     """The branch whose peaks of drift and u1 are closest to the measured peaks, by their ratios."""
 
     def distance(name: str) -> float:
-        expected = layers[name].orbit.peaks
+        expected = branches[name].orbit.peaks
         return hypot(log(peak.drift / expected.drift), log(peak.u1 / expected.u1))
 
-    return min(layers, key=distance, default=_ROCKING)
+    return min(branches, key=distance, default=_ROCKING)
 
 
 def _described(settled: Settled) -> str:
@@ -264,7 +264,7 @@ def _remarks(
     settled: Settled,
     reference: Settled,
     name: str,
-    layers: dict[str, Layer],
+    branches: dict[str, Branch],
     agrees: bool | None,
     on_table: float | None,
     orbit: Mapping[str, Any],
@@ -273,14 +273,15 @@ def _remarks(
     if not state.steady:
         yield f"not steady after {settled.time:.0f} s: {_described(settled)}, spread {100.0 * state.spread:.1f} %"
         if on_table is not None:
-            yield f"disturbances of the predicted orbit {_growth(layers[_ROCKING].multiplier, on_table)}"
+            yield f"disturbances of the predicted orbit {_growth(branches[_ROCKING].multiplier, on_table)}"
         if orbit:
             gained = f"alpha_2 = {orbit['alpha_2_orbit']:.4f} +- {orbit['alpha_2_orbit_uncertainty']:.4f}"
             verdict = {True: ", which agrees with the prediction", False: ", which differs from the prediction"}
             yield f"its mean cycle gives the gain of the orbit: {gained}{verdict.get(orbit['orbit_agrees'], '')}"
-    elif name in layers and not layers[name].stable:
-        yield f"steady while measured; disturbances of the predicted orbit {_growth(layers[name].multiplier, on_table)}"
-    elif name != _ROCKING and _ROCKING in layers and layers[_ROCKING].stable:
+    elif name in branches and not branches[name].stable:
+        growth = _growth(branches[name].multiplier, on_table)
+        yield f"steady while measured; disturbances of the predicted orbit {growth}"
+    elif name != _ROCKING and _ROCKING in branches and branches[_ROCKING].stable:
         yield "no start reached the stable rocking motion; the block rests"
     yield from _amplitude_remark(settled)
     if peak.harmonics > HARMONICS_NOTE:

@@ -31,7 +31,7 @@ from protocols.harmonic.judgement import Conditions, judge, predicted_fields
 from protocols.harmonic.pace import Pace
 from protocols.harmonic.protocol import HarmonicParameters, HarmonicPoint, PointStatus
 from protocols.harmonic.settling import Held, Report, Settled, checked, linear_frame, settle_and_measure
-from sim.gain import Layer, predict_gain
+from sim.gain import Branch, predict_gain
 from sim.specimen import Specimen
 from sim.steady import Orbit, resting_level
 
@@ -60,7 +60,7 @@ class HarmonicPlan:
         self._amplitude = parameters.amplitude_factor * self._specimen.uplift_acceleration
         self._pace = Pace(parameters.omega, 1 + len(parameters.beta))
         self._bare: dict[float, Settled] = {}
-        self._aimed: dict[tuple[float, float], Layer | None] = {}
+        self._target_branches: dict[tuple[float, float], Branch | None] = {}
         self._points: list[HarmonicPoint] = []
         self._draws = shared_draws()
 
@@ -183,13 +183,13 @@ class HarmonicPlan:
 
     def _overturned(self, specimen: Specimen, omega: float, falls: int, chance: float) -> HarmonicPoint:
         bare = self._bare[omega].peak
-        layer = self._aimed_at(specimen, omega)
-        kind = "stable" if layer and layer.stable else "unstable"
+        branch = self._target_branch(specimen, omega)
+        kind = "stable" if branch and branch.stable else "unstable"
         return HarmonicPoint(
             omega_rad_s=omega,
             beta=specimen.label or 0.0,
             status=PointStatus.OVERTURNED,
-            **predicted_fields("rocking", layer, self._configuration.known_on_table),
+            **predicted_fields("rocking", branch, self._configuration.known_on_table),
             bare_drift_peak_m=bare.drift,
             bare_amplitude_m_s2=bare.amplitude,
             starts_tried=falls,
@@ -197,17 +197,17 @@ class HarmonicPlan:
             reason=f"the block fell in all {falls} starts; the predicted orbit is {kind}",
         )
 
-    def _aimed_at(self, specimen: Specimen, omega: float) -> Layer | None:
+    def _target_branch(self, specimen: Specimen, omega: float) -> Branch | None:
         """The predicted rocking branch at the nominal amplitude, computed once per point."""
         key = specimen.k_c, omega
-        if key not in self._aimed:
+        if key not in self._target_branches:
             bare = self._bare[omega].peak.amplitude
-            self._aimed[key] = predict_gain(specimen, omega, self._amplitude, bare).rocking
-        return self._aimed[key]
+            self._target_branches[key] = predict_gain(specimen, omega, self._amplitude, bare).rocking
+        return self._target_branches[key]
 
     def _orbit(self, specimen: Specimen, omega: float) -> Orbit | None:
-        layer = self._aimed_at(specimen, omega)
-        return layer.orbit if layer else None
+        branch = self._target_branch(specimen, omega)
+        return branch.orbit if branch else None
 
     def _prepared(self, orbit: Orbit | None) -> StabiliserDesign | None:
         if not self._parameters.hold:
@@ -261,8 +261,8 @@ class HarmonicPlan:
         running: RunningGain | None = None
         if specimen is not None and bare is not None:
             running = RunningGain(bare, self._sensors, self._draws)
-            layer = self._aimed_at(specimen, omega)
-            predicted = layer.alpha_2 if layer else predicted
+            branch = self._target_branch(specimen, omega)
+            predicted = branch.alpha_2 if branch else predicted
 
         def report(cycles: list[Cycle]) -> Generator[Step, Outcome, None]:
             nonlocal evaluated

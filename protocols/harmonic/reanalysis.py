@@ -159,9 +159,9 @@ class HarmonicFollower:
         bare = self._bare[omega]
         if point.status is PointStatus.OVERTURNED:
             asked = self._amplitude
-            layer = predict_gain(specimen, omega, asked, bare.peak.amplitude).rocking
+            branch = predict_gain(specimen, omega, asked, bare.peak.amplitude).rocking
             peaks = {"bare_drift_peak_m": bare.peak.drift, "bare_amplitude_m_s2": bare.peak.amplitude}
-            return point.model_copy(update=predicted_fields("rocking", layer, known) | peaks)
+            return point.model_copy(update=predicted_fields("rocking", branch, known) | peaks)
         sensors = checked(self._configuration.sensors, self._bare.values())
         shaker = self._configuration.simulated_shaker
         harmonics = self._parameters.harmonics

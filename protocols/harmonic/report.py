@@ -19,7 +19,7 @@ from protocols.harmonic.holding import HoldCycle
 from protocols.harmonic.report_cycles import Dwells, MeasuredMotion, measured_figure
 from protocols.harmonic.report_hold import hold_figure
 from sim.errors import InvalidInput
-from sim.gain import Layer, predict_gain
+from sim.gain import Branch, predict_gain
 
 MOST = 30
 """Largest number of bars in a figure."""
@@ -27,7 +27,7 @@ MOST = 30
 ROWS = 4
 """Maximum number of points in a figure of cycles."""
 
-LAYERS = "rocking", "resting"
+BRANCHES = "rocking", "resting"
 
 
 def harmonic_sections(campaign: Campaign) -> list[Section]:
@@ -124,7 +124,7 @@ def _histories(campaign: Campaign, points: Sequence[Mapping[str, Any]]) -> list[
     drawn: list[MeasuredMotion] = []
     missing: list[str] = []
     for row in points:
-        motion = dwells.motion(row, _layer(campaign, row))
+        motion = dwells.motion(row, _branch(campaign, row))
         if motion is None:
             missing.append(f"β = {row['beta']:g}, Ω = {row['omega_rad_s']:g} rad/s")
         else:
@@ -150,12 +150,12 @@ def _histories(campaign: Campaign, points: Sequence[Mapping[str, Any]]) -> list[
     return parts
 
 
-def _layer(campaign: Campaign, row: Mapping[str, Any]) -> Layer | None:
+def _branch(campaign: Campaign, row: Mapping[str, Any]) -> Branch | None:
     """Steady motion of the model at the achieved amplitudes."""
-    if row["amplitude_m_s2"] is None or row["layer"] not in LAYERS:
+    if row["amplitude_m_s2"] is None or row["layer"] not in BRANCHES:
         return None
     specimen = campaign.specimen.coupled(row["beta"])
-    return predict_gain(specimen, row["omega_rad_s"], row["amplitude_m_s2"], row["bare_amplitude_m_s2"]).layers.get(
+    return predict_gain(specimen, row["omega_rad_s"], row["amplitude_m_s2"], row["bare_amplitude_m_s2"]).branches.get(
         row["layer"]
     )
 
@@ -175,10 +175,10 @@ def _gains(campaign: Campaign, points: Sequence[Mapping[str, Any]]) -> Table:
     rows: list[list[str]] = []
     for row in points:
         measured, predicted = row["alpha_2"], row["alpha_2_predicted"]
-        layer = _layer(campaign, row)
+        branch = _branch(campaign, row)
         open_ = row.get("alpha_2_predicted_uncertainty")
-        if open_ is None and layer is not None:
-            open_ = expanded_uncertainty(layer, campaign.known)
+        if open_ is None and branch is not None:
+            open_ = expanded_uncertainty(branch, campaign.known)
         stable = row["predicted_stable"]
         rows.append(
             [

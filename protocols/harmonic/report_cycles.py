@@ -27,7 +27,7 @@ from bench.figures.style import (
     set_grid,
 )
 from bench.live_values import Estimate
-from sim.gain import Layer
+from sim.gain import Branch
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -92,8 +92,8 @@ class Dwells:
         self._blocks = self._record.blocks
         self._ends = _ends_of_dwells(self._record)
 
-    def motion(self, point: Mapping[str, Any], layer: Layer | None) -> MeasuredMotion | None:
-        """Last measured cycles of a point; None if the file lacks them. `layer` is the predicted motion."""
+    def motion(self, point: Mapping[str, Any], branch: Branch | None) -> MeasuredMotion | None:
+        """Last measured cycles of a point; None if the file lacks them. `branch` is the predicted motion."""
         omega, beta = float(point["omega_rad_s"]), float(point["beta"])
         found = self._cycles(omega, beta, point.get("drift_peak_m"))
         if found is None:
@@ -107,7 +107,7 @@ class Dwells:
             drift=found.drift,
             u1=found.u1,
             bare_drift=None if bare is None else bare.drift,
-            predicted=None if layer is None else _predicted(layer),
+            predicted=None if branch is None else _predicted(branch),
         )
 
     def _cycles(self, omega: float, beta: float | None, peak: float | None) -> Cycles | None:
@@ -204,8 +204,8 @@ def _in_phase(signals: Floats, period: float) -> Cycles | None:
     return Cycles(drift=means[:, DRIFT], u1=means[:, U1])
 
 
-def _predicted(layer: Layer) -> Predicted:
-    u1, u2, theta = np.tile(layer.orbit.samples(SAMPLES)[:, 1:], (PERIODS, 1)).T
+def _predicted(branch: Branch) -> Predicted:
+    u1, u2, theta = np.tile(branch.orbit.samples(SAMPLES)[:, 1:], (PERIODS, 1)).T
     return Predicted(drift=u2 - u1, u1=u1, theta=theta)
 
 

@@ -54,9 +54,9 @@ def points(members: int) -> bool:
     good = True
     for beta, omega in POINTS:
         specimen = Specimen().coupled(beta)
-        layer = predict_gain(specimen, omega, AMPLITUDE).rocking
-        assert layer is not None
-        orbit = layer.orbit
+        branch = predict_gain(specimen, omega, AMPLITUDE).rocking
+        assert branch is not None
+        orbit = branch.orbit
         drawn = ASSUMED.draws(specimen, members, np.random.default_rng(1))
         steady_gains([orbit], [drawn[:2]])
         found, clock, processors = timed(lambda orbit=orbit, drawn=drawn: steady_gains([orbit], [drawn])[0, :, 1])
@@ -71,7 +71,7 @@ def points(members: int) -> bool:
         ratios = []
         for known in (ASSUMED, TENTH):
             own = steady_gains([orbit], [known.draws(specimen, members, np.random.default_rng(1))])[0, :, 1]
-            ratios.append(2.0 * float(np.nanstd(own)) / (expanded_uncertainty(layer, known) or np.nan))
+            ratios.append(2.0 * float(np.nanstd(own)) / (expanded_uncertainty(branch, known) or np.nan))
         print(
             f"{beta:4g}  {omega:5g}  {clock:9.2f}  {processors:7.2f}  {slow:8.2f}  {slow / processors:5.1f}  "
             f"{error:11.1e}  {ratios[0]:27.3f}  {ratios[1]:7.3f}"

@@ -100,11 +100,11 @@ def bench(seed: int, case: Case, omega: float, beta: float) -> Bench | None:
     if "truth" not in case.off:
         [specimen] = CONFIGURATION.known.draws(specimen, 1, random)
     true = omega / (1.0 + case.clock)
-    layer = predict_gain(specimen, true, LEVEL).rocking
-    if layer is None or not layer.stable:
+    branch = predict_gain(specimen, true, LEVEL).rocking
+    if branch is None or not branch.stable:
         return None
     found = sensors.calibrated() if case.calibrated else None
-    phase, *start = (float(value) for value in layer.orbit.section)
+    phase, *start = (float(value) for value in branch.orbit.section)
     moved = np.array([*start[:4], 0.0, start[4]])
     amplitudes = np.array(steady_response(specimen.bare(), true, LEVEL))
     steady = [c.imag for c in (*amplitudes, *(1j * true * amplitudes))]

@@ -66,9 +66,9 @@ def measured(omega: float, beta: float, seed: int, share: float, options: list[s
     if point["status"] == "held":
         # a spring that is not the nominal one: beta of the true k_c over the true k1
         true = specimen.coupled(beta * factor * BenchConfiguration().specimen.frame.k1 / specimen.frame.k1)
-        layer = predict_gain(true, omega, point["amplitude_m_s2"], point["bare_amplitude_m_s2"]).rocking
-        point["truth"] = None if layer is None else layer.alpha_2
-        point["true_multiplier"] = None if layer is None else layer.multiplier
+        branch = predict_gain(true, omega, point["amplitude_m_s2"], point["bare_amplitude_m_s2"]).rocking
+        point["truth"] = None if branch is None else branch.alpha_2
+        point["true_multiplier"] = None if branch is None else branch.multiplier
     return point
 
 

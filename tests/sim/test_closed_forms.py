@@ -149,9 +149,9 @@ def test_full_restitution_without_damping_keeps_the_energy(beta: float) -> None:
 def test_a_spring_that_vanishes_leaves_no_gain(omega: float) -> None:
     gains: list[tuple[float, float]] = []
     for beta in (0.0, 1e-3, 1e-4, 1e-5):
-        layer = predict_gain(Specimen(beta=beta), omega, A_S).rocking
-        assert layer is not None
-        gains.append((layer.alpha_1 - 1.0, layer.alpha_2 - 1.0))
+        branch = predict_gain(Specimen(beta=beta), omega, A_S).rocking
+        assert branch is not None
+        gains.append((branch.alpha_1 - 1.0, branch.alpha_2 - 1.0))
     found = np.abs(gains)
     assert found[0].max() < 1e-12  # measured 1e-13
     assert found[1:-1] / found[2:] == pytest.approx(np.full((2, 2), 10.0), rel=0.05)  # first order in beta

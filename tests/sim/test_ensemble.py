@@ -17,23 +17,23 @@ KNOWN = SpecimenKnowledge()
 def test_steady_gains_are_those_of_the_orbits_found_one_by_one() -> None:
     points = [(0.25, 20.0, "rocking"), (0.25, 20.0, "resting"), (0.64, 16.0, "rocking")]
     orbits, members = [], []
-    for number, (beta, omega, layer) in enumerate(points):
+    for number, (beta, omega, branch) in enumerate(points):
         specimen = Specimen().coupled(beta)
-        orbits.append(predict_gain(specimen, omega, AMPLITUDE).layers[layer].orbit)
+        orbits.append(predict_gain(specimen, omega, AMPLITUDE).branches[branch].orbit)
         members.append(KNOWN.draws(specimen, 12, np.random.default_rng(number)))
     found = steady_gains(orbits, members, bare_amplitude=0.9 * AMPLITUDE)
     assert found.shape == (3, 12, 2)
-    for i, (_, omega, layer) in enumerate(points):
+    for i, (_, omega, branch) in enumerate(points):
         for j, member in enumerate(members[i]):
-            alone = predict_gain(member, omega, AMPLITUDE, 0.9 * AMPLITUDE).layers.get(layer)
+            alone = predict_gain(member, omega, AMPLITUDE, 0.9 * AMPLITUDE).branches.get(branch)
             expected = (np.nan, np.nan) if alone is None else (alone.alpha_1, alone.alpha_2)
             assert found[i, j] == pytest.approx(expected, rel=1e-9, nan_ok=True)
 
 
 def test_a_member_far_from_the_known_orbit_is_followed_and_one_that_lifts_has_no_resting_motion() -> None:
-    layers = predict_gain(Specimen().coupled(0.25), 20.0, AMPLITUDE).layers
+    branches = predict_gain(Specimen().coupled(0.25), 20.0, AMPLITUDE).branches
     far = Specimen(block=Block(restitution_factor=0.9)).coupled(0.6)
-    rocking, resting = steady_gains([layers["rocking"].orbit, layers["resting"].orbit], [[far], [far.coupled(1.2)]])
+    rocking, resting = steady_gains([branches["rocking"].orbit, branches["resting"].orbit], [[far], [far.coupled(1.2)]])
     alone = predict_gain(far, 20.0, AMPLITUDE).rocking
     assert alone is not None
     assert rocking[0, 1] == pytest.approx(alone.alpha_2, rel=1e-9)

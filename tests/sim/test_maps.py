@@ -36,13 +36,13 @@ def test_multipliers_keep_their_product(full: GainMap) -> None:
     assert np.abs(product.real / closed_form - 1.0).max() < 1e-8
 
 
-def test_resting_layer_has_its_known_extent(full: GainMap) -> None:
+def test_resting_branch_has_its_known_extent(full: GainMap) -> None:
     # counted by another program from the closed form, on this grid
     assert full.resting.exists.sum() == 1441
     assert full.resting.stable.sum() == 1441
 
 
-def test_rocking_layer_is_stable_where_it_should_be(full: GainMap) -> None:
+def test_rocking_branch_is_stable_where_it_should_be(full: GainMap) -> None:
     # of 10 000 cells 2553 - 2182 = 371 overturned and 10 000 - 2553 - 6726 = 721 survived on an unstable orbit
     assert (~full.rocking.stable).sum() == 371 + 721
     assert full.rocking.stable[np.ix_(BETAS <= 0.5, OMEGAS >= 12.5)].all()
@@ -51,15 +51,15 @@ def test_rocking_layer_is_stable_where_it_should_be(full: GainMap) -> None:
 @pytest.mark.parametrize(("i", "j"), [(0, 0), (99, 99), (50, 13), (17, 65), (80, 30)])
 def test_a_cell_is_the_single_prediction(full: GainMap, i: int, j: int) -> None:
     prediction = predict_gain(Specimen(beta=float(BETAS[i])), float(OMEGAS[j]), A_S)
-    for name, layer in (("rocking", full.rocking), ("resting", full.resting)):
-        if name not in prediction.layers:
-            assert np.isnan(layer.alpha_2[i, j])
+    for name, branch in (("rocking", full.rocking), ("resting", full.resting)):
+        if name not in prediction.branches:
+            assert np.isnan(branch.alpha_2[i, j])
             continue
-        single = prediction.layers[name]
-        assert layer.alpha_1[i, j] == pytest.approx(single.alpha_1, rel=1e-9)
-        assert layer.alpha_2[i, j] == pytest.approx(single.alpha_2, rel=1e-9)
-        assert layer.multiplier[i, j] == pytest.approx(single.multiplier, rel=1e-8)
-        assert layer.stable[i, j] == single.stable
+        single = prediction.branches[name]
+        assert branch.alpha_1[i, j] == pytest.approx(single.alpha_1, rel=1e-9)
+        assert branch.alpha_2[i, j] == pytest.approx(single.alpha_2, rel=1e-9)
+        assert branch.multiplier[i, j] == pytest.approx(single.multiplier, rel=1e-8)
+        assert branch.stable[i, j] == single.stable
 
 
 @pytest.mark.parametrize(("i", "j"), [(5, 50), (60, 20), (95, 90)])
@@ -118,7 +118,7 @@ def test_axes_in_any_order_and_another_bare_test(full: GainMap) -> None:
     assert 2.0 * some.resting.alpha_1 == pytest.approx(full.resting.alpha_1[np.ix_(rows, columns)], nan_ok=True)
 
 
-def test_too_weak_a_drive_has_only_the_resting_layer() -> None:
+def test_too_weak_a_drive_has_only_the_resting_branch() -> None:
     # a hundredth of the amplitude cannot make up for what two impacts take from any motion of this period
     weak = gain_map(Specimen(), [0.2, 0.4], [15.0, 16.0], 0.01 * A_S)
     assert not weak.rocking.exists.any()

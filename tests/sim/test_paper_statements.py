@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
 from sim.excitation import SampledRecord
-from sim.gain import GainPrediction, Layer, gain_spectrum, predict_gain, seismic_curve
+from sim.gain import Branch, GainPrediction, gain_spectrum, predict_gain, seismic_curve
 from sim.linear import bare_modes, coupled_modes
 from sim.specimen import Specimen
 from tests.sim.runs import A_S
@@ -34,19 +34,19 @@ def spectrum(beta: float, low: float = 12.5, high: float = 20.0, step: float = 0
     return np.array([[p.omega, rocking(p).alpha_2, rocking(p).stable] for p in predictions])
 
 
-def rocking(prediction: GainPrediction) -> Layer:
+def rocking(prediction: GainPrediction) -> Branch:
     assert prediction.rocking is not None
     return prediction.rocking
 
 
-def point(omega: float) -> Layer:
+def point(omega: float) -> Branch:
     """A, B and C of the paper's Fig. 4(b) lie at 16, 14 and 17.5 rad/s and beta 0.4."""
     return rocking(predict_gain(Specimen(beta=0.4), omega, A_S))
 
 
-def lag_of_u1(layer: Layer) -> float:
+def lag_of_u1(branch: Branch) -> float:
     """Phase [degrees] of u1 ahead of theta in the fundamental of the drive, both in the paper's positive directions."""
-    table = layer.orbit.samples(2000)
+    table = branch.orbit.samples(2000)
     wave = np.exp(-1j * table[:, 0])
     return float(np.degrees(np.angle((table[:, 1] @ wave) / (table[:, 3] @ wave))))
 
@@ -91,7 +91,7 @@ def test_statement_5_counter_phase_at_a_and_a_small_u1() -> None:
     a, b, c = point(16.0), point(14.0), point(17.5)
     assert lag_of_u1(a) == pytest.approx(-19.2, abs=0.5)
     assert lag_of_u1(b) == pytest.approx(-79.0, abs=0.5)
-    ratio = [layer.orbit.peaks.theta / layer.orbit.peaks.u1 for layer in (a, b, c)]
+    ratio = [branch.orbit.peaks.theta / branch.orbit.peaks.u1 for branch in (a, b, c)]
     assert ratio == pytest.approx([11.4, 140.8, 3.28], rel=0.01)
 
 

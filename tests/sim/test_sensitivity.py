@@ -50,9 +50,9 @@ def test_against_orbits_solved_anew(beta: float, omega: float) -> None:
         assert found[name] == pytest.approx(difference, rel=1e-6, abs=1e-7), name
 
 
-@pytest.mark.parametrize("layer", ["rocking", "resting"])
-def test_scalings_leave_the_gain_alone(layer: Literal["rocking", "resting"]) -> None:
-    f = scaled(sensitivities(Specimen(beta=0.25), 18.5, A_S, layer))
+@pytest.mark.parametrize("branch", ["rocking", "resting"])
+def test_scalings_leave_the_gain_alone(branch: Literal["rocking", "resting"]) -> None:
+    f = scaled(sensitivities(Specimen(beta=0.25), 18.5, A_S, branch))
     magnitude = max(float(np.abs(value).max()) for value in f.values())
     zero = pytest.approx(np.zeros(2), abs=1e-7 * magnitude)
     # the block's mass is rho 2b 2h_b s
@@ -70,7 +70,7 @@ def test_an_uncoupled_block_has_no_say() -> None:
         assert value == pytest.approx(np.zeros(2), abs=1e-7), name
 
 
-def test_resting_layer_by_its_closed_form() -> None:
+def test_resting_branch_by_its_closed_form() -> None:
     specimen, omega, step = Specimen(beta=0.25), 18.5, 1e-5
     found = sensitivities(specimen, omega, A_S, "resting")
     # linear: the block and the amplitude do not matter
@@ -89,7 +89,7 @@ def test_resting_layer_by_its_closed_form() -> None:
     assert found["beta"].alpha_1 == pytest.approx((gains[1] - gains[0]) / (2.0 * step), rel=1e-7)
 
 
-def test_the_layer_must_exist() -> None:
+def test_the_branch_must_exist() -> None:
     with pytest.raises(NoOrbit, match="lifts"):
         sensitivities(Specimen(beta=0.97), 16.0, A_S, "resting")
     with pytest.raises(InvalidInput, match="specimen"):

@@ -117,7 +117,7 @@ def test_samples_are_one_period_from_the_drives_zero() -> None:
         orbit.samples(0)
 
 
-def test_resting_layer_and_its_edge() -> None:
+def test_resting_branch_and_its_edge() -> None:
     # the stated grid has steps of 0.09 rad/s: the edge lies within one step below each onset
     for beta, onset in ((0.1, 17.0), (0.25, 18.0), (0.4, 18.8), (0.64, 20.2)):
         assert resting_state(Specimen(beta=beta), onset, A_S) is not None
@@ -125,13 +125,13 @@ def test_resting_layer_and_its_edge() -> None:
     assert all(resting_state(Specimen(beta=0.97), omega, A_S) is None for omega in np.linspace(12.0, 21.0, 40))
 
 
-def test_resting_layer_has_its_own_gain_and_stays_at_rest() -> None:
+def test_resting_branch_has_its_own_gain_and_stays_at_rest() -> None:
     prediction = predict_gain(Specimen(beta=0.25), 18.0, A_S)
     assert prediction.resting is not None
     assert prediction.rocking is not None
     assert prediction.resting.alpha_2 == pytest.approx(3.365, abs=5e-4)
     assert prediction.rocking.alpha_2 == pytest.approx(2.4, abs=0.05)
-    assert list(prediction.layers) == ["rocking", "resting"]
+    assert list(prediction.branches) == ["rocking", "resting"]
     orbit = prediction.resting.orbit
     motion = simulate(orbit.specimen, SineProgram([Sweep.dwell(30.0, A_S, 18.0)], phase=orbit.phase), state=orbit.start)
     assert motion.end.mode is Mode.REST

@@ -36,7 +36,7 @@ from sim.shaker import Shaker
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from bench.figures.map_figure import Layer
+    from bench.figures.map_figure import BranchGrid
 
 MOST_SPECTRA = 12
 """Maximum number of stiffnesses with separate lines."""
@@ -263,16 +263,16 @@ def gain_map(request: MapRequest, subject: Subject, progress: Progress) -> Resul
         table = _table(request, subject, spectra, progress)
 
     def figure() -> "Figure":
-        from bench.figures.map_figure import Layer, map_figure
+        from bench.figures.map_figure import BranchGrid, map_figure
 
         columns = arrays(table)
 
-        def layer(name: str) -> "Layer":
+        def grid_of(name: str) -> "BranchGrid":
             gains = {gain: grids(columns, request, name, gain) for gain in ("alpha_1", "alpha_2")}
-            return Layer(gains, grids(columns, request, name, "floquet_modulus"))
+            return BranchGrid(gains, grids(columns, request, name, "floquet_modulus"))
 
         axes = np.sort(request.omega), np.sort(request.beta)
-        return map_figure(*axes, layer("rocking"), layer("resting"), resting_margin(subject.specimen, request))
+        return map_figure(*axes, grid_of("rocking"), grid_of("resting"), resting_margin(subject.specimen, request))
 
     found = _result("gain maps", request, subject, table, lambda: extremes(table), figure)
     return replace(found, close=stores[0].remove) if stores else found
@@ -334,7 +334,7 @@ def _history_figure(found: Sequence[History]) -> "Figure":
 
 def extremes(table: "Table") -> str:
     """Least and greatest alpha_2 of each branch at each stiffness; for a map, of each branch over the whole map."""
-    omega, beta, layer, alpha, stable = (
+    omega, beta, branch, alpha, stable = (
         table[name].values for name in ("omega_rad_s", "beta", "layer", "alpha_2", "stable")
     )
     stiffnesses = np.unique(beta)
@@ -346,7 +346,7 @@ def extremes(table: "Table") -> str:
     rows: list[list[str]] = []
     for value, chosen in groups:
         for name in ("rocking", "resting"):
-            here = np.flatnonzero(chosen & (layer == name))
+            here = np.flatnonzero(chosen & (branch == name))
             if not here.size:
                 continue
             least, most = here[alpha[here].argmin()], here[alpha[here].argmax()]

@@ -86,11 +86,11 @@ def lines_of(prediction: Table) -> list[Line]:
             _line(columns, records == name, "beta", name, f"{texts.PREDICTED}, {name}")
             for name in dict.fromkeys(records)
         ]
-    layer = columns["layer"].astype(str)
+    branch = columns["layer"].astype(str)
     return [
         _line(
             columns,
-            (beta == each) & (layer == kind),
+            (beta == each) & (branch == kind),
             "omega",
             float(each),
             f"{texts.PREDICTED}, β = {each:g}, {kind}",
@@ -98,7 +98,7 @@ def lines_of(prediction: Table) -> list[Line]:
         )
         for each in np.unique(beta)
         for kind in ("rocking", "resting")
-        if ((beta == each) & (layer == kind)).any()
+        if ((beta == each) & (branch == kind)).any()
     ]
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from bench.app.cli.main import main
 from bench.figures.history_figure import Motion, history_figure
-from bench.figures.map_figure import Layer, least_over_omega, levels_for, map_figure
+from bench.figures.map_figure import BranchGrid, least_over_omega, levels_for, map_figure
 from bench.figures.modes_figure import modes_figure
 from bench.figures.style import GREEN, PURPLE, VERMILLION, new_figure, write_figure
 from sim.errors import InvalidInput
@@ -189,24 +189,24 @@ def test_a_block_that_rests_gets_an_axis_all_the_same() -> None:
 OMEGAS, BETAS = np.linspace(12.0, 21.0, 46), np.linspace(0.1, 1.2, 23)
 
 
-def layers() -> tuple[Layer, Layer, NDArray[np.float64]]:
-    """Made-up layers: a valley along omega = 16 + beta, unstable in a corner, resting where omega > 17 + 5 beta."""
+def branches() -> tuple[BranchGrid, BranchGrid, NDArray[np.float64]]:
+    """Made-up branches: a valley along omega = 16 + beta, unstable in a corner, resting where omega > 17 + 5 beta."""
     omega, beta = np.meshgrid(OMEGAS, BETAS)
     gain = np.exp(0.3 * (omega - 16.0 - beta) ** 2 - 2.0)
     multiplier = np.where((omega < 14.0) & (beta > 0.6), 1.1, 0.97)
     margin = 0.1 * (omega - 17.0 - 5.0 * beta)
     rests = margin > 0.0
-    rocking = Layer({"alpha_1": gain, "alpha_2": 2.0 * gain}, multiplier)
-    resting = Layer(dict.fromkeys(("alpha_1", "alpha_2"), np.where(rests, 3.0, nan)), np.where(rests, 0.98, nan))
+    rocking = BranchGrid({"alpha_1": gain, "alpha_2": 2.0 * gain}, multiplier)
+    resting = BranchGrid(dict.fromkeys(("alpha_1", "alpha_2"), np.where(rests, 3.0, nan)), np.where(rests, 0.98, nan))
     return rocking, resting, margin
 
 
 @pytest.fixture(scope="module")
 def gain_maps() -> Figure:
-    return map_figure(OMEGAS, BETAS, *layers())
+    return map_figure(OMEGAS, BETAS, *branches())
 
 
-def test_surfaces_stand_above_the_maps_of_both_layers(gain_maps: Figure) -> None:
+def test_surfaces_stand_above_the_maps_of_both_branches(gain_maps: Figure) -> None:
     titles = [panel.get_title(loc="left") for panel in gain_maps.axes]
     for gain in (r"$\alpha_1$", r"$\alpha_2$"):
         assert [title for title in titles if gain in title] == [
@@ -258,9 +258,9 @@ def test_the_resting_boundary_and_the_unstable_region_lie_where_they_should(gain
     assert corners[:, 1].min() > 0.55
 
 
-def test_without_a_resting_layer_there_is_no_row_for_it() -> None:
-    rocking, resting, margin = layers()
-    nowhere = Layer({name: gain * nan for name, gain in resting.gains.items()}, resting.multiplier * nan)
+def test_without_a_resting_branch_there_is_no_row_for_it() -> None:
+    rocking, resting, margin = branches()
+    nowhere = BranchGrid({name: gain * nan for name, gain in resting.gains.items()}, resting.multiplier * nan)
     figure = map_figure(OMEGAS, BETAS, rocking, nowhere, -np.abs(margin) - 1.0)
     assert len(figure.axes) == 4
     assert "block may rest to the right of this line" not in legend_of(figure)

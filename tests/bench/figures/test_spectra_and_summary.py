@@ -25,7 +25,7 @@ OMEGA = np.linspace(12.0, 21.0, 91)
 
 
 def prediction() -> dict[str, NDArray[Any]]:
-    """Made-up branches with the traits of the real ones: a minimum, a peak of 9, an unstable stretch, two layers."""
+    """Made-up branches with the traits of the real ones: a minimum, a peak of 9, an unstable stretch, two of them."""
     parts = list[tuple[NDArray[np.float64], float, NDArray[np.float64], NDArray[np.bool_], str]]()
     for beta, peak in ((0.25, 18.0), (0.64, 20.0), (0.97, 22.0)):
         gain = 0.3 + 8.7 / (1.0 + (3.0 * (OMEGA - peak)) ** 2)
@@ -101,7 +101,7 @@ def test_the_predicted_branch_is_solid_and_its_unstable_part_is_dashed_without_a
     np.testing.assert_array_equal(np.isfinite(dashed), x < 14.15)
 
 
-def test_the_resting_layer_is_another_line_where_it_exists(figure: Figure) -> None:
+def test_the_resting_branch_is_another_line_where_it_exists(figure: Figure) -> None:
     line = lines(figure.axes[1], "predicted, block resting")[0]
     assert to_hex(line.get_color()) == GREEN.lower()
     assert data(line)[0].min() == pytest.approx(20.0)

@@ -17,11 +17,11 @@ SPECIMEN = Specimen().coupled(0.97)
 
 
 def test_the_range_is_that_of_the_drawn_specimens() -> None:
-    layer = predict_gain(SPECIMEN, 15.0, 1.01 * Specimen().uplift_acceleration).rocking
-    assert layer is not None
+    branch = predict_gain(SPECIMEN, 15.0, 1.01 * Specimen().uplift_acceleration).rocking
+    assert branch is not None
     exact = SpecimenKnowledge(stiffness=0.0, damping=0.0, restitution=0.0, spring=0.0)
     certain, drawn = (
-        long_term(layer, known, Shaker(), 5, cycles=400, members=4)
+        long_term(branch, known, Shaker(), 5, cycles=400, members=4)
         for known in (exact, SpecimenKnowledge(stiffness=0.005, damping=0.05, restitution=0.002, spring=0.005))
     )
     assert certain.low == certain.high == pytest.approx(certain.gains.max(), rel=1e-12)

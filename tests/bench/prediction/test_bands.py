@@ -16,12 +16,12 @@ SURE = SpecimenKnowledge(stiffness=0.003, damping=0.02, restitution=0.001, sprin
 
 
 @pytest.mark.parametrize(
-    ("beta", "omega", "layer"), [(0.25, 20.0, "rocking"), (0.25, 20.0, "resting"), (0.64, 16.0, "rocking")]
+    ("beta", "omega", "branch"), [(0.25, 20.0, "rocking"), (0.25, 20.0, "resting"), (0.64, 16.0, "rocking")]
 )
 def test_sensitivities_deviations_and_monte_carlo_agree_where_little_is_open(
-    beta: float, omega: float, layer: str
+    beta: float, omega: float, branch: str
 ) -> None:
-    found = predict_gain(Specimen().coupled(beta), omega, AMPLITUDE).layers[layer]
+    found = predict_gain(Specimen().coupled(beta), omega, AMPLITUDE).branches[branch]
     exact = expanded_uncertainty(found, SURE)
     assert exact is not None
     straight = bands([found.orbit], [found.alpha_2], SURE)

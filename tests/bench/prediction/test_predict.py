@@ -70,7 +70,7 @@ def test_steady_gains_agree_with_the_reference_to_its_digits(capsys: pytest.Capt
         assert point["stable"] is True
 
 
-def test_each_existing_layer_is_an_entry_and_the_resting_one_agrees_with_its_closed_form(
+def test_each_existing_branch_is_an_entry_and_the_resting_one_agrees_with_its_closed_form(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     points = predicted(capsys, "steady", "--omega", "17.5", "18", "--beta", "0.25")["points"]

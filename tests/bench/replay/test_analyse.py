@@ -135,10 +135,10 @@ def test_accuracies_and_specimen_are_those_that_were_given(
     assert float(str(point["alpha_2_uncertainty"])) < float(str(old["alpha_2_uncertainty"]))
     frame = Frame(**(BENCH.specimen.frame.model_dump() | {"k2": stiffer}))
     specimen = Specimen(frame=frame, beta=BETA)
-    layers = predict_gain(
+    prediction = predict_gain(
         specimen, OMEGA, float(str(point["amplitude_m_s2"])), float(str(point["bare_amplitude_m_s2"]))
     )
-    assert point["alpha_2_predicted"] == layers.layers[str(point["layer"])].alpha_2
+    assert point["alpha_2_predicted"] == prediction.branches[str(point["layer"])].alpha_2
     assert point["alpha_2_predicted"] != old["alpha_2_predicted"]
     # the same by way of a file
     (tmp_path / "bench.toml").write_text(

@@ -56,7 +56,7 @@ def test_all_points_are_reported(campaign: Campaign) -> None:
     assert {point["status"] for point in campaign.points} <= {"steady", "held", "resting"}
 
 
-def test_every_stable_point_is_reached_and_agrees_with_its_layer(campaign: Campaign) -> None:
+def test_every_stable_point_is_reached_and_agrees_with_its_branch(campaign: Campaign) -> None:
     stable = [point for point in campaign.points if point["predicted_stable"]]
     assert len(stable) == len(set(campaign.asked.points) - set(UNSTABLE))
     for point in stable:

@@ -1,4 +1,4 @@
-"""A measured dwell is compared with the layer on which it lies."""
+"""A measured dwell is compared with the branch on which it lies."""
 
 from dataclasses import replace
 from math import hypot
@@ -46,14 +46,14 @@ def conditions(
     return Conditions(OMEGA, SPECIMEN, known, reference, sensors)
 
 
-@pytest.mark.parametrize(("layer", "status"), [("rocking", PointStatus.STEADY), ("resting", PointStatus.RESTING)])
+@pytest.mark.parametrize(("branch", "status"), [("rocking", PointStatus.STEADY), ("resting", PointStatus.RESTING)])
 @pytest.mark.parametrize("error", [-0.015, 0.0, 0.015])
-def test_each_layer_is_recognised(layer: str, status: PointStatus, error: float) -> None:
-    expected = PREDICTED.layers[layer]
+def test_each_branch_is_recognised(branch: str, status: PointStatus, error: float) -> None:
+    expected = PREDICTED.branches[branch]
     peaks = expected.orbit.peaks
     known = SpecimenKnowledge()
     point = judge(_settled(peaks.drift * (1 + error), peaks.u1), conditions(known), 2)
-    assert (point.status, point.layer) == (status, layer)
+    assert (point.status, point.layer) == (status, branch)
     assert point.alpha_2_predicted == pytest.approx(expected.alpha_2)
     assert point.agrees is True
 
@@ -67,7 +67,7 @@ EXACT = SensorAccuracy(laser_linearity=0.0, laser_mismatch=0.0, laser_resolution
 def test_a_difference_beyond_the_uncertainties_of_both_is_flagged(
     accuracy: SensorAccuracy, known: SpecimenKnowledge, side: float
 ) -> None:
-    peaks = PREDICTED.layers["rocking"].orbit.peaks
+    peaks = PREDICTED.branches["rocking"].orbit.peaks
 
     def off(share: float) -> HarmonicPoint:
         drift = (1.0 + side * share) * peaks.drift
@@ -88,7 +88,7 @@ def test_a_difference_beyond_the_uncertainties_of_both_is_flagged(
 
 @pytest.mark.parametrize(("repeats", "words"), [(0, "does not repeat"), (3, "repeats every 3 cycles")])
 def test_what_is_not_steady_is_modulated_and_says_how(repeats: int, words: str) -> None:
-    peaks = PREDICTED.layers["rocking"].orbit.peaks
+    peaks = PREDICTED.branches["rocking"].orbit.peaks
     point = judge(_settled(peaks.drift, peaks.u1, Steadiness(False, 0.3, 0.1, repeats)), conditions(), 1)
     assert point.status is PointStatus.MODULATED
     assert words in point.reason
@@ -96,7 +96,7 @@ def test_what_is_not_steady_is_modulated_and_says_how(repeats: int, words: str) 
 
 
 def test_a_bare_frame_that_was_not_steady_is_no_reference() -> None:
-    peaks = PREDICTED.layers["rocking"].orbit.peaks
+    peaks = PREDICTED.branches["rocking"].orbit.peaks
     wandering = _settled(PREDICTED.bare.drift, PREDICTED.bare.u1, Steadiness(False, 0.1, 0.1, 0))
     point = judge(_settled(peaks.drift, peaks.u1), conditions(reference=wandering), 1)
     assert point.agrees is None
@@ -119,7 +119,7 @@ def test_a_steady_motion_on_an_unstable_orbit_says_that_it_will_not_last() -> No
 
 
 def test_a_table_that_is_off_is_told() -> None:
-    peaks = PREDICTED.layers["rocking"].orbit.peaks
+    peaks = PREDICTED.branches["rocking"].orbit.peaks
     good = _settled(peaks.drift, peaks.u1)
     assert judge(good, conditions(), 1).reason == ""
     off = replace(good, amplitude_error=-0.004, phase_error=0.002, peak=replace(good.peak, harmonics=0.013))
@@ -131,14 +131,14 @@ def test_a_table_that_is_off_is_told() -> None:
 
 
 def test_a_resting_block_says_that_the_stable_rocking_motion_was_not_reached() -> None:
-    peaks = PREDICTED.layers["resting"].orbit.peaks
+    peaks = PREDICTED.branches["resting"].orbit.peaks
     point = judge(_settled(peaks.drift, peaks.u1), conditions(), 6)
     assert "no start reached the stable rocking motion" in point.reason
 
 
 @pytest.mark.parametrize("off", [0.0, 0.5])
 def test_the_orbit_about_which_a_motion_turns_is_compared_with_the_prediction(off: float) -> None:
-    peaks = PREDICTED.layers["rocking"].orbit.peaks
+    peaks = PREDICTED.branches["rocking"].orbit.peaks
     turning = replace(
         _settled(1.05 * peaks.drift, peaks.u1, Steadiness(False, 0.1, 0.0, 0)),
         motion=FreeMotion(0.95 * peaks.drift, peaks.drift, 1.05 * peaks.drift, 0, Rate(0.999, 0.001, 2.7), 96),
@@ -146,7 +146,7 @@ def test_the_orbit_about_which_a_motion_turns_is_compared_with_the_prediction(of
     )
     point = judge(turning, conditions(SpecimenKnowledge()), 1)
     assert (point.status, point.agrees, point.orbit_agrees) == (PointStatus.MODULATED, None, off == 0.0)
-    assert point.alpha_2_orbit == pytest.approx((1.0 + off) * PREDICTED.layers["rocking"].alpha_2)
+    assert point.alpha_2_orbit == pytest.approx((1.0 + off) * PREDICTED.branches["rocking"].alpha_2)
     assert point.alpha_2_least is not None
     assert point.alpha_2_least < point.alpha_2_orbit or off == 0.0
     assert (point.multiplier, point.multiplier_uncertainty) == (0.999, 0.002)

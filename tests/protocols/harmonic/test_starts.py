@@ -37,9 +37,9 @@ def _tested(specimen: Specimen, start: Start, drive: float = 1.0, dwell: float =
 
 
 def _orbit(specimen: Specimen, omega: float) -> Orbit:
-    layer = predict_gain(specimen, omega, AMPLITUDE).rocking
-    assert layer is not None
-    return layer.orbit
+    branch = predict_gain(specimen, omega, AMPLITUDE).rocking
+    assert branch is not None
+    return branch.orbit
 
 
 @pytest.mark.parametrize(
@@ -60,7 +60,7 @@ def test_the_first_start_leads_to_the_orbit(omega: float, beta: float) -> None:
     assert motion.peaks.theta == pytest.approx(orbit.peaks.theta, rel=0.02)
 
 
-def test_where_two_layers_exist_the_block_is_lifted_off_its_rest() -> None:
+def test_where_two_branches_exist_the_block_is_lifted_off_its_rest() -> None:
     """At beta = 0.25 and 20 rad/s a soft start without overshoot leaves the block at rest."""
     specimen = Specimen().coupled(0.25)
     found = predict_gain(specimen, 20.0, AMPLITUDE)

@@ -64,7 +64,7 @@ def _earthquake(beta: float, alpha_2: float | None, record: str = "Kobe") -> dic
     return point.model_dump()
 
 
-def test_lines_are_ascending_and_one_for_each_record_or_layer() -> None:
+def test_lines_are_ascending_and_one_for_each_record_or_branch() -> None:
     kobe, centro = lines_of(RECORDS)
     assert (kobe.group, kobe.x.tolist(), centro.gain.tolist()) == ("Kobe", [0.2, 0.4, 0.6], [1.1, 0.9])
     assert np.isnan(kobe.gain[2])

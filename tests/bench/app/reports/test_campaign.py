@@ -93,8 +93,8 @@ def test_the_drawn_cycles_are_the_measured_ones_in_the_phase_of_the_model(file: 
         assert campaign.configuration is not None
         signals = SignalMap(record.channels, campaign.configuration.laser_reference)
         amplitudes = point["amplitude_m_s2"], point["bare_amplitude_m_s2"]
-        layer = predict_gain(campaign.specimen.coupled(0.25), 20.0, *amplitudes).rocking
-        motion = Dwells(campaign, signals).motion(point, layer)
+        branch = predict_gain(campaign.specimen.coupled(0.25), 20.0, *amplitudes).rocking
+        motion = Dwells(campaign, signals).motion(point, branch)
     assert motion is not None
     assert motion.predicted is not None
     assert motion.bare_drift is not None
