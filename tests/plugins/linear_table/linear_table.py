@@ -13,7 +13,7 @@ from drivers.rig import Channel
 from sim.parameters import quantity
 
 FULL_SCALE = {"table_displacement": 0.1, "table_acceleration": 50.0, "laser_1": 0.1, "laser_2": 0.1}
-"""Largest value of each channel [m, m/s2]; the lasers stand on the ground and see the table's displacement."""
+"""Largest value of each channel [m, m/s2]; the lasers are on the ground and measure the table's displacement."""
 COUNTS = 2**15 - 1
 
 
@@ -65,7 +65,7 @@ class LinearTableRig(ComputedRig):
 
 
 def open_table(configuration: CommonSettings, settings: LinearTable, realtime: bool) -> LinearTableRig:
-    """The table, at the pace of the wall clock or as fast as the machine allows."""
+    """The rig, paced by the wall clock or as fast as the computer allows."""
     return LinearTableRig(settings, configuration.lead_samples, WallClock() if realtime else VirtualClock())
 
 
