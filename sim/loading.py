@@ -1,14 +1,41 @@
-"""Loading of the compiled model; the first use after an installation compiles it once, which takes many seconds."""
+"""Loading of the compiled model; the first use after an installation compiles it once, which takes several seconds.
 
+Compilation runs in two processes where there are two processors: a helper compiles the modules of `APART`, which use no
+other ones or only early ones, into the same cache. Modules that it does not deliver are compiled here.
+"""
+
+import os
+import subprocess
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Generator, Mapping, Sequence
+from contextlib import contextmanager
 from importlib import import_module
+from pathlib import Path
+from threading import Event, Thread
+from typing import IO
 
-MODEL = {"roots": 6, "watching": 8, "resting": 14, "steps": 3, "rocking": 20, "members": 40}
-"""Modules of `sim.kernel` used by every prediction, with their shares of the compilation time."""
+from sim.waiting import wait
+
+STEADY = {"roots": 6, "watching": 8, "steps": 3, "resting": 14, "members": 40}
+"""Modules of `sim.kernel` used by predictions of steady motions, with their shares of the compilation time."""
+
+MODEL = {**STEADY, "rocking": 20}
+"""Modules used by every prediction."""
 
 BENCH = {**MODEL, "laser": 3, "filter": 2, "plant": 8, "table": 15}
 """Modules used by a simulated bench."""
+
+APART = ("resting", "laser", "filter", "plant", "table", "rocking")
+"""Modules compiled by the helper, in its order."""
+
+_HELPER = """
+import sys
+sys.path.insert(0, sys.argv[1])
+from importlib import import_module
+for name in sys.argv[2:]:
+    import_module("sim.kernel." + name)
+    print(name, flush=True)
+"""
 
 
 def load_model(
@@ -18,13 +45,54 @@ def load_model(
     if all(f"sim.kernel.{name}" in sys.modules for name in modules):
         return
     report("loading the model", 0, 0)
-    is_compiled = import_module("sim.kernel.compiled").is_compiled
-    phase = "loading the model"
-    if not all(is_compiled(name) for name in modules):
-        phase = "compiling the model, once per installation, about 12 s"
-    done, total = 0, sum(modules.values())
-    for name, share in modules.items():
-        report(phase, done, total)
-        import_module(f"sim.kernel.{name}")
-        done += share
+    compiled = import_module("sim.kernel.compiled")
+    missing = {name for name in modules if not compiled.is_compiled(name)}
+    apart = [name for name in APART if name in missing] if compiled.cache_folder() is not None else []
+    phase, done, total = "loading the model", 0, sum(modules.values())
+    if missing:
+        phase = "compiling the model, once per installation, about 10 s"
+    with helped(apart) as ready:
+        for name, share in modules.items():
+            report(phase, done, total)
+            if name in ready:
+                wait(ready[name])
+            import_module(f"sim.kernel.{name}")
+            done += share
     report(phase, total, total)
+
+
+@contextmanager
+def helped(names: Sequence[str]) -> Generator[Mapping[str, Event], None, None]:
+    """Context manager that runs the helper for the modules `names`: an event for each, set once it need not be awaited.
+    Empty where a helper would not save time or cannot be started.
+    """
+    if not names or not sys.executable or (os.cpu_count() or 1) < 2:
+        yield {}
+        return
+    command = [sys.executable, "-P", "-c", _HELPER, str(Path(__file__).parents[1]), *names]
+    try:
+        helper = subprocess.Popen(
+            command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, close_fds=True
+        )
+    except OSError:
+        yield {}
+        return
+    ready = {name: Event() for name in names}
+    reader = Thread(target=_listen, args=(helper.stdout, ready), name="kernel helper", daemon=True)
+    reader.start()
+    try:
+        yield ready
+    finally:
+        helper.kill()
+        helper.wait()
+        reader.join()
+
+
+def _listen(lines: IO[bytes], ready: Mapping[str, Event]) -> None:
+    """Set the event of every module that the helper reports, and all of them when it ends."""
+    with lines:
+        for line in lines:
+            if (name := line.decode().strip()) in ready:
+                ready[name].set()
+    for each in ready.values():
+        each.set()

@@ -118,11 +118,12 @@ def known_from(
     InvalidInput.
     """
     from bench.config.model import BenchConfiguration
-    from bench.config.result_files import read_specimen
     from sim.identified import Identified
 
     known = (configuration or BenchConfiguration()).known
     if file is not None:
+        from bench.config.result_files import read_specimen
+
         identified = read_specimen(file) if file.suffix == SPECIMEN_FILE else Identified()
         known = known.model_copy(update={"identified": identified})
     if restitution_factor is None:
@@ -140,11 +141,12 @@ def specimen_from(
     """The specimen: flags override the file, the file overrides the `assumed` specimen or the paper's; identified
     properties from `known_from` replace assumed ones. Raises InvalidInput.
     """
-    from bench.config.toml import read_table
     from sim.specimen import Block, Specimen
 
     table = assumed.model_dump(mode="json") if assumed is not None else {}
     if file is not None and file.suffix != SPECIMEN_FILE:
+        from bench.config.toml import read_table
+
         table = read_table(file, "--specimen")
     if distance is not None:
         table["d"] = read_fields(Specimen, {"d": distance})["d"]

@@ -30,7 +30,7 @@ from bench.prediction.steady import modes_table, predict_points, predict_spectra
 from bench.progress import Progress, counting
 from sim.errors import RockbenchError
 from sim.gain import GainPrediction
-from sim.loading import load_model
+from sim.loading import STEADY, load_model
 from sim.shaker import Shaker
 
 if TYPE_CHECKING:
@@ -139,7 +139,7 @@ def history(request: HistoryRequest, subject: Subject, progress: Progress) -> Re
 
 def steady(request: SteadyRequest, subject: Subject, progress: Progress) -> Result:
     """Steady motions at single points."""
-    load_model(progress)
+    load_model(progress, STEADY)
     table = _table(request, subject, predict_points(subject.specimen, request, progress), progress)
 
     def figure() -> "Figure":
@@ -152,7 +152,7 @@ def steady(request: SteadyRequest, subject: Subject, progress: Progress) -> Resu
 
 def spectrum(request: SpectrumRequest, subject: Subject, progress: Progress) -> Result:
     """Gain spectra, one for each stiffness."""
-    load_model(progress)
+    load_model(progress, STEADY)
     table = _table(request, subject, predict_spectra(subject.specimen, request, progress), progress)
 
     def figure() -> "Figure":
@@ -236,7 +236,7 @@ def gain_map(request: MapRequest, subject: Subject, progress: Progress) -> Resul
     from bench.prediction.gain_map import grids, map_table, resting_margin
     from bench.prediction.map_store import MapStore
 
-    load_model(progress)
+    load_model(progress, STEADY)
     stores = list[MapStore]()
     if request.solver == "taylor":
         known = subject.known if request.band or request.members else None
