@@ -4,7 +4,7 @@ import gc
 import os
 import subprocess
 import sys
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from pathlib import Path
 from typing import Any
 
@@ -57,6 +57,19 @@ LATENESS = pytest.StashKey[Lateness]()
 SPREAD = "tests/faults/test_matrix.py"
 """The longest file of all; its tests share nothing, so they fill every process at the end."""
 
+SLOW = (
+    "tests/test_notebooks.py",
+    "tests/sim/test_kernel_cache.py",
+    "tests/pages/",
+    "tests/first_edition/",
+    "tests/faults/test_killed.py",
+    "tests/bench/app/cli/test_hostile_files.py",
+    "tests/bench/app/cli/test_streams.py",
+    "tests/bench/replay/",
+    "tests/protocols/",
+)
+"""Files of which many take ten seconds and more: begun early, so that none of them is alone at the end."""
+
 
 KERNELS = (
     "sim.kernel.members",
@@ -83,6 +96,27 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     long = [item for item in items if item.get_closest_marker("soak")]
     config.hook.pytest_deselected(items=long)
     items[:] = [item for item in items if not item.get_closest_marker("soak")]
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        items.sort(key=_turns(items))
+
+
+def _turns(items: list[pytest.Item]) -> Callable[[pytest.Item], int]:
+    """The order in which processes take files: the groups of REAL_TIME, which last longest, then what is slow.
+
+    Each process is given two files at first. The second of one with a group of REAL_TIME begins last of all: it is a
+    single test of SPREAD.
+    """
+    spread = tuple(item.nodeid for item in items if item.nodeid.startswith(SPREAD))
+    places = SLOW[:1], spread[: len(REAL_TIME)], SLOW[1:]
+
+    def turn(item: pytest.Item) -> int:
+        group = _paced_by(item.nodeid)
+        if group is not None:
+            return [*REAL_TIME].index(group)
+        later = len(places) + item.nodeid.startswith(SPREAD)
+        return len(REAL_TIME) + next((n for n, place in enumerate(places) if item.nodeid.startswith(place)), later)
+
+    return turn
 
 
 def pytest_collection_finish() -> None:
@@ -138,6 +172,9 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, Any, Any]:
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> object:
     """A file stays in one process, so that what its fixtures made is made once; so does each group of REAL_TIME."""
     from xdist.scheduler import LoadScopeScheduling
+
+    # in the order of `_turns`
+    config.option.loadscopereorder = False
 
     class Together(LoadScopeScheduling):
         def _split_scope(self, nodeid: str) -> str:
