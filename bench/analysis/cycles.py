@@ -71,37 +71,6 @@ class Cycle:
         return found
 
 
-@dataclass(frozen=True, eq=False)
-class _Grid:
-    """Basis at the phases of n samples, shape (n, 1 + 2 harmonics), and the matrix of its normal equations."""
-
-    basis: NDArray[np.float64]
-    normal: NDArray[np.float64]
-
-    @staticmethod
-    def of(phase: NDArray[np.float64], harmonics: int) -> "_Grid":
-        basis = _basis(phase, harmonics)
-        return _Grid(basis, basis.T @ basis)
-
-    def coefficients(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Least-squares coefficients of values of shape (n, m)."""
-        return np.linalg.solve(self.normal, self.basis.T @ values).astype(np.float64)
-
-
-@lru_cache(maxsize=16)
-def _grid(step: float, n: int, harmonics: int) -> _Grid:
-    """The basis of samples at equal steps of the phase from 0."""
-    return _Grid.of(step * np.arange(n, dtype=np.float64), harmonics)
-
-
-def _delayed(coefficients: NDArray[np.float64], phase: float) -> NDArray[np.float64]:
-    """Coefficients, relative to phase 0, of a motion whose coefficients relative to `phase` [rad] are given."""
-    harmonics = len(coefficients) // 2
-    turned = coefficients[1 : 1 + harmonics] + 1j * coefficients[1 + harmonics :]
-    turned *= np.exp(1j * phase * np.arange(1, 1 + harmonics))[:, None]
-    return np.concatenate((coefficients[:1], turned.real, turned.imag))
-
-
 def fit_cycle(
     index: int, phase: NDArray[np.float64], values: NDArray[np.float64], highest: int = HARMONICS
 ) -> Cycle | None:
@@ -116,38 +85,18 @@ def fit_cycle(
     harmonics = min(highest, (phase.size - 1) // 4)
     if share < COMPLETE or harmonics < 1:
         return None
-    grid = _Grid.of(phase, harmonics)
-    coefficients = grid.coefficients(values)
-    return _cycle(index, values, coefficients, values - grid.basis @ coefficients)
-
-
-def fit_steps(
-    index: int, first: float, step: float, values: NDArray[np.float64], highest: int = HARMONICS
-) -> Cycle | None:
-    """`fit_cycle` for samples at equal steps of the phase, `first`, `first + step`, ... [rad]; the basis is computed
-    once for cycles of the same length.
-    """
-    n = len(values)
-    harmonics = min(highest, (n - 1) // 4)
-    if harmonics < 1 or not np.isfinite(values).all():
-        return fit_cycle(index, first + step * np.arange(n, dtype=np.float64), values, highest)
-    grid = _grid(step, n, harmonics)
-    coefficients = grid.coefficients(values)
-    return _cycle(index, values, _delayed(coefficients, first), values - grid.basis @ coefficients)
-
-
-def _cycle(
-    index: int, values: NDArray[np.float64], coefficients: NDArray[np.float64], residual: NDArray[np.float64]
-) -> Cycle:
-    harmonics = len(coefficients) // 2
+    basis = _basis(phase, harmonics)
+    coefficients: NDArray[np.float64] = np.linalg.solve(basis.T @ basis, basis.T @ values).astype(np.float64)
+    residual = values - basis @ coefficients
+    waveform = _period(harmonics) @ coefficients
     return Cycle(
         index=index,
-        samples=len(values),
+        samples=phase.size,
         coefficients=coefficients,
         fundamental=coefficients[1] + 1j * coefficients[harmonics + 1],
-        peak=_peak(_period(harmonics) @ coefficients),
+        peak=_peak(waveform),
         extreme=_extreme(values),
-        noise=np.sqrt(np.einsum("ij,ij->j", residual, residual) / len(values)),
+        noise=np.sqrt(np.mean(residual**2, axis=0)),
     )
 
 
@@ -283,7 +232,8 @@ class CycleAnalyser:
         cycles: list[Cycle] = []
         while self._start + queue.shape[0] >= self._end():
             n = self._end() - self._start
-            cycle = fit_steps(self._count, self._step * self._start, self._step, queue[:n], self._highest)
+            phase = self._step * np.arange(self._start, self._start + n, dtype=np.float64)
+            cycle = fit_cycle(self._count, phase, queue[:n], self._highest)
             if cycle is not None:
                 cycles.append(cycle)
             queue = queue[n:]

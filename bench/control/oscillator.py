@@ -87,25 +87,6 @@ _Factors = list[tuple[int, NDArray[np.complex128]]]
 """Orders of harmonics and their complex amplitudes [V]."""
 
 
-@dataclass(frozen=True, eq=False)
-class _Turns:
-    """The K harmonics of a held sine over a block of `n` samples: their amplitudes `begin` and i times their `orders`,
-    shape (K,), and their course `ahead` from the beginning of the block, shape (K, n); for the same `factors`.
-    """
-
-    factors: _Factors
-    n: int
-    begin: NDArray[np.complex128]
-    orders: NDArray[np.complex128]
-    ahead: NDArray[np.complex128]
-
-    @staticmethod
-    def of(factors: _Factors, step: float, n: int) -> "_Turns":
-        orders = np.array([1j * k for k, _ in factors], dtype=np.complex128)
-        begin = np.array([factor[0] for _, factor in factors], dtype=np.complex128)
-        return _Turns(factors, n, begin, orders, np.exp(np.outer(orders, step * np.arange(1, n + 1))))
-
-
 class Oscillator:
     """Converts target acceleration to drive voltage, block by block."""
 
@@ -113,7 +94,6 @@ class Oscillator:
         self._rate = sample_rate
         self._calibration: DriveCalibration | None = None
         self._constant: tuple[object, _Factors] = (None, [])
-        self._turns = _Turns.of([], 0.0, 0)
         self.reset()
 
     def reset(self) -> None:
@@ -189,32 +169,21 @@ class Oscillator:
         return volts
 
     def _held(self, n: int) -> Array:
-        step, first = self._omega / self._rate, self._phase
-        self._phase = (first + step * n) % tau
+        step = self._omega / self._rate
+        phase: Array = self._phase + step * np.arange(1, n + 1, dtype=np.float64)
+        self._phase = (self._phase + step * n) % tau
         if self._amplitude == 0.0:
             return np.zeros(n)
-        amplitude, omega = np.array(self._amplitude), np.array(self._omega)
-        if not self._shares.constant(n):
-            return self._drive(amplitude, omega, first + step * np.arange(1, n + 1, dtype=np.float64))
-        factors = self._factors(self._calibrated, amplitude, omega, self._shares.next(n))
-        if self._turns.factors is not factors or self._turns.n != n:
-            self._turns = _Turns.of(factors, step, n)
-        volts = np.asarray(self._turns.begin * np.exp(first * self._turns.orders) @ self._turns.ahead, np.complex128)
-        return np.ascontiguousarray(volts.imag)
-
-    @property
-    def _calibrated(self) -> DriveCalibration:
-        if self._calibration is None:
-            raise RuntimeError("the drive must be calibrated before the oscillator moves the table")
-        return self._calibration
+        return self._drive(np.array(self._amplitude), np.array(self._omega), phase)
 
     def _drive(self, amplitude: Array, omega: Array, phase: Array) -> Array:
         """Drive [V] at `phase` [rad], shape (n,); `amplitude` and `omega` have that shape or are scalars."""
-        calibration = self._calibrated
+        if self._calibration is None:
+            raise RuntimeError("the drive must be calibrated before the oscillator moves the table")
         shares = self._shares.next(phase.size)
         power = turn = np.exp(1j * phase)
         volts, order = np.zeros(phase.size), 1
-        for k, factor in self._factors(calibration, amplitude, omega, shares):
+        for k, factor in self._factors(self._calibration, amplitude, omega, shares):
             for _ in range(k - order):
                 power = power * turn
             order = k

@@ -40,10 +40,6 @@ class ShareRamp:
         if self._waiting or not np.array_equal(self._to, _pure()):
             self.to((1.0,), samples)
 
-    def constant(self, n: int) -> bool:
-        """Whether the shares are constant over the next `n` samples."""
-        return self._done >= self._length and (not self._waiting or self._waiting[0][0] >= self._played + n)
-
     def next(self, n: int) -> NDArray[np.complex128]:
         """Shares at the next `n` samples, shape (n, HARMONICS), or (1, HARMONICS) while they are constant."""
         if not self._waiting or self._waiting[0][0] >= self._played + n:
