@@ -180,6 +180,12 @@ def _startup(scale: Scale) -> Section:
     return startup(scale.warm)
 
 
+def _commands(scale: Scale) -> Section:
+    from bench.app.benchmark.commands import commands
+
+    return commands(quick=not scale.all_methods)
+
+
 PARTS: dict[str, Callable[[Scale], Section]] = {
     "work_precision": _work_precision,
     "steady_by_time": _steady_by_time,
@@ -188,6 +194,7 @@ PARTS: dict[str, Callable[[Scale], Section]] = {
     "streaming": _streaming,
     "scaling": _scaling,
     "startup": _startup,
+    "commands": _commands,
 }
 """The parts of the benchmark by name, in order."""
 

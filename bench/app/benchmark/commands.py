@@ -1,0 +1,107 @@
+"""Commands for which a person waits: elapsed time, processor time and memory of each in a process of its own."""
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from bench.app.benchmark.section import Cell, Column, Section, Target
+from bench.unfinished import temporary_folder
+from sim.errors import RockbenchError
+
+COLUMNS = (
+    Column("command", "command"),
+    Column("elapsed_s", "elapsed [s]", ".2f"),
+    Column("processor_s", "processor time [s]", ".2f"),
+    Column("memory_mb", "memory [MB]", ".0f"),
+)
+
+
+@dataclass(frozen=True)
+class Waited:
+    """A command, with the limit of its time [s], elapsed or of the processor, and of its memory [MB]."""
+
+    line: str
+    limit: float
+    of: Literal["elapsed_s", "processor_s"] = "elapsed_s"
+    memory: float | None = None
+    quick: bool = False
+
+
+COMMANDS = (
+    Waited("--help", 0.25, "processor_s", quick=True),
+    Waited("predict steady", 0.9, "processor_s", quick=True),
+    Waited("predict seismic", 3.0, quick=True),
+    Waited("paper --html paper.html", 40.0),
+    Waited("predict map --omega 12:21:1000 --beta 0.1:1.2:1000 --out map.h5", 40.0, memory=1000.0),
+    Waited("run earthquake --out campaign", 60.0),
+)
+"""The seven synthetic records: with 40 stiffnesses in `predict seismic`, with three springs in the campaign."""
+
+
+def commands(quick: bool) -> Section:
+    """Run every command once with the compiled kernel; with `quick`, only the short ones."""
+    rows: list[dict[str, Cell]] = []
+    targets: list[Target] = []
+    for each in COMMANDS:
+        row: dict[str, Cell] = {"command": f"rockbench {each.line}"}
+        if each.quick or not quick:
+            with temporary_folder() as folder:
+                row |= _measured(each.line.split(), folder)
+            rows.append(row)
+        time_of, memory = row.get(each.of), row.get("memory_mb")
+        kind = "processor time" if each.of == "processor_s" else "time"
+        name = " ".join(each.line.split(" --")[0].split()) or each.line
+        targets.append(Target(f"{kind} of {name}", each.limit, time_of if isinstance(time_of, float) else None, "s"))
+        if each.memory is not None:
+            measured = memory if isinstance(memory, float) else None
+            targets.append(Target(f"memory of {name}, 1000 x 1000", each.memory, measured, "MB"))
+    notes = (
+        "Each command runs once in a new process, with the compiled kernel but without results kept from earlier runs. "
+        "The targets of elapsed times hold for two processors without other load.",
+    )
+    return Section("commands", "Commands", COLUMNS, rows, notes, targets)
+
+
+def _measured(arguments: Sequence[str], folder: Path) -> dict[str, Cell]:
+    """Times and greatest memory of a command in `folder`; None where the system does not report them. Raises
+    RockbenchError if the command fails.
+    """
+    code = f"import sys; from bench.app.cli.process import run; sys.argv[1:] = {list(arguments)!r}; run()"
+    environment = os.environ | {"ROCKBENCH_RESULT_CACHE": "off"}
+    begin = time.perf_counter()
+    with (folder / "messages").open("w+b") as messages:
+        process = subprocess.Popen(
+            [sys.executable, "-c", code],
+            cwd=folder,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=messages,
+        )
+        try:
+            ended, processor, memory = _ended(process)
+        finally:
+            if process.poll() is None:
+                process.kill()
+                process.wait()
+        elapsed = time.perf_counter() - begin
+        if ended != 0:
+            messages.seek(0)
+            last = (messages.read().decode(errors="replace").strip().splitlines() or ["no message"])[-1]
+            raise RockbenchError(f"rockbench {' '.join(arguments)} ended with code {ended}: {last}")
+    return {"elapsed_s": elapsed, "processor_s": processor, "memory_mb": memory}
+
+
+def _ended(process: "subprocess.Popen[bytes]") -> tuple[int, float | None, float | None]:
+    """Exit code, processor time [s] and greatest memory [MB] of a process at its end."""
+    if sys.platform == "win32":
+        return process.wait(), None, None
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    per_mb = 2**20 if sys.platform == "darwin" else 2**10
+    return process.returncode, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / per_mb
