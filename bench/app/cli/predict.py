@@ -82,8 +82,8 @@ def _sine(
     documentation: str,
     drawable: int | None = None,
 ) -> "Callable[..., int]":
-    """A command with the flags of a request, computed by a `function` of `predict_sine`. Its figure can hold `drawable`
-    points.
+    """A command with the flags of a request, computed by a `function` of this package, as "module:name". Its figure can
+    hold `drawable` points.
     """
 
     def command(
@@ -109,12 +109,12 @@ def _sine(
                 allowed = f"at most {drawable} points fit in this figure; specify fewer"
                 raise InvalidInput("--plot", f"{points} points", allowed)
         warn_of_unusual(request, specimen)
-        make = resolve_name(f"bench.app.cli.predict_sine:{function}")
+        make = resolve_name(f"bench.app.cli.{function}")
         subject = Subject(specimen, known, BenchConfiguration(), unfinished=_unfinished(options))
         return deliver(lambda: make(request, subject, progress), options, progress)
 
     command.__doc__ = f"{documentation}\n\n{_EXIT_CODES}"
-    return with_flags(request_type, f"Parameters of {function.removeprefix('gain_')}", command)
+    return with_flags(request_type, f"Parameters of {function.partition(':')[2].removeprefix('gain_')}", command)
 
 
 def _check_scheduler(request: Parameters) -> None:
@@ -168,14 +168,14 @@ def _under_records(
 
 modes = _sine(
     ModesRequest,
-    "modes",
+    "predict_sine:modes",
     "Frequencies and shapes of the bare frame and of the linearised coupled system.\n\n"
     "A mode with negative stiffness is divergent: it has a growth rate instead of a frequency. The figure is like the "
     "paper's Fig. 3; with more than five stiffnesses it shows curves against stiffness.",
 )
 history = _sine(
     HistoryRequest,
-    "history",
+    "predict_sine:history",
     "Time histories of drift, u1 and theta, with the sine switched on at rest or in the steady state.\n\n"
     "From rest the block may overturn even where the steady motion is stable; the history then ends at that time and "
     "is marked. With --steady: whole periods of each steady motion that exists. The figure is like the paper's Fig. "
@@ -183,7 +183,7 @@ history = _sine(
 )
 steady = _sine(
     SteadyRequest,
-    "steady",
+    "predict_sine:steady",
     "Steady motions at single points: gain coefficients, peaks, impacts, Floquet multipliers.\n\nThe "
     "periodic motions are solved for directly, without waiting for transients to decay. Up to two exist "
     "at a point: the block rocks, or it never lifts. Each is listed, and its alpha_2 has an uncertainty "
@@ -193,19 +193,19 @@ steady = _sine(
 )
 spectrum = _sine(
     SpectrumRequest,
-    "spectrum",
+    "predict_sine:spectrum",
     "Gain spectra: alpha_1 and alpha_2 against frequency for each stiffness, both branches.\n\n"
     "Every alpha_2 has a band, as in `steady`. The figure is like the paper's Fig. 6, without measurements.",
 )
 gain_map = _sine(
     MapRequest,
-    "gain_map",
+    "predict_sine:gain_map",
     "Gain maps: alpha_1 and alpha_2 over frequency and stiffness, both branches, with stability.\n\n"
     "The figure is like the paper's Fig. 4: surfaces and contour maps.",
 )
 stability = _sine(
     StabilityRequest,
-    "stability",
+    "predict_on_table:stability",
     "Stability boundaries of the rocking motions in frequency, on fixed ground and on a table.\n\nThe block pushes "
     "the table, which changes how a disturbance grows or decays: a motion may be stable on the table and unstable on "
     "fixed ground. The table's motion is a sine up to the harmonic --harmonics; the drive does not react within a "
@@ -213,7 +213,7 @@ stability = _sine(
 )
 attractor = _sine(
     AttractorRequest,
-    "attractor",
+    "predict_on_table:attractor",
     "Long-term motions on a table, where the periodic rocking motion is unstable: period, peaks, falls.\n\nThe motion "
     "is simulated from the disturbed orbit for --cycles; the drive keeps the mean of the table's harmonics. The "
     "motion repeats after several cycles, does not repeat, or ends with a fall. The range of the greatest peak and "

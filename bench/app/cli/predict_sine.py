@@ -16,14 +16,11 @@ from bench.figures.text_table import TextColumn, text_table
 from bench.prediction.files import plain, provenance, rows_of
 from bench.prediction.history import History, histories, history_table, runs_table
 from bench.prediction.requests import (
-    AttractorRequest,
     GainRequest,
     HistoryRequest,
     MapRequest,
     ModesRequest,
-    OnTableRequest,
     SpectrumRequest,
-    StabilityRequest,
     SteadyRequest,
 )
 from bench.prediction.steady import modes_table, predict_points, predict_spectra, steady_table
@@ -31,7 +28,6 @@ from bench.progress import Progress, counting
 from sim.errors import RockbenchError
 from sim.gain import GainPrediction
 from sim.loading import STEADY, load_model
-from sim.shaker import Shaker
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -78,27 +74,6 @@ _STEADY = {
     "floquet_modulus": "Floquet",
     "stable": "stable",
     "status": "status",
-}
-
-_BOUNDARIES = {
-    "beta": "beta",
-    "ground": "ground",
-    "omega_rad_s": "boundary at omega",
-    "kind": "kind",
-    "argument_rad": "argument",
-}
-
-_ATTRACTORS = {
-    "omega_rad_s": "omega",
-    "beta": "beta",
-    "alpha_2": "alpha_2 of the orbit",
-    "stable": "stable",
-    "repeats_cycles": "repeats after",
-    "alpha_2_least": "least peak",
-    "alpha_2_greatest": "greatest",
-    "greatest_low": "from",
-    "greatest_high": "to",
-    "falls": "falls",
 }
 
 
@@ -164,73 +139,6 @@ def spectrum(request: SpectrumRequest, subject: Subject, progress: Progress) -> 
     return _result("gain spectra", request, subject, table, lambda: extremes(table), figure)
 
 
-def stability(request: StabilityRequest, subject: Subject, progress: Progress) -> Result:
-    """Multipliers of the rocking orbits, and the boundaries of stability."""
-    from bench.prediction.stability import boundaries_table, multipliers_table
-
-    load_model(progress)
-    shaker = _shaker(request, subject)
-    points = multipliers_table(subject.specimen, shaker, request, progress)
-    _print_lost(len(request.omega) * len(request.beta) - points["beta"].values.size)
-    if missing := int(np.isnan(points["table_modulus"].values).sum()):
-        print(f"rockbench: the shaker cannot move this table as requested at {missing} points", file=sys.stderr)
-    boundaries = boundaries_table(subject.specimen, shaker, request, points, progress)
-
-    def text() -> str:
-        if not boundaries["beta"].values.size:
-            return "no stability boundary lies in the range"
-        return columns_text(boundaries, _BOUNDARIES)
-
-    def figure() -> "Figure":
-        from bench.figures.stability_figure import stability_figure
-
-        if not points["beta"].values.size:
-            raise RockbenchError("no rocking motion was found, so there is nothing to draw: choose other points")
-        return stability_figure(arrays(points), arrays(boundaries))
-
-    return Result(
-        title="stability of the rocking motions",
-        tables={"points": points, "boundaries": boundaries},
-        content=lambda: {"points": rows_of(points), "boundaries": rows_of(boundaries)},
-        text=text,
-        metadata=provenance(request, subject.specimen),
-        figure=figure,
-    )
-
-
-def attractor(request: AttractorRequest, subject: Subject, progress: Progress) -> Result:
-    """Long-term motions where the rocking orbits are unstable on the table."""
-    from bench.prediction.attractors import attractors_table, long_terms
-
-    load_model(progress)
-    found = long_terms(subject.specimen, subject.known, _shaker(request, subject), request, progress)
-    if lost := len(request.omega) * len(request.beta) - len(found):
-        print(f"rockbench: no rocking orbit on the table was found at {lost} point{'s' * (lost > 1)}", file=sys.stderr)
-    table = attractors_table(found)
-
-    def figure() -> "Figure":
-        from bench.figures.attractor_figure import attractor_figure
-
-        if not found:
-            raise RockbenchError("no rocking motion was found, so there is nothing to draw: choose other points")
-        return attractor_figure(arrays(table), [each.gains for each in found])
-
-    return Result(
-        title="long-term motions on the table",
-        tables={"points": table},
-        content=lambda: {"points": rows_of(table)},
-        text=lambda: columns_text(table, _ATTRACTORS) if found else "no rocking motion was found",
-        metadata=provenance(request, subject.specimen, subject.known),
-        figure=figure,
-    )
-
-
-def _shaker(request: OnTableRequest, subject: Subject) -> Shaker:
-    """Shaker of the simulated bench, with the requested mass."""
-    shaker = subject.configuration.simulation.bench.shaker
-    return shaker if request.table_mass is None else shaker.model_copy(update={"moving_mass": request.table_mass})
-
-
 def gain_map(request: MapRequest, subject: Subject, progress: Progress) -> Result:
     """Gain maps."""
     from bench.prediction.gain_map import grids, map_table, resting_margin
@@ -257,7 +165,7 @@ def gain_map(request: MapRequest, subject: Subject, progress: Progress) -> Resul
                 rows = f"{stores[0].after.rows} of {len(request.beta)} rows are complete"
                 print(f"rockbench: {rows}; the same command continues the map", file=sys.stderr)
             raise
-        _print_lost(len(request.omega) * len(request.beta) - int((table["layer"].values == "rocking").sum()))
+        print_lost(len(request.omega) * len(request.beta) - int((table["layer"].values == "rocking").sum()))
     else:
         spectra = predict_spectra(subject.specimen, request, progress)
         table = _table(request, subject, spectra, progress)
@@ -279,7 +187,7 @@ def gain_map(request: MapRequest, subject: Subject, progress: Progress) -> Resul
 
 
 def _table(request: GainRequest, subject: Subject, predictions: list[GainPrediction], progress: Progress) -> Table:
-    _print_lost(sum(prediction.rocking is None for prediction in predictions))
+    print_lost(sum(prediction.rocking is None for prediction in predictions))
     scheduler = request.scheduler
     if request.solver == "taylor":
         return steady_table(
@@ -291,7 +199,7 @@ def _table(request: GainRequest, subject: Subject, predictions: list[GainPredict
     return steady_table(predictions, timed)
 
 
-def _print_lost(points: int) -> None:
+def print_lost(points: int) -> None:
     if points:
         print(f"rockbench: no rocking orbit was found at {points} point{'s' * (points > 1)}", file=sys.stderr)
 

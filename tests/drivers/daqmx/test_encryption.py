@@ -9,9 +9,8 @@ from pathlib import Path
 import grpc
 import pytest
 
-from drivers.daqmx.connection import Connection
+from drivers.daqmx.connection import Connection, require_private
 from drivers.daqmx.devices import find_devices
-from drivers.daqmx.encryption import require_private
 from drivers.daqmx.parameters import Tls
 from drivers.emulation.daqmx.models import x_series
 from drivers.emulation.daqmx.server import DaqServer
@@ -115,7 +114,7 @@ def test_a_plain_connection_stays_in_the_laboratory(
 ) -> None:
     family = socket.AF_INET6 if ":" in address else socket.AF_INET
     monkeypatch.setattr(
-        "drivers.daqmx.encryption.socket.getaddrinfo",
+        "drivers.daqmx.connection.socket.getaddrinfo",
         lambda *_: [(family, socket.SOCK_STREAM, 6, "", (address, 0))],
     )
     if not refused:
