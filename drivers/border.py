@@ -237,7 +237,7 @@ class CheckedRig:
             return ()
         with self._calls("raw values"):
             given: Any = method()
-        if given == ():
+        if given is _NONE:
             return ()
         names = [channel.name for channel in self.channels]
         if type(given) is not tuple or not all(is_raw(each, names) for each in cast("tuple[Any, ...]", given)):
@@ -253,6 +253,10 @@ class CheckedRig:
             if low[column] < span.min or high[column] > span.max:
                 told = f"from {low[column]} to {high[column]} of {channel.name}, which are stored in {span.bits} bits"
                 self._refuse(f"returned counts {told}")
+
+
+_NONE: tuple[()] = ()
+"""What most rigs return as raw values in every block; compared by identity, since a backend may return any type."""
 
 
 class _Calls:

@@ -1,11 +1,14 @@
 """The border to a rig backend: what it passes on, and what it keeps of the safety inputs."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from bench.testing.loopback import LoopbackRig
 from drivers.border import CheckedRig
+from drivers.errors import BackendFault
 from drivers.rig import Alignment
 
 
@@ -58,3 +61,13 @@ def test_an_alignment_that_is_not_known_yet_is_no_fault() -> None:
     backend.alignments = (Alignment(backend.channels[0].name, np.nan, np.nan, np.nan, 0.0, 0, 0, 0, 0),)
     (found,) = CheckedRig(backend, "loopback").alignments
     assert np.isnan(found.offset)
+
+
+@pytest.mark.parametrize("given", [np.array([]), np.zeros(3), [], None, "", {}])
+def test_raw_values_of_another_type_name_the_backend(given: object) -> None:
+    class Lying(LoopbackRig):
+        def raw_values(self) -> Any:
+            return given
+
+    with pytest.raises(BackendFault, match=r"loopback.*as raw values of its sensors"):
+        CheckedRig(Lying(), "loopback").raw_values()
