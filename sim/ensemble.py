@@ -83,12 +83,12 @@ def simulate_many(
     share = -(-runs // processors(scheduler))
     size = min(share, max(SMALLEST_PART, min(-(-share // 4), LARGEST_PART)))
     parts = [places[i : i + size] for places in alike.values() for i in range(0, len(places), size)]
-    motions = sweep(_side_by_side, [[prepared[i] for i in part] for part in parts], scheduler)
+    motions = sweep(side_by_side, [[prepared[i] for i in part] for part in parts], scheduler)
     ordered = dict(zip(chain(*parts), chain(*motions), strict=True))
     return [ordered[i] for i in range(runs)]
 
 
-def _side_by_side(runs: list[RockingRun]) -> list[Motion]:
+def side_by_side(runs: list[RockingRun]) -> list[Motion]:
     """Results of several runs, computed together, bit-identical to those of `RockingRun.motion`. The runs have no
     samples, and equal order, tolerance and overturning angle.
     """

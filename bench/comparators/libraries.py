@@ -51,7 +51,7 @@ class HeyokaPeer:
             hy.nt_event(slope, callback=self._watcher(which), **kind) for which, slope in enumerate(slopes) if peaks
         ]
         self._integrator = hy.taylor_adaptive(
-            _equations(hy, self._real),
+            equations(hy, self._real),
             state=[self._real(0)] * 6,
             pars=[self._real(1)],
             t_events=events,
@@ -96,7 +96,7 @@ class HeyokaPeer:
         return watch
 
 
-def _equations(hy: Any, real: Any) -> list[tuple[Any, Any]]:
+def equations(hy: Any, real: Any) -> list[tuple[Any, Any]]:
     """Eq. (8) and (A.1) in a form without cancellation at small angles."""
     m1, m2, k1, k2, c1, c2, h1, k_c, d, b, h_b, mass, inertia, _, g, _ = (real(v) for v in SPECIMEN.packed()[:16])
     u1, u2, v1, v2, theta, omega = hy.make_vars("u1", "u2", "v1", "v2", "theta", "omega")

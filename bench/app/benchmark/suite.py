@@ -180,6 +180,12 @@ def _startup(scale: Scale) -> Section:
     return startup(scale.warm)
 
 
+def _members(scale: Scale) -> Section:
+    from bench.app.benchmark.members import members
+
+    return members(scale.repetitions)
+
+
 def _commands(scale: Scale) -> Section:
     from bench.app.benchmark.commands import commands
 
@@ -191,6 +197,7 @@ PARTS: dict[str, Callable[[Scale], Section]] = {
     "steady_by_time": _steady_by_time,
     "gain_map": _gain_map,
     "records": _records,
+    "members": _members,
     "streaming": _streaming,
     "scaling": _scaling,
     "startup": _startup,
